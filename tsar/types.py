@@ -1,0 +1,146 @@
+"""Frozen records that pass between the stages of the pipeline.
+
+Shapes use the symbols of ``NOTATION.md``: ``n`` framelets or tiles, ``s`` samples along a framelet's side, ``e`` field
+elements (``sdf * sdf``), ``c`` cached framelets. Fields over elements and samples within framelets are in Morton order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """A non-overlapping cut through the quadtree that covers the image once, in Morton order.
+
+    Attributes:
+        level: quad level of each tile; a tile at level ``L`` is ``1 / 2^L`` of the image wide.
+        index: Morton index of each tile within its level, in ``[0, 4^L)``.
+    """
+
+    level: Int64[Tensor, " n"]
+    index: Int64[Tensor, " n"]
+
+    @property
+    def tile_count(self) -> int:
+        return int(self.level.shape[0])
+
+
+@dataclass(frozen=True)
+class FrameletBatch:
+    """What the renderer is asked for: tiles of ``s * s`` samples.
+
+    Attributes:
+        level, index: the tile of each framelet, as in :class:`Tiling`.
+        position: sample positions on the image plane, ``(x, y)`` in ``[0, 1)`` from the top left corner, Morton order
+            within a framelet. Multiples of ``1 / 65536``, so exact in float32.
+        time_s: animation time of each sample, seconds.
+        cycle: pipeline cycle that asked for it.
+        seed: with the tile, cycle and sample number, the key of every random number the renderer may draw.
+    """
+
+    level: Int64[Tensor, " n"]
+    index: Int64[Tensor, " n"]
+    position: Float[Tensor, "n samples 2"]
+    time_s: Float[Tensor, "n samples"]
+    cycle: int = 0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class SampleBatch:
+    """What the renderer answers.
+
+    Attributes:
+        color: linear RGB radiance, float32, Morton order within a framelet. May hold non-finite values: the next stage
+            counts and replaces them.
+        counters: work done, by name (``primary_rays``, ``shadow_rays``, ``reflection_rays``, …).
+    """
+
+    color: Float[Tensor, "n samples 3"]
+    counters: dict[str, int] = field(default_factory=dict)
+
+
+Trace = Callable[[FrameletBatch], SampleBatch]
+"""The renderer as the pipeline sees it."""
+
+
+@dataclass(frozen=True)
+class Densities:
+    """Sample densities over the field elements, Morton order, float64.
+
+    Attributes:
+        spatial: θ_s, samples per element.
+        temporal: θ_t, refreshes per pipeline cycle, in (0, 1].
+        surplus: C, combined density not handed out, carried over cycles.
+    """
+
+    spatial: Float[Tensor, " e"]
+    temporal: Float[Tensor, " e"]
+    surplus: float = 0.0
+
+    def combined(self) -> Float[Tensor, " e"]:
+        """θ = θ_s θ_t, samples per element per cycle (Stephens 2011, eq. 6.5)."""
+        return self.spatial * self.temporal
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Signed sample-rate errors over the field elements in [-1, 1]; positive is undersampled, zero outside the batch."""
+
+    spatial: Float[Tensor, " e"]
+    temporal: Float[Tensor, " e"]
+
+
+@dataclass(frozen=True)
+class Display:
+    """An image as it goes onto the display.
+
+    Attributes:
+        display_time_s: when it appears.
+        sample_time_s: animation time of its newest samples.
+        image: ``(height, width, 3)`` float32 linear RGB.
+    """
+
+    display_time_s: float
+    sample_time_s: float
+    image: Float[Tensor, "h w 3"]
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What one cycle did, for the records on disk.
+
+    Attributes:
+        cycle: its number, negative during warm-up.
+        sim_time_s: animation time sampled.
+        cost_s: duration of the cycle on the chosen clock.
+        tiling: the tiling that was selected from.
+        selected: indices of the selected tiles into ``tiling``.
+        densities: after the response.
+        errors: estimated from this cycle's batch.
+        surplus: after the response.
+        conservation_residual: ``|sum(θ_s θ_t) + C - budget| / budget``.
+        stage_s: measured wall seconds per stage.
+        counters: rays and other counts.
+        nonfinite: non-finite samples replaced.
+        age_spread_s: newest minus oldest sample age shown inside regions of fast refresh, seconds (0 without a display).
+    """
+
+    cycle: int
+    sim_time_s: float
+    cost_s: float
+    tiling: Tiling
+    selected: Int64[Tensor, " b"]
+    densities: Densities
+    errors: Errors
+    surplus: float
+    conservation_residual: float
+    stage_s: dict[str, float]
+    counters: dict[str, int]
+    nonfinite: int
+    age_spread_s: float = 0.0
