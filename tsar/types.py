@@ -90,7 +90,7 @@ class Densities:
 
 @dataclass(frozen=True)
 class Errors:
-    """Signed sample-rate errors over the field elements in [-1, 1]; positive is undersampled, zero outside the batch."""
+    """Signed sample-rate errors over the elements in [-1, 1]; positive is undersampled, zero outside the batch."""
 
     spatial: Float[Tensor, " e"]
     temporal: Float[Tensor, " e"]
@@ -128,7 +128,7 @@ class StepRecord:
         stage_s: measured wall seconds per stage.
         counters: rays and other counts.
         nonfinite: non-finite samples replaced.
-        age_spread_s: newest minus oldest sample age shown inside regions of fast refresh, seconds (0 without a display).
+        age_spread_s: newest minus oldest sample time shown inside regions of fast refresh, seconds.
     """
 
     cycle: int

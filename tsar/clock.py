@@ -1,0 +1,55 @@
+"""Clocks: the only source of time in the pipeline.
+
+Simulated time advances by what the cost model says a cycle takes; wall time by what it took. Either is a function from
+the work a cycle did to seconds, so the pipeline does not know which it has.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+CycleSeconds = Callable[[Mapping[str, int], float], float]
+"""``(counters, wall_s) -> seconds``: what one cycle or frame costs on the chosen clock."""
+
+
+def wall_clock(counters: Mapping[str, int], wall_s: float) -> float:
+    """The measured time: wall-clock mode."""
+    return wall_s
+
+
+def fixed_clock(seconds: float) -> CycleSeconds:
+    """Every cycle takes the same simulated time."""
+    return lambda counters, wall_s: seconds
+
+
+def checked(clock: CycleSeconds, counters: Mapping[str, int], wall_s: float) -> float:
+    """What the clock says, refusing what would stop time or send it back.
+
+    Raises:
+        ValueError: the clock returned a value that is not finite and positive.
+    """
+    seconds = clock(counters, wall_s)
+    if not 0.0 < seconds < float("inf"):
+        raise ValueError(f"clock: expected a finite, positive cycle time, got {seconds!r} s")
+    return seconds
+
+
+class StageTimer:
+    """Wall seconds per named stage of one cycle."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+
+    @property
+    def total(self) -> float:
+        return sum(self.seconds.values())

@@ -1,0 +1,187 @@
+"""Configuration: one frozen dataclass a stage, composed into :class:`TsarConfig`. Imports nothing, so that a command
+line can be made from it quickly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import log2
+from typing import Literal
+
+Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "trivial"]
+
+
+class ConfigError(ValueError):
+    """A field out of range; the message names the field, what it expects and what arrived."""
+
+
+def require(condition: bool, name: str, expected: str, got: object) -> None:
+    """Raise :class:`ConfigError` unless the condition holds."""
+    if not condition:
+        raise ConfigError(f"{name}: expected {expected}, got {got!r}")
+
+
+@dataclass(frozen=True)
+class TilingConfig:
+    """Bounds of the tiling (Stephens 2011, sec. 4.1.6)."""
+
+    level_min: int = 2
+    """Coarsest quad level: tiles are at most 1/2^level_min of the image wide."""
+    level_max: int = 0
+    """Finest quad level; 0 means one level finer than one sample per output pixel."""
+    tile_count_max: int = 0
+    """Most tiles in a tiling; 0 means max(512, 4 * batch size), the thesis' 512 at its batch size of 128."""
+    threshold_samples: float = 256.0
+    """A tile is split while the samples asked for in it exceed this; one framelet holds 256."""
+
+    def __post_init__(self) -> None:
+        require(self.level_min >= 1, "tiling.level_min", "at least 1", self.level_min)
+        require(self.level_max >= 0, "tiling.level_max", "at least 0", self.level_max)
+        require(self.tile_count_max >= 0, "tiling.tile_count_max", "at least 0", self.tile_count_max)
+        require(self.threshold_samples > 0, "tiling.threshold_samples", "a positive number", self.threshold_samples)
+
+
+@dataclass(frozen=True)
+class ErrorConfig:
+    """The error estimate's template: log2 power = offset + slope * octave, octave 0 the coarsest (sec. 5.3.3.2)."""
+
+    spatial_offset: float = -8.0
+    """log2 of the power tolerated per coefficient at the coarsest spatial octave (compressed luminance squared)."""
+    spatial_slope: float = -2.0
+    """Change of that log2 per octave towards fine scales; steeper is more sensitive. The thesis sweeps to -8.6."""
+    temporal_offset: float = -8.0
+    """As spatial_offset, for the temporal octants."""
+    temporal_slope: float = -2.0
+    """As spatial_slope, for the temporal octants; the thesis sweeps to -9.6."""
+    norm: Literal["l2", "linf"] = "l2"
+    """Levelwise norm: total power, or the greatest power of one coefficient."""
+    form: Literal["contrast", "difference"] = "contrast"
+    """(S - T) / (S + T), or the difference of log2 powers, divided by 8 octaves of power and clamped to [-1, 1]."""
+
+    def __post_init__(self) -> None:
+        for name in ("spatial_offset", "spatial_slope", "temporal_offset", "temporal_slope"):
+            value = getattr(self, name)
+            require(-60.0 <= value <= 60.0, f"error.{name}", "a number in [-60, 60]", value)
+
+
+@dataclass(frozen=True)
+class ResponseConfig:
+    """The control decision (chapter 6)."""
+
+    solver: Solver = "waterfill"
+    """Density transport: how freed density is handed out."""
+    gain: float = 1.0
+    """Distance moved in normalised density space per unit error (eq. 6.11 has 1)."""
+    bias: float = 0.0
+    """Octaves by which each decision slides along the iso-product curve: positive towards space, negative to time."""
+    surplus_max: float = 0.1
+    """Bound of the running surplus C as a share of the budget."""
+    temporal_min: float = 1.0 / 64.0
+    """Least temporal density, refreshes per cycle: even a static tile is looked at this often."""
+
+    def __post_init__(self) -> None:
+        require(self.gain > 0, "response.gain", "a positive number", self.gain)
+        require(-8.0 <= self.bias <= 8.0, "response.bias", "a number in [-8, 8]", self.bias)
+        require(0 <= self.surplus_max < 1, "response.surplus_max", "a share in [0, 1)", self.surplus_max)
+        require(0 < self.temporal_min <= 1, "response.temporal_min", "a density in (0, 1]", self.temporal_min)
+
+
+@dataclass(frozen=True)
+class ReconstructionConfig:
+    """Image reconstruction (sec. 4.2)."""
+
+    age_support_px: int = 9
+    """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off."""
+
+    def __post_init__(self) -> None:
+        ok = self.age_support_px >= 1 and self.age_support_px % 2 == 1
+        require(ok, "reconstruction.age_support_px", "an odd number of pixels, at least 1", self.age_support_px)
+
+
+@dataclass(frozen=True)
+class TsarConfig:
+    """Everything that decides a run of the pipeline, given the renderer and the cost of a cycle."""
+
+    batch_size: int = 128
+    """Framelets rendered per cycle."""
+    resolution_px: int = 512
+    """Output image width and height, pixels, a power of two."""
+    framelet_side: int = 16
+    """Samples along a framelet's side, 16 or 32."""
+    sdf_side: int = 128
+    """Elements along a side of the density and error fields, a power of two."""
+    cache_size: int = 2048
+    """Framelets kept in the cache (scaled up with the batch when that is larger than a quarter of it)."""
+    seed: int = 0
+    """Seed of every random number, and of the phase in which tiles first fall due."""
+    warmup_cycles: int = 48
+    """Cycles run before the start time, so that measurement begins in the steady state."""
+    tiling: TilingConfig = field(default_factory=TilingConfig)
+    error: ErrorConfig = field(default_factory=ErrorConfig)
+    response: ResponseConfig = field(default_factory=ResponseConfig)
+    reconstruction: ReconstructionConfig = field(default_factory=ReconstructionConfig)
+
+    def __post_init__(self) -> None:
+        require(1 <= self.batch_size <= 8192, "batch_size", "between 1 and 8192 framelets", self.batch_size)
+        for name, low, high in (("resolution_px", 64, 8192), ("sdf_side", 16, 512)):
+            value = getattr(self, name)
+            ok = low <= value <= high and value & (value - 1) == 0
+            require(ok, name, f"a power of two in [{low}, {high}]", value)
+        require(self.framelet_side in (16, 32), "framelet_side", "16 or 32", self.framelet_side)
+        require(self.warmup_cycles >= 0, "warmup_cycles", "at least 0", self.warmup_cycles)
+        low, high = self.level_min, self.level_max
+        require(low <= high <= self.field_level, "tiling.level_max", f"between {low} and {self.field_level}", high)
+        require(
+            2**high <= self.resolution_px // 2, "tiling.level_max", "tiles of at least two output pixels", high
+        )
+        smallest = max(self.batch_size, 4**low)
+        require(
+            smallest <= self.tile_count_max <= 4**high,
+            "tiling.tile_count_max",
+            f"between {smallest} (every batch must be full) and {4**high} (all tiles of the finest level)",
+            self.tile_count_max,
+        )
+        require(self.cache_size >= self.batch_size, "cache_size", "at least one batch", self.cache_size)
+
+    @property
+    def field_level(self) -> int:
+        """Quad level at which a tile is one field element."""
+        return int(log2(self.sdf_side))
+
+    @property
+    def samples(self) -> int:
+        """Samples per framelet, s * s."""
+        return self.framelet_side**2
+
+    @property
+    def level_min(self) -> int:
+        return self.tiling.level_min
+
+    @property
+    def level_max(self) -> int:
+        auto = int(log2(self.resolution_px / self.framelet_side)) + 1
+        return self.tiling.level_max or max(self.level_min, min(auto, self.field_level))
+
+    @property
+    def tile_count_max(self) -> int:
+        return self.tiling.tile_count_max or min(max(512, 4 * self.batch_size), 4**self.level_max)
+
+    @property
+    def cache_slots(self) -> int:
+        """Slots actually kept: at least four times the largest tiling, as in table 7.1."""
+        return max(self.cache_size, 4 * self.tile_count_max)
+
+    @property
+    def budget(self) -> float:
+        """Samples per cycle: sum(θ_s θ_t) + C stays equal to this."""
+        return float(self.batch_size * self.samples)
+
+    @property
+    def spatial_bounds(self) -> tuple[float, float]:
+        """Least and greatest θ_s, samples per element, of the coarsest and finest tile."""
+        per_image = self.samples / self.sdf_side**2
+        return per_image * 4**self.level_min, per_image * 4**self.level_max
+
+    @property
+    def temporal_bounds(self) -> tuple[float, float]:
+        """Least and greatest θ_t, refreshes per cycle."""
+        return self.response.temporal_min, 1.0

@@ -1,0 +1,116 @@
+"""Morton curves, kd- and quadtree indices, depth-first order, and integrals over tiles.
+
+All functions are element-wise over int64 tensors of any shape. ``x`` takes the even bits of a Morton index and ``y``
+the odd ones. A *kd index* puts the depth in front: ``2^depth + Morton index`` where the tree halves one axis a level.
+
+Source: Stephens 2011, sec. 4.1.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+_SPREAD = ((8, 0x00FF00FF00FF00FF), (4, 0x0F0F0F0F0F0F0F0F), (2, 0x3333333333333333), (1, 0x5555555555555555))
+_GATHER = ((1, 0x3333333333333333), (2, 0x0F0F0F0F0F0F0F0F), (4, 0x00FF00FF00FF00FF), (8, 0x0000FFFF0000FFFF))
+
+
+def interleave(x: Int64[Tensor, "*n"], y: Int64[Tensor, "*n"]) -> Int64[Tensor, "*n"]:
+    """Morton index of cell ``(x, y)``, coordinates in ``[0, 2^16)``; ``interleave(3, 2) = 13``.
+
+    Source: Stephens 2011, sec. 4.1.2.
+    """
+    for shift, mask in _SPREAD:
+        x = (x | (x << shift)) & mask
+        y = (y | (y << shift)) & mask
+    return x | (y << 1)
+
+
+def deinterleave(index: Int64[Tensor, "*n"]) -> tuple[Int64[Tensor, "*n"], Int64[Tensor, "*n"]]:
+    """Cell ``(x, y)`` of a Morton index below ``4^16``: the inverse of :func:`interleave`."""
+    pair = torch.stack((index, index >> 1)) & 0x5555555555555555
+    for shift, mask in _GATHER:
+        pair = (pair | (pair >> shift)) & mask
+    return pair[0], pair[1]
+
+
+def floor_log2(k: Int64[Tensor, "*n"]) -> Int64[Tensor, "*n"]:
+    """``floor(log2 k)`` for ``1 <= k < 2^53``, exact: float64 holds such integers without rounding."""
+    return torch.frexp(k.to(torch.float64)).exponent.to(torch.int64) - 1
+
+
+def kd_min_child(k: Int64[Tensor, "*n"], depth: int) -> Int64[Tensor, "*n"]:
+    """First descendant of kd tile ``k`` at ``depth``, or its ancestor there when ``k`` is deeper.
+
+    ``MinChild_4(5) = 20``. Source: Stephens 2011, eq. 4.6.
+    """
+    shift = depth - floor_log2(k)
+    return torch.where(shift >= 0, k << shift.clamp(min=0), k >> (-shift).clamp(min=0))
+
+
+def kd_overlap(k: Int64[Tensor, "*n"], depth: int) -> Int64[Tensor, "*n"]:
+    """How many tiles at ``depth`` kd tile ``k`` covers (0 when it is deeper). Source: Stephens 2011, eq. 4.7."""
+    return kd_min_child(k + 1, depth) - kd_min_child(k, depth)
+
+
+def depth_first(k: Int64[Tensor, "*n"], depth_max: int) -> Int64[Tensor, "*n"]:
+    """Position of kd tile ``k`` in the depth-first order of the complete binary tree of depth ``depth_max``, from 1.
+
+    Walks the bits of ``k`` from the root: a step to the left child costs one, a step to the right child also the size
+    of the left sibling's subtree, ``2^(m - depth + 1) - 1``.
+
+    Source: Stephens 2011, eq. 4.12–4.13.
+    """
+    own_depth = floor_log2(k)
+    position = torch.ones_like(k)
+    for depth in range(1, depth_max + 1):
+        on_path = depth <= own_depth
+        is_right = ((k >> (own_depth - depth).clamp(min=0)) & 1) * on_path
+        position = position + on_path + is_right * (2 ** (depth_max - depth + 1) - 1)
+    return position
+
+
+def prefix_sum(field: Float[Tensor, " e"]) -> Float[Tensor, " e1"]:
+    """Exclusive prefix sum along the curve in float64, one entry longer than the field.
+
+    In float32 a tile of small values after large ones would be lost: the sum of ``128^2`` values needs more digits than
+    float32 has. Source: Stephens 2011, sec. 4.1.5.
+    """
+    total = torch.cumsum(field.to(torch.float64), 0)
+    return torch.cat((total.new_zeros(1), total))
+
+
+def tile_interval(
+    level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], field_level: int
+) -> tuple[Int64[Tensor, " n"], Int64[Tensor, " n"]]:
+    """Half-open interval of field elements that each tile covers; tiles must not be finer than the field.
+
+    Source: Stephens 2011, sec. 4.1.5.
+    """
+    shift = 2 * (field_level - level)
+    return index << shift, (index + 1) << shift
+
+
+def tile_integral(
+    prefix: Float[Tensor, " e1"], level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], field_level: int
+) -> Float[Tensor, " n"]:
+    """Sum of the field over each tile from its prefix sum: two look-ups a tile, whatever its size."""
+    first, last = tile_interval(level, index, field_level)
+    return prefix[last] - prefix[first]
+
+
+@lru_cache(maxsize=32)
+def raster_to_morton(side: int) -> Int64[Tensor, " cells"]:
+    """For each cell in raster order (row by row), its Morton index: ``field[raster_to_morton(s)]`` is the raster."""
+    row = torch.arange(side)
+    return interleave(row[None, :].expand(side, side).reshape(-1), row[:, None].expand(side, side).reshape(-1))
+
+
+@lru_cache(maxsize=32)
+def morton_to_raster(side: int) -> Int64[Tensor, " cells"]:
+    """For each cell in Morton order, its raster index ``y * side + x``."""
+    x, y = deinterleave(torch.arange(side * side))
+    return y * side + x

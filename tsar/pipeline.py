@@ -1,0 +1,149 @@
+"""The pipeline as a recipe: select, render, estimate, cache, respond, re-tile, reconstruct.
+
+Contains no mathematics; every stage is a function of its own module.
+
+Source: Stephens 2011, sec. 3.4.4 and fig. 3.13.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.cache import FrameletCache
+from tsar.clock import CycleSeconds, StageTimer, checked
+from tsar.config import TsarConfig
+from tsar.error import estimate
+from tsar.morton import raster_to_morton
+from tsar.reconstruction import Reconstruction, reconstruct
+from tsar.response import initial_densities, respond
+from tsar.selection import initial_history, make_batch, select
+from tsar.tiling import build
+from tsar.types import Densities, Display, Errors, SampleBatch, StepRecord, Tiling, Trace
+
+LATENCY_CYCLES = 3
+"""TSAR shows what was sampled three cycles ago (sec. 3.4.4)."""
+
+FAST_REFRESH = 0.5
+"""Elements refreshed at least this often per cycle count as moving when the spread of ages is measured."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What one cycle hands to the next. Frozen, but the cache within changes in place."""
+
+    tiling: Tiling
+    densities: Densities
+    history: Float[Tensor, " e"]
+    cache: FrameletCache
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one cycle produced, beside the next state."""
+
+    selected: Tensor
+    samples: SampleBatch
+    errors: Errors
+    nonfinite: int
+    reconstruction: Reconstruction
+    stages: StageTimer
+
+
+def initial_state(config: TsarConfig) -> State:
+    """A uniform field, its tiling and an empty cache."""
+    densities = initial_densities(config)
+    return State(build(densities.spatial, config), densities, initial_history(config), FrameletCache(config))
+
+
+def step(
+    state: State, config: TsarConfig, trace: Trace, time_s: float, cycle: int, cycle_s: float
+) -> tuple[State, Outcome]:
+    """One cycle at animation time ``time_s``; ``cycle_s`` is the length of the last cycle, the unit of age."""
+    stage = StageTimer()
+    with stage("selection"):
+        selected, history = select(state.tiling, state.densities.temporal, state.history, config)
+        batch = make_batch(state.tiling, selected, time_s, cycle, config)
+    with stage("tracing"):
+        samples = trace(batch)
+    with stage("error"):
+        estimated = estimate(batch, samples.color, state.cache, config)
+    with stage("cache"):
+        state.cache.insert(batch, estimated.color, estimated.coefficients)
+    with stage("response"):
+        densities = respond(state.densities, estimated.errors, config)
+    with stage("tiling"):
+        tiling = build(densities.spatial, config)
+    with stage("reconstruction"):
+        image = reconstruct(state.cache, config, cycle_s)
+    after = State(tiling, densities, history, state.cache)
+    return after, Outcome(selected, samples, estimated.errors, estimated.nonfinite, image, stage)
+
+
+def run(
+    config: TsarConfig, trace: Trace, cycle_seconds: CycleSeconds, start_s: float, end_s: float
+) -> Iterator[tuple[StepRecord, Display]]:
+    """Cycles from a warm start until the animation time passes ``end_s``.
+
+    Warm-up cycles before ``start_s`` have negative numbers and are yielded too: the first images on the display come
+    from them.
+
+    Args:
+        config: everything that decides the run.
+        trace: the renderer.
+        cycle_seconds: the clock.
+        start_s, end_s: span of animation time to cover, seconds.
+    """
+    cycle_s = _probe(config, trace, cycle_seconds, start_s)
+    state = initial_state(config)
+    cycle, time_s = -config.warmup_cycles, start_s - config.warmup_cycles * cycle_s
+    while time_s < end_s:
+        before = state
+        state, outcome = step(state, config, trace, time_s, cycle, cycle_s)
+        cycle_s = checked(cycle_seconds, outcome.samples.counters, outcome.stages.total)
+        record = _record(before, state, outcome, config, cycle, time_s, cycle_s)
+        yield record, Display(time_s + LATENCY_CYCLES * cycle_s, time_s, outcome.reconstruction.image)
+        cycle, time_s = cycle + 1, time_s + cycle_s
+
+
+def _probe(config: TsarConfig, trace: Trace, cycle_seconds: CycleSeconds, start_s: float) -> float:
+    """Length of a cycle, from two throw-away ones (the first may compile kernels)."""
+    state = initial_state(config)
+    for cycle in range(2):
+        state, outcome = step(state, config, trace, start_s, cycle, 1.0)
+    return checked(cycle_seconds, outcome.samples.counters, outcome.stages.total)
+
+
+def _record(
+    before: State, after: State, outcome: Outcome, config: TsarConfig, cycle: int, time_s: float, cycle_s: float
+) -> StepRecord:
+    densities = after.densities
+    total = float(densities.combined().sum()) + densities.surplus
+    return StepRecord(
+        cycle=cycle,
+        sim_time_s=time_s,
+        cost_s=cycle_s,
+        tiling=before.tiling,
+        selected=outcome.selected,
+        densities=densities,
+        errors=outcome.errors,
+        surplus=densities.surplus,
+        conservation_residual=abs(total - config.budget) / config.budget,
+        stage_s=dict(outcome.stages.seconds),
+        counters=dict(outcome.samples.counters),
+        nonfinite=outcome.nonfinite,
+        age_spread_s=_age_spread(outcome.reconstruction.newest_s, densities, config),
+    )
+
+
+def _age_spread(newest_s: Tensor, densities: Densities, config: TsarConfig) -> float:
+    """Newest minus oldest sample shown among the elements that are refreshed fast, seconds; 0 if there are none."""
+    side, repeat = config.sdf_side, config.sdf_side // newest_s.shape[0]
+    field = newest_s.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1).reshape(-1)
+    fast = densities.temporal[raster_to_morton(side)] >= FAST_REFRESH
+    shown = field[fast & torch.isfinite(field)]
+    return float(shown.max() - shown.min()) if shown.numel() else 0.0

@@ -1,0 +1,83 @@
+"""Local constraints: from errors to a desired and a greatest change of combined density at every element.
+
+Works in normalised densities: each axis divided by its maximum, so that a unit of error means the same on both.
+
+Source: Stephens 2011, sec. 6.2.
+
+Deviation: eq. 6.12 is misprinted (``a_t`` and repeated bounds in the spatial rows) and eq. 6.13 as printed is always
+zero, for two of its four distances are negative; what is computed is the distance at which the ray leaves the box.
+Eq. 6.21 can leave the box: its extremum counts only where it lies inside, and ``k_max`` bounds it always.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from tsar.types import Errors
+
+
+@dataclass(frozen=True)
+class Box:
+    """Bounds of the normalised densities: ``(min, 1)`` on either axis."""
+
+    spatial_min: float
+    temporal_min: float
+
+
+@dataclass(frozen=True)
+class LocalConstraints:
+    """Per element, normalised and float64.
+
+    Attributes:
+        a_s, a_t: densities before the decision.
+        m_s, m_t: mixture, a unit vector, or zero where there is no error.
+        k_phi: distance asked for; k_min: the same within the box; k_max: distance to the box's wall.
+        desired_change: Δθ* at ``k_min``; max_change: Δθ_max, of the same sign and at least as large.
+    """
+
+    a_s: Float[Tensor, " e"]
+    a_t: Float[Tensor, " e"]
+    m_s: Float[Tensor, " e"]
+    m_t: Float[Tensor, " e"]
+    k_min: Float[Tensor, " e"]
+    k_max: Float[Tensor, " e"]
+    desired_change: Float[Tensor, " e"]
+    max_change: Float[Tensor, " e"]
+
+    @property
+    def active(self) -> Bool[Tensor, " e"]:
+        return (self.m_s != 0) | (self.m_t != 0)
+
+
+def area_change(a_s: Tensor, a_t: Tensor, m_s: Tensor, m_t: Tensor, k: Tensor) -> Tensor:
+    """``Area(a + k m) - Area(a)`` without subtracting the areas (eq. 6.16, 6.18)."""
+    return k * (a_s * m_t + a_t * m_s + m_s * m_t * k)
+
+
+def exit_distance(a: Tensor, m: Tensor, low: float, high: float) -> Tensor:
+    """Distance at which a ray that starts within ``[low, high]`` leaves it along one axis; inf where ``m = 0``."""
+    wall = torch.where(m > 0, high - a, low - a)
+    return torch.where(m == 0, torch.inf, wall / torch.where(m == 0, 1.0, m)).clamp(min=0.0)
+
+
+def constrain(a_s: Tensor, a_t: Tensor, errors: Errors, box: Box, gain: float) -> LocalConstraints:
+    """Desired and greatest change (eq. 6.8–6.22) for normalised densities inside the box."""
+    length = torch.hypot(errors.spatial, errors.temporal)
+    unit = torch.where(length > 0, length, 1.0)
+    m_s, m_t = errors.spatial / unit, errors.temporal / unit
+    k_max = torch.minimum(exit_distance(a_s, m_s, box.spatial_min, 1.0), exit_distance(a_t, m_t, box.temporal_min, 1.0))
+    k_max = torch.where(length > 0, k_max, 0.0)
+    k_min = torch.minimum(k_max, gain * length)
+    desired = area_change(a_s, a_t, m_s, m_t, k_min)
+    product = m_s * m_t
+    opposed = product < 0
+    extremum = -(a_s * m_t + a_t * m_s) / torch.where(opposed, 2.0 * product, 1.0)
+    use_extremum = opposed & (extremum > 0) & (extremum < k_max) & (k_min < 2.0 * extremum)
+    most = area_change(a_s, a_t, m_s, m_t, torch.where(use_extremum, extremum, k_max))
+    # Where rounding leaves the two a hair apart, the desired change is the bound: solvers rely on |desired| <= |max|.
+    most = torch.where(desired >= 0, torch.maximum(desired, most), torch.minimum(desired, most))
+    return LocalConstraints(a_s, a_t, m_s, m_t, k_min, k_max, desired, most)

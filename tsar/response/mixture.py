@@ -1,0 +1,59 @@
+"""Density mixture: the new pair of densities for each element, and the bias between space and time.
+
+Source: Stephens 2011, sec. 6.4.
+
+Deviation: eq. 6.55–6.56 cancel where the mixture is nearly axis-aligned. The same quadratic is solved by
+``q = -(B + sign(B) sqrt(B² - 4AD)) / 2`` with roots ``q / A`` and ``D / q``.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.response.local import Box, LocalConstraints
+
+
+def smallest_root(a: Tensor, b: Tensor, d: Tensor) -> Tensor:
+    """Smallest non-negative ``k`` with ``a k² + b k + d = 0``, 0 where there is none; discriminant clamped at 0."""
+    q = -0.5 * (b + torch.where(b < 0, -1.0, 1.0) * torch.sqrt((b * b - 4.0 * a * d).clamp(min=0.0)))
+    first = torch.where(a != 0, q / torch.where(a != 0, a, 1.0), torch.inf)
+    second = torch.where(q != 0, d / torch.where(q != 0, q, 1.0), torch.inf)
+    # -0.0 and roots that rounding put a hair below zero would otherwise be skipped for the far root.
+    root = torch.minimum(torch.where(first >= 0, first, torch.inf), torch.where(second >= 0, second, torch.inf))
+    return torch.where(torch.isfinite(root), root, 0.0)
+
+
+def mix(
+    local: LocalConstraints, change: Float[Tensor, " e"], box: Box, bias: float
+) -> tuple[Float[Tensor, " e"], Float[Tensor, " e"]]:
+    """Point b on the ray with the granted combined density, then slid along the iso-product curve to c.
+
+    Where no combined density was granted although some was asked for, the far root of the same equation, ``2 k*``,
+    redistributes between the axes, provided that it lies within the distance asked for.
+
+    Args:
+        local: densities, mixture and distances, normalised.
+        change: granted change of the normalised combined density.
+        box: bounds.
+        bias: octaves to slide by, positive towards space; only where there is an error.
+
+    Returns:
+        New normalised spatial and temporal densities, inside the box.
+    """
+    a_s, a_t, m_s, m_t = local.a_s, local.a_t, local.m_s, local.m_t
+    product, slope = m_s * m_t, a_s * m_t + a_t * m_s
+    k = smallest_root(product, slope, -change)
+    far = -slope / torch.where(product < 0, product, 1.0)
+    redistribute = (change == 0) & (product < 0) & (far > 0) & (far <= local.k_min)
+    k = torch.minimum(torch.where(redistribute, far, torch.where(change == 0, 0.0, k)), local.k_max)
+    b_s = (a_s + k * m_s).clamp(box.spatial_min, 1.0)
+    b_t = (a_t + k * m_t).clamp(box.temporal_min, 1.0)
+    if bias == 0.0:
+        return b_s, b_t
+    shift = torch.full_like(b_s, 2.0**bias)
+    least = torch.maximum(box.spatial_min / b_s, b_t)
+    most = torch.minimum(1.0 / b_s, b_t / box.temporal_min)
+    shift = torch.where(local.active, torch.minimum(torch.maximum(shift, least), most), 1.0)
+    return b_s * shift, b_t / shift

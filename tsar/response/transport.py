@@ -1,0 +1,184 @@
+"""Density transport: how much of each element's desired change is granted, so that the total is conserved.
+
+Every solver takes ``desired`` and ``bound`` (same sign, ``|bound| >= |desired|``) and the surplus C with its bound, and
+returns ``change`` with ``0 <= change / desired``, ``|change| <= |bound|`` and ``0 <= C - sum(change) <= C_max``.
+
+A is the set of elements that ask for density and B the set that frees it.
+
+Source: Stephens 2011, sec. 6.3.
+
+Deviation: eq. 6.27 has a sign slip. Freed density that nobody takes adds to the surplus: ``C' = C - sum(change)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+Field = Float[Tensor, " e"]
+
+
+class TransportSolver(Protocol):
+    """One way to pick a solution out of the set of eq. 6.36."""
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field: ...
+
+
+def fill(direction: Field, bound: Field, target: float) -> Field:
+    """``min(λ * direction, bound)`` with the λ that makes it sum to ``target``: water poured into vessels.
+
+    All arguments are non-negative. Exact up to rounding: the sum is piecewise linear in λ with a knee at every
+    ``bound / direction``, so sorting the knees finds the segment and one division finds λ.
+    """
+    if target <= 0.0:
+        return torch.zeros_like(direction)
+    active = direction > 0
+    if target >= float(bound[active].sum()):
+        return torch.where(active, bound, 0.0)
+    weight, vessel = direction[active], bound[active]
+    knee, order = torch.sort(vessel / weight, stable=True)
+    full = torch.cumsum(vessel[order], 0)
+    open_weight = weight.sum() - torch.cumsum(weight[order], 0)
+    at_knee = full + knee * open_weight.clamp(min=0.0)
+    segment = int(torch.searchsorted(at_knee, torch.tensor(target, dtype=at_knee.dtype)))
+    segment = min(segment, knee.numel() - 1)
+    before_full = full[segment - 1] if segment > 0 else full.new_zeros(())
+    before_weight = weight[order][segment:].sum()
+    scale = (target - before_full) / before_weight
+    poured = torch.zeros_like(direction)
+    poured[active] = torch.minimum(scale * weight, vessel)
+    return poured
+
+
+def _sides(desired: Field, bound: Field) -> tuple[Field, Field, Field, Field]:
+    """Magnitudes of desired change and bound for A and for B, zero outside each set."""
+    asks, frees = desired > 0, desired < 0
+    zero = torch.zeros_like(desired)
+    return (
+        torch.where(asks, desired, zero),
+        torch.where(asks, bound, zero),
+        torch.where(frees, -desired, zero),
+        torch.where(frees, -bound, zero),
+    )
+
+
+def _max_weight(desired: Field, bound: Field) -> float:
+    """The greatest common weight of one side: the least ``bound / desired`` over it (eq. 6.40–6.41)."""
+    active = desired > 0
+    return float((bound[active] / desired[active]).min()) if bool(active.any()) else 0.0
+
+
+@dataclass(frozen=True)
+class Trivial:
+    """No change of combined density (fig. 6.5c)."""
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
+        return torch.zeros_like(desired)
+
+
+@dataclass(frozen=True)
+class SlowGreater:
+    """Point b: the side that wants more is slowed to the other; no surplus is used or made (fig. 6.5d, 6.8)."""
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
+        ask, _, free, _ = _sides(desired, bound)
+        total_ask, total_free = float(ask.sum()), float(free.sum())
+        flux = min(total_ask, total_free)
+        if flux == 0.0:
+            return torch.zeros_like(desired)
+        return ask * (flux / total_ask) - free * (flux / total_free)
+
+
+@dataclass(frozen=True)
+class ScaleLesser:
+    """Point e with a running surplus: the lesser side is sped up by one weight as far as its tightest element allows,
+    and the surplus takes or gives what is left (sec. 6.3.2.3)."""
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
+        ask, ask_bound, free, free_bound = _sides(desired, bound)
+        total_ask, total_free = float(ask.sum()), float(free.sum())
+        if total_ask >= total_free:
+            most_free = total_free * _max_weight(free, free_bound)
+            given = min(total_ask, most_free + surplus)
+            freed = min(most_free, given)
+        else:
+            most_ask = total_ask * _max_weight(ask, ask_bound)
+            freed = min(total_free, most_ask + surplus_max - surplus)
+            given = min(most_ask, freed)
+        return _scaled(ask, total_ask, given) - _scaled(free, total_free, freed)
+
+
+def _scaled(side: Field, total: float, wanted: float) -> Field:
+    return side * (wanted / total) if total > 0.0 else torch.zeros_like(side)
+
+
+@dataclass(frozen=True)
+class Square:
+    """The side that wants more is squared before it is normalised to the other, so that large responses are slowed
+    least (fig. 6.5e); elements at their bound pass the rest on."""
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
+        ask, ask_bound, free, free_bound = _sides(desired, bound)
+        flux = min(float(ask.sum()), float(free.sum()))
+        if float(ask.sum()) >= float(free.sum()):
+            return fill(ask.square(), ask_bound, flux) - fill(free, free_bound, flux)
+        return fill(ask, ask_bound, flux) - fill(free.square(), free_bound, flux)
+
+
+@dataclass(frozen=True)
+class Descend:
+    """The lesser side goes to its bounds; the greater is served in descending order until the sums meet, the rest gets
+    nothing (fig. 6.5f)."""
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
+        ask, ask_bound, free, free_bound = _sides(desired, bound)
+        if float(ask.sum()) >= float(free.sum()):
+            flux = min(float(free_bound.sum()), float(ask.sum()))
+            return _largest_first(ask, flux) - fill(free, free_bound, flux)
+        flux = min(float(ask_bound.sum()), float(free.sum()))
+        return fill(ask, ask_bound, flux) - _largest_first(free, flux)
+
+
+def _largest_first(side: Field, flux: float) -> Field:
+    """Full desired change in descending order while the sum stays within ``flux``; the element that would pass it gets
+    what is left."""
+    ordered, order = torch.sort(side, descending=True, stable=True)
+    before = torch.cumsum(ordered, 0) - ordered
+    granted = torch.zeros_like(side)
+    granted[order] = torch.minimum(ordered, (flux - before).clamp(min=0.0))
+    return granted
+
+
+@dataclass(frozen=True)
+class Waterfill:
+    """``clip(λ * desired, bound)`` with one λ a side: each element is sped up or slowed alike until its own bound, so
+    that the many elements at a bound do not hold back the few that are not (sec. 6.3.2.4).
+
+    The side that wants less is sped up towards the other as far as its bounds allow; what is missing comes out of the
+    surplus, what is left over goes into it.
+    """
+
+    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
+        ask, ask_bound, free, free_bound = _sides(desired, bound)
+        total_ask, total_free = float(ask.sum()), float(free.sum())
+        if total_ask >= total_free:
+            freed = min(float(free_bound.sum()), total_ask)
+            given = min(total_ask, freed + surplus)
+        else:
+            given = min(float(ask_bound.sum()), total_free)
+            freed = min(total_free, given + surplus_max - surplus)
+        return fill(ask, ask_bound, given) - fill(free, free_bound, freed)
+
+
+SOLVERS: dict[str, TransportSolver] = {
+    "waterfill": Waterfill(),
+    "slow_greater": SlowGreater(),
+    "scale_lesser": ScaleLesser(),
+    "square": Square(),
+    "descend": Descend(),
+    "trivial": Trivial(),
+}

@@ -1,0 +1,79 @@
+"""Which tiles are rendered next, and where their samples lie.
+
+Source: Stephens 2011, sec. 3.4.4.1.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from tsar.config import TsarConfig
+from tsar.morton import deinterleave, prefix_sum, tile_integral
+from tsar.tiling import tile_of_element
+from tsar.types import FrameletBatch, Tiling
+
+
+def initial_history(config: TsarConfig) -> Float[Tensor, " e"]:
+    """Credit of every element before the first cycle: a seeded permutation in [0, 1), so that tiles of equal temporal
+    density fall due in an order that differs between seeds and is the same for equal seeds."""
+    generator = torch.Generator().manual_seed(config.seed)
+    count = config.sdf_side**2
+    return torch.randperm(count, generator=generator).to(torch.float64) / count
+
+
+def select(
+    tiling: Tiling, temporal_density: Float[Tensor, " e"], history: Float[Tensor, " e"], config: TsarConfig
+) -> tuple[Int64[Tensor, " b"], Float[Tensor, " e"]]:
+    """The ``batch_size`` most overdue tiles.
+
+    Each element gathers its temporal density every cycle, a tile is as overdue as the mean credit of the elements it
+    covers, and rendering a tile resets its elements to zero. Credit lives on the field, so it survives re-tiling.
+    Because every density is positive and credit is only reset, a tile's turn always comes; where more falls due than a
+    batch holds, rates shrink in proportion to the densities.
+
+    Returns:
+        Indices into the tiling in Morton order, and the history for the next cycle. Ties go to the earlier tile.
+    """
+    credit = history + temporal_density
+    covered = 4.0 ** (config.field_level - tiling.level.to(torch.float64))
+    overdue = tile_integral(prefix_sum(credit), tiling.level, tiling.index, config.field_level) / covered
+    order = torch.sort(overdue, descending=True, stable=True).indices
+    selected = torch.sort(order[: config.batch_size]).values
+    rendered = torch.zeros(tiling.tile_count, dtype=torch.bool)
+    rendered[selected] = True
+    reset = rendered[tile_of_element(tiling, config.field_level)]
+    return selected, torch.where(reset, 0.0, credit)
+
+
+@lru_cache(maxsize=8)
+def _cell_centres(side: int) -> Float[Tensor, "samples 2"]:
+    """Sample offsets within a tile, in tile widths, Morton order."""
+    x, y = deinterleave(torch.arange(side * side))
+    return (torch.stack((x, y), dim=1).to(torch.float32) + 0.5) / side
+
+
+def sample_positions(
+    level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], side: int
+) -> Float[Tensor, "n samples 2"]:
+    """Where each tile's samples lie on the image plane, in ``[0, 1)``: the centres of a regular grid, always the same
+    for the same tile, so that a static picture gives identical samples and no temporal error.
+
+    Every coordinate is a multiple of ``1 / 65536`` and exact in float32. Source: Stephens 2011, sec. 3.4.4.2.
+    """
+    corner = torch.stack(deinterleave(index), dim=1).to(torch.float32)
+    width = torch.exp2(-level.to(torch.float32))
+    return (corner[:, None, :] + _cell_centres(side)) * width[:, None, None]
+
+
+def make_batch(
+    tiling: Tiling, selected: Int64[Tensor, " b"], time_s: float, cycle: int, config: TsarConfig
+) -> FrameletBatch:
+    """The request to the renderer: every sample of the batch at one animation time."""
+    level, index = tiling.level[selected], tiling.index[selected]
+    position = sample_positions(level, index, config.framelet_side)
+    time = torch.full(position.shape[:2], time_s, dtype=torch.float32)
+    return FrameletBatch(level, index, position, time, cycle=cycle, seed=config.seed)

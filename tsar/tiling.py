@@ -1,0 +1,95 @@
+"""From a density field to a non-overlapping tiling.
+
+Source: Stephens 2011, sec. 4.1.6.
+
+Deviation: the thesis walks intervals of the curve with a token stack per thread and restarts the kernel until the
+tiling is full. Here every node of the quadtree decides at once: a node splits when the samples asked for within it
+exceed the threshold. A parent's integral is never below its child's, so the split nodes are closed under ancestors and
+the tiling is the set of nodes that do not split under a parent that does. A bound on the number of tiles is then a
+bound on the number of splits, met by raising the threshold to the right order statistic: no stack, no restart, no loop
+over tiles.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from tsar.config import TsarConfig
+from tsar.morton import tile_interval
+from tsar.types import Tiling
+
+
+def uniform(level: int) -> Tiling:
+    """All ``4^level`` tiles of one level."""
+    index = torch.arange(4**level)
+    return Tiling(level=torch.full_like(index, level), index=index)
+
+
+def build(spatial_density: Float[Tensor, " e"], config: TsarConfig) -> Tiling:
+    """Tiling whose tiles hold about ``threshold_samples`` of the asked-for samples each.
+
+    Args:
+        spatial_density: θ_s, samples per element, Morton order, non-negative and finite.
+        config: level bounds, threshold and the least and greatest number of tiles.
+
+    Returns:
+        Between ``max(batch_size, 4^level_min)`` and ``tile_count_max`` tiles (to within 3, the tiles a split adds),
+        in Morton order, covering the image exactly once.
+
+    Raises:
+        ValueError: the field holds negative or non-finite values.
+    """
+    if not bool(torch.isfinite(spatial_density).all()) or bool((spatial_density < 0).any()):
+        raise ValueError("tiling.build: expected finite, non-negative densities")
+    low, high = config.level_min, config.level_max
+    integrals = node_integrals(spatial_density, config.field_level, low, high)
+    split = _choose_splits(torch.cat(integrals[:-1]), integrals, config) if high > low else []
+    levels, indices = [], []
+    exists = torch.ones(4**low, dtype=torch.bool)
+    for level in range(low, high + 1):
+        leaf = exists & ~split[level - low] if level < high else exists
+        index = leaf.nonzero().squeeze(1)
+        levels.append(torch.full_like(index, level))
+        indices.append(index)
+        if level < high:
+            exists = (exists & split[level - low]).repeat_interleave(4)
+    level, index = torch.cat(levels), torch.cat(indices)
+    order = torch.argsort(tile_interval(level, index, config.field_level)[0])
+    return Tiling(level=level[order], index=index[order])
+
+
+def node_integrals(
+    field: Float[Tensor, " e"], field_level: int, level_low: int, level_high: int
+) -> list[Float[Tensor, " nodes"]]:
+    """Sum of the field over every quadtree node, for levels ``level_low`` to ``level_high``, in float64.
+
+    Sums of four children at a time: unlike a difference of prefix sums, a parent can then never come out smaller than
+    its child through rounding, whatever the range of the field.
+    """
+    sums = [field.to(torch.float64)]
+    for _ in range(field_level - level_low):
+        sums.append(sums[-1].reshape(-1, 4).sum(1))
+    sums.reverse()
+    return sums[: level_high - level_low + 1]
+
+
+def _choose_splits(candidates: Tensor, integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
+    """Which nodes of the levels above the finest split, as one boolean tensor a level."""
+    coarse = 4**config.level_min
+    most = (config.tile_count_max - coarse) // 3
+    least = min(-(-max(config.batch_size - coarse, 0) // 3), most)
+    wanted = int((candidates > config.tiling.threshold_samples).sum())
+    count = min(max(wanted, least), most, candidates.numel())
+    # Stable and coarse-to-fine, so that among equal integrals a parent comes before its child.
+    order = torch.sort(candidates, descending=True, stable=True).indices
+    chosen = torch.zeros(candidates.numel(), dtype=torch.bool)
+    chosen[order[:count]] = True
+    return list(chosen.split([level.numel() for level in integrals[:-1]]))
+
+
+def tile_of_element(tiling: Tiling, field_level: int) -> Int64[Tensor, " e"]:
+    """For each field element, the tile that covers it; the tiling must be in Morton order and cover everything."""
+    first, last = tile_interval(tiling.level, tiling.index, field_level)
+    return torch.repeat_interleave(torch.arange(tiling.tile_count), last - first)
