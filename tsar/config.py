@@ -73,15 +73,15 @@ class ResponseConfig:
     """Distance moved in normalised density space per unit error (eq. 6.11 has 1)."""
     bias: float = 0.0
     """Octaves by which each decision slides along the iso-product curve: positive towards space, negative to time."""
-    surplus_max: float = 0.1
-    """Bound of the running surplus C as a share of the budget."""
+    surplus_max: float = 1.0
+    """Bound of the running surplus C as a share of the budget; at 1 a picture that asks for nothing frees everything."""
     temporal_min: float = 1.0 / 64.0
     """Least temporal density, refreshes per cycle: even a static tile is looked at this often."""
 
     def __post_init__(self) -> None:
         require(self.gain > 0, "response.gain", "a positive number", self.gain)
         require(-8.0 <= self.bias <= 8.0, "response.bias", "a number in [-8, 8]", self.bias)
-        require(0 <= self.surplus_max < 1, "response.surplus_max", "a share in [0, 1)", self.surplus_max)
+        require(0 <= self.surplus_max <= 1, "response.surplus_max", "a share in [0, 1]", self.surplus_max)
         require(0 < self.temporal_min <= 1, "response.temporal_min", "a density in (0, 1]", self.temporal_min)
 
 

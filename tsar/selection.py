@@ -31,9 +31,10 @@ def select(
     """The ``batch_size`` most overdue tiles.
 
     Each element gathers its temporal density every cycle, a tile is as overdue as the mean credit of the elements it
-    covers, and rendering a tile resets its elements to zero. Credit lives on the field, so it survives re-tiling.
-    Because every density is positive and credit is only reset, a tile's turn always comes; where more falls due than a
-    batch holds, rates shrink in proportion to the densities.
+    covers, and rendering a tile takes one refresh off its credit. Credit lives on the field, so it survives re-tiling.
+    What is left after a refresh is kept within one refresh either way: then fractional rates come out right on average,
+    where more or less falls due than a batch holds all rates shrink or grow in proportion, and, every density being
+    positive, a tile's turn always comes.
 
     Returns:
         Indices into the tiling in Morton order, and the history for the next cycle. Ties go to the earlier tile.
@@ -43,10 +44,10 @@ def select(
     overdue = tile_integral(prefix_sum(credit), tiling.level, tiling.index, config.field_level) / covered
     order = torch.sort(overdue, descending=True, stable=True).indices
     selected = torch.sort(order[: config.batch_size]).values
-    rendered = torch.zeros(tiling.tile_count, dtype=torch.bool)
-    rendered[selected] = True
-    reset = rendered[tile_of_element(tiling, config.field_level)]
-    return selected, torch.where(reset, 0.0, credit)
+    left = torch.full_like(overdue, torch.nan)
+    left[selected] = (overdue[selected] - 1.0).clamp(-1.0, 1.0)
+    left = left[tile_of_element(tiling, config.field_level)]
+    return selected, torch.where(torch.isnan(left), credit, left)
 
 
 @lru_cache(maxsize=8)

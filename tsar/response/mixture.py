@@ -30,8 +30,12 @@ def mix(
 ) -> tuple[Float[Tensor, " e"], Float[Tensor, " e"]]:
     """Point b on the ray with the granted combined density, then slid along the iso-product curve to c.
 
-    Where no combined density was granted although some was asked for, the far root of the same equation, ``2 k*``,
-    redistributes between the axes, provided that it lies within the distance asked for.
+    Where the errors have opposite signs and less change was granted than desired, the rest of the response needs no
+    density at all: b is then the point with the granted product and the ratio of the axes that b* has (sec. 6.3 and
+    6.4 say that such elements may redistribute; the ray alone would leave them where they are, for it meets the curve
+    again only at ``2 k*``, if at all). It is b* itself when everything was granted.
+
+    Deviation: the redistribution, of which the thesis gives no equation.
 
     Args:
         local: densities, mixture and distances, normalised.
@@ -45,11 +49,15 @@ def mix(
     a_s, a_t, m_s, m_t = local.a_s, local.a_t, local.m_s, local.m_t
     product, slope = m_s * m_t, a_s * m_t + a_t * m_s
     k = smallest_root(product, slope, -change)
-    far = -slope / torch.where(product < 0, product, 1.0)
-    redistribute = (change == 0) & (product < 0) & (far > 0) & (far <= local.k_min)
-    k = torch.minimum(torch.where(redistribute, far, torch.where(change == 0, 0.0, k)), local.k_max)
-    b_s = (a_s + k * m_s).clamp(box.spatial_min, 1.0)
-    b_t = (a_t + k * m_t).clamp(box.temporal_min, 1.0)
+    k = torch.minimum(torch.where(change == 0, 0.0, k), local.k_max)
+    b_s, b_t = a_s + k * m_s, a_t + k * m_t
+    redistribute = (product < 0) & (change.abs() < local.desired_change.abs())
+    after = a_s * a_t + change
+    ratio = (a_s + local.k_min * m_s) / (a_t + local.k_min * m_t)
+    slid = torch.minimum(torch.maximum(torch.sqrt(after * ratio), after), after / box.temporal_min)
+    slid = slid.clamp(box.spatial_min, 1.0)
+    b_s = torch.where(redistribute, slid, b_s).clamp(box.spatial_min, 1.0)
+    b_t = torch.where(redistribute, after / slid, b_t).clamp(box.temporal_min, 1.0)
     if bias == 0.0:
         return b_s, b_t
     shift = torch.full_like(b_s, 2.0**bias)

@@ -1,0 +1,168 @@
+import pytest
+import torch
+
+from tests.oracles import pictures
+from tsar.baselines.framed import run as run_framed
+from tsar.clock import fixed_clock
+from tsar.config import ConfigError, ResponseConfig, TilingConfig, TsarConfig
+from tsar.morton import raster_to_morton
+from tsar.pipeline import run
+from tsar.types import SampleBatch
+
+CYCLE = 1 / 60
+
+
+def small(**more):
+    return TsarConfig(batch_size=32, resolution_px=256, **{"warmup_cycles": 16, **more})
+
+
+def play(config, picture, cycles, start_s=0.0):
+    return list(run(config, pictures.tracer(picture), fixed_clock(CYCLE), start_s, start_s + cycles * CYCLE))
+
+
+def element_grid(field, side=128):
+    return field[raster_to_morton(side)].reshape(side, side)
+
+
+def test_a_constant_image_has_no_error_and_asks_for_nothing():
+    config = small()
+    record, display = play(config, pictures.constant, 100)[-1]
+    assert torch.allclose(display.image, torch.full((256, 256, 3), 0.4), atol=1e-6)
+    # Nobody asks for density, so all of it goes into the surplus and is still accounted for.
+    assert float(record.densities.temporal.max()) == pytest.approx(config.response.temporal_min)
+    assert float(record.densities.spatial.max()) == pytest.approx(config.spatial_bounds[0])
+    assert record.surplus > 0.98 * config.budget and record.conservation_residual < 1e-9
+    bounded = small(response=ResponseConfig(surplus_max=0.1))
+    assert play(bounded, pictures.constant, 20)[-1][0].surplus == pytest.approx(0.1 * bounded.budget)
+
+
+def test_a_static_scene_lets_temporal_density_fall_to_its_floor():
+    """Fine static detail asks for space and frees time; the flat half frees both."""
+    config = small()
+    record, _ = play(config, pictures.static_stripes, 150)[-1]
+    assert float(record.densities.temporal.max()) <= config.response.temporal_min * 1.01
+    spatial = element_grid(record.densities.spatial)
+    assert float(spatial[:, 8:56].median()) == pytest.approx(config.spatial_bounds[1])
+    assert float(spatial[:, 72:].median()) == pytest.approx(config.spatial_bounds[0])
+
+
+def test_density_gathers_on_a_moving_edge_and_follows_it():
+    speed = 0.25
+    config = small()
+    records = [r for r, _ in play(config, pictures.moving_edge(speed, start=0.1), 120)]
+    x = (torch.arange(128) + 0.5) / 128
+    lag = []
+    for record in records[-60:]:
+        combined = element_grid(record.densities.combined()).mean(0)
+        edge = 0.1 + speed * record.sim_time_s
+        near = (x - edge).abs() < 0.06
+        assert float(combined[near].mean()) > 2 * float(combined[(x - edge).abs() > 0.2].mean())
+        temporal = element_grid(record.densities.temporal).mean(0)
+        centre = float((x * temporal.clamp(min=2 * float(temporal.median())).sub(2 * float(temporal.median()))).sum())
+        mass = float(temporal.clamp(min=2 * float(temporal.median())).sub(2 * float(temporal.median())).sum())
+        lag.append(edge - centre / mass)
+    # The refreshed band trails the edge by no more than what it travels in a third of a second.
+    assert abs(sum(lag) / len(lag)) < speed / 3
+
+
+def test_bounds_conservation_coverage_and_full_batches_on_every_cycle():
+    config = small()
+    low, high = config.spatial_bounds
+    for record, display in play(config, pictures.textured_motion, 40):
+        assert record.conservation_residual <= 1e-9
+        d = record.densities
+        assert low * (1 - 1e-12) <= float(d.spatial.min()) and float(d.spatial.max()) <= high * (1 + 1e-12)
+        assert float(d.temporal.min()) >= config.response.temporal_min * (1 - 1e-12) and float(d.temporal.max()) <= 1.0
+        assert float((0.25 ** record.tiling.level.to(torch.float64)).sum()) == 1.0
+        assert record.selected.unique().numel() == config.batch_size
+        assert bool(torch.isfinite(display.image).all())
+
+
+def test_latency_is_three_cycles_and_two_frames():
+    for record, display in play(small(), pictures.constant, 2):
+        assert display.display_time_s - record.sim_time_s == pytest.approx(3 * CYCLE)
+    frames = list(run_framed(small(), pictures.tracer(pictures.constant), fixed_clock(0.1), 0.0, 0.5))
+    assert frames[0].display_time_s <= 0.0, "something is on the display when measurement begins"
+    assert all(f.display_time_s - f.sample_time_s == pytest.approx(0.2) for f in frames)
+    assert frames[1].sample_time_s - frames[0].sample_time_s == pytest.approx(0.1)
+
+
+def test_framed_image_is_the_picture_at_pixel_centres():
+    config = small()
+    frame = next(iter(run_framed(config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5)))
+    centre = (torch.arange(256) + 0.5) / 256
+    time = torch.tensor(frame.sample_time_s, dtype=torch.float32)
+    expected = pictures.textured_motion(centre[None].expand(256, 256), centre[:, None].expand(256, 256), time)
+    assert torch.allclose(frame.image, expected, atol=1e-6)
+    fine = next(iter(run_framed(config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5, 2)))
+    assert fine.image.shape == (256, 256, 3) and (fine.image - expected).abs().mean() < 0.02
+    with pytest.raises(ConfigError, match="samples_per_axis: expected a power of two, got 3"):
+        next(iter(run_framed(config, pictures.tracer(pictures.constant), fixed_clock(0.1), 0.0, 0.5, 3)))
+
+
+def test_results_do_not_depend_on_the_thread_count():
+    before, results = torch.get_num_threads(), []
+    try:
+        for threads in (1, 2, 3):
+            torch.set_num_threads(threads)
+            results.append(play(small(), pictures.textured_motion, 12)[-1])
+    finally:
+        torch.set_num_threads(before)
+    for record, display in results[1:]:
+        assert torch.equal(display.image, results[0][1].image)
+        assert torch.equal(record.densities.spatial, results[0][0].densities.spatial)
+        assert torch.equal(record.densities.temporal, results[0][0].densities.temporal)
+        assert torch.equal(record.tiling.index, results[0][0].tiling.index)
+
+
+def test_seeds_repeat_and_differ():
+    same = [play(small(seed=s), pictures.textured_motion, 6)[-1][1].image for s in (3, 3, 4)]
+    assert torch.equal(same[0], same[1]) and not torch.equal(same[0], same[2])
+
+
+def test_nonfinite_samples_are_counted_and_never_shown():
+    def trace(batch):
+        color = pictures.tracer(pictures.textured_motion)(batch).color
+        color[:, ::17] = float("nan")
+        return SampleBatch(color, {})
+
+    for record, display in run(small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
+        assert record.nonfinite == 32 * 16 and bool(torch.isfinite(display.image).all())
+
+
+def test_a_clock_that_stops_time_is_refused():
+    for seconds in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="finite, positive cycle time"):
+            next(run(small(), pictures.tracer(pictures.constant), fixed_clock(seconds), 0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: TsarConfig(batch_size=-3), r"batch_size: expected between 1 and 8192 framelets, got -3"),
+        (lambda: TsarConfig(resolution_px=500), r"resolution_px: expected a power of two in \[64, 8192\], got 500"),
+        (lambda: TsarConfig(framelet_side=8), r"framelet_side: expected 16 or 32, got 8"),
+        (lambda: TilingConfig(threshold_samples=0), r"tiling.threshold_samples: expected a positive number, got 0"),
+        (lambda: ResponseConfig(temporal_min=0), r"response.temporal_min: expected a density in \(0, 1\], got 0"),
+        (lambda: TsarConfig(batch_size=64, tiling=TilingConfig(tile_count_max=32)), r"tiling.tile_count_max: expected"),
+        (lambda: TsarConfig(tiling=TilingConfig(level_max=9)), r"tiling.level_max: expected between 2 and 7, got 9"),
+    ],
+)
+def test_bad_configuration_names_field_and_value(make, message):
+    with pytest.raises(ConfigError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        TsarConfig(batch_size=32, resolution_px=256, framelet_side=32, warmup_cycles=4),
+        TsarConfig(batch_size=256, resolution_px=256, sdf_side=64, warmup_cycles=4),
+        TsarConfig(batch_size=16, resolution_px=64, sdf_side=256, warmup_cycles=4),
+        TsarConfig(batch_size=16, resolution_px=128, warmup_cycles=4, response=ResponseConfig(bias=1.0, gain=0.3)),
+    ],
+)
+def test_other_sizes_run_and_conserve(config):
+    for record, display in play(config, pictures.textured_motion, 6):
+        assert record.conservation_residual <= 1e-9 and bool(torch.isfinite(display.image).all())
+        assert record.selected.numel() == config.batch_size

@@ -1,0 +1,228 @@
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tsar.config import ResponseConfig, TsarConfig
+from tsar.response import initial_densities, respond
+from tsar.response.local import Box, constrain, exit_distance
+from tsar.response.mixture import mix, smallest_root
+from tsar.response.transport import SOLVERS, fill
+from tsar.types import Densities, Errors
+
+BOX = Box(spatial_min=1 / 256, temporal_min=1 / 64)
+
+
+def random_problem(seed, count=400, quiet=0.3):
+    g = torch.Generator().manual_seed(seed)
+
+    def uniform(low, high):
+        return low + (high - low) * torch.rand(count, generator=g, dtype=torch.float64)
+
+    errors = torch.stack((uniform(-1, 1), uniform(-1, 1)))
+    errors[:, torch.rand(count, generator=g) < quiet] = 0.0
+    errors[0, :20] = 0.0  # axis-aligned
+    errors[1, 20:40] = 0.0
+    a_s, a_t = uniform(BOX.spatial_min, 1), uniform(BOX.temporal_min, 1)
+    a_s[40:50], a_t[50:60] = BOX.spatial_min, 1.0  # at a wall
+    return constrain(a_s, a_t, Errors(errors[0], errors[1]), BOX, 1.0)
+
+
+def test_exit_distance_of_a_box():
+    a = torch.tensor([0.5, 0.5, 0.5, 0.25], dtype=torch.float64)
+    m = torch.tensor([1.0, -0.5, 0.0, -1.0], dtype=torch.float64)
+    assert exit_distance(a, m, 0.25, 1.0).tolist() == [0.5, 0.5, float("inf"), 0.0]
+
+
+def test_local_constraints_by_brute_force():
+    """k_max leaves the box, and the greatest change of the right sign along the ray is max_change."""
+    local = random_problem(1)
+    steps = torch.linspace(0, 1, 4001, dtype=torch.float64)[:, None]
+    k = steps * local.k_max
+    b_s, b_t = local.a_s + k * local.m_s, local.a_t + k * local.m_t
+    assert b_s.min() > BOX.spatial_min - 1e-12 and b_s.max() < 1 + 1e-12
+    assert b_t.min() > BOX.temporal_min - 1e-12 and b_t.max() < 1 + 1e-12
+    past = (local.k_max + 1e-6)[local.active]
+    outside_s = (local.a_s + 0 * local.a_s)[local.active] + past * local.m_s[local.active]
+    outside_t = local.a_t[local.active] + past * local.m_t[local.active]
+    left = (outside_s < BOX.spatial_min) | (outside_s > 1) | (outside_t < BOX.temporal_min) | (outside_t > 1)
+    assert bool(left.all())
+    change = b_s * b_t - local.a_s * local.a_t
+    sign = torch.sign(local.desired_change)
+    brute = (change * sign).amax(0) * sign
+    assert torch.allclose(local.max_change, brute, atol=1e-6)
+    assert bool((local.max_change.abs() >= local.desired_change.abs()).all())
+    assert bool((local.max_change * local.desired_change >= 0).all())
+
+
+def test_an_element_at_a_wall_slides_along_it():
+    one, low = torch.ones(1, dtype=torch.float64), torch.full((1,), BOX.spatial_min, dtype=torch.float64)
+    half = one * 0.5
+    at_ceiling = constrain(one, half, Errors(half, -half), BOX, 1.0)
+    assert (float(at_ceiling.m_s), float(at_ceiling.m_t)) == (0.0, -1.0) and float(at_ceiling.k_max) > 0.4
+    at_floor = constrain(low, half, Errors(-half, -half), BOX, 1.0)
+    assert (float(at_floor.m_s), float(at_floor.m_t)) == (0.0, -1.0)
+    inward = constrain(low, half, Errors(half, -half), BOX, 1.0)
+    assert float(inward.m_s) > 0.7
+
+
+def test_no_error_means_no_move():
+    zero = torch.zeros(4, dtype=torch.float64)
+    a = torch.tensor([0.1, 0.3, 0.5, 1.0], dtype=torch.float64)
+    local = constrain(a, a.flip(0), Errors(zero, zero), BOX, 1.0)
+    assert not local.active.any() and not local.desired_change.any() and not local.max_change.any()
+    b_s, b_t = mix(local, zero, BOX, 0.7)
+    assert torch.equal(b_s, a) and torch.equal(b_t, a.flip(0))
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+@given(seed=st.integers(0, 10_000), share=st.floats(0.0, 1.0), ceiling=st.floats(0.0, 5.0), lean=st.floats(-6.0, 6.0))
+def test_every_solver_conserves_and_stays_within_bounds(name, seed, share, ceiling, lean):
+    local = random_problem(seed)
+    # Lean the problem towards one side by up to six decades.
+    tilt = torch.where(local.desired_change > 0, 10.0 ** max(lean, 0.0), 10.0 ** max(-lean, 0.0))
+    desired, bound = local.desired_change * tilt, local.max_change * tilt
+    surplus = share * ceiling
+    change = SOLVERS[name].solve(desired, bound, surplus, ceiling)
+    scale = float(change.abs().sum()) + ceiling + 1e-30
+    assert bool((change * desired >= 0).all())
+    assert bool((change.abs() <= bound.abs() * (1 + 1e-12)).all())
+    left = surplus - float(change.sum())
+    assert -1e-6 * scale <= left <= ceiling + 1e-6 * scale
+    if name in ("slow_greater", "square", "descend", "trivial"):
+        assert abs(float(change.sum())) <= 1e-6 * scale
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, 1.2))
+def test_fill_against_bisection(seed, share):
+    g = torch.Generator().manual_seed(seed)
+    direction = torch.rand(200, generator=g, dtype=torch.float64) ** 3
+    direction[:20] = 0.0
+    bound = direction * (1 + 10 * torch.rand(200, generator=g, dtype=torch.float64))
+    target = share * float(bound.sum())
+    low, high = 0.0, 20.0
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if torch.minimum(middle * direction, bound).sum() < target else (low, middle)
+    assert torch.allclose(fill(direction, bound, target), torch.minimum(low * direction, bound), atol=1e-9)
+
+
+def test_waterfill_is_not_held_back_by_the_elements_at_their_bound():
+    """Sec. 6.3.2.4: 97 % of the elements may not be sped up, 3 % may; point e is stuck, waterfill is not."""
+    desired = torch.full((100,), 1.0, dtype=torch.float64)
+    bound = desired.clone()
+    bound[:3] = 50.0
+    desired, bound = torch.cat((desired, -desired * 2)), torch.cat((bound, -bound * 4))
+    slow = SOLVERS["scale_lesser"].solve(desired, bound, 0.0, 0.0)
+    free = SOLVERS["waterfill"].solve(desired, bound, 0.0, 0.0)
+    assert slow[:3].tolist() == [1.0] * 3 and free[:3].min() > 20.0
+    assert abs(float(free.sum())) < 1e-9
+
+
+def test_square_favours_large_responses_and_descend_serves_them_first():
+    desired = torch.tensor([4.0, 2.0, 1.0, -1.0], dtype=torch.float64)
+    bound = desired * 1.5
+    square = SOLVERS["square"].solve(desired, bound, 0.0, 0.0)
+    assert square[0] / square[1] == pytest.approx(4.0)
+    descend = SOLVERS["descend"].solve(desired, bound, 0.0, 0.0)
+    assert descend.tolist() == [1.5, 0.0, 0.0, -1.5]
+
+
+def test_surplus_serves_those_who_ask_when_nobody_frees():
+    desired = torch.tensor([1.0, 3.0], dtype=torch.float64)
+    assert SOLVERS["waterfill"].solve(desired, desired, 2.0, 5.0).sum() == pytest.approx(2.0)
+    assert SOLVERS["waterfill"].solve(-desired, -desired, 2.0, 5.0).sum() == pytest.approx(-3.0)
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1))
+def test_quadratic_root_solves_or_reports_zero(a, b, d):
+    args = [torch.tensor([v], dtype=torch.float64) for v in (a, b, d)]
+    k = float(smallest_root(*args))
+    disc = b * b - 4 * a * d
+    roots = []
+    if a != 0 and disc >= 0:
+        roots = [r for r in ((-b - disc**0.5) / (2 * a), (-b + disc**0.5) / (2 * a)) if r >= 0]
+    assert k >= 0
+    if k > 0 and disc >= 0:
+        assert abs(a * k * k + b * k + d) <= 1e-9 * max(1.0, abs(a) * k * k, abs(b) * k)
+    if roots and min(abs(a), abs(disc)) > 1e-6 and k < 1e6:
+        assert k == pytest.approx(min(roots), rel=1e-4, abs=1e-7)
+
+
+def test_quadratic_survives_a_vanishing_leading_term():
+    """Where eq. 6.55-6.56 cancel: A -> 0 must give -D / B to full precision."""
+    for a in (0.0, 1e-300, 1e-18, -1e-17):
+        k = smallest_root(*(torch.tensor([v], dtype=torch.float64) for v in (a, 0.37, -0.011)))
+        assert float(k) == pytest.approx(0.011 / 0.37, rel=1e-14)
+
+
+@pytest.mark.parametrize("bias", [-1.5, 0.0, 0.8])
+def test_mixture_hits_the_granted_density_inside_the_box(bias):
+    for seed in range(20):
+        local = random_problem(seed)
+        change = SOLVERS["waterfill"].solve(local.desired_change, local.max_change, 0.0, 0.0)
+        b_s, b_t = mix(local, change, BOX, bias)
+        assert b_s.min() >= BOX.spatial_min * (1 - 1e-12) and b_s.max() <= 1 + 1e-12
+        assert b_t.min() >= BOX.temporal_min * (1 - 1e-12) and b_t.max() <= 1 + 1e-12
+        assert torch.allclose(b_s * b_t, local.a_s * local.a_t + change, atol=1e-10)
+
+
+def test_bias_slides_towards_space_or_time():
+    local = random_problem(3)
+    change = torch.zeros_like(local.a_s)
+    plain, _ = mix(local, change, BOX, 0.0)
+    more, _ = mix(local, change, BOX, 0.5)
+    less, _ = mix(local, change, BOX, -0.5)
+    active = local.active
+    assert bool((more >= plain).all()) and bool((less <= plain).all())
+    assert more[active].mean() > plain[active].mean() > less[active].mean()
+
+
+@pytest.mark.parametrize(("s", "t"), [(0.1, 0.4), (0.4, 0.1)])
+def test_without_granted_density_the_axes_are_still_redistributed(s, t):
+    """Trivial transport, opposite errors: the element slides along its iso-product curve (sec. 6.3.1.3)."""
+    a_s, a_t = (torch.tensor([v], dtype=torch.float64) for v in (s, t))
+    local = constrain(a_s, a_t, Errors(torch.tensor([0.05]).double(), torch.tensor([-0.05]).double()), BOX, 1.0)
+    b_s, b_t = mix(local, torch.zeros(1, dtype=torch.float64), BOX, 0.0)
+    assert float(b_s * b_t) == pytest.approx(s * t) and float(b_s) > s and float(b_t) < t
+    assert float(b_s / b_t) == pytest.approx((s + 0.05) / (t - 0.05))
+    full, _ = mix(local, local.desired_change, BOX, 0.0)
+    assert float(full) == pytest.approx(s + 0.05), "with everything granted, b is b*"
+
+
+@pytest.mark.parametrize("name", [n if n == "waterfill" else pytest.param(n, marks=pytest.mark.slow) for n in SOLVERS])
+def test_ten_thousand_cycles_do_not_drift(name):
+    config = TsarConfig(sdf_side=16, resolution_px=128, batch_size=16, response=ResponseConfig(solver=name))
+    densities = initial_densities(config)
+    g = torch.Generator().manual_seed(11)
+    low, high = config.spatial_bounds
+    for cycle in range(10_000):
+        noise = torch.rand(3, 256, generator=g, dtype=torch.float64)
+        drift = 0.3 * torch.sin(torch.tensor(cycle / 500.0))
+        batch = noise[2] < 0.4
+        errors = Errors(*(torch.where(batch, (2 * noise[i] - 1 + drift).clamp(-1, 1), 0.0) for i in (0, 1)))
+        densities = respond(densities, errors, config)
+    total = float(densities.combined().sum()) + densities.surplus
+    assert abs(total - config.budget) <= 1e-5 * config.budget
+    assert 0.0 <= densities.surplus <= config.response.surplus_max * config.budget * (1 + 1e-9)
+    assert densities.spatial.min() >= low * (1 - 1e-12) and densities.spatial.max() <= high * (1 + 1e-12)
+    assert densities.temporal.min() >= config.response.temporal_min * (1 - 1e-12) and densities.temporal.max() <= 1
+
+
+def test_the_initial_field_spends_exactly_the_budget():
+    for batch, resolution in ((32, 256), (128, 512), (1024, 1024)):
+        config = TsarConfig(batch_size=batch, resolution_px=resolution)
+        densities = initial_densities(config)
+        assert float(densities.combined().sum()) == pytest.approx(config.budget, rel=1e-12)
+        low, high = config.spatial_bounds
+        assert low <= float(densities.spatial[0]) <= high
+
+
+def test_elements_outside_the_batch_keep_their_bits():
+    config = TsarConfig()
+    densities = initial_densities(config)
+    errors = torch.zeros(16384, dtype=torch.float64)
+    errors[:64] = 0.5
+    after = respond(densities, Errors(errors, -errors), config)
+    assert torch.equal(after.spatial[64:], densities.spatial[64:])
+    assert isinstance(after, Densities)

@@ -1,0 +1,68 @@
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.oracles.tiling_serial import build_serial
+from tsar.config import TilingConfig, TsarConfig
+from tsar.tiling import build, tile_of_element, uniform
+
+
+def config(**tiling):
+    return TsarConfig(batch_size=16, tiling=TilingConfig(**tiling))
+
+
+def field(seed, decades):
+    generator = torch.Generator().manual_seed(seed)
+    return 10.0 ** ((torch.rand(128 * 128, generator=generator, dtype=torch.float64) - 0.5) * decades)
+
+
+def covers_once(tiling, field_level=7):
+    first = tiling.index << 2 * (field_level - tiling.level)
+    last = (tiling.index + 1) << 2 * (field_level - tiling.level)
+    return bool(first[0] == 0) and bool(last[-1] == 4**field_level) and torch.equal(last[:-1], first[1:])
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, 12.0), st.integers(16, 1024))
+def test_a_tiling_covers_the_image_once_within_its_bounds(seed, decades, most):
+    cfg = config(tile_count_max=most, level_max=6)
+    tiling = build(field(seed, decades), cfg)
+    assert covers_once(tiling)
+    assert 16 <= tiling.tile_count <= most
+    assert cfg.level_min <= int(tiling.level.min()) and int(tiling.level.max()) <= cfg.level_max
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_against_the_serial_construction(seed):
+    density = field(seed, 3) * 6
+    density[1000:1400] *= 40
+    cfg = config(tile_count_max=4096, level_max=6)
+    tiling = build(density, cfg)
+    expected = build_serial(density.tolist(), 2, 6, 256.0)
+    assert list(zip(tiling.level.tolist(), tiling.index.tolist(), strict=True)) == expected
+
+
+def test_a_full_batch_always_exists():
+    tiling = build(torch.full((16384,), 1e-9, dtype=torch.float64), TsarConfig(batch_size=128))
+    assert tiling.tile_count >= 128 and covers_once(tiling)
+
+
+def test_more_density_gives_smaller_tiles():
+    density = torch.full((16384,), 0.25, dtype=torch.float64)
+    density[: 16384 // 4] = 64.0  # the upper left quadrant
+    tiling = build(density, config(tile_count_max=2048, level_max=6))
+    inside = tiling.index << 2 * (7 - tiling.level) < 4096
+    assert int(tiling.level[inside].min()) > int(tiling.level[~inside].max())
+
+
+def test_bad_fields_are_refused():
+    for value in (float("nan"), float("inf"), -1.0):
+        with pytest.raises(ValueError, match="finite, non-negative"):
+            build(torch.full((16384,), value, dtype=torch.float64), config())
+
+
+def test_tile_of_element_inverts_coverage():
+    tiling = build(field(3, 6), config())
+    owner = tile_of_element(tiling, 7)
+    assert owner.shape == (16384,) and torch.equal(torch.bincount(owner), 4 ** (7 - tiling.level))
+    assert tile_of_element(uniform(7), 7).tolist() == list(range(16384))
