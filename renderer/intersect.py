@@ -1,0 +1,199 @@
+"""Rays against instances: nearest hit and occlusion."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.camera import track_pose
+from renderer.structs import (
+    SHAPE_DISK,
+    SHAPE_MESH,
+    SHAPE_RECTANGLE,
+    SHAPE_SPHERE,
+    Hit,
+    InstanceRecord,
+    SceneData,
+    ViewData,
+)
+
+_MESH = wp.constant(SHAPE_MESH)
+_SPHERE = wp.constant(SHAPE_SPHERE)
+_DISK = wp.constant(SHAPE_DISK)
+_RECTANGLE = wp.constant(SHAPE_RECTANGLE)
+
+_TINY = wp.constant(1.0e-20)
+
+
+@wp.func
+def reciprocal(direction: wp.vec3) -> wp.vec3:
+    """Component-wise 1 / x, large but finite for zero so that slab tests meet no NaN."""
+    x = wp.where(wp.abs(direction[0]) > _TINY, direction[0], _TINY)
+    y = wp.where(wp.abs(direction[1]) > _TINY, direction[1], _TINY)
+    z = wp.where(wp.abs(direction[2]) > _TINY, direction[2], _TINY)
+    return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+
+
+@wp.func
+def meets_box(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3, t_max: wp.float32) -> wp.bool:
+    """Whether a ray passes through an axis-aligned box before ``t_max``."""
+    a = wp.cw_mul(lower - origin, inverse)
+    b = wp.cw_mul(upper - origin, inverse)
+    near = wp.max(wp.max(wp.min(a[0], b[0]), wp.min(a[1], b[1])), wp.min(a[2], b[2]))
+    far = wp.min(wp.min(wp.max(a[0], b[0]), wp.max(a[1], b[1])), wp.max(a[2], b[2]))
+    return near <= far and far >= 0.0 and near < t_max
+
+
+@wp.func
+def sphere_distance(origin: wp.vec3, direction: wp.vec3) -> wp.float32:
+    """Distance to the unit sphere along a unit direction, negative for none.
+
+    Source: Haines, Günther and Akenine-Möller 2019, "Precision Improvements for Ray/Sphere Intersection".
+    """
+    b = wp.dot(origin, direction)
+    nearest = origin - b * direction
+    discriminant = 1.0 - wp.dot(nearest, nearest)
+    if discriminant < 0.0:
+        return -1.0
+    c = wp.dot(origin, origin) - 1.0
+    root = wp.sqrt(discriminant)
+    if b > 0.0:
+        far = -b - root  # both roots share this denominator; here the ray moves away from the centre
+        t = c / far
+        if t >= 0.0:
+            return t
+        return -1.0
+    far = -b + root
+    t = c / far
+    if t >= 0.0:
+        return t
+    return far
+
+
+@wp.func
+def plane_distance(origin: wp.vec3, direction: wp.vec3, disk: wp.bool) -> wp.float32:
+    """Distance to the unit disk or to the square [-1, 1]² at z = 0, negative for none."""
+    if direction[2] == 0.0:
+        return -1.0
+    t = -origin[2] / direction[2]
+    x = origin[0] + t * direction[0]
+    y = origin[1] + t * direction[1]
+    if disk:
+        if x * x + y * y > 1.0:
+            return -1.0
+    elif wp.abs(x) > 1.0 or wp.abs(y) > 1.0:
+        return -1.0
+    return t
+
+
+@wp.func
+def cube_distance(origin: wp.vec3, direction: wp.vec3):
+    """Distance to the cube [-1, 1]³ (negative for none) and its face: axis, plus 3 for the negative side."""
+    inverse = reciprocal(direction)
+    near = wp.float32(-1.0e30)
+    far = wp.float32(1.0e30)
+    near_face = wp.int32(0)
+    far_face = wp.int32(0)
+    for axis in range(3):
+        a = (-1.0 - origin[axis]) * inverse[axis]
+        b = (1.0 - origin[axis]) * inverse[axis]
+        enter = wp.min(a, b)
+        leave = wp.max(a, b)
+        if enter > near:
+            near = enter
+            near_face = axis + wp.where(inverse[axis] > 0.0, 3, 0)
+        if leave < far:
+            far = leave
+            far_face = axis + wp.where(inverse[axis] > 0.0, 0, 3)
+    if near > far or far < 0.0:
+        return -1.0, 0
+    if near >= 0.0:
+        return near, near_face
+    return far, far_face
+
+
+@wp.func
+def to_track(origin: wp.vec3, direction: wp.vec3, translation: wp.vec3, rotation: wp.quat):
+    """A world ray in the space a rigid track acts on."""
+    return wp.quat_rotate_inv(rotation, origin - translation), wp.quat_rotate_inv(rotation, direction)
+
+
+@wp.func
+def meet_instance(
+    scene: SceneData, record: InstanceRecord, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+) -> Hit:
+    """Nearest hit of a ray in track space with one instance, before ``t_max``; ``instance`` is 0 for a hit."""
+    hit = Hit()
+    hit.instance = -1
+    start = record.to_local * origin + record.to_local_offset
+    towards = record.to_local * direction
+    stretch = wp.length(towards)
+    towards = towards / stretch
+    reach = t_max * stretch
+    t = wp.float32(-1.0)
+    if record.shape == _MESH:
+        query = wp.mesh_query_ray(scene.meshes[record.mesh].id, start, towards, reach)
+        if query.result:
+            t = query.t
+            hit.u = query.u
+            hit.v = query.v
+            hit.face = query.face
+    elif record.shape == _SPHERE:
+        t = sphere_distance(start, towards)
+    elif record.shape == _DISK or record.shape == _RECTANGLE:
+        t = plane_distance(start, towards, record.shape == _DISK)
+    else:
+        distance, face = cube_distance(start, towards)
+        t = distance
+        hit.face = face
+    if t >= 0.0 and t < reach:
+        hit.instance = 0
+        hit.t = t / stretch
+    return hit
+
+
+@wp.func
+def closest_hit(
+    scene: SceneData, view: ViewData, time_s: wp.float64, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+) -> Hit:
+    """Nearest hit of a world ray of unit direction with any instance."""
+    best = Hit()
+    best.instance = -1
+    best.t = t_max
+    track = wp.int32(0)
+    start = wp.vec3(origin[0], origin[1], origin[2])
+    towards = wp.vec3(direction[0], direction[1], direction[2])
+    inverse = reciprocal(direction)
+    for i in range(scene.instance_count):
+        if scene.instance_track[i] != track:
+            track = scene.instance_track[i]
+            translation, rotation = track_pose(scene, view, track, time_s)
+            start, towards = to_track(origin, direction, translation, rotation)
+            inverse = reciprocal(towards)
+        if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], best.t):
+            hit = meet_instance(scene, scene.instances[i], start, towards, best.t)
+            if hit.instance == 0:
+                best = hit
+                best.instance = i
+    return best
+
+
+@wp.func
+def occluded(
+    scene: SceneData, view: ViewData, time_s: wp.float64, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+) -> wp.bool:
+    """Whether anything lies along a world ray before ``t_max``."""
+    track = wp.int32(0)
+    start = wp.vec3(origin[0], origin[1], origin[2])
+    towards = wp.vec3(direction[0], direction[1], direction[2])
+    inverse = reciprocal(direction)
+    for i in range(scene.instance_count):
+        if scene.instance_track[i] != track:
+            track = scene.instance_track[i]
+            translation, rotation = track_pose(scene, view, track, time_s)
+            start, towards = to_track(origin, direction, translation, rotation)
+            inverse = reciprocal(towards)
+        if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], t_max):
+            hit = meet_instance(scene, scene.instances[i], start, towards, t_max)
+            if hit.instance == 0:
+                return True
+    return False

@@ -1,0 +1,180 @@
+"""Records that kernels read, as they lie in memory.
+
+``buffers.py`` fills those of the scene once; ``trace.py`` fills :class:`ViewData` for every batch.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK, SHAPE_RECTANGLE, SHAPE_CUBE = range(5)
+TEXTURE_CONSTANT, TEXTURE_IMAGE, TEXTURE_CHECKERBOARD = range(3)
+WRAP_REPEAT, WRAP_CLAMP, WRAP_BLACK = range(3)
+FILTER_NEAREST, FILTER_BILINEAR, FILTER_MIPMAP = range(3)
+LIGHT_POINT, LIGHT_DIRECTIONAL = range(2)
+
+
+@wp.struct
+class TrackRecord:
+    """A rigid motion: where its keys lie in the key arrays, and their times in seconds."""
+
+    first_key: wp.int32
+    key_count: wp.int32
+    start_s: wp.float64
+    interval_s: wp.float64
+
+
+@wp.struct
+class InstanceRecord:
+    """A shape in place.
+
+    ``to_local`` maps track space (the space the rigid track acts on; world space for a static instance) to the unit
+    space of the shape, ``from_local`` back. Meshes are stored centred and scaled into ``[-1, 1]³``, spheres and disks
+    with radius 1, so that float32 serves scenes of any size.
+    """
+
+    shape: wp.int32
+    track: wp.int32
+    material: wp.int32
+    mesh: wp.int32
+    to_local: wp.mat33
+    to_local_offset: wp.vec3
+    from_local: wp.mat33
+    from_local_offset: wp.vec3
+    extent: wp.float32  # greatest distance the unit shape is stretched to, scene units
+
+
+@wp.struct
+class MeshRecord:
+    """A mesh: its BVH, and where its arrays lie in the pools. A negative first index means it has none."""
+
+    id: wp.uint64
+    first_face: wp.int32
+    first_vertex: wp.int32
+    first_normal: wp.int32
+    first_uv: wp.int32
+
+
+@wp.struct
+class MaterialRecord:
+    """Every supported material in one form; a negative texture means none."""
+
+    diffuse: wp.int32
+    mirror: wp.int32
+    specular: wp.vec3
+    exponent: wp.float32
+    ambient: wp.float32
+    fresnel_min: wp.float32
+    fresnel_max: wp.float32
+    fresnel_exponent: wp.float32
+    mirror_tint: wp.vec3
+    emission: wp.vec3
+
+
+@wp.struct
+class TextureRecord:
+    """One node of a texture; ``value`` multiplies whatever the node yields."""
+
+    kind: wp.int32
+    value: wp.vec3
+    uv_scale: wp.vec2
+    uv_offset: wp.vec2
+    texel_scale: wp.float32  # texels per unit of uv, geometric mean of both axes
+    first_level: wp.int32
+    level_count: wp.int32
+    wrap: wp.int32
+    filter: wp.int32
+    even: wp.int32
+    odd: wp.int32
+
+
+@wp.struct
+class LevelRecord:
+    """One level of a mip map in the pool of texels."""
+
+    first_texel: wp.int32
+    width: wp.int32
+    height: wp.int32
+
+
+@wp.struct
+class LightRecord:
+    """``place`` is the position of a point light, or the unit direction towards a directional light."""
+
+    kind: wp.int32
+    place: wp.vec3
+    color: wp.vec3
+
+
+@wp.struct
+class SceneData:
+    """The scene as kernels see it; instances are sorted by track."""
+
+    instance_count: wp.int32
+    instances: wp.array(dtype=InstanceRecord)
+    instance_track: wp.array(dtype=wp.int32)
+    bounds_lower: wp.array(dtype=wp.vec3)  # of each instance, in its track space
+    bounds_upper: wp.array(dtype=wp.vec3)
+    meshes: wp.array(dtype=MeshRecord)
+    vertices: wp.array(dtype=wp.vec3)
+    faces: wp.array(dtype=wp.vec3i)
+    normals: wp.array(dtype=wp.vec3)
+    uvs: wp.array(dtype=wp.vec2)
+    materials: wp.array(dtype=MaterialRecord)
+    textures: wp.array(dtype=TextureRecord)
+    levels: wp.array(dtype=LevelRecord)
+    texels: wp.array(dtype=wp.vec3)
+    light_count: wp.int32
+    lights: wp.array(dtype=LightRecord)
+    tracks: wp.array(dtype=TrackRecord)
+    key_translation: wp.array(dtype=wp.vec3d)
+    key_rotation: wp.array(dtype=wp.quat)
+    key_angle: wp.array(dtype=wp.float32)  # between a key's quaternion and the next one's, radians
+    ambient: wp.vec3
+    environment_level: wp.int32  # negative for black
+    environment_to_map: wp.mat33
+    environment_scale: wp.float32
+    depth: wp.int32
+    throughput_cutoff: wp.float32
+
+
+@wp.struct
+class ViewData:
+    """The camera, and what is known about the time of a whole launch."""
+
+    from_camera: wp.mat33
+    from_camera_offset: wp.vec3
+    camera_track: wp.int32
+    tan_x: wp.float32  # tangents of the half angles of the image
+    tan_y: wp.float32
+    spread: wp.float32  # width of a pixel's cone per unit of distance
+    single_time: wp.int32  # 1 where ``pose_*`` hold every track's pose for all samples of the launch
+    pose_translation: wp.array(dtype=wp.vec3)
+    pose_rotation: wp.array(dtype=wp.quat)
+
+
+@wp.struct
+class Hit:
+    """Nearest intersection along a ray; ``instance`` is negative for a miss.
+
+    ``u`` and ``v`` weigh the first two corners of a mesh's face; for other shapes they are unused.
+    """
+
+    instance: wp.int32
+    t: wp.float32
+    u: wp.float32
+    v: wp.float32
+    face: wp.int32
+
+
+@wp.struct
+class Surface:
+    """What shading needs of a hit, in world space; normals are on the viewer's side."""
+
+    position: wp.vec3
+    geometric_normal: wp.vec3
+    normal: wp.vec3
+    uv: wp.vec2
+    uv_density: wp.float32  # uv units per scene unit, geometric mean of both axes
+    offset: wp.float32  # how far a ray must start off the surface to clear rounding, scene units
+    material: wp.int32

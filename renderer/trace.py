@@ -1,0 +1,215 @@
+"""The host side of the renderer: framelet batches and whole frames through one kernel."""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import torch
+import warp as wp
+from torch import Tensor
+
+from renderer import device as devices
+from renderer import kernels
+from renderer.blocks import pixel_blocks
+from renderer.buffers import build_buffers
+from renderer.structs import ViewData
+from scenes.canonical import PerspectiveCamera, Scene, SceneError
+from tsar.types import FrameletBatch, SampleBatch
+
+_CHUNK_SAMPLES = 1 << 18
+_RANGE_SAMPLES = 4096  # per launch: its fixed cost of about 20 µs stays well below one per cent
+_BYTES_PER_SAMPLE = 64  # position, time, colour and counts, and their copies in flight
+_BYTES_PER_PIXEL = 12 + 8  # colour, and its place in the order of rendering
+
+
+class Renderer:
+    """A scene ready to be sampled.
+
+    Attributes:
+        device: where kernels run, ``cpu`` or ``cuda:0``.
+        threads: host threads that launch kernels (``cpu`` only).
+        footprint_resolution_px: pixels along the shorter image axis that :meth:`trace` filters textures for.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        device: str = "cpu",
+        threads: int | None = None,
+        footprint_resolution_px: float = 512.0,
+        throughput_cutoff: float = 2.0e-3,
+    ) -> None:
+        """Builds acceleration structures and loads kernels.
+
+        Args:
+            scene: what to render.
+            device: ``cpu`` or ``cuda:0``.
+            threads: host threads, by default one per core this process may use.
+            footprint_resolution_px: see the class. It is fixed for all batches, so that a coarse tile is as sharp as a
+                fine one, and a framed renderer as sharp as an adaptive one.
+            throughput_cutoff: a chain of mirrors ends where it would contribute less than this share.
+
+        Raises:
+            SceneError: if the scene holds what the renderer does not support.
+            DeviceError: if the device is not there.
+        """
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads: expected at least 1, got {threads}")
+        if not footprint_resolution_px > 0.0:
+            raise ValueError(f"footprint_resolution_px: expected a positive number, got {footprint_resolution_px}")
+        self.device = devices.pick(device)
+        self.threads = threads or devices.core_count()
+        self.footprint_resolution_px = float(footprint_resolution_px)
+        self._camera = _check_camera(scene)
+        self._scene = scene
+        self._buffers = build_buffers(scene, self.device)
+        self._buffers.data.throughput_cutoff = float(throughput_cutoff)
+        devices.load_kernels(kernels, self.device)
+        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 and self.device == "cpu" else None
+
+    def trace(self, batch: FrameletBatch) -> SampleBatch:
+        """Shades the samples of a batch on a square image.
+
+        Args:
+            batch: positions ``(n, samples, 2)`` and times ``(n, samples)``.
+
+        Returns:
+            Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, and ray counts.
+
+        Raises:
+            ValueError: if the shapes do not fit or a time is not finite.
+        """
+        shape = tuple(batch.position.shape)
+        if len(shape) != 3 or shape[2] != 2 or tuple(batch.time_s.shape) != shape[:2]:
+            raise ValueError(
+                f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and "
+                f"{tuple(batch.time_s.shape)}"
+            )
+        color, counters = self._shade(
+            batch.position.reshape(-1, 2), batch.time_s.reshape(-1), 1.0, self.footprint_resolution_px
+        )
+        return SampleBatch(color.reshape(*shape[:2], 3), counters)
+
+    def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
+        """Renders a whole picture: a batch of framelets of all its pixels.
+
+        Args:
+            time_s: animation time, seconds.
+            width_px, height_px: size of the picture; the field of view spans its shorter axis.
+            samples_per_axis: a regular grid of this many samples squared is averaged per pixel.
+
+        Returns:
+            ``(height, width, 3)`` float32 linear RGB on the CPU, row 0 at the top.
+
+        Raises:
+            ValueError: if a size is below 1, or the picture does not fit into memory.
+        """
+        for name, value in (("width_px", width_px), ("height_px", height_px), ("samples_per_axis", samples_per_axis)):
+            if int(value) != value or value < 1:
+                raise ValueError(f"{name}: expected a whole number of at least 1, got {value}")
+        self._check_memory(width_px, height_px)
+        image = torch.empty(height_px * width_px, 3)
+        footprint = min(width_px, height_px) * samples_per_axis
+        limit = max(1, _CHUNK_SAMPLES // samples_per_axis**2)
+        for pixels, position in pixel_blocks(width_px, height_px, samples_per_axis, limit):
+            time = torch.full((position.shape[0],), float(time_s), dtype=torch.float64)
+            color, _ = self._shade(position, time, width_px / height_px, footprint)
+            image[pixels] = color.reshape(len(pixels), -1, 3).mean(dim=1)
+        return image.reshape(height_px, width_px, 3)
+
+    def close(self) -> None:
+        """Ends the worker threads; the renderer must not be used afterwards."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def _shade(self, position: Tensor, time_s: Tensor, aspect: float, footprint_px: float) -> tuple[Tensor, dict[str, int]]:
+        """Colours ``(k, 3)`` and ray counts of flat lists of samples; ``aspect`` is width over height."""
+        count, home = position.shape[0], position.device
+        if count == 0:
+            return torch.zeros(0, 3, device=home), {"primary_rays": 0, "shadow_rays": 0, "reflection_rays": 0}
+        target = torch.device(self.device)
+        position = position.to(target, torch.float32).contiguous()
+        time_s = time_s.to(target, torch.float64).contiguous()
+        earliest, latest = (float(bound) for bound in torch.aminmax(time_s))
+        if not (math.isfinite(earliest) and math.isfinite(latest)):
+            raise ValueError("time_s: expected finite times")
+        color = torch.empty(count, 3, device=target)
+        rays = torch.empty(count, 2, dtype=torch.int32, device=target)
+        view = self._view(earliest if earliest == latest else None, aspect, footprint_px)
+        shared = (
+            wp.from_torch(position, dtype=wp.vec2),
+            wp.from_torch(time_s, dtype=wp.float64),
+            wp.from_torch(color, dtype=wp.vec3),
+            wp.from_torch(rays, dtype=wp.vec2i),
+        )
+        self._launch(view, shared, count)
+        shadow, reflection = rays.sum(dim=0, dtype=torch.int64).tolist()
+        return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
+
+    def _launch(self, view: ViewData, shared: tuple[wp.array, ...], count: int) -> None:
+        """One launch on a GPU; on the CPU many over sub-ranges, which release the interpreter lock."""
+
+        def run(first: int, dim: int) -> None:
+            wp.launch(kernels.shade_samples, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device)
+
+        if self.device != "cpu":
+            torch.cuda.synchronize()  # Warp launches on a stream of its own
+            run(0, count)
+            wp.synchronize_device(self.device)
+        elif self._pool is None:
+            run(0, count)
+        else:
+            firsts = range(0, count, _RANGE_SAMPLES)
+            for _ in self._pool.map(lambda first: run(first, min(_RANGE_SAMPLES, count - first)), firsts):
+                pass
+
+    def _view(self, time_s: float | None, aspect: float, footprint_px: float) -> ViewData:
+        """Camera record; with a time, poses of all tracks at it."""
+        tangent = math.tan(math.radians(self._camera.fov_deg) / 2.0)
+        to_world = np.asarray(self._camera.to_world, np.float64)
+        view = ViewData()
+        view.from_camera = wp.mat33(*to_world[:3, :3].astype(np.float32).reshape(-1).tolist())
+        view.from_camera_offset = wp.vec3(*to_world[:3, 3].tolist())
+        view.camera_track = self._buffers.tracks.add(self._camera.track)
+        view.tan_x, view.tan_y = tangent * max(aspect, 1.0), tangent * max(1.0 / aspect, 1.0)
+        view.spread = 2.0 * tangent / footprint_px
+        view.single_time = int(time_s is not None)
+        if time_s is not None:
+            view.pose_translation, view.pose_rotation = self._buffers.tracks.poses(time_s)
+        return view
+
+    def _check_memory(self, width_px: int, height_px: int) -> None:
+        need = width_px * height_px * _BYTES_PER_PIXEL + _CHUNK_SAMPLES * _BYTES_PER_SAMPLE
+        have = _free_memory_bytes()
+        if need > have:
+            raise ValueError(
+                f"render_frame: {width_px} x {height_px} pixels need about {need / 2**30:.1f} GiB of memory, "
+                f"{have / 2**30:.1f} GiB are free"
+            )
+
+
+def _free_memory_bytes() -> int:
+    try:
+        with open("/proc/meminfo") as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
+def _check_camera(scene: Scene) -> PerspectiveCamera:
+    camera = scene.camera
+    if not isinstance(camera, PerspectiveCamera):
+        raise SceneError(f"camera {type(camera).__name__} is not supported yet, expected PerspectiveCamera")
+    if camera.lens_radius > 0.0:
+        raise SceneError(f"PerspectiveCamera.lens_radius {camera.lens_radius} is not supported yet, expected 0")
+    if tuple(camera.shutter_s) != (0.0, 0.0):
+        raise SceneError(f"PerspectiveCamera.shutter_s {camera.shutter_s} is not supported yet, expected (0, 0)")
+    if camera.to_world.shape != (4, 4) or not np.isfinite(camera.to_world).all():
+        raise SceneError("PerspectiveCamera.to_world: expected a finite (4, 4) matrix")
+    return camera

@@ -1,0 +1,86 @@
+"""Rigid motions: their keys for the kernels, and their poses at one time in float64 on the host."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from scenes.canonical import RigidTrack
+
+
+def pose_at(track: RigidTrack, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pose of a track at one time.
+
+    Args:
+        track: keys.
+        time_s: animation time, seconds.
+
+    Returns:
+        Translation ``(3,)`` in scene units and unit quaternion ``(4,)`` as ``(x, y, z, w)``, float64.
+    """
+    last = len(track.translation) - 1
+    at = min(max((time_s - track.start_s) / track.interval_s, 0.0), float(last))
+    index = min(int(at), max(last - 1, 0))
+    fraction = at - index
+    second = min(index + 1, last)
+    translation = (1.0 - fraction) * track.translation[index] + fraction * track.translation[second]
+    a, b = track.rotation[index], track.rotation[second]
+    angle = _angle(a, b)
+    if angle > 1.0e-9:
+        rotation = (np.sin((1.0 - fraction) * angle) * a + np.sin(fraction * angle) * b) / np.sin(angle)
+    else:
+        rotation = (1.0 - fraction) * a + fraction * b
+    return translation, rotation / np.linalg.norm(rotation)
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    # by the chord: well conditioned for near keys, where an arc cosine is not
+    return 2.0 * np.arcsin(np.clip(np.linalg.norm(b - a, axis=-1) / 2.0, 0.0, 1.0))
+
+
+class TrackTable:
+    """The unique tracks of a scene; index 0 stands for "does not move"."""
+
+    def __init__(self, device: str) -> None:
+        self.device = device
+        self.tracks: list[RigidTrack] = [RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))]
+        self.rows: list[dict] = [{"first_key": 0, "key_count": 1, "start_s": 0.0, "interval_s": 1.0}]
+        self._index: dict[int, int] = {}
+
+    def add(self, track: RigidTrack | None) -> int:
+        """Index of a track; the same object gets the same index."""
+        if track is None:
+            return 0
+        if id(track) not in self._index:
+            first = self.rows[-1]["first_key"] + self.rows[-1]["key_count"]
+            self._index[id(track)] = len(self.tracks)
+            self.tracks.append(track)
+            self.rows.append(
+                {
+                    "first_key": first,
+                    "key_count": len(track.translation),
+                    "start_s": track.start_s,
+                    "interval_s": track.interval_s,
+                }
+            )
+        return self._index[id(track)]
+
+    def keys(self) -> tuple[wp.array, wp.array, wp.array]:
+        """Translations (float64), rotations and angles to the next key (float32) of all tracks."""
+        translation = np.concatenate([track.translation for track in self.tracks]).astype(np.float64)
+        rotation = np.concatenate([track.rotation for track in self.tracks])
+        # across the border of two tracks the angle is meaningless, and never read with a fraction above zero
+        angle = np.append(_angle(rotation[:-1], rotation[1:]), 0.0).astype(np.float32)
+        return (
+            wp.array(translation, dtype=wp.vec3d, device=self.device),
+            wp.array(rotation.astype(np.float32), dtype=wp.quat, device=self.device),
+            wp.array(angle, dtype=wp.float32, device=self.device),
+        )
+
+    def poses(self, time_s: float) -> tuple[wp.array, wp.array]:
+        """Translations and rotations, float32, of all tracks at one time."""
+        pairs = [pose_at(track, time_s) for track in self.tracks]
+        return (
+            wp.array(np.array([t for t, _ in pairs], np.float32), dtype=wp.vec3, device=self.device),
+            wp.array(np.array([r for _, r in pairs], np.float32), dtype=wp.quat, device=self.device),
+        )
