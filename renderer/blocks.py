@@ -20,7 +20,9 @@ def _morton_block(side: int) -> tuple[Tensor, Tensor]:
     return x, y
 
 
-def pixel_blocks(width_px: int, height_px: int, samples_per_axis: int, limit_px: int) -> Iterator[tuple[Tensor, Tensor]]:
+def pixel_blocks(
+    width_px: int, height_px: int, samples_per_axis: int, limit_px: int
+) -> Iterator[tuple[Tensor, Tensor]]:
     """Cuts a frame into chunks of whole blocks.
 
     Args:

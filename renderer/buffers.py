@@ -142,7 +142,7 @@ class _Builder:
         unit, vertices = _unit_mesh(mesh, len(self.mesh_rows))
         bvh = wp.Mesh(
             points=wp.array(vertices, dtype=wp.vec3, device=self.device),
-            indices=wp.array(np.ascontiguousarray(mesh.faces, np.int32).reshape(-1), dtype=wp.int32, device=self.device),
+            indices=wp.array(mesh.faces.reshape(-1).astype(np.int32), dtype=wp.int32, device=self.device),
         )
         self.keep.append(bvh)
         # normals of the unit mesh are those of the mesh: centring and uniform scaling do not turn them
@@ -236,7 +236,7 @@ class _Builder:
         """Fills and uploads everything."""
         scene, device = self.scene, self.device
         data = SceneData()
-        self.tracks.add(scene.camera.track if hasattr(scene.camera, "track") else None)
+        self.tracks.add(getattr(scene.camera, "track", None))
         for instance in scene.instances:
             self.instance(instance)
         light_rows, environment = self.lights()
@@ -245,10 +245,9 @@ class _Builder:
         rows = [row for row, _, _ in self.instance_rows]
         data.instance_count = len(rows)
         data.instances = _upload(rows, InstanceRecord, device)
-        tracks = [np.array([[row["track"]] for row in rows])] if rows else []
-        data.instance_track = wp.array(_pool(tracks, 1, wp.int32, np.int32, device).numpy().reshape(-1), dtype=wp.int32, device=device)
-        data.bounds_lower = _pool([np.array([low for _, low, _ in self.instance_rows])] if rows else [], 3, wp.vec3, np.float32, device)
-        data.bounds_upper = _pool([np.array([up for _, _, up in self.instance_rows])] if rows else [], 3, wp.vec3, np.float32, device)
+        data.instance_track = wp.array([row["track"] for row in rows] or [0], dtype=wp.int32, device=device)
+        data.bounds_lower = _pool([low[None] for _, low, _ in self.instance_rows], 3, wp.vec3, np.float32, device)
+        data.bounds_upper = _pool([up[None] for _, _, up in self.instance_rows], 3, wp.vec3, np.float32, device)
         data.meshes = _upload(self.mesh_rows, MeshRecord, device)
         data.vertices = _pool(self.pools.vertices, 3, wp.vec3, np.float32, device)
         data.faces = _pool(self.pools.faces, 3, wp.vec3i, np.int32, device)

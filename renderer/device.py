@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes.util
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import ModuleType
 
 import warp as wp
 
 DEVICES = ("cpu", "cuda:0")
 
-# Set on import: declaring the first record or kernel already starts Warp.
-wp.config.quiet = True
-wp.config.enable_backward = False
-
 _SLOW_LOAD_S = 0.4
-_initialised = False
+_WARNINGS_ONLY = 30
 _loaded: set[tuple[str, str]] = set()
 _lock = threading.Lock()
 
@@ -26,14 +24,29 @@ class DeviceError(ValueError):
     """The device asked for cannot be used here."""
 
 
+@contextlib.contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    """Hides what native code writes to standard error."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    sink = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(sink)
+
+
 def initialise() -> None:
-    """Starts Warp once."""
-    global _initialised
-    with _lock:
-        if _initialised:
-            return
+    """Starts Warp, silently and without code for gradients; does nothing the second time."""
+    wp.config.quiet = True
+    wp.config.log_level = _WARNINGS_ONLY
+    wp.config.enable_backward = False
+    # Without a CUDA driver Warp warns on every start; that is no fault here, and asking for CUDA reports it anyway.
+    with contextlib.nullcontext() if ctypes.util.find_library("cuda") else _quiet_stderr():
         wp.init()
-        _initialised = True
 
 
 def pick(device: str) -> str:
@@ -50,7 +63,6 @@ def pick(device: str) -> str:
     """
     if device not in DEVICES:
         raise DeviceError(f"device: expected one of {', '.join(DEVICES)}, got {device!r}")
-    initialise()
     if device != "cpu" and not wp.is_cuda_available():
         raise DeviceError(f"device {device!r}: no CUDA device is available on this machine, use 'cpu'")
     return device
@@ -89,3 +101,7 @@ def core_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+# on import: declaring the first record or kernel would otherwise start Warp with its defaults
+initialise()

@@ -25,7 +25,7 @@ def direct_light(
 ):
     """Radiance reflected from the lights towards the viewer, and the shadow rays it took.
 
-    ``albedo`` is the diffuse colour already scaled by what the mirrored part leaves; ``direction`` is the viewing ray's.
+    ``albedo`` is the diffuse colour, scaled by what the mirrored part leaves; ``direction`` is the viewing ray's.
     """
     total = wp.vec3(0.0, 0.0, 0.0)
     rays = wp.int32(0)

@@ -125,7 +125,9 @@ class Renderer:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _shade(self, position: Tensor, time_s: Tensor, aspect: float, footprint_px: float) -> tuple[Tensor, dict[str, int]]:
+    def _shade(
+        self, position: Tensor, time_s: Tensor, aspect: float, footprint_px: float
+    ) -> tuple[Tensor, dict[str, int]]:
         """Colours ``(k, 3)`` and ray counts of flat lists of samples; ``aspect`` is width over height."""
         count, home = position.shape[0], position.device
         if count == 0:
@@ -153,7 +155,9 @@ class Renderer:
         """One launch on a GPU; on the CPU many over sub-ranges, which release the interpreter lock."""
 
         def run(first: int, dim: int) -> None:
-            wp.launch(kernels.shade_samples, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device)
+            wp.launch(
+                kernels.shade_samples, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device
+            )
 
         if self.device != "cpu":
             torch.cuda.synchronize()  # Warp launches on a stream of its own
