@@ -74,7 +74,7 @@ class ResponseConfig:
     bias: float = 0.0
     """Octaves by which each decision slides along the iso-product curve: positive towards space, negative to time."""
     surplus_max: float = 1.0
-    """Bound of the running surplus C as a share of the budget; at 1 a picture that asks for nothing frees everything."""
+    """Bound of the running surplus C as a share of the budget; at 1 a still, plain picture frees all it can."""
     temporal_min: float = 1.0 / 64.0
     """Least temporal density, refreshes per cycle: even a static tile is looked at this often."""
 

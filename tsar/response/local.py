@@ -23,7 +23,6 @@ from torch import Tensor
 
 from tsar.types import Errors
 
-
 _AT_WALL = 1e-9
 
 

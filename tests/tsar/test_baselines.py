@@ -1,0 +1,55 @@
+import pytest
+import torch
+
+from tests.oracles import pictures
+from tsar.baselines import afr, frameless
+from tsar.baselines.scatter import pull_push
+from tsar.clock import fixed_clock
+from tsar.config import TsarConfig
+from tsar.morton import floor_log2
+
+CONFIG = TsarConfig(batch_size=32, resolution_px=128, warmup_cycles=6)
+
+
+def play(module, picture, cycles=4, config=CONFIG):
+    return list(module.run(config, pictures.tracer(picture), fixed_clock(0.02), 0.0, cycles * 0.02))
+
+
+@pytest.mark.parametrize("module", [frameless, afr])
+def test_constant_picture_is_shown_exactly_and_runs_repeat(module):
+    shown = play(module, pictures.constant)[-1]
+    assert torch.allclose(shown.image, torch.full((128, 128, 3), 0.4), atol=1e-5)
+    assert shown.display_time_s - shown.sample_time_s == pytest.approx(0.02)
+    again = [play(module, pictures.textured_motion)[-1].image for _ in range(2)]
+    assert torch.equal(*again) and bool(torch.isfinite(again[0]).all())
+
+
+def test_frameless_visits_every_pixel_once_a_sweep():
+    """A static picture is complete after one sweep: 128² pixels at 32 * 256 a cycle are two cycles."""
+    centre = (torch.arange(128) + 0.5) / 128
+    exact = pictures.static_stripes(centre[None].expand(128, 128), centre[:, None].expand(128, 128), None)
+    assert torch.equal(play(frameless, pictures.static_stripes)[2].image, exact)
+
+
+def test_afr_keeps_its_leaf_count_and_a_cut_that_covers_the_image():
+    depth = 14
+    tree = afr._initial(depth)
+    for cycle in range(20):
+        node, pixel = afr.draw(tree, 8192, depth, CONFIG, cycle)
+        x, y = (pixel % 128 + 0.5) / 128, (pixel // 128 + 0.5) / 128
+        luminance = pictures.moving_edge(0.0, 0.3)(x, y, torch.zeros(8192))[:, 0]
+        tree = afr.adapt(afr.observe(tree, node, luminance), depth)
+        leaves = tree.leaf.nonzero().squeeze(1)
+        assert leaves.numel() == afr.LEAVES
+        assert float(torch.exp2(-floor_log2(leaves).double()).sum()) == 1.0
+    # Small leaves gather on the edge at x = 0.3.
+    node, pixel = afr.draw(tree, 8192, depth, CONFIG, 99)
+    near = ((pixel % 128 + 0.5) / 128 - 0.3).abs() < 0.05
+    assert float(near.float().mean()) > 0.25
+
+
+def test_pull_push_keeps_known_pixels_and_fills_the_rest():
+    color, weight = torch.zeros(3, 32, 32), torch.zeros(1, 32, 32)
+    color[:, ::4, ::4], weight[:, ::4, ::4] = 0.7, 1.0
+    filled = pull_push(color, weight)
+    assert torch.allclose(filled, torch.full_like(filled, 0.7), atol=1e-5)

@@ -1,0 +1,70 @@
+"""What the single-sample baselines share: scattered requests, a buffer of the newest sample per pixel, its display."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from tsar.config import TsarConfig
+from tsar.error import replace_nonfinite
+from tsar.types import FrameletBatch, Trace
+
+
+@dataclass(frozen=True)
+class PixelBuffer:
+    """Newest sample per output pixel, raster order; changes in place.
+
+    Attributes:
+        color: ``(res * res, 3)`` float32.
+        time_s: ``(res * res,)`` float64, ``-inf`` where nothing has been sampled yet.
+    """
+
+    color: Float[Tensor, "pixels 3"]
+    time_s: Float[Tensor, " pixels"]
+
+    @staticmethod
+    def empty(config: TsarConfig) -> PixelBuffer:
+        pixels = config.resolution_px**2
+        return PixelBuffer(torch.zeros(pixels, 3), torch.full((pixels,), -torch.inf, dtype=torch.float64))
+
+
+def generator(config: TsarConfig, cycle: int) -> torch.Generator:
+    """Random numbers of one cycle: a function of seed and cycle only."""
+    return torch.Generator().manual_seed((config.seed * 1_000_003 + cycle + 500_000) % 2**63)
+
+
+def render_pixels(
+    pixel: Int64[Tensor, " samples"], config: TsarConfig, trace: Trace, time_s: float, cycle: int
+) -> tuple[Float[Tensor, "samples 3"], dict[str, int]]:
+    """Trace the centres of output pixels (raster indices), grouped into as many framelets as fit; their count must be a
+    multiple of ``config.samples``. Non-finite samples are replaced as in the adaptive pipeline."""
+    resolution = config.resolution_px
+    position = torch.stack((pixel % resolution, pixel // resolution), dim=1).to(torch.float32).add_(0.5) / resolution
+    position = position.reshape(-1, config.samples, 2)
+    nothing = torch.zeros(position.shape[0], dtype=torch.int64)
+    time = torch.full(position.shape[:2], time_s, dtype=torch.float32)
+    answer = trace(FrameletBatch(nothing, nothing, position, time, cycle=cycle, seed=config.seed))
+    color, _ = replace_nonfinite(answer.color, config.framelet_side)
+    return color.reshape(-1, 3), answer.counters
+
+
+def write(buffer: PixelBuffer, pixel: Int64[Tensor, " samples"], color: Tensor, time_s: float) -> None:
+    """Put samples into the buffer; where a pixel occurs twice, both are the same picture at the same instant."""
+    buffer.color[pixel] = color
+    buffer.time_s[pixel] = time_s
+
+
+def pull_push(color: Float[Tensor, "3 h w"], weight: Float[Tensor, "1 h w"]) -> Float[Tensor, "3 h w"]:
+    """Fill by pyramid: a pixel of weight 1 keeps its colour, one of less is blended with the coarser level, whose
+    weights are the sums of its children's, at most 1."""
+    if color.shape[1] == 1:
+        return color
+    total = 4.0 * F.avg_pool2d(weight[None], 2)[0]
+    mean = 4.0 * F.avg_pool2d((color * weight)[None], 2)[0] / total.clamp(min=1e-12)
+    coarse = pull_push(mean, total.clamp(max=1.0))
+    fine = F.interpolate(coarse[None], scale_factor=2, mode="bilinear", align_corners=False)[0]
+    return weight * color + (1.0 - weight) * fine
