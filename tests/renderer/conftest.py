@@ -1,0 +1,20 @@
+"""Kernels are compiled once, before the first test that needs them."""
+
+from __future__ import annotations
+
+import pytest
+
+from renderer import device, kernels
+from renderer.trace import Renderer
+from tests.renderer.builders import driving_scene
+
+
+@pytest.fixture(scope="session", autouse=True)
+def warm_kernels() -> None:
+    device.load_kernels(kernels, "cpu")
+
+
+@pytest.fixture(scope="session")
+def driving() -> Renderer:
+    """A renderer of the driving scene on two threads."""
+    return Renderer(driving_scene(), threads=2)
