@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import kornia
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float, Int64
@@ -20,7 +19,7 @@ from torch import Tensor
 
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
-from tsar.morton import deinterleave, raster_to_morton
+from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
 
 _SHIFT_CYCLES = 0.5
 
@@ -58,7 +57,7 @@ def reconstruct(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Rec
     reference = newest[torch.isfinite(newest)].max() if bool(torch.isfinite(newest).any()) else newest.new_zeros(())
     # Relative to the newest sample, in cycles: small numbers that float32 holds well.
     age = ((newest - reference) / cycle_s).clamp(min=-1e6).to(torch.float32)
-    threshold = smooth_age(_to_pixels(age, config.resolution_px), config.reconstruction.age_support_px)
+    threshold = smooth_age(age, config.resolution_px, config.reconstruction.age_support_px)
     total = _Accumulator(config, threshold, cache, ((cache.time_s - reference) / cycle_s).to(torch.float32))
     for level in range(config.level_min, config.level_max + 1):
         total.add_level(level)
@@ -78,92 +77,135 @@ def newest_times(cache: FrameletCache, config: TsarConfig) -> Float[Tensor, "sid
     return newest[raster_to_morton(side)].reshape(side, side)
 
 
-def _to_pixels(grid: Float[Tensor, "side side"], resolution: int) -> Float[Tensor, "h w"]:
-    repeat = resolution // grid.shape[0]
-    return grid.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1)
+def smooth_age(newest: Float[Tensor, "side side"], resolution: int, support_px: int) -> Float[Tensor, "h w"]:
+    """The age field at output pixels after one-sided smoothing: it may only become older, never newer.
 
-
-def smooth_age(newest: Float[Tensor, "h w"], support_px: int) -> Float[Tensor, "h w"]:
-    """One-sided smoothing: the field may only become older, never newer (sec. 4.2.3, fig. 4.6)."""
+    A box filter of ``support_px`` over pixels, borders repeated. The field is constant over each finest tile, so the
+    filter is a product with one small matrix on either side. Source: Stephens 2011, sec. 4.2.3 and fig. 4.6.
+    """
+    repeat = resolution // newest.shape[0]
+    pixels = newest.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1)
     if support_px == 1:
-        return newest
-    blurred = kornia.filters.box_blur(newest[None, None], (support_px, support_px), "replicate", separable=True)
-    return torch.minimum(newest, blurred[0, 0])
+        return pixels
+    box = _box_matrix(resolution, newest.shape[0], support_px)
+    return torch.minimum(pixels, box @ newest @ box.T)
+
+
+@lru_cache(maxsize=8)
+def _box_matrix(resolution: int, side: int, support_px: int) -> Float[Tensor, "h side"]:
+    """Share of each of ``side`` cells in the box around each pixel along one axis."""
+    half = support_px // 2
+    reach = torch.arange(resolution)[:, None] + torch.arange(-half, half + 1)
+    cell = reach.clamp(0, resolution - 1) // (resolution // side)
+    return F.one_hot(cell, side).to(torch.float32).mean(1)
 
 
 @lru_cache(maxsize=32)
 def spatial_weights(side: int, width_px: int) -> tuple[Float[Tensor, "p side"], int]:
     """Weights of a tile's samples at output pixels along one axis, and the pixels of margin on either side.
 
-    Bilinear about each sample where samples are at least a pixel apart, reaching half a sample spacing beyond the tile;
-    the pixel's box where they are closer. Rows sum to one inside the tile and to less in the margin.
+    Bilinear about each sample, reaching half a sample spacing beyond the tile. Edge rows hold only their share of the
+    interpolation: the neighbouring tile, whose margin covers them, adds the rest. For tiles whose samples are at least
+    a pixel apart.
     """
     spacing = width_px / side
     margin = max(0, int(torch.tensor(spacing / 2 + 0.5).ceil()) - 1)
     pixel = torch.arange(-margin, width_px + margin, dtype=torch.float64) + 0.5
     sample = (torch.arange(side, dtype=torch.float64) + 0.5) * spacing
     distance = (pixel[:, None] - sample[None, :]).abs()
-    if spacing >= 1.0:
-        weight = (1.0 - distance / spacing).clamp(min=0.0)
-        # Edge pixels have one neighbour only: the tile's own sample stands for the missing one outside the overlap.
-    else:
-        weight = (distance < 0.5).to(torch.float64) * spacing
+    weight = (1.0 - distance / spacing).clamp(min=0.0)
     return weight.to(torch.float32), margin
 
 
 class _Accumulator:
-    """Colour and weight sums over the output image, with a margin around it that is cut off at the end."""
+    """Sums of weighted colour and weight over the output image.
+
+    Two layouts, added up at the end. Tiles whose samples are at most a pixel apart reach no further than their own
+    pixels, so they accumulate in Morton order, where a tile is one contiguous row and no sample moves. Coarser tiles
+    overlap their neighbours by half a sample and accumulate in raster order, with a margin around the image.
+    """
 
     def __init__(self, config: TsarConfig, threshold: Tensor, cache: FrameletCache, time: Tensor) -> None:
         self.config, self.cache, self.time = config, cache, time
-        self.margin = spatial_weights(config.framelet_side, config.resolution_px >> config.level_min)[1]
-        self.stride = config.resolution_px + 2 * self.margin
+        resolution = config.resolution_px
+        self.margin = spatial_weights(config.framelet_side, resolution >> config.level_min)[1]
+        self.stride = resolution + 2 * self.margin
         self.threshold = F.pad(threshold[None], (self.margin,) * 4, mode="replicate")[0]
-        self.sums = [torch.zeros(self.stride**2) for _ in range(4)]
+        self.threshold_morton = threshold.reshape(-1).index_select(0, morton_to_raster(resolution))
+        self.coarse = [torch.zeros(self.stride**2) for _ in range(4)]
+        self.fine = torch.zeros(resolution**2, 4)
         self.pairs = 0
 
     def add_level(self, level: int) -> None:
         """Splat all framelets of one level that are not older than the age field everywhere."""
-        cache, side, width = self.cache, self.config.framelet_side, self.config.resolution_px >> level
-        slot = (cache.level == level).nonzero().squeeze(1)
+        width = self.config.resolution_px >> level
+        slot = (self.cache.level == level).nonzero().squeeze(1)
         if slot.numel() == 0:
             return
+        add = self._add_fine if width <= self.config.framelet_side else self._add_coarse
+        add(level, width, slot)
+
+    def _passing(self, slot: Int64[Tensor, " n"], least: Float[Tensor, " n"]) -> Int64[Tensor, " m"]:
+        """Slots not older than the least threshold in their extent; the others are marked dead."""
+        passes = self.time[slot] >= least
+        self.cache.dead[slot[~passes]] = True
+        return slot[passes]
+
+    def _add_fine(self, level: int, width: int, slot: Int64[Tensor, " n"]) -> None:
+        threshold = self.threshold_morton.reshape(-1, width**2)
+        slot = self._passing(slot, threshold.amin(1)[self.cache.index[slot]])
+        tile = self.cache.index[slot]
+        weight = self._temporal_weight(slot, threshold.index_select(0, tile))
+        # Pixels of a tile are runs of its samples, both being in Morton order.
+        per_pixel = self.config.samples // width**2
+        color = self.cache.color.index_select(0, slot)
+        color = color if per_pixel == 1 else color.unflatten(1, (width**2, per_pixel)).mean(2)
+        value = torch.cat((color * weight[..., None], weight[..., None]), dim=2)
+        self.fine.reshape(-1, width**2 * 4).index_add_(0, tile, value.flatten(1))
+        self.pairs += weight.numel()
+
+    def _add_coarse(self, level: int, width: int, slot: Int64[Tensor, " n"]) -> None:
+        side = self.config.framelet_side
         weights, margin = spatial_weights(side, width)
         # Least threshold over each tile with its margin decides whether a framelet can contribute at all.
         inset = self.margin - margin
         field = self.threshold[inset : self.stride - inset, inset : self.stride - inset]
         least = -F.max_pool2d(-field[None, None], width + 2 * margin, stride=width)[0, 0]
-        x, y = deinterleave(cache.index[slot])
-        passes = self.time[slot] >= least[y, x]
-        cache.dead[slot[~passes]] = True
-        slot, x, y = slot[passes], x[passes], y[passes]
+        x, y = deinterleave(self.cache.index[slot])
+        slot = self._passing(slot, least[y, x])
+        x, y = deinterleave(self.cache.index[slot])
         corner = (y * width + inset) * self.stride + x * width + inset
         pixel = corner[:, None] + _block_offsets(weights.shape[0], self.stride)
-        weight = self._temporal_weight(slot, pixel) * (weights.sum(1)[:, None] * weights.sum(1)[None, :]).reshape(-1)
-        samples = cache.color[slot][:, raster_to_morton(side)].transpose(1, 2).reshape(-1, 3, side, side)
+        threshold = self.threshold.reshape(-1).index_select(0, pixel.reshape(-1)).reshape(pixel.shape)
+        weight = self._temporal_weight(slot, threshold)
+        weight = weight * (weights.sum(1)[:, None] * weights.sum(1)[None, :]).reshape(-1)
+        samples = self.cache.color[slot][:, raster_to_morton(side)].transpose(1, 2).reshape(-1, 3, side, side)
         # Rows of the margin sum to less than one; the colour there is the weighted mean of the samples in reach.
-        unit = weights / weights.sum(1, keepdim=True).clamp(min=1e-12)
+        unit = weights / weights.sum(1, keepdim=True)
         color = (unit @ samples @ unit.T).flatten(2)
         flat = pixel.reshape(-1)
         for channel in range(3):
-            self.sums[channel].index_add_(0, flat, (color[:, channel] * weight).reshape(-1))
-        self.sums[3].index_add_(0, flat, weight.reshape(-1))
+            self.coarse[channel].index_add_(0, flat, (color[:, channel] * weight).reshape(-1))
+        self.coarse[3].index_add_(0, flat, weight.reshape(-1))
         self.pairs += flat.numel()
 
-    def _temporal_weight(self, slot: Int64[Tensor, " n"], pixel: Int64[Tensor, "n p"]) -> Float[Tensor, "n p"]:
+    def _temporal_weight(self, slot: Int64[Tensor, " n"], threshold: Float[Tensor, "n p"]) -> Float[Tensor, "n p"]:
         """Cycles by which a framelet is newer than the age field, plus half a cycle; 0 where it is older."""
-        newer = self.time[slot][:, None] - self.threshold.reshape(-1)[pixel]
+        newer = self.time[slot][:, None] - threshold
         return torch.where(newer >= 0, newer + _SHIFT_CYCLES, 0.0)
 
     def normalised(self) -> Float[Tensor, "h w 3"]:
         """Divide by the weight; where nothing passed, fill from the surroundings."""
-        stacked = torch.stack(self.sums).reshape(4, self.stride, self.stride)
-        inner = slice(self.margin, self.margin + self.config.resolution_px)
-        stacked = stacked[:, inner, inner]
-        hole = stacked[3] <= 0
+        resolution = self.config.resolution_px
+        inner = slice(self.margin, self.margin + resolution)
+        total = self.fine.index_select(0, raster_to_morton(resolution)).reshape(resolution, resolution, 4)
+        for channel, plane in enumerate(self.coarse):
+            total[..., channel] += plane.reshape(self.stride, self.stride)[inner, inner]
+        hole = total[..., 3:] <= 0
         if bool(hole.any()):
-            stacked = torch.where(hole, _fill_from_coarser(stacked), stacked)
-        return (stacked[:3] / stacked[3]).permute(1, 2, 0).contiguous()
+            filled = _fill_from_coarser(total.permute(2, 0, 1)).permute(1, 2, 0)
+            total = torch.where(hole, filled, total)
+        return total[..., :3] / total[..., 3:]
 
 
 @lru_cache(maxsize=32)
