@@ -16,6 +16,7 @@ from renderer.structs import (
     SHAPE_MESH,
     SHAPE_RECTANGLE,
     SHAPE_SPHERE,
+    GroupRecord,
     InstanceRecord,
     LevelRecord,
     LightRecord,
@@ -199,6 +200,17 @@ class _Builder:
         }
         self.instance_rows.append((row, placed.min(axis=0) - margin, placed.max(axis=0) + margin))
 
+    def groups(self) -> list[dict]:
+        """Runs of instances on one track, from instances sorted by track."""
+        groups: list[dict] = []
+        for index, (row, lower, upper) in enumerate(self.instance_rows):
+            if not groups or groups[-1]["track"] != row["track"]:
+                groups.append({"track": row["track"], "first": index, "radius": 0.0})
+            radius = 1.00001 * float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper))))
+            groups[-1]["end"] = index + 1
+            groups[-1]["radius"] = max(groups[-1]["radius"], radius)
+        return groups
+
     def lights(self) -> tuple[list[dict], EnvironmentLight | None]:
         """Rows of the lights that cast shadows, and the environment."""
         rows: list[dict] = []
@@ -243,9 +255,10 @@ class _Builder:
         self.environment(environment, data)
         self.instance_rows.sort(key=lambda entry: entry[0]["track"])  # stable: one pose serves a run of instances
         rows = [row for row, _, _ in self.instance_rows]
-        data.instance_count = len(rows)
+        groups = self.groups()
+        data.group_count = len(groups)
+        data.groups = _upload(groups, GroupRecord, device)
         data.instances = _upload(rows, InstanceRecord, device)
-        data.instance_track = wp.array([row["track"] for row in rows] or [0], dtype=wp.int32, device=device)
         data.bounds_lower = _pool([low[None] for _, low, _ in self.instance_rows], 3, wp.vec3, np.float32, device)
         data.bounds_upper = _pool([up[None] for _, _, up in self.instance_rows], 3, wp.vec3, np.float32, device)
         data.meshes = _upload(self.mesh_rows, MeshRecord, device)

@@ -21,23 +21,36 @@ def rotation_between(a: wp.quat, b: wp.quat, angle: wp.float32, fraction: wp.flo
 
 
 @wp.func
-def track_pose(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp.float64):
-    """Translation and rotation of a track; the pose of all samples of a launch where they share one time."""
-    if view.single_time == 1:
-        return view.pose_translation[track], view.pose_rotation[track]
+def track_key(scene: SceneData, track: wp.int32, time_s: wp.float64):
+    """Indices of the keys around a time, and how far between them it lies; float64 keeps hours of animation exact."""
     record = scene.tracks[track]
     last = record.key_count - 1
     at = wp.clamp((time_s - record.start_s) / record.interval_s, wp.float64(0.0), wp.float64(last))
     index = wp.min(wp.int32(at), wp.max(last - 1, 0))
-    fraction = at - wp.float64(index)
     first = record.first_key + index
-    second = wp.min(first + 1, record.first_key + last)
+    return first, wp.min(first + 1, record.first_key + last), at - wp.float64(index)
+
+
+@wp.func
+def track_translation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp.float64) -> wp.vec3:
+    """Where a track's origin is; taken from the host where all samples of a launch share one time."""
+    if view.single_time == 1:
+        return view.pose_translation[track]
+    first, second, fraction = track_key(scene, track, time_s)
     start = scene.key_translation[first]
-    translation = start + (scene.key_translation[second] - start) * fraction
-    rotation = rotation_between(
+    at = start + (scene.key_translation[second] - start) * fraction
+    return wp.vec3(wp.float32(at[0]), wp.float32(at[1]), wp.float32(at[2]))
+
+
+@wp.func
+def track_rotation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp.float64) -> wp.quat:
+    """How a track is turned, as :func:`track_translation`."""
+    if view.single_time == 1:
+        return view.pose_rotation[track]
+    first, second, fraction = track_key(scene, track, time_s)
+    return rotation_between(
         scene.key_rotation[first], scene.key_rotation[second], scene.key_angle[first], wp.float32(fraction)
     )
-    return wp.vec3(wp.float32(translation[0]), wp.float32(translation[1]), wp.float32(translation[2])), rotation
 
 
 @wp.func
@@ -51,7 +64,7 @@ def camera_ray(scene: SceneData, view: ViewData, position: wp.vec2, time_s: wp.f
     origin = view.from_camera_offset
     direction = view.from_camera * local
     if view.camera_track != 0:
-        translation, rotation = track_pose(scene, view, view.camera_track, time_s)
-        origin = wp.quat_rotate(rotation, origin) + translation
+        rotation = track_rotation(scene, view, view.camera_track, time_s)
+        origin = wp.quat_rotate(rotation, origin) + track_translation(scene, view, view.camera_track, time_s)
         direction = wp.quat_rotate(rotation, direction)
     return origin, wp.normalize(direction)

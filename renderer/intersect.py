@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.camera import track_pose
+from renderer.camera import track_rotation, track_translation
 from renderer.structs import (
     SHAPE_DISK,
     SHAPE_MESH,
@@ -112,9 +112,15 @@ def cube_distance(origin: wp.vec3, direction: wp.vec3):
 
 
 @wp.func
-def to_track(origin: wp.vec3, direction: wp.vec3, translation: wp.vec3, rotation: wp.quat):
-    """A world ray in the space a rigid track acts on."""
-    return wp.quat_rotate_inv(rotation, origin - translation), wp.quat_rotate_inv(rotation, direction)
+def misses_sphere(from_center: wp.vec3, direction: wp.vec3, radius: wp.float32, t_max: wp.float32) -> wp.bool:
+    """Whether a ray that starts at ``from_center`` surely stays outside a sphere up to ``t_max``."""
+    b = wp.dot(from_center, direction)
+    squared = wp.dot(from_center, from_center)
+    if squared <= radius * radius:
+        return False
+    nearest = from_center - b * direction
+    # the slack covers what rounding takes from a far start
+    return b > 0.0 or -b - radius > t_max or wp.dot(nearest, nearest) > radius * radius + 4.0e-6 * squared
 
 
 @wp.func
@@ -152,6 +158,20 @@ def meet_instance(
 
 
 @wp.func
+def instance_blocks(
+    scene: SceneData, record: InstanceRecord, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+) -> wp.bool:
+    """Whether an instance lies along a ray in track space before ``t_max``; any hit will do."""
+    if record.shape == _MESH:
+        start = record.to_local * origin + record.to_local_offset
+        towards = record.to_local * direction
+        stretch = wp.length(towards)
+        return wp.mesh_query_ray_anyhit(scene.meshes[record.mesh].id, start, towards / stretch, t_max * stretch)
+    hit = meet_instance(scene, record, origin, direction, t_max)
+    return hit.instance == 0
+
+
+@wp.func
 def closest_hit(
     scene: SceneData, view: ViewData, time_s: wp.float64, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
 ) -> Hit:
@@ -159,21 +179,26 @@ def closest_hit(
     best = Hit()
     best.instance = -1
     best.t = t_max
-    track = wp.int32(0)
-    start = wp.vec3(origin[0], origin[1], origin[2])
-    towards = wp.vec3(direction[0], direction[1], direction[2])
-    inverse = reciprocal(direction)
-    for i in range(scene.instance_count):
-        if scene.instance_track[i] != track:
-            track = scene.instance_track[i]
-            translation, rotation = track_pose(scene, view, track, time_s)
-            start, towards = to_track(origin, direction, translation, rotation)
+    for g in range(scene.group_count):
+        group = scene.groups[g]
+        start = wp.vec3(origin[0], origin[1], origin[2])
+        towards = wp.vec3(direction[0], direction[1], direction[2])
+        missed = wp.bool(False)
+        if group.track != 0:
+            start = origin - track_translation(scene, view, group.track, time_s)
+            missed = misses_sphere(start, direction, group.radius, best.t)
+            if not missed:
+                rotation = track_rotation(scene, view, group.track, time_s)
+                start = wp.quat_rotate_inv(rotation, start)
+                towards = wp.quat_rotate_inv(rotation, direction)
+        if not missed:
             inverse = reciprocal(towards)
-        if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], best.t):
-            hit = meet_instance(scene, scene.instances[i], start, towards, best.t)
-            if hit.instance == 0:
-                best = hit
-                best.instance = i
+            for i in range(group.first, group.end):
+                if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], best.t):
+                    hit = meet_instance(scene, scene.instances[i], start, towards, best.t)
+                    if hit.instance == 0:
+                        best = hit
+                        best.instance = i
     return best
 
 
@@ -182,18 +207,22 @@ def occluded(
     scene: SceneData, view: ViewData, time_s: wp.float64, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
 ) -> wp.bool:
     """Whether anything lies along a world ray before ``t_max``."""
-    track = wp.int32(0)
-    start = wp.vec3(origin[0], origin[1], origin[2])
-    towards = wp.vec3(direction[0], direction[1], direction[2])
-    inverse = reciprocal(direction)
-    for i in range(scene.instance_count):
-        if scene.instance_track[i] != track:
-            track = scene.instance_track[i]
-            translation, rotation = track_pose(scene, view, track, time_s)
-            start, towards = to_track(origin, direction, translation, rotation)
+    for g in range(scene.group_count):
+        group = scene.groups[g]
+        start = wp.vec3(origin[0], origin[1], origin[2])
+        towards = wp.vec3(direction[0], direction[1], direction[2])
+        missed = wp.bool(False)
+        if group.track != 0:
+            start = origin - track_translation(scene, view, group.track, time_s)
+            missed = misses_sphere(start, direction, group.radius, t_max)
+            if not missed:
+                rotation = track_rotation(scene, view, group.track, time_s)
+                start = wp.quat_rotate_inv(rotation, start)
+                towards = wp.quat_rotate_inv(rotation, direction)
+        if not missed:
             inverse = reciprocal(towards)
-        if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], t_max):
-            hit = meet_instance(scene, scene.instances[i], start, towards, t_max)
-            if hit.instance == 0:
-                return True
+            for i in range(group.first, group.end):
+                if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], t_max):
+                    if instance_blocks(scene, scene.instances[i], start, towards, t_max):
+                        return True
     return False

@@ -107,12 +107,22 @@ class LightRecord:
 
 
 @wp.struct
+class GroupRecord:
+    """A run of instances on one track, and the sphere about the track's origin that holds them whatever its turn."""
+
+    track: wp.int32
+    first: wp.int32
+    end: wp.int32
+    radius: wp.float32
+
+
+@wp.struct
 class SceneData:
     """The scene as kernels see it; instances are sorted by track."""
 
-    instance_count: wp.int32
+    group_count: wp.int32
+    groups: wp.array(dtype=GroupRecord)
     instances: wp.array(dtype=InstanceRecord)
-    instance_track: wp.array(dtype=wp.int32)
     bounds_lower: wp.array(dtype=wp.vec3)  # of each instance, in its track space
     bounds_upper: wp.array(dtype=wp.vec3)
     meshes: wp.array(dtype=MeshRecord)

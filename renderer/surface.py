@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.camera import track_pose
+from renderer.camera import track_rotation, track_translation
 from renderer.structs import (
     SHAPE_DISK,
     SHAPE_MESH,
@@ -147,7 +147,8 @@ def surface_at(
     rotation = wp.quat(0.0, 0.0, 0.0, 1.0)
     point = origin + hit.t * direction
     if record.track != 0:
-        translation, rotation = track_pose(scene, view, record.track, time_s)
+        translation = track_translation(scene, view, record.track, time_s)
+        rotation = track_rotation(scene, view, record.track, time_s)
         point = wp.quat_rotate_inv(rotation, point - translation)
     local = local_surface(scene, record, hit, record.to_local * point + record.to_local_offset)
     to_local_transposed = wp.transpose(record.to_local)

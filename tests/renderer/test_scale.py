@@ -22,13 +22,10 @@ from tests.renderer.builders import WHITE, look_at, place, sphere_mesh
 
 SCALES = (1e-3, 1.0, 1e3)
 
+_FACES = "013 032 467 475 045 051 237 276 026 064 157 173"
 BOX = Mesh(
     np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32),
-    np.array(
-        [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4)]
-        + [(1, 5, 7), (1, 7, 3)],
-        np.int32,
-    ),
+    np.array([[int(corner) for corner in face] for face in _FACES.split()], np.int32),
 )
 
 
