@@ -1,0 +1,76 @@
+"""Writing files so that a reader never sees half of one."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+PARTIAL = ".partial"
+"""Ending of the name a file has while it is being written."""
+
+
+@contextmanager
+def atomic(path: Path, keep_partial: bool = False) -> Iterator[Path]:
+    """A temporary name beside ``path``, moved there when the block ends well.
+
+    Args:
+        path: where the finished file goes; its folder is created.
+        keep_partial: leave what was written under its temporary name when the block raises, instead of removing it.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # the ending stays last: writers choose the format by it
+    temporary = path.with_name(f"{path.stem}{PARTIAL}{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        if not keep_partial:
+            temporary.unlink(missing_ok=True)
+
+
+def writable_folder(path: Path, what: str) -> Path:
+    """Creates a folder and checks that files can be written there.
+
+    Raises:
+        ValueError: it is a file, or cannot be created or written; the message names ``what`` and the path.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".probe{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise ValueError(f"{what}: cannot write to {str(path)!r} ({error.strerror or error})") from None
+    return path
+
+
+def plain(value: Any) -> Any:
+    """A value made of what JSON knows: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else ("inf" if value > 0 else "-inf")
+    if isinstance(value, Path):
+        return str(value)
+    if value is None or isinstance(value, (str, int, float, bool)):
+        return value
+    raise TypeError(f"plain: cannot write a {type(value).__name__} to JSON")
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Writes valid JSON atomically."""
+    text = json.dumps(plain(value), indent=1, allow_nan=False)
+    with atomic(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")

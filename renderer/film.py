@@ -1,0 +1,190 @@
+"""Image files: EXR (linear, half or float), PNG and PPM (sRGB, 8 bit), and MP4 sequences.
+
+Every writer writes to a temporary name and moves it into place, and returns how many values were not finite.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from numpy.typing import NDArray
+from torch import Tensor
+
+STILL_FORMATS = (".exr", ".png", ".ppm")
+FORMATS = (*STILL_FORMATS, ".mp4")
+
+
+class FilmError(ValueError):
+    """An image that cannot be written; the message names the file and the reason."""
+
+
+@contextmanager
+def _placed(path: Path) -> Iterator[Path]:
+    """A temporary name beside ``path``, moved there when the block ends well and removed when it does not."""
+    temporary = path.with_name(f"{path.stem}.partial{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not os.access(path.parent, os.W_OK):
+            raise FilmError(f"{path}: the folder is not writable")
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise FilmError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        try:
+            temporary.unlink(missing_ok=True)
+        except OSError:
+            pass
+
+
+def count_nonfinite(image: Tensor) -> int:
+    """Values that are infinite or NaN."""
+    return int((~torch.isfinite(image)).sum())
+
+
+def encode_srgb(image: Float[Tensor, "h w 3"]) -> NDArray[np.uint8]:
+    """``(h, w, 3)`` uint8 sRGB of linear radiance, clipped; NaN becomes black, infinity white."""
+    from kornia.color import linear_rgb_to_rgb
+
+    finite = torch.nan_to_num(image.detach().cpu().to(torch.float32), nan=0.0, posinf=1.0, neginf=0.0).clamp(0.0, 1.0)
+    encoded = linear_rgb_to_rgb(finite.permute(2, 0, 1)).permute(1, 2, 0)
+    return (encoded * 255.0 + 0.5).clamp(0.0, 255.0).to(torch.uint8).contiguous().numpy()
+
+
+def write_exr(path: Path, image: Float[Tensor, "h w 3"], half: bool = True) -> int:
+    """Writes linear radiance.
+
+    Args:
+        path: file to write.
+        image: linear RGB.
+        half: 16-bit floats; False keeps 32 bits.
+
+    Returns:
+        How many values were not finite (they are written as they are).
+
+    Raises:
+        FilmError: the file cannot be written.
+    """
+    import OpenEXR
+
+    pixels = np.ascontiguousarray(image.detach().cpu().numpy(), dtype=np.float32)
+    if half:
+        limit = np.float32(np.finfo(np.float16).max)
+        # values beyond half's range would silently become infinite
+        pixels = np.where(np.isfinite(pixels), np.clip(pixels, -limit, limit), pixels).astype(np.float16)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with _placed(path) as temporary:
+        try:
+            OpenEXR.File(header, {"RGB": pixels}).write(str(temporary))
+        except (RuntimeError, ValueError) as error:
+            raise FilmError(f"{path}: cannot be written ({error})") from None
+    return count_nonfinite(image)
+
+
+def read_exr(path: Path) -> NDArray[np.float32]:
+    """``(h, w, 3)`` float32 linear RGB of an EXR file with RGB channels."""
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path)) as file:
+            return np.asarray(file.channels()["RGB"].pixels, dtype=np.float32)
+    except (RuntimeError, KeyError, OSError, ValueError) as error:
+        raise FilmError(f"{path}: cannot be read as RGB EXR ({error})") from None
+
+
+def write_png(path: Path, image: Float[Tensor, "h w 3"]) -> int:
+    """Writes an 8-bit sRGB PNG; returns and raises as :func:`write_exr`."""
+    from PIL import Image
+
+    with _placed(path) as temporary:
+        Image.fromarray(encode_srgb(image)).save(temporary, format="PNG")
+    return count_nonfinite(image)
+
+
+def write_ppm(path: Path, image: Float[Tensor, "h w 3"]) -> int:
+    """Writes an 8-bit sRGB binary PPM (P6); returns and raises as :func:`write_exr`."""
+    pixels = encode_srgb(image)
+    with _placed(path) as temporary:
+        temporary.write_bytes(f"P6\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes())
+    return count_nonfinite(image)
+
+
+def write_image(path: Path, image: Float[Tensor, "h w 3"]) -> int:
+    """Writes in the format that the name ends in; returns and raises as :func:`write_exr`."""
+    writers = {".exr": write_exr, ".png": write_png, ".ppm": write_ppm}
+    ending = path.suffix.lower()
+    if ending not in writers:
+        raise FilmError(f"{path}: expected a name ending in {', '.join(STILL_FORMATS)}, got {ending!r}")
+    return writers[ending](path, image)
+
+
+class Mp4Writer:
+    """An H.264 film (MPEG-4 part 2 where there is no encoder for it), written frame by frame.
+
+    A context manager: the file appears under its name when the block ends well. 8-bit frames of even width and height.
+
+    Attributes:
+        frames: how many were written.
+    """
+
+    def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:
+        """Raises FilmError if a size is odd or the file cannot be written."""
+        if width_px % 2 or height_px % 2 or min(width_px, height_px) < 2:
+            raise FilmError(f"{path}: MP4 needs an even width and height, got {width_px} x {height_px}")
+        if not fps > 0:
+            raise FilmError(f"{path}: expected a positive frame rate, got {fps}")
+        self.path, self.frames = path, 0
+        self._size, self._fps, self._crf = (width_px, height_px), fps, crf
+        self._placing = _placed(path)
+
+    def __enter__(self) -> Mp4Writer:
+        import av
+        from av.error import FFmpegError
+
+        temporary = self._placing.__enter__()
+        try:
+            self._container = av.open(str(temporary), mode="w")
+            codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
+            self._stream = self._container.add_stream(codec, rate=_fraction(self._fps))
+            self._stream.width, self._stream.height = self._size
+            self._stream.pix_fmt = "yuv420p"
+            if codec == "libx264":
+                self._stream.options = {"crf": str(self._crf), "preset": "veryfast"}
+            else:
+                self._stream.bit_rate = max(1_000_000, int(4 * self._size[0] * self._size[1] * self._fps / 8))
+        except (FFmpegError, OSError) as error:
+            self._placing.__exit__(FilmError, FilmError(), None)
+            raise FilmError(f"{self.path}: cannot be written ({error})") from None
+        return self
+
+    def add(self, pixels: NDArray[np.uint8]) -> None:
+        """Appends a frame ``(h, w, 3)`` uint8 sRGB."""
+        import av
+
+        if pixels.shape != (self._size[1], self._size[0], 3):
+            raise FilmError(f"{self.path}: expected frames {self._size[1]} x {self._size[0]} x 3, got {pixels.shape}")
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
+        for packet in self._stream.encode(frame):
+            self._container.mux(packet)
+        self.frames += 1
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool | None:
+        try:
+            if kind is None:
+                for packet in self._stream.encode():
+                    self._container.mux(packet)
+        finally:
+            self._container.close()
+        return self._placing.__exit__(kind, error, trace)  # type: ignore[arg-type]
+
+
+def _fraction(fps: float):
+    from fractions import Fraction
+
+    return Fraction(fps).limit_denominator(1001)
