@@ -273,6 +273,7 @@ class _Builder:
         data.light_count = len(light_rows)
         data.lights = _upload(light_rows, LightRecord, device)
         data.tracks = _upload(self.tracks.rows, TrackRecord, device)
+        self.tracks.finish()
         data.key_translation, data.key_rotation, data.key_angle = self.tracks.keys()
         data.ambient = wp.vec3(*map(float, scene.ambient))
         data.depth = UNLIMITED_DEPTH if scene.integrator.depth < 0 else int(scene.integrator.depth)

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from types import ModuleType
 
+import torch
 import warp as wp
 
 DEVICES = ("cpu", "cuda:0")
@@ -63,7 +64,7 @@ def pick(device: str) -> str:
     """
     if device not in DEVICES:
         raise DeviceError(f"device: expected one of {', '.join(DEVICES)}, got {device!r}")
-    if device != "cpu" and not wp.is_cuda_available():
+    if device != "cpu" and not (wp.is_cuda_available() and torch.cuda.is_available()):
         raise DeviceError(f"device {device!r}: no CUDA device is available on this machine, use 'cpu'")
     return device
 

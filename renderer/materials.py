@@ -46,7 +46,7 @@ def mip_levels(image: np.ndarray) -> list[np.ndarray]:
     levels = [np.ascontiguousarray(image, np.float32)]
     while max(levels[-1].shape[:2]) > 1:
         height, width = (max(1, side // 2) for side in levels[-1].shape[:2])
-        planes = torch.from_numpy(levels[-1]).permute(2, 0, 1)
+        planes = torch.tensor(levels[-1]).permute(2, 0, 1)
         smaller = torch.nn.functional.adaptive_avg_pool2d(planes, (height, width))
         levels.append(smaller.permute(1, 2, 0).contiguous().numpy())
     return levels

@@ -20,7 +20,9 @@ from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from tsar.types import FrameletBatch, SampleBatch
 
 _CHUNK_SAMPLES = 1 << 18
-_RANGE_SAMPLES = 4096  # per launch: its fixed cost of about 20 µs stays well below one per cent
+# Samples per launch on the CPU: enough that the fixed cost of about 20 µs is small, few enough that threads end together.
+_RANGE_SAMPLES = (1024, 4096)
+_RANGES_PER_THREAD = 4
 _BYTES_PER_SAMPLE = 64  # position, time, colour and counts, and their copies in flight
 _BYTES_PER_PIXEL = 12 + 8  # colour, and its place in the order of rendering
 
@@ -166,8 +168,8 @@ class Renderer:
         elif self._pool is None:
             run(0, count)
         else:
-            firsts = range(0, count, _RANGE_SAMPLES)
-            for _ in self._pool.map(lambda first: run(first, min(_RANGE_SAMPLES, count - first)), firsts):
+            step = min(max(count // (_RANGES_PER_THREAD * self.threads), _RANGE_SAMPLES[0]), _RANGE_SAMPLES[1])
+            for _ in self._pool.map(lambda first: run(first, min(step, count - first)), range(0, count, step)):
                 pass
 
     def _view(self, time_s: float | None, aspect: float, footprint_px: float) -> ViewData:

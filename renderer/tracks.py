@@ -7,30 +7,7 @@ import warp as wp
 
 from scenes.canonical import RigidTrack
 
-
-def pose_at(track: RigidTrack, time_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pose of a track at one time.
-
-    Args:
-        track: keys.
-        time_s: animation time, seconds.
-
-    Returns:
-        Translation ``(3,)`` in scene units and unit quaternion ``(4,)`` as ``(x, y, z, w)``, float64.
-    """
-    last = len(track.translation) - 1
-    at = min(max((time_s - track.start_s) / track.interval_s, 0.0), float(last))
-    index = min(int(at), max(last - 1, 0))
-    fraction = at - index
-    second = min(index + 1, last)
-    translation = (1.0 - fraction) * track.translation[index] + fraction * track.translation[second]
-    a, b = track.rotation[index], track.rotation[second]
-    angle = _angle(a, b)
-    if angle > 1.0e-9:
-        rotation = (np.sin((1.0 - fraction) * angle) * a + np.sin(fraction * angle) * b) / np.sin(angle)
-    else:
-        rotation = (1.0 - fraction) * a + fraction * b
-    return translation, rotation / np.linalg.norm(rotation)
+_STILL = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -39,11 +16,14 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 class TrackTable:
-    """The unique tracks of a scene; index 0 stands for "does not move"."""
+    """The unique tracks of a scene; index 0 stands for "does not move".
+
+    Tracks are added, then :meth:`finish` lays out their keys; after that the table does not change.
+    """
 
     def __init__(self, device: str) -> None:
         self.device = device
-        self.tracks: list[RigidTrack] = [RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))]
+        self.tracks: list[RigidTrack] = [_STILL]
         self.rows: list[dict] = [{"first_key": 0, "key_count": 1, "start_s": 0.0, "interval_s": 1.0}]
         self._index: dict[int, int] = {}
 
@@ -65,22 +45,52 @@ class TrackTable:
             )
         return self._index[id(track)]
 
-    def keys(self) -> tuple[wp.array, wp.array, wp.array]:
-        """Translations (float64), rotations and angles to the next key (float32) of all tracks."""
-        translation = np.concatenate([track.translation for track in self.tracks]).astype(np.float64)
-        rotation = np.concatenate([track.rotation for track in self.tracks])
+    def finish(self) -> None:
+        """Joins the keys of all tracks into tables."""
+        columns = ("first_key", "key_count", "start_s", "interval_s")
+        self._first, count, self._start_s, self._interval_s = (np.array([row[c] for row in self.rows]) for c in columns)
+        self._last = count - 1
+        self._translation = np.concatenate([track.translation for track in self.tracks]).astype(np.float64)
+        self._rotation = np.concatenate([track.rotation for track in self.tracks]).astype(np.float64)
         # across the border of two tracks the angle is meaningless, and never read with a fraction above zero
-        angle = np.append(_angle(rotation[:-1], rotation[1:]), 0.0).astype(np.float32)
+        self._key_angle = np.append(_angle(self._rotation[:-1], self._rotation[1:]), 0.0)
+
+    def keys(self) -> tuple[wp.array, wp.array, wp.array]:
+        """Translations (float64), rotations and angles to the next key (float32) of all tracks, on the device."""
         return (
-            wp.array(translation, dtype=wp.vec3d, device=self.device),
-            wp.array(rotation.astype(np.float32), dtype=wp.quat, device=self.device),
-            wp.array(angle, dtype=wp.float32, device=self.device),
+            wp.array(self._translation, dtype=wp.vec3d, device=self.device),
+            wp.array(self._rotation.astype(np.float32), dtype=wp.quat, device=self.device),
+            wp.array(self._key_angle.astype(np.float32), dtype=wp.float32, device=self.device),
         )
 
+    def evaluate(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Poses of all tracks at one time.
+
+        Args:
+            time_s: animation time, seconds.
+
+        Returns:
+            Translations ``(tracks, 3)`` in scene units and unit quaternions ``(tracks, 4)`` as ``(x, y, z, w)``,
+            float64.
+        """
+        at = np.clip((time_s - self._start_s) / self._interval_s, 0.0, self._last)
+        index = np.minimum(at.astype(np.int64), np.maximum(self._last - 1, 0))
+        fraction = (at - index)[:, None]
+        a = self._first + index
+        b = np.minimum(a + 1, self._first + self._last)
+        translation = (1.0 - fraction) * self._translation[a] + fraction * self._translation[b]
+        angle = np.where(b > a, self._key_angle[a], 0.0)[:, None]
+        small = angle < 1.0e-9
+        sine = np.where(small, 1.0, np.sin(angle))
+        weight_a = np.where(small, 1.0 - fraction, np.sin((1.0 - fraction) * angle) / sine)
+        weight_b = np.where(small, fraction, np.sin(fraction * angle) / sine)
+        rotation = weight_a * self._rotation[a] + weight_b * self._rotation[b]
+        return translation, rotation / np.linalg.norm(rotation, axis=1, keepdims=True)
+
     def poses(self, time_s: float) -> tuple[wp.array, wp.array]:
-        """Translations and rotations, float32, of all tracks at one time."""
-        pairs = [pose_at(track, time_s) for track in self.tracks]
+        """Translations and rotations of all tracks at one time, float32, on the device."""
+        translation, rotation = self.evaluate(time_s)
         return (
-            wp.array(np.array([t for t, _ in pairs], np.float32), dtype=wp.vec3, device=self.device),
-            wp.array(np.array([r for _, r in pairs], np.float32), dtype=wp.quat, device=self.device),
+            wp.array(translation.astype(np.float32), dtype=wp.vec3, device=self.device),
+            wp.array(rotation.astype(np.float32), dtype=wp.quat, device=self.device),
         )

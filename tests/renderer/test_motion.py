@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from renderer.trace import Renderer
-from renderer.tracks import pose_at
+from renderer.tracks import TrackTable
 from scenes.canonical import RigidTrack
 from tests.oracles.brute_force_tracer import track_matrix
 from tests.renderer.builders import batch, driving_scene, grid, turning_track
@@ -16,7 +16,11 @@ from tests.renderer.builders import batch, driving_scene, grid, turning_track
 @pytest.mark.parametrize("time_s", [-5.0, -0.2, 0.1, 0.25, 0.9999, 1.0, 3.0])
 def test_pose_on_the_host_is_scipys(time_s: float) -> None:
     track = turning_track(4)
-    translation, rotation = pose_at(track, time_s)
+    table = TrackTable("cpu")
+    table.add(turning_track(5, keys=1))
+    assert table.add(track) == 2
+    table.finish()
+    translation, rotation = (values[2] for values in table.evaluate(time_s))
     matrix = track_matrix(track, time_s)
     np.testing.assert_allclose(translation, matrix[:3, 3], atol=1e-12)
     x, y, z, w = rotation
