@@ -78,7 +78,6 @@ class StepWriter:
         self._rows_per_group = rows_per_group
         self._pending: list[dict[str, Any]] = []
         self._writer: pq.ParquetWriter | None = None
-        self._schema: pa.Schema | None = None
 
     def __enter__(self) -> StepWriter:
         return self
@@ -115,20 +114,22 @@ class StepWriter:
     def _flush(self) -> None:
         if not self._pending:
             return
-        if self._schema is None:
-            columns = dict(_FIELDS)
-            columns |= {name: pa.float64() for name in self._pending[0] if name.startswith("stage_")}
-            columns |= {name: pa.int64() for name in self._pending[0] if name.startswith("count_")}
-            metadata = {_META: json.dumps(plain(self._limits)).encode()}
-            self._schema = pa.schema(columns, metadata=metadata)
-            self._temporary.parent.mkdir(parents=True, exist_ok=True)
-            self._writer = pq.ParquetWriter(self._temporary, self._schema, compression="zstd")
+        if self._writer is None:
+            self._writer = self._open(self._pending[0])
+        schema = self._writer.schema
         table = pa.Table.from_pydict(
-            {name: [row.get(name) for row in self._pending] for name in self._schema.names}, schema=self._schema
+            {name: [row.get(name) for row in self._pending] for name in schema.names}, schema=schema
         )
-        assert self._writer is not None
         self._writer.write_table(table)
         self._pending.clear()
+
+    def _open(self, first: dict[str, Any]) -> pq.ParquetWriter:
+        columns = dict(_FIELDS)
+        columns |= {name: pa.float64() for name in first if name.startswith("stage_")}
+        columns |= {name: pa.int64() for name in first if name.startswith("count_")}
+        schema = pa.schema(columns, metadata={_META: json.dumps(plain(self._limits)).encode()})
+        self._temporary.parent.mkdir(parents=True, exist_ok=True)
+        return pq.ParquetWriter(self._temporary, schema, compression="zstd")
 
     def close(self, keep: bool = True) -> None:
         """Ends the file; without ``keep`` nothing stays on disk."""

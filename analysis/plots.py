@@ -1,0 +1,128 @@
+"""Records to figures; computes nothing but positions on the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from analysis.files import atomic
+
+Floats = NDArray[np.float64]
+
+ADAPTIVE, FRAMED, OTHER = "#c9570c", "#1f6fb4", "#5a8f29"
+_GRID = {"color": "0.85", "linewidth": 0.6}
+
+
+def save(figure: Figure, path: Path, dpi: int = 130) -> None:
+    """Writes a figure as PNG, atomically."""
+    FigureCanvasAgg(figure)
+    with atomic(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, format="png")
+
+
+def _new(width: float, height: float, rows: int = 1, **kwargs) -> tuple[Figure, NDArray]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots(rows, 1, squeeze=False, **kwargs)[:, 0]
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.grid(True, **_GRID)
+        axis.set_axisbelow(True)
+    return figure, axes
+
+
+def error_figure(
+    times_s: Floats,
+    adaptive: Floats,
+    framed: Mapping[str, Floats],
+    ratio: Floats,
+    refresh_s: Sequence[float],
+    title: str,
+) -> Figure:
+    """Errors over time above their ratio (figs 7.14 and 7.15).
+
+    Args:
+        times_s: reference times.
+        adaptive: MSE of the adaptive run.
+        framed: MSE of framed runs by name; the first is the one the ratio is taken to.
+        ratio: adaptive over framed; infinite values are marked along the upper edge.
+        refresh_s: times at which the framed display changes.
+        title: above the figure.
+    """
+    figure, (upper, lower) = _new(9.0, 5.6, 2, sharex=True, height_ratios=(3, 2))
+    for axis in (upper, lower):
+        axis.vlines(refresh_s, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
+    for (name, values), ink in zip(framed.items(), (FRAMED, OTHER), strict=False):
+        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, linewidth=1.8, label=name)
+    upper.plot(times_s, np.where(adaptive > 0, adaptive, np.nan), color=ADAPTIVE, linewidth=1.2, label="TSAR")
+    upper.set_yscale("log")
+    upper.set_ylabel("mean squared error")
+    upper.set_title(title, fontsize=10, loc="left")
+    upper.legend(frameon=False, fontsize=8, ncols=3, loc="upper left", bbox_to_anchor=(0.0, 1.02))
+    shown = np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan)
+    lower.plot(times_s, shown, color="0.2", linewidth=1.1)
+    infinite = np.isinf(ratio)
+    if infinite.any():
+        transform = lower.get_xaxis_transform()
+        lower.plot(
+            times_s[infinite], np.full(infinite.sum(), 0.97), "^", color="0.2", markersize=4, transform=transform
+        )
+    lower.axhline(1.0, color="0.0", linewidth=0.8)
+    lower.set_yscale("log")
+    _widen(lower, shown)
+    lower.set_ylabel("TSAR / framed")
+    lower.set_xlabel("simulated time, s   (dotted: the framed display changes)")
+    lower.margins(x=0.0)
+    return figure
+
+
+def _widen(axis, values: Floats) -> None:
+    """Shows at least the factor 3 about one on a ratio axis."""
+    finite = values[np.isfinite(values)]
+    low, high = (finite.min(), finite.max()) if finite.size else (1.0, 1.0)
+    axis.set_ylim(min(low * 0.8, 1 / 3), max(high * 1.25, 3.0))
+
+
+def density_figure(quantiles: Mapping[str, NDArray], bounds: Mapping[str, tuple[float, float]]) -> Figure:
+    """Bands of the densities over time: 5–95 %, 25–75 % and the median over the elements."""
+    figure, axes = _new(9.0, 4.6, 2, sharex=True)
+    labels = {
+        "density_spatial": "spatial density,\nsamples per element",
+        "density_temporal": "temporal density,\nper cycle",
+    }
+    time = quantiles["sim_time_s"]
+    for axis, (name, label), ink in zip(axes, labels.items(), (FRAMED, ADAPTIVE), strict=True):
+        q = quantiles[name]
+        axis.fill_between(time, q[:, 0], q[:, 4], color=ink, alpha=0.18, linewidth=0, label="5–95 %")
+        axis.fill_between(time, q[:, 1], q[:, 3], color=ink, alpha=0.38, linewidth=0, label="25–75 %")
+        axis.plot(time, q[:, 2], color=ink, linewidth=1.3, label="median")
+        axis.set_yscale("log", base=2)
+        axis.set_ylim(bounds[name][0] / 1.3, bounds[name][1] * 1.3)
+        axis.set_ylabel(label)
+        axis.margins(x=0.0)
+    axes[0].legend(frameon=False, fontsize=8, ncols=3, loc="upper left", bbox_to_anchor=(0.0, 1.18))
+    axes[1].set_xlabel("simulated time, s (negative: warm-up)")
+    return figure
+
+
+def stage_figure(modelled: Mapping[str, float], measured: Mapping[str, float]) -> Figure:
+    """Share of a cycle each stage takes by the cost model beside what was measured."""
+    names = list(dict.fromkeys((*modelled, *measured)))
+    figure, (axis,) = _new(9.0, 2.8)
+    place = np.arange(len(names))
+    for shift, (values, ink, label) in zip(
+        (-0.2, 0.2), ((modelled, FRAMED, "modelled operations"), (measured, ADAPTIVE, "measured seconds")), strict=True
+    ):
+        total = sum(values.values()) or 1.0
+        share = [100.0 * values.get(name, 0.0) / total for name in names]
+        bars = axis.bar(place + shift, share, 0.38, color=ink, label=label)
+        axis.bar_label(bars, fmt="%.1f", fontsize=7, padding=1)
+    axis.set_xticks(place, names)
+    axis.set_ylabel("share of a cycle, %")
+    axis.set_ylim(0, 108)
+    axis.legend(frameon=False, fontsize=8)
+    return figure
