@@ -1,0 +1,127 @@
+"""Files to arrays: textures, high-dynamic-range images, meshes. Every failure is a SceneError naming file and reason."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import kornia.color
+import numpy as np
+import OpenEXR
+import torch
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+
+from scenes.canonical import Mesh, SceneError
+
+ASSETS = Path(__file__).parent / "assets"
+
+Picture = NDArray[np.float32]
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def asset(name: str) -> Path:
+    """Path of a file delivered with the project.
+
+    Raises:
+        SceneError: if there is none of that name.
+    """
+    path = ASSETS / name
+    if not path.is_file():
+        raise SceneError(f"asset {name!r}: expected a file at {path}, found none")
+    return path
+
+
+@lru_cache(maxsize=32)
+def read_image(path: Path) -> Picture:
+    """Reads a picture as linear Rec. 709 RGB.
+
+    Eight-bit files are decoded from sRGB; OpenEXR files are linear already.
+
+    Args:
+        path: PNG, JPEG or another format Pillow reads, or ``.exr``.
+
+    Returns:
+        ``(height, width, 3)`` float32, row 0 at the top; shared between callers, so read-only.
+
+    Raises:
+        SceneError: if the file is missing or cannot be read.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SceneError(f"texture {path}: expected an image file, found none")
+    try:
+        pixels = _read_exr(path) if path.suffix.lower() == ".exr" else _read_srgb(path)
+    except Exception as error:  # decoders raise what they like on broken files
+        raise SceneError(f"texture {path}: cannot be read: {_one_line(error)}") from error
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
+        raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
+    pixels.flags.writeable = False
+    return pixels
+
+
+def _read_srgb(path: Path) -> Picture:
+    with Image.open(path) as image:
+        encoded = np.array(image.convert("RGB"), np.float32) / 255.0
+    planes = torch.from_numpy(encoded).permute(2, 0, 1)
+    return np.ascontiguousarray(kornia.color.rgb_to_linear_rgb(planes).permute(1, 2, 0).numpy())
+
+
+def _read_exr(path: Path) -> Picture:
+    with OpenEXR.File(str(path)) as file:
+        channels = file.channels()
+        if "RGB" in channels:
+            return np.array(channels["RGB"].pixels, np.float32)
+        if "RGBA" in channels:
+            return np.array(channels["RGBA"].pixels[..., :3], np.float32)
+        return np.stack([np.array(channels[name].pixels, np.float32) for name in "RGB"], axis=-1)
+
+
+def clamp_radiance(image: Picture, limit: float) -> Picture:
+    """Scales texels down whose greatest channel exceeds ``limit``, keeping their colour.
+
+    An environment map holds the sun's disk, tens of thousands of times brighter than the sky; seen in a mirror by one
+    sample in thousands it would be noise that no sample count removes. The disk's light comes from a directional light.
+    """
+    peak = image.max(axis=-1, keepdims=True)
+    return (image * np.minimum(1.0, limit / np.maximum(peak, 1e-12))).astype(np.float32)
+
+
+def read_mesh(path: Path) -> Mesh:
+    """Reads OBJ, PLY, STL, GLB or what else trimesh knows as one mesh in the file's own frame.
+
+    Args:
+        path: the file; scenes of several parts are joined, with their transforms applied.
+
+    Returns:
+        Vertices, faces, and where the file has them normals and texture coordinates.
+
+    Raises:
+        SceneError: if the file is missing, cannot be read, or holds no triangles.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SceneError(f"mesh {path}: expected a mesh file, found none")
+    try:
+        loaded = trimesh.load_mesh(path, process=False)
+        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        faces = np.asarray(mesh.faces, np.int32)
+    except Exception as error:  # parsers raise what they like on broken files
+        raise SceneError(f"mesh {path}: cannot be read: {_one_line(error)}") from error
+    if len(faces) == 0:
+        raise SceneError(f"mesh {path}: expected triangles, found none")
+    uvs = getattr(mesh.visual, "uv", None)
+    normals = np.array(mesh.vertex_normals, np.float32)
+    lengths = np.linalg.norm(normals, axis=1)
+    normals[lengths < 1e-6] = (0.0, 0.0, 1.0)  # vertices of no triangle
+    return Mesh(
+        vertices=np.array(mesh.vertices, np.float32),
+        faces=faces,
+        normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
+        uvs=None if uvs is None or len(uvs) != len(mesh.vertices) else np.array(uvs, np.float32),
+        source=str(path),
+    )
