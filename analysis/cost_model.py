@@ -86,7 +86,7 @@ class CostParameters:
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if value is None and item.name == "avg_recon_overdraw":
+            if value is None:
                 continue
             least = float(value) if isinstance(value, (int, float)) else float(value.min())
             # the left edge of fig. 7.5 is a sample that costs nothing

@@ -1,0 +1,85 @@
+"""What all command lines share: one clear line for bad input, a clean end on Ctrl-C."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+Options = TypeVar("Options")
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+_FRAME = re.compile(r"[╭╮╰╯│─]+")
+
+
+class InputError(ValueError):
+    """Bad input; the message says what was expected, what arrived, and where."""
+
+
+@contextlib.contextmanager
+def bad_input() -> Iterator[None]:
+    """Marks a block in which a ValueError, an OSError or a lack of memory is the fault of the input."""
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        raise InputError(f"{where}{error.strerror or error}") from error
+    except (ValueError, MemoryError) as error:
+        raise InputError(str(error) or type(error).__name__) from error
+
+
+def parse(options: type[Options], description: str, arguments: list[str] | None = None) -> Options:
+    """Options from the command line; help goes to standard output.
+
+    Raises:
+        InputError: something cannot be parsed or is out of range.
+    """
+    import tyro
+
+    caught = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(caught), bad_input():
+            return tyro.cli(options, description=description, args=arguments)
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        raise InputError(_one_line(caught.getvalue())) from None
+
+
+def require_memory(need_bytes: float, what: str) -> None:
+    """Raises InputError where less memory is free than ``what`` needs."""
+    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
+    if need_bytes > have:
+        raise InputError(f"{what} needs about {need_bytes / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free")
+
+
+def _one_line(box: str) -> str:
+    """The message inside the frame that the parser draws, without its title and its advice."""
+    inside = (re.sub(r"Error parsing \w+: ", "", line) for line in box.splitlines() if line[:1] != "╭")
+    lines = [re.sub(r"\s+", " ", _FRAME.sub(" ", line)).strip() for line in inside]
+    text = " ".join(line for line in lines if line)
+    return text.partition(" For full helptext")[0] or "the command line cannot be parsed"
+
+
+def run_cli(main: Callable[[], None]) -> None:
+    """Runs a script's main function and ends the process.
+
+    Bad input ends with one line on standard error and status 2, Ctrl-C with one line and status 130.
+    """
+    try:
+        main()
+    except InputError as error:
+        message = re.sub(r"\s+", " ", str(error)).strip()
+        print(f"error: {message}", file=sys.stderr)
+        sys.exit(EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
+        sys.exit(EXIT_INTERRUPTED)

@@ -1,0 +1,36 @@
+"""Progress bars with the time left, on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+
+class Bars:
+    """Bars, one a task."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+
+    def task(self, label: str, total: int) -> Callable[[int], None]:
+        """Adds a bar; returns a function that takes how much is done."""
+        number = self._progress.add_task(label, total=total)
+        return lambda done: self._progress.update(number, completed=done)
+
+
+@contextmanager
+def bars() -> Iterator[Bars]:
+    """Shows bars while the block runs."""
+    columns = (
+        TextColumn("{task.description:<12}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        yield Bars(progress)
