@@ -12,6 +12,8 @@ over tiles.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
@@ -82,11 +84,27 @@ def _choose_splits(candidates: Tensor, integrals: list[Tensor], config: TsarConf
     least = min(-(-max(config.batch_size - coarse, 0) // 3), most)
     wanted = int((candidates > config.tiling.threshold_samples).sum())
     count = min(max(wanted, least), most, candidates.numel())
-    # Stable and coarse-to-fine, so that among equal integrals a parent comes before its child.
-    order = torch.sort(candidates, descending=True, stable=True).indices
+    ranks = _tie_order(config.level_min, config.level_max)
+    order = ranks[torch.sort(candidates[ranks], descending=True, stable=True).indices]
     chosen = torch.zeros(candidates.numel(), dtype=torch.bool)
     chosen[order[:count]] = True
     return list(chosen.split([level.numel() for level in integrals[:-1]]))
+
+
+@lru_cache(maxsize=16)
+def _tie_order(level_low: int, level_high: int) -> Int64[Tensor, " nodes"]:
+    """Order in which equal nodes split: coarse before fine, so that a parent comes before its child, and within a level
+    by bit-reversed index, so that where the bound on the tiles leaves only some of many equal nodes to split, they are
+    spread over the whole image instead of filling it from its first corner."""
+    order, first = [], 0
+    for level in range(level_low, level_high):
+        index = torch.arange(4**level)
+        reverse = torch.zeros_like(index)
+        for bit in range(2 * level):
+            reverse |= ((index >> bit) & 1) << (2 * level - 1 - bit)
+        order.append(first + torch.argsort(reverse))
+        first += 4**level
+    return torch.cat(order)
 
 
 def tile_of_element(tiling: Tiling, field_level: int) -> Int64[Tensor, " e"]:

@@ -66,3 +66,10 @@ def test_tile_of_element_inverts_coverage():
     owner = tile_of_element(tiling, 7)
     assert owner.shape == (16384,) and torch.equal(torch.bincount(owner), 4 ** (7 - tiling.level))
     assert tile_of_element(uniform(7), 7).tolist() == list(range(16384))
+
+
+def test_equal_nodes_split_all_over_the_image():
+    """A uniform field that wants more tiles than allowed: every quadrant gets its share, not the first corner all."""
+    tiling = build(torch.full((16384,), 8.0, dtype=torch.float64), config(tile_count_max=400, level_max=6))
+    fine = tiling.index[tiling.level == 5] >> 8
+    assert torch.bincount(fine, minlength=4).float().std() <= 8.0 and covers_once(tiling)
