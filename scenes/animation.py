@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from scenes.canonical import Matrix, RigidTrack
 
-Times = NDArray[np.float64]
+Times = NDArray[np.floating]
 Pose = tuple[NDArray[np.float64], Rotation]
 PoseFunction = Callable[[Times], Pose]
 

@@ -6,8 +6,8 @@ Conventions, fixed here once:
 * A transform is a ``(4, 4)`` float64 matrix acting on column vectors, object (or camera) to world.
 * A camera looks along its local ``-z`` with ``+x`` to the right and ``+y`` up; image coordinates run from the top left
   corner ``(0, 0)`` to the bottom right ``(1, 1)``.
-* An untransformed environment map gives direction ``(sin 2πu sin θ, cos θ, -cos 2πu sin θ)`` the texel at ``u`` from the
-  left and polar angle ``θ`` from the top row.
+* An untransformed environment map gives direction ``(sin 2πu sin θ, cos θ, -cos 2πu sin θ)`` the texel at ``u`` from
+  the left and polar angle ``θ`` from the top row.
 * Colours and radiances are linear RGB with Rec. 709 primaries, float32.
 * Texture coordinates have ``v = 0`` at the bottom row of the image.
 
@@ -63,7 +63,7 @@ class RigidTrack:
         if not self.interval_s > 0.0:
             raise SceneError(f"RigidTrack.interval_s: expected a positive time, got {self.interval_s}")
         if t.ndim != 2 or t.shape[1] != 3 or q.shape != (t.shape[0], 4) or t.shape[0] < 1:
-            raise SceneError(f"RigidTrack: expected translation (k, 3) and rotation (k, 4), got {t.shape} and {q.shape}")
+            raise SceneError(f"RigidTrack: expected translation (k, 3), rotation (k, 4), got {t.shape} and {q.shape}")
         if not (np.isfinite(t).all() and np.isfinite(q).all()):
             raise SceneError("RigidTrack: keys hold non-finite values")
         if not np.allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-6):
@@ -143,9 +143,10 @@ Texture = ConstantTexture | ImageTexture | CheckerboardTexture | ScaleTexture | 
 class Phong:
     """Phong reflection with a Fresnel-weighted mirror term: the material of the driving scenes.
 
-    Outgoing radiance is ``ambient * diffuse + sum over lights of (diffuse / π * cos + specular * (e + 2) / 2π * cos^e)``
-    times the arriving irradiance, plus ``F * mirrored radiance`` with
-    ``F = fresnel_min + (fresnel_max - fresnel_min) * (1 - cos)^fresnel_exponent``; the diffuse part is scaled by ``1 - F``.
+    Outgoing radiance is ``ambient * diffuse``, plus over all lights the sum of
+    ``(diffuse / π * cos + specular * (e + 2) / 2π * cos^e)`` times the arriving irradiance, plus
+    ``F * mirrored radiance`` with ``F = fresnel_min + (fresnel_max - fresnel_min) * (1 - cos)^fresnel_exponent``; the
+    diffuse part is scaled by ``1 - F``.
 
     Attributes:
         diffuse: albedo.

@@ -1,4 +1,4 @@
-"""Files to arrays: textures, high-dynamic-range images, meshes. Every failure is a SceneError naming file and reason."""
+"""Files to arrays: textures, high-dynamic-range images, meshes. A failure is a SceneError naming file and reason."""
 
 from __future__ import annotations
 

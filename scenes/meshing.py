@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,14 +36,19 @@ class Surface:
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         longest = np.max([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
         faces = self.faces[area > 1e-5 * longest**2 + 1e-12]
-        used, faces = np.unique(faces, return_inverse=True)
+        slim = replace(self, faces=faces).compact()
         return Mesh(
-            vertices=self.vertices[used].astype(np.float32),
-            faces=faces.reshape(-1, 3).astype(np.int32),
-            normals=self.normals[used].astype(np.float32),
-            uvs=self.uvs[used].astype(np.float32),
+            vertices=slim.vertices.astype(np.float32),
+            faces=slim.faces.astype(np.int32),
+            normals=slim.normals.astype(np.float32),
+            uvs=slim.uvs.astype(np.float32),
             source=source,
         )
+
+    def compact(self) -> Surface:
+        """The surface without vertices of no triangle."""
+        used, faces = np.unique(self.faces, return_inverse=True)
+        return Surface(self.vertices[used], faces.reshape(-1, 3), self.normals[used], self.uvs[used])
 
 
 def unit(vectors: Array) -> Array:
@@ -88,7 +93,8 @@ def flat(surface: Surface) -> Surface:
     vertices = surface.vertices[surface.faces].reshape(-1, 3)
     a, b, c = vertices[0::3], vertices[1::3], vertices[2::3]
     normals = np.repeat(unit(np.cross(b - a, c - a)), 3, axis=0)
-    return Surface(vertices, np.arange(len(vertices)).reshape(-1, 3), normals, surface.uvs[surface.faces].reshape(-1, 2))
+    faces = np.arange(len(vertices)).reshape(-1, 3)
+    return Surface(vertices, faces, normals, surface.uvs[surface.faces].reshape(-1, 2))
 
 
 def grid(points: Array) -> Surface:
@@ -145,7 +151,7 @@ def box(lower: Sequence[float], upper: Sequence[float]) -> Surface:
 
 
 def extrude(outline: Array, lower: float, upper: float) -> Surface:
-    """A convex polygon ``(n, 2)``, counter-clockwise, raised from ``z = lower`` to ``upper``, with flat sides and caps."""
+    """A convex polygon ``(n, 2)``, counter-clockwise, raised from ``z = lower`` to ``upper``; flat sides and caps."""
     count = len(outline)
     ring = np.arange(count)
     after = (ring + 1) % count
@@ -223,11 +229,12 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
     outside = [surface.faces[count == 0]]
     crossed = surface.faces[(count == 1) | (count == 2)]
     if len(crossed) == 0:
-        return replace(surface, faces=inside[0]), replace(surface, faces=outside[0])
+        return replace(surface, faces=inside[0]).compact(), replace(surface, faces=outside[0]).compact()
     lone = below[crossed] == (below[crossed].sum(axis=1) == 1)[:, None]
     shift = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(crossed, shift, axis=1).T  # a is alone on its side
-    edges, which = np.unique(np.sort(np.concatenate([np.stack([a, b], -1), np.stack([a, c], -1)]), 1), axis=0, return_inverse=True)
+    both = np.sort(np.concatenate([np.stack([a, b], -1), np.stack([a, c], -1)]), axis=1)
+    edges, which = np.unique(both, axis=0, return_inverse=True)
     low, high = edges.T
     share = (value[low] / (value[low] - value[high]))[:, None]
     fresh = which.reshape(-1) + len(surface.vertices)
@@ -241,30 +248,22 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
     tip_below = below[a]
     inside += [tip[tip_below], rest[np.tile(~tip_below, 2)]]
     outside += [tip[~tip_below], rest[np.tile(tip_below, 2)]]
-    whole = Surface(
-        blend(surface.vertices), np.concatenate(inside), unit(blend(surface.normals)), blend(surface.uvs)
-    )
-    return whole, replace(whole, faces=np.concatenate(outside))
+    whole = Surface(blend(surface.vertices), np.concatenate(inside), unit(blend(surface.normals)), blend(surface.uvs))
+    return whole.compact(), replace(whole, faces=np.concatenate(outside)).compact()
 
 
-def polygon_distance(points: Array, outline: Array, radius: float = 0.0) -> Array:
-    """Signed distance to a polygon with rounded corners, negative inside.
+def carve(surface: Surface, *sides: Callable[[Array], Array]) -> tuple[Surface, Surface]:
+    """Cuts out where every one of several functions of the vertices ``(v, 3)`` is negative, one after the other, so
+    that corners between them stay sharp.
 
-    Args:
-        points: ``(n, 2)``.
-        outline: ``(k, 2)`` corners in order.
-        radius: the polygon is grown by this much, which rounds its outer corners.
+    Returns:
+        What was cut out, and the rest.
     """
-    start, end = outline, np.roll(outline, -1, axis=0)
-    along = end - start
-    offset = points[:, None] - start
-    part = np.clip((offset * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
-    distance = np.linalg.norm(offset - part[..., None] * along, axis=-1).min(axis=1)
-    rises = (start[:, 1] <= points[:, None, 1]) != (end[:, 1] <= points[:, None, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = start[:, 0] + (points[:, None, 1] - start[:, 1]) / along[:, 1] * along[:, 0]
-    odd = (rises & (points[:, None, 0] < crossing)).sum(axis=1) % 2 == 1
-    return np.where(odd, -distance, distance) - radius
+    inside, rest = surface, []
+    for side in sides:
+        inside, outside = cut(inside, side(inside.vertices))
+        rest.append(outside)
+    return inside, join(rest)
 
 
 def boundary_edges(surface: Surface) -> Indices:

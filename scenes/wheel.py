@@ -74,8 +74,9 @@ def rim() -> Mesh:
     inner = _RIM_RADIUS - 0.016
     barrel = np.array(
         [
-            (inner - 0.012, -0.098), (inner - 0.012, -0.06), (inner - 0.004, 0.0), (inner, 0.075), (inner + 0.004, 0.094),
-            (_RIM_RADIUS - 0.007, 0.099), (_RIM_RADIUS + 0.002, 0.099), (_RIM_RADIUS + 0.004, 0.094),
+            (inner - 0.012, -0.098), (inner - 0.012, -0.06), (inner - 0.004, 0.0), (inner, 0.075),
+            (inner + 0.004, 0.094), (_RIM_RADIUS - 0.007, 0.099), (_RIM_RADIUS + 0.002, 0.099),
+            (_RIM_RADIUS + 0.004, 0.094),
         ]
     )  # fmt: skip
     # seen from the axle, so the profile runs down; the lip then faces outwards
@@ -102,7 +103,9 @@ def caliper() -> Surface:
     turn = np.radians(np.linspace(-32.0, 32.0, 8))
     inside, outside = 0.118, 0.186
     arc = np.stack([-np.cos(turn), np.sin(turn)], -1)
-    section = np.array([(outside, -0.035), (outside, 0.026), (outside - 0.01, 0.036), (inside, 0.036), (inside, -0.035)])
+    section = np.array(
+        [(outside, -0.035), (outside, 0.026), (outside - 0.01, 0.036), (inside, 0.036), (inside, -0.035)]
+    )
     section = np.concatenate([section, section[:1]])
     points = np.empty((len(turn), len(section), 3))
     points[..., 0] = arc[:, :1] * section[:, 0]
