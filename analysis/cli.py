@@ -8,6 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TypeVar
 
 Options = TypeVar("Options")
@@ -15,6 +16,7 @@ Options = TypeVar("Options")
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
+_MEMORY = Path("/proc/meminfo")
 _FRAME = re.compile(r"[╭╮╰╯│─]+")
 
 
@@ -56,9 +58,21 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
 
 def require_memory(need_bytes: float, what: str) -> None:
     """Raises InputError where less memory is free than ``what`` needs."""
-    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
+    have = _free_memory_bytes()
     if need_bytes > have:
         raise InputError(f"{what} needs about {need_bytes / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free")
+
+
+def _free_memory_bytes() -> int:
+    """Memory that can be had, what the system keeps of files included: it gives that back."""
+    try:
+        with _MEMORY.open() as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def _one_line(box: str) -> str:

@@ -37,11 +37,6 @@ class Meter:
         self.counters.update(samples.counters)
         return samples
 
-    @property
-    def mean_counters(self) -> dict[str, float]:
-        """Work of one call."""
-        return {name: count / max(self.calls, 1) for name, count in self.counters.items()}
-
 
 @dataclass
 class Totals:

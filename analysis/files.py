@@ -18,12 +18,10 @@ PARTIAL = ".partial"
 
 
 @contextmanager
-def atomic(path: Path, keep_partial: bool = False) -> Iterator[Path]:
-    """A temporary name beside ``path``, moved there when the block ends well.
+def atomic(path: Path) -> Iterator[Path]:
+    """A temporary name beside ``path``, moved there when the block ends well and removed when it does not.
 
-    Args:
-        path: where the finished file goes; its folder is created.
-        keep_partial: leave what was written under its temporary name when the block raises, instead of removing it.
+    The folder is created.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     # the ending stays last: writers choose the format by it
@@ -32,8 +30,7 @@ def atomic(path: Path, keep_partial: bool = False) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, path)
     finally:
-        if not keep_partial:
-            temporary.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def writable_folder(path: Path, what: str) -> Path:

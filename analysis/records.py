@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+import math
 import os
 import platform
 import subprocess
@@ -132,15 +133,17 @@ class StepWriter:
         return pq.ParquetWriter(self._temporary, schema, compression="zstd")
 
     def close(self, keep: bool = True) -> None:
-        """Ends the file; without ``keep`` nothing stays on disk."""
-        if keep:
-            self._flush()
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+        """Ends the file; without ``keep``, or where that fails, nothing of it stays on disk."""
+        try:
             if keep:
-                os.replace(self._temporary, self.path)
-        self._temporary.unlink(missing_ok=True)
+                self._flush()
+            if self._writer is not None:
+                self._writer.close()
+                if keep:
+                    os.replace(self._temporary, self.path)
+        finally:
+            self._writer = None
+            self._temporary.unlink(missing_ok=True)
 
 
 def read_limits(path: Path) -> RecordLimits:
@@ -185,7 +188,7 @@ def check_invariants(path: Path) -> dict[str, Any]:
             item = {name: values[name][row] for name in columns}
             fields = {name: item[name].values.to_numpy() for name in columns[2:]}
             residual = _residual(fields, item["surplus"].as_py(), limits)
-            worst = max(residual, item["conservation_residual"].as_py())
+            worst = max(_or_infinite(residual), _or_infinite(item["conservation_residual"].as_py()))
             found["cycles"] += 1
             found["conservation_residual"] = max(found["conservation_residual"], worst)
             found["densities_out_of_bounds"] += not _within(fields, limits)
@@ -201,10 +204,16 @@ def _residual(fields: dict[str, np.ndarray], surplus: float, limits: RecordLimit
     return abs(float(combined.sum()) + surplus - limits.budget) / limits.budget
 
 
+def _or_infinite(residual: float) -> float:
+    """NaN would lose every comparison and so pass for the least."""
+    return math.inf if math.isnan(residual) else residual
+
+
 def _within(fields: dict[str, np.ndarray], limits: RecordLimits) -> bool:
     for name in ("density_spatial", "density_temporal"):
         low, high = getattr(limits, name)
-        if fields[name].min() < low * (1 - _ROUNDING) or fields[name].max() > high * (1 + _ROUNDING):
+        inside = (fields[name] >= low * (1 - _ROUNDING)) & (fields[name] <= high * (1 + _ROUNDING))
+        if not inside.all():
             return False
     return True
 

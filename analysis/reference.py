@@ -169,12 +169,14 @@ def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[
 
 def _render_missing(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[[int, int], None]) -> int:
     """Renders what is missing and puts the file into place; returns how many images were already there."""
-    partial, state = cache / f"{spec.key}{PARTIAL}.npy", cache / f"{spec.key}{PARTIAL}.json"
+    # not the temporary name of the sidecar: writing that would take the state along
+    partial, state = cache / f"{spec.key}{PARTIAL}.npy", cache / f"{spec.key}.state.json"
     done, nonfinite = _resume(partial, state, spec)
     if done == 0:
         free = shutil.disk_usage(cache).free
         if spec.bytes > free:
             raise ValueError(f"{cache}: the reference needs {spec.bytes / 1e9:.1f} GB, {free / 1e9:.1f} GB are free")
+        state.unlink(missing_ok=True)  # of a file that is gone or damaged
         np.lib.format.open_memmap(partial, mode="w+", dtype=np.float16, shape=spec.shape)
     before, images = done, np.lib.format.open_memmap(partial, mode="r+")
     for number in range(done, spec.count):
@@ -199,7 +201,7 @@ def _resume(partial: Path, state: Path, spec: ReferenceSpec) -> tuple[int, int]:
     try:
         found = json.loads(state.read_text())
         shape = np.load(partial, mmap_mode="r").shape
-    except (OSError, ValueError):
+    except (OSError, ValueError, EOFError):
         return 0, 0
     return (found["done"], found["nonfinite"]) if shape == spec.shape else (0, 0)
 

@@ -50,9 +50,10 @@ class Report:
     Attributes:
         title: of the page.
         lead: paragraphs that say what was compared and what came out.
-        figures: caption and PNG bytes.
+        key_numbers: table before the figures.
+        figures: caption and PNG bytes; the moments stand after the first.
         moments: strip of pictures.
-        tables: in order; those of the first group stand before the figures.
+        tables: in order, after the figures.
         details: nested mappings shown as lists of names and values (configuration, provenance).
     """
 

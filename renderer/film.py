@@ -175,13 +175,25 @@ class Mp4Writer:
         self.frames += 1
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool | None:
-        try:
-            if kind is None:
-                for packet in self._stream.encode():
-                    self._container.mux(packet)
-        finally:
-            self._container.close()
+        failure = self._finish(complete=kind is None)
+        if kind is None and failure is not None:
+            self._placing.__exit__(FilmError, failure, None)
+            raise failure
         return self._placing.__exit__(kind, error, trace)  # type: ignore[arg-type]
+
+    def _finish(self, complete: bool) -> FilmError | None:
+        """Writes what the encoder still holds and closes the file; returns what went wrong."""
+        from av.error import FFmpegError
+
+        try:
+            try:
+                for packet in self._stream.encode() if complete else ():
+                    self._container.mux(packet)
+            finally:
+                self._container.close()
+        except (FFmpegError, OSError) as error:
+            return FilmError(f"{self.path}: cannot be written ({error})")
+        return None
 
 
 def _fraction(fps: float):

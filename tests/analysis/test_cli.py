@@ -1,0 +1,145 @@
+"""Bad input ends with one plain line that names the field, and with the right exit status."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from analysis import cli
+from analysis.cli import InputError, bad_input, parse, require_memory, run_cli
+from tsar.config import TsarConfig
+
+
+@dataclass(frozen=True)
+class Options:
+    """Like those of a script."""
+
+    count: int = 3
+    """How many."""
+    place: Path = Path("a")
+    """Where."""
+    tsar: TsarConfig = field(default_factory=TsarConfig)
+    """What."""
+
+    def __post_init__(self) -> None:
+        if self.count < 0:
+            raise ValueError(f"count: expected at least 0,\n got {self.count}")
+
+
+def test_options_are_parsed() -> None:
+    found = parse(Options, "d", ["--count", "7", "--place", "b/c", "--tsar.batch-size", "64"])
+    assert found == Options(7, Path("b/c"), TsarConfig(batch_size=64))
+    assert parse(Options, "d", []) == Options()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--nope", "3"], ["--nope"]),
+        (["--coumt", "3"], ["--coumt", "--count"]),
+        (["--count", "x"], ["--count", "'x'"]),
+        (["--count"], ["--count"]),
+        (["stray"], ["stray"]),
+        (["--count", "-1"], ["count: expected at least 0", "got -1"]),
+        (["--tsar.batch-size", "-3"], ["batch_size: expected between 1 and 8192 framelets, got -3"]),
+        (["--tsar.tiling.level-max", "9"], ["tiling.level_max: expected between 2 and 7, got 9"]),
+        (["--tsar.error.norm", "l3"], ["--tsar.error.norm", "l3", "linf"]),
+    ],
+)
+def test_bad_arguments_name_what_is_wrong_in_one_line(
+    arguments: list[str], parts: list[str], capsys: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(InputError) as caught:
+        parse(Options, "d", arguments)
+    message = str(caught.value)
+    assert all(part in message for part in parts), message
+    assert not set(message) & set("╭╮╰╯│─") and "full helptext" not in message
+    assert capsys.readouterr() == ("", ""), "nothing is printed on the way"
+
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: parse(Options, "d", arguments))
+    printed = capsys.readouterr()
+    assert stop.value.code == 2 and printed.out == ""
+    assert printed.err.startswith("error: ") and printed.err.endswith("\n") and printed.err.count("\n") == 1
+
+
+def test_help_goes_to_standard_output(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as stop:
+        parse(Options, "what it does", ["--help"])
+    printed = capsys.readouterr()
+    assert not stop.value.code and printed.err == ""
+    assert "what it does" in printed.out and "--tsar.batch-size" in printed.out and "How many." in printed.out
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def main() -> None:
+        raise error
+
+    return main
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (InputError("a: expected b,\n   got\tc"), 2, "error: a: expected b, got c\n"),
+        (KeyboardInterrupt(), 130, None),
+    ],
+)
+def test_run_cli_ends_with_one_line(error, status: int, line: str | None, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as stop:
+        run_cli(raising(error))
+    printed = capsys.readouterr()
+    assert stop.value.code == status and printed.out == ""
+    assert printed.err.count("\n") == 1 and (printed.err == line or (line is None and "interrupted" in printed.err))
+
+
+def test_run_cli_hides_neither_success_nor_faults_of_the_program() -> None:
+    done = []
+    run_cli(lambda: done.append(1))
+    assert done == [1]
+    with pytest.raises(ValueError, match="a fault"):
+        run_cli(raising(ValueError("a fault")))
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (ValueError("side: got 3"), "side: got 3"),
+        (ValueError(), "ValueError"),
+        (MemoryError(), "MemoryError"),
+        (InputError("as it is"), "as it is"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory", "a/b.obj"), "a/b.obj: No such file or directory"),
+        (OSError("plain"), "plain"),
+    ],
+)
+def test_bad_input_turns_faults_of_the_input_into_one_kind(error: Exception, message: str) -> None:
+    with pytest.raises(InputError) as caught, bad_input():
+        raise error
+    assert str(caught.value) == message
+
+
+def test_bad_input_lets_other_faults_through() -> None:
+    with pytest.raises(KeyError), bad_input():
+        raise KeyError("a")
+
+
+def test_require_memory_counts_what_the_system_can_give_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    meminfo = tmp_path / "meminfo"
+    meminfo.write_text("MemTotal: 9999999 kB\nMemFree: 10 kB\nMemAvailable:    2097152 kB\n")
+    monkeypatch.setattr(cli, "_MEMORY", meminfo)
+    require_memory(2.0 * 2**30, "x")
+    with pytest.raises(InputError, match=r"^resolution_px: 99 needs about 2\.5 GiB of memory, 2\.0 GiB are free$"):
+        require_memory(2.5 * 2**30, "resolution_px: 99")
+
+
+def test_require_memory_on_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the system keeps no such file."""
+    for place in (Path("/proc/meminfo"), tmp_path / "none"):
+        monkeypatch.setattr(cli, "_MEMORY", place)
+        require_memory(1, "x")
+        with pytest.raises(InputError):
+            require_memory(1e18, "x")

@@ -1,0 +1,124 @@
+"""The comparison film: sizes, places, labels and curves of a frame, and a film on disk that reads back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image, ImageDraw
+
+from analysis.video import ADAPTIVE, FRAMED, PAPER, ComparisonFilm, draw_errors, panels, to_pixels
+from renderer.film import Mp4Writer
+from tests.analysis.builders import SCALES, grey, view
+
+SIDE = 96
+LABELS = ["reference", "framed", "TSAR", "tiling by refresh rate", "spatial density", "temporal density"]
+
+
+def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> ComparisonFilm:
+    return ComparisonFilm(side, SCALES, span)
+
+
+def panel(frame: np.ndarray, slot: int, strip: int, columns: int = 1) -> np.ndarray:
+    """Pixels below the label of one of two times four slots."""
+    top, left = slot // 4 * (SIDE + strip) + strip, slot % 4 * SIDE
+    return frame[top : top + SIDE, left : left + columns * SIDE]
+
+
+def has(pixels: np.ndarray, ink: tuple[int, int, int]) -> np.ndarray:
+    return (pixels == np.array(ink)).all(-1)
+
+
+@settings(max_examples=12)
+@given(st.integers(1, 300))
+def test_a_frame_has_the_size_it_says_and_that_is_even(side: int) -> None:
+    made = film(side)
+    assert made.width_px % 2 == 0 and made.height_px % 2 == 0
+    assert made.width_px // 4 == max(96, side // 2 * 2)
+    frame = made.frame(view(), [0.0], [0.1], [0.2])
+    assert frame.shape == (made.height_px, made.width_px, 3) and frame.dtype == np.uint8
+
+
+def test_every_picture_has_its_place_and_its_label() -> None:
+    """Three displays on top, then tiling and fields; the last two slots hold the errors."""
+    made = film()
+    strip = made.height_px // 2 - SIDE
+    frame, shown = made.frame(view(), [0.0], [0.1], [0.2]), panels(view(), SCALES, SIDE)
+    assert list(shown) == LABELS
+    for slot, pixels in enumerate(shown.values()):
+        assert np.array_equal(panel(frame, slot, strip), pixels), LABELS[slot]
+    for slot, value in enumerate((0, 188, 255)):
+        assert (panel(frame, slot, strip) == value).all(), "sRGB of linear 0, 0.5 and 1"
+    labels = [frame[s // 4 * (SIDE + strip) :, s % 4 * SIDE :][:strip, :SIDE] for s in range(7)]
+    assert all((~has(label, PAPER)).sum() > 20 for label in labels)
+    assert len({label.tobytes() for label in labels}) == 7
+
+
+def test_the_time_is_shown() -> None:
+    early, late = (film().frame(view(time), [0.0], [0.1], [0.2]) for time in (0.1, 0.9))
+    changed = (early != late).any(-1).nonzero()
+    assert len(changed[0]) and changed[1].min() >= 2 * SIDE and changed[0].min() >= film().height_px // 2
+
+
+def test_curves_lie_where_their_values_are() -> None:
+    """The greater error above the lesser one, both up to the present and no further."""
+    made = film()
+    strip, times = made.height_px // 2 - SIDE, np.linspace(0.0, 0.75, 30).tolist()
+    box = panel(made.frame(view(0.75), times, [1e-3] * 30, [1e-1] * 30), 6, strip, 2)
+    drawn = {ink: has(box, ink)[:, SIDE:] for ink in (ADAPTIVE, FRAMED)}
+    rows = {ink: np.median(mask.nonzero()[0]) for ink, mask in drawn.items()}
+    assert rows[FRAMED] < rows[ADAPTIVE] - SIDE / 4
+    ends = [mask.any(0).nonzero()[0].max() + SIDE for mask in drawn.values()]
+    size = max(9, SIDE // 24)
+    expected = 4 * size + 0.75 * (2 * SIDE - 5 * size)
+    assert all(abs(end - expected) <= 2 for end in ends)
+
+
+@pytest.mark.parametrize("errors", [[], [0.0], [0.0, 0.0], [1e-9, 2.0], [0.0, 1e-3]])
+def test_any_errors_can_be_drawn(errors: list[float]) -> None:
+    canvas = Image.new("RGB", (200, 100), PAPER)
+    times = [0.1 * i for i in range(len(errors))]
+    curves = {"a": (errors, ADAPTIVE), "b": (errors[::-1], FRAMED)}
+    draw_errors(ImageDraw.Draw(canvas), (0, 0, 200, 100), (0.0, 1.0), times, curves)
+    assert has(np.asarray(canvas), FRAMED).any() == bool(errors)
+
+
+def test_to_pixels_is_srgb_and_black_where_not_finite() -> None:
+    image = torch.tensor([[[0.0, 1.0, 0.5], [float("nan"), float("inf"), -float("inf")], [-1.0, 7.0, 0.002]]])
+    assert to_pixels(image).tolist() == [[[0, 255, 188], [0, 0, 0], [0, 255, 7]]]
+    assert torch.isnan(image).sum() == 1, "the image is left as it is"
+
+
+def test_a_film_reads_back(tmp_path: Path) -> None:
+    """Frames, size, rate and colours; the grey of the framed panel grows from frame to frame."""
+    made, path = film(), tmp_path / "films" / "comparison.mp4"
+    strip, values = made.height_px // 2 - SIDE, [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9]
+    with Mp4Writer(path, 30.0, made.width_px, made.height_px) as writer:
+        for number, value in enumerate(values):
+            writer.add(made.frame(view(number / 30, framed=value), [0.0], [0.1], [0.2]))
+        assert not path.exists()
+    assert writer.frames == len(values) and [p.name for p in path.parent.iterdir()] == ["comparison.mp4"]
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.average_rate == 30
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert [frame.shape for frame in frames] == [(made.height_px, made.width_px, 3)] * len(values)
+    density = panels(view(), SCALES, SIDE)["temporal density"].astype(int)
+    for value, frame in zip(values, frames, strict=True):
+        expected = to_pixels(grey(value))[0, 0].astype(int)
+        assert np.abs(panel(frame, 1, strip)[20:-20, 20:-20].astype(int) - expected).max() <= 6
+        assert np.abs(panel(frame, 5, strip)[10:50, 10:-10].astype(int) - density[10:50, 10:-10]).max() <= 12
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_exception_leaves_no_film(tmp_path: Path, error: type[BaseException]) -> None:
+    made = film()
+    with pytest.raises(error), Mp4Writer(tmp_path / "a.mp4", 30.0, made.width_px, made.height_px) as writer:
+        writer.add(made.frame(view(), [0.0], [0.1], [0.2]))
+        raise error
+    assert list(tmp_path.iterdir()) == []
