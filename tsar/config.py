@@ -44,13 +44,13 @@ class TilingConfig:
 class ErrorConfig:
     """The error estimate's template: log2 power = offset + slope * octave, octave 0 the coarsest (sec. 5.3.3.2)."""
 
-    spatial_offset: float = -8.0
+    spatial_offset: float = -7.0
     """log2 of the power tolerated per coefficient at the coarsest spatial octave (compressed luminance squared)."""
-    spatial_slope: float = -2.0
+    spatial_slope: float = -1.0
     """Change of that log2 per octave towards fine scales; steeper is more sensitive. The thesis sweeps to -8.6."""
-    temporal_offset: float = -8.0
+    temporal_offset: float = -7.0
     """As spatial_offset, for the temporal octants."""
-    temporal_slope: float = -2.0
+    temporal_slope: float = -1.0
     """As spatial_slope, for the temporal octants; the thesis sweeps to -9.6."""
     norm: Literal["l2", "linf"] = "l2"
     """Levelwise norm: total power, or the greatest power of one coefficient."""
@@ -75,7 +75,7 @@ class ResponseConfig:
     """Octaves by which each decision slides along the iso-product curve: positive towards space, negative to time."""
     surplus_max: float = 1.0
     """Bound of the running surplus C as a share of the budget; at 1 a still, plain picture frees all it can."""
-    temporal_min: float = 1.0 / 64.0
+    temporal_min: float = 1.0 / 16.0
     """Least temporal density, refreshes per cycle: even a static tile is looked at this often."""
 
     def __post_init__(self) -> None:

@@ -31,7 +31,8 @@ def test_a_constant_image_has_no_error_and_asks_for_nothing():
     # Nobody asks for density, so all of it goes into the surplus and is still accounted for.
     assert float(record.densities.temporal.max()) == pytest.approx(config.response.temporal_min)
     assert float(record.densities.spatial.max()) == pytest.approx(config.spatial_bounds[0])
-    assert record.surplus > 0.98 * config.budget and record.conservation_residual < 1e-9
+    floor = 4**config.level_min * config.samples * config.response.temporal_min
+    assert record.surplus == pytest.approx(config.budget - floor) and record.conservation_residual < 1e-9
     bounded = small(response=ResponseConfig(surplus_max=0.1))
     assert play(bounded, pictures.constant, 20)[-1][0].surplus == pytest.approx(0.1 * bounded.budget)
 
