@@ -38,6 +38,18 @@ def bad_input() -> Iterator[None]:
         raise InputError(str(error) or type(error).__name__) from error
 
 
+@contextlib.contextmanager
+def full_disk(folder: Path, *writer_errors: type[Exception]) -> Iterator[None]:
+    """Marks a block in which an OSError, or an error of a file writer, means that results cannot be written to
+    ``folder``, such as to a full disk."""
+    try:
+        yield
+    except writer_errors as error:
+        raise InputError(str(error)) from error
+    except OSError as error:
+        raise InputError(f"{error.filename or folder}: cannot be written ({error.strerror or error})") from error
+
+
 def parse(options: type[Options], description: str, arguments: list[str] | None = None) -> Options:
     """Options from the command line; help goes to standard output.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from analysis.cli import bad_input, require_memory
+from analysis.cli import bad_input, full_disk, require_memory
 from analysis.cost_model import CAPACITY_DEFAULT, CostParameters, Ledger, cycle_seconds, frame_seconds
 from analysis.files import writable_folder, write_json
 from tsar.config import TsarConfig, require
@@ -170,9 +170,11 @@ def run_experiment(options: RunOptions) -> dict[str, Any]:
     from analysis.quality import reference_times
     from analysis.records import RecordLimits, StepWriter, check_invariants
     from analysis.summary import Measured
+    from renderer.film import FilmError
 
+    (options.out / "summary.json").unlink(missing_ok=True)
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
-    with progress.bars() as bars:
+    with progress.bars() as bars, full_disk(options.out, FilmError):
         reference = _reference(options, setup, len(times_s), bars)
         limits = RecordLimits(
             options.tsar.batch_size, options.tsar.budget, options.tsar.spatial_bounds, options.tsar.temporal_bounds
@@ -181,9 +183,25 @@ def run_experiment(options: RunOptions) -> dict[str, Any]:
         with StepWriter(options.out / "steps.parquet", limits) as writer:
             streams, meters = _streams(options, setup, totals, writer)
             comparison = _compare(options, times_s, reference, streams, bars)
-    invariants = check_invariants(options.out / "steps.parquet")
-    measured = Measured(comparison, totals, meters, options.framed, invariants, reference.nonfinite, options.cost)
-    return _write(options, setup, measured)
+    with full_disk(options.out):
+        invariants = check_invariants(options.out / "steps.parquet")
+        measured = Measured(comparison, totals, meters, options.framed, invariants, reference.nonfinite, options.cost)
+        return _write(options, setup, measured)
+
+
+def finished(options: RunOptions) -> dict[str, Any] | None:
+    """The summary of a complete run of these options by this commit, or None."""
+    import json
+
+    from analysis.records import provenance
+
+    now = provenance(ROOT, dataclasses.asdict(options))
+    try:
+        found = json.loads((options.out / "summary.json").read_text())
+        same = all(found["provenance"][name] == now[name] for name in ("commit", "config_hash"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return found if same and not now["uncommitted_changes"] else None
 
 
 def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:

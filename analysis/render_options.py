@@ -1,0 +1,74 @@
+"""Options of plain rendering, and what tells whether stills on disk belong to the same job."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from tsar.config import require
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """A still, or a sequence of stills at a constant rate."""
+
+    scene: Annotated[str, tyro.conf.Positional]
+    """Built-in scene, by name or number."""
+    width_px: int = 512
+    """Width, pixels; the field of view spans the shorter side."""
+    height_px: int = 512
+    """Height, pixels."""
+    samples_per_axis: int = 2
+    """Samples along a pixel's side."""
+    time_s: float = 0.0
+    """Animation time of the first frame, seconds."""
+    frames: int = 1
+    """How many frames."""
+    fps: float = 30.0
+    """Frames per second of animation time."""
+    format: Literal["png", "exr", "ppm", "mp4"] = "png"
+    """Of the stills (EXR is linear, the others are sRGB); mp4 writes PNG stills and joins them into film.mp4."""
+    phase: float = 0.0
+    """Phase of the animation, a fraction of a wheel's turn."""
+    device: Literal["cpu", "cuda:0"] = "cpu"
+    """Where rays are traced."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/render")
+    """Folder for the results; frames that an interrupted run of the same job left there are kept."""
+
+    def __post_init__(self) -> None:
+        for name, most in (("width_px", 32768), ("height_px", 32768), ("samples_per_axis", 64), ("frames", 10**6)):
+            require(1 <= getattr(self, name) <= most, name, f"between 1 and {most}", getattr(self, name))
+        require(0 < self.fps < math.inf, "fps", "a positive, finite number", self.fps)
+        require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
+        require(self.threads >= 0, "threads", "at least 0", self.threads)
+
+    @property
+    def times_s(self) -> list[float]:
+        """Animation time of every frame."""
+        return [self.time_s + number / self.fps for number in range(self.frames)]
+
+    @property
+    def still_ending(self) -> str:
+        """Ending of a still's name."""
+        return ".png" if self.format == "mp4" else f".{self.format}"
+
+    @property
+    def job(self) -> dict[str, Any]:
+        """What decides the content of the stills."""
+        return {k: v for k, v in dataclasses.asdict(self).items() if k not in ("frames", "threads", "format", "out")}
+
+
+def previous_job(out: Path) -> str | None:
+    """Hash of the job whose stills lie in a folder; None where there is none."""
+    try:
+        return json.loads((out / "job.json").read_text())["config_hash"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

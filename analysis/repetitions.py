@@ -1,0 +1,80 @@
+"""Repetitions of a comparison over inputs, and over seeds or animation phases."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from analysis.cost_model import CAPACITY_DEFAULT, Ledger
+from analysis.experiment import RunOptions
+from tsar.config import TsarConfig, require
+
+INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
+
+
+@dataclass(frozen=True)
+class InputsOptions:
+    """Which inputs, and how often. Runs that are complete in the folder are not repeated."""
+
+    inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
+    """Built-in inputs."""
+    vary: Literal["seed", "phase"] = "seed"
+    """What differs between repetitions: the seed (0, 1, …) or the phase (0, 1/n, …)."""
+    repetitions: int = 3
+    """Runs of each input."""
+    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    """The adaptive pipeline; its seed is set here where seeds vary."""
+    seconds: float = 2.0
+    """Simulated time to measure, seconds."""
+    ledger: Ledger = "thesis"
+    """How cost is counted."""
+    capacity: float = CAPACITY_DEFAULT
+    """Speed of the simulated machine, FLOP/s."""
+    out: Path = Path("out/inputs")
+    """Folder for the results, one folder a run within."""
+
+    def __post_init__(self) -> None:
+        require(self.repetitions >= 1, "repetitions", "at least 1", self.repetitions)
+        require(len(self.inputs) >= 1, "inputs", "at least one", self.inputs)
+
+    def runs(self) -> list[RunOptions]:
+        """Every run, resolved."""
+        found = []
+        for name in self.inputs:
+            for number in range(self.repetitions):
+                out = self.out / f"{name}-{self.vary}{number}"
+                by_phase = self.vary == "phase"
+                found.append(
+                    RunOptions(
+                        input=name,
+                        tsar=self.tsar if by_phase else dataclasses.replace(self.tsar, seed=number),
+                        phase=number / self.repetitions if by_phase else 0.0,
+                        seconds=self.seconds,
+                        ledger=self.ledger,
+                        capacity=self.capacity,
+                        film=False,
+                        out=out,
+                    )
+                )
+        return found
+
+
+def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """What a table over runs shows of one of them."""
+    names = ("ratio_median", "ratio_quartiles", "share_suitable", "suitable_percentile", "cycles", "age_spread_s")
+    beside = summary.get("ratio_statistics_framed_supersampled") or {}
+    return {
+        "run": run.out.name,
+        "input": run.input,
+        "seed": run.tsar.seed,
+        "phase": run.phase,
+        **{name: summary[name] for name in names},
+        "ratio_median_supersampled": beside.get("median"),
+        "invariants_ok": summary["invariants"]["ok"],
+        "stage_wall_s": summary["stage_wall_s"],
+    }

@@ -1,0 +1,66 @@
+"""Stills of a sequence, written one by one so that an interrupted rendering goes on where it stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from renderer.film import Mp4Writer, write_image
+from renderer.trace import Renderer
+
+
+def still_path(folder: Path, number: int, ending: str) -> Path:
+    """Where the still of a number lies; ``ending`` is ``.exr``, ``.png`` or ``.ppm``."""
+    return folder / f"frame{number:05d}{ending}"
+
+
+def render_stills(
+    renderer: Renderer,
+    times_s: Sequence[float],
+    size_px: tuple[int, int],
+    samples_per_axis: int,
+    folder: Path,
+    ending: str,
+    done: Callable[[int], None] = lambda count: None,
+) -> tuple[int, int]:
+    """Renders the stills that are not on disk yet.
+
+    Args:
+        renderer: the scene.
+        times_s: animation time of each still, seconds.
+        size_px: width and height.
+        samples_per_axis: the average of a grid of this many samples squared is one pixel.
+        folder, ending: where stills go, and their format.
+        done: called with the number of stills that are on disk.
+
+    Returns:
+        How many were rendered now, and how many of their values were not finite.
+
+    Raises:
+        FilmError: a still cannot be written.
+    """
+    rendered, nonfinite = 0, 0
+    for number, time_s in enumerate(times_s):
+        path = still_path(folder, number, ending)
+        if not path.exists():
+            nonfinite += write_image(path, renderer.render_frame(time_s, *size_px, samples_per_axis))
+            rendered += 1
+        done(number + 1)
+    return rendered, nonfinite
+
+
+def write_film(stills: Sequence[Path], path: Path, fps: float) -> None:
+    """Joins 8-bit stills of equal size into an MP4; a row or column beyond an even size is cut off.
+
+    Raises:
+        FilmError: the film cannot be written.
+    """
+    with Image.open(stills[0]) as first:
+        width, height = (side - side % 2 for side in first.size)
+    with Mp4Writer(path, fps, width, height) as film:
+        for still in stills:
+            with Image.open(still) as picture:
+                film.add(np.asarray(picture.convert("RGB"))[:height, :width])

@@ -1,0 +1,60 @@
+"""Render a frame or a sequence of a scene.
+
+Examples: python scripts/render.py fly-by --time-s 1 --out out/still
+          python scripts/render.py chase --frames 60 --format mp4 --out out/chase
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.files import writable_folder, write_json
+from analysis.records import provenance
+from analysis.render_options import RenderOptions, previous_job
+
+
+def main() -> None:
+    """Parses, renders, prints what was written where."""
+    options = parse(RenderOptions, __doc__ or "")
+    with bad_input():
+        writable_folder(options.out, "out")
+
+    from analysis.progress import bars
+    from renderer.film import FilmError
+    from renderer.sequence import render_stills, still_path, write_film
+    from renderer.trace import Renderer
+    from scenes import catalog
+
+    with bad_input():
+        scene = catalog.load(options.scene, options.phase)
+        renderer = Renderer(scene, options.device, options.threads or None)
+    source = provenance(Path(__file__).parent.parent, options.job, scene=scene.name, device=options.device)
+    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
+        if previous_job(options.out) != source["config_hash"]:
+            for old in options.out.glob("frame*.*"):
+                old.unlink()
+        write_json(options.out / "job.json", {"config_hash": source["config_hash"]})
+        stills = [still_path(options.out, number, options.still_ending) for number in range(options.frames)]
+        rendered, nonfinite = render_stills(
+            renderer,
+            options.times_s,
+            (options.width_px, options.height_px),
+            options.samples_per_axis,
+            options.out,
+            options.still_ending,
+            shown.task("frames", options.frames),
+        )
+        if options.format == "mp4":
+            write_film(stills, options.out / "film.mp4", options.fps)
+        found = {"frames": options.frames, "rendered_now": rendered, "nonfinite": nonfinite}
+        write_json(options.out / "summary.json", {**found, "config": dataclasses.asdict(options), "provenance": source})
+    print(f"{options.frames} frames ({rendered} rendered now, {nonfinite} values not finite) in {options.out}")
+
+
+if __name__ == "__main__":
+    run_cli(main)
