@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import log2
 from typing import Literal
 
-Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "trivial"]
+Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "diffusion", "trivial"]
 
 
 class ConfigError(ValueError):
@@ -48,7 +48,7 @@ class ErrorConfig:
     """log2 of the power tolerated per coefficient at the coarsest spatial octave (compressed luminance squared)."""
     spatial_slope: float = -1.0
     """Change of that log2 per octave towards fine scales; steeper is more sensitive. The thesis sweeps to -8.6."""
-    temporal_offset: float = -7.0
+    temporal_offset: float = -9.0
     """As spatial_offset, for the temporal octants."""
     temporal_slope: float = -1.0
     """As spatial_slope, for the temporal octants; the thesis sweeps to -9.6."""
