@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from analysis.files import atomic
@@ -62,7 +63,8 @@ def error_figure(
     upper.set_yscale("log")
     upper.set_ylabel("mean squared error")
     upper.set_title(title, fontsize=10, loc="left")
-    upper.legend(frameon=False, fontsize=8, ncols=3, loc="upper left", bbox_to_anchor=(0.0, 1.02))
+    upper.margins(y=0.15)
+    upper.legend(frameon=False, fontsize=8, ncols=3, loc="upper left")
     shown = np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan)
     lower.plot(times_s, shown, color="0.2", linewidth=1.1)
     infinite = np.isinf(ratio)
@@ -76,7 +78,7 @@ def error_figure(
     _widen(lower, shown)
     lower.set_ylabel("TSAR / framed")
     lower.set_xlabel("simulated time, s   (dotted: the framed display changes)")
-    lower.margins(x=0.0)
+    lower.set_xlim(times_s[0], times_s[-1])
     return figure
 
 
@@ -85,6 +87,9 @@ def _widen(axis, values: Floats) -> None:
     finite = values[np.isfinite(values)]
     low, high = (finite.min(), finite.max()) if finite.size else (1.0, 1.0)
     axis.set_ylim(min(low * 0.8, 1 / 3), max(high * 1.25, 3.0))
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
 
 
 def density_figure(quantiles: Mapping[str, NDArray], bounds: Mapping[str, tuple[float, float]]) -> Figure:
