@@ -24,5 +24,8 @@ test: $(STAMP)
 test-slow: $(STAMP)
 	$(PY) -m pytest -m slow
 
+bench: $(STAMP)
+	$(PY) scripts/bench.py --out out/bench
+
 clean:
 	rm -rf out .cache

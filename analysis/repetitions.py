@@ -35,12 +35,16 @@ class InputsOptions:
     """How cost is counted."""
     capacity: float = CAPACITY_DEFAULT
     """Speed of the simulated machine, FLOP/s."""
+    reference_rate_hz: float = 30.0
+    """Reference images per simulated second; half of run.py's, for the references take most of the time."""
     out: Path = Path("out/inputs")
     """Folder for the results, one folder a run within."""
 
     def __post_init__(self) -> None:
         require(self.repetitions >= 1, "repetitions", "at least 1", self.repetitions)
         require(len(self.inputs) >= 1, "inputs", "at least one", self.inputs)
+        unknown = [name for name in self.inputs if name not in INPUTS]
+        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
 
     def runs(self) -> list[RunOptions]:
         """Every run, resolved."""
@@ -57,6 +61,7 @@ class InputsOptions:
                         seconds=self.seconds,
                         ledger=self.ledger,
                         capacity=self.capacity,
+                        reference_rate_hz=self.reference_rate_hz,
                         film=False,
                         out=out,
                     )

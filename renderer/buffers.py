@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
+from renderer.checks import check_affine, check_finite, check_light
+from renderer.hierarchy import box_tree
 from renderer.materials import MaterialTable
+from renderer.merging import Assembly, assemble
+from renderer.meshes import MeshTable, UnitMesh, check_mesh
 from renderer.structs import (
     LIGHT_DIRECTIONAL,
     LIGHT_POINT,
@@ -22,6 +26,7 @@ from renderer.structs import (
     LightRecord,
     MaterialRecord,
     MeshRecord,
+    NodeRecord,
     SceneData,
     TextureRecord,
     TrackRecord,
@@ -33,6 +38,7 @@ from scenes.canonical import (
     Disk,
     EnvironmentLight,
     Instance,
+    Matrix,
     Mesh,
     PointLight,
     Rectangle,
@@ -41,8 +47,8 @@ from scenes.canonical import (
     Sphere,
 )
 
-UNLIMITED_DEPTH = 64
-"""Bounces followed where the scene sets no limit."""
+DEPTH_MAX = 64
+"""Bounces followed at most, also where the scene sets no limit: facing mirrors end here."""
 
 _UNIT_SHAPES = {Sphere: SHAPE_SPHERE, Disk: SHAPE_DISK, Rectangle: SHAPE_RECTANGLE, Cube: SHAPE_CUBE}
 
@@ -53,8 +59,8 @@ class SceneBuffers:
 
     Attributes:
         data: what kernels read.
-        tracks: rigid motions, for poses on the host.
-        keep: Warp objects that ``data`` refers to by number only.
+        tracks: rigid motions by their index.
+        keep: objects that ``data`` refers to by number only.
         triangle_count: of all unique meshes.
     """
 
@@ -64,63 +70,13 @@ class SceneBuffers:
     triangle_count: int
 
 
-@dataclass
-class _Pools:
-    """Arrays of all unique meshes, one behind the other."""
-
-    vertices: list[np.ndarray] = field(default_factory=list)
-    faces: list[np.ndarray] = field(default_factory=list)
-    normals: list[np.ndarray] = field(default_factory=list)
-    uvs: list[np.ndarray] = field(default_factory=list)
-
-    @staticmethod
-    def append(pool: list[np.ndarray], array: np.ndarray | None) -> int:
-        """Adds an array; the index its first row gets, or -1 for None."""
-        if array is None:
-            return -1
-        first = sum(len(entry) for entry in pool)
-        pool.append(array)
-        return first
-
-
-@dataclass
-class _UnitMesh:
-    """A mesh moved into ``[-1, 1]³``; ``center`` and ``scale`` lead back to object space."""
-
-    index: int
-    center: np.ndarray
-    scale: float
-    lower: np.ndarray
-    upper: np.ndarray
-
-
-def _unit_mesh(mesh: Mesh, index: int) -> tuple[_UnitMesh, np.ndarray]:
-    vertices = mesh.vertices.astype(np.float64)
-    used = vertices[np.unique(mesh.faces)]
-    lower, upper = used.min(axis=0), used.max(axis=0)
-    center, scale = (lower + upper) / 2.0, float((upper - lower).max()) / 2.0
-    if scale == 0.0:
-        raise SceneError(f"Mesh {mesh.source!r}: all vertices lie in one point")
-    for name, array in (("normals", mesh.normals), ("uvs", mesh.uvs)):
-        if array is not None and not np.isfinite(array).all():
-            raise SceneError(f"Mesh {mesh.source!r}: {name} hold non-finite values")
-    return _UnitMesh(index, center, scale, (lower - center) / scale, (upper - center) / scale), (
-        ((vertices - center) / scale).astype(np.float32)
-    )
-
-
-def _upload(rows: list, record: type, device: str) -> wp.array:
-    """An array of structs from tuples of field values; one zeroed row where there are none."""
+def _upload(rows: list[dict], record: type, device: str) -> wp.array:
+    """An array of structs from rows of field values; one zeroed row where there are none."""
     table = np.zeros(max(len(rows), 1), dtype=record.numpy_dtype())
     for index, row in enumerate(rows):
         for name, value in row.items():
             table[name][index] = value
     return wp.array(table, dtype=record, device=device)
-
-
-def _pool(arrays: list[np.ndarray], width: int, dtype: type, scalar: type, device: str) -> wp.array:
-    table = np.concatenate(arrays) if arrays else np.zeros((1, width))
-    return wp.array(np.ascontiguousarray(table, dtype=scalar), dtype=dtype, device=device)
 
 
 class _Builder:
@@ -130,68 +86,53 @@ class _Builder:
         self.scene, self.device = scene, device
         self.materials = MaterialTable()
         self.tracks = TrackTable(device)
-        self.pools = _Pools()
-        self.meshes: dict[int, _UnitMesh] = {}
-        self.mesh_rows: list[dict] = []
+        self.meshes = MeshTable(device)
         self.instance_rows: list[tuple[dict, np.ndarray, np.ndarray]] = []
-        self.keep: list[object] = []
 
-    def mesh(self, mesh: Mesh) -> _UnitMesh:
-        """Uploads a mesh once, however many instances share it."""
-        if id(mesh) in self.meshes:
-            return self.meshes[id(mesh)]
-        unit, vertices = _unit_mesh(mesh, len(self.mesh_rows))
-        bvh = wp.Mesh(
-            points=wp.array(vertices, dtype=wp.vec3, device=self.device),
-            indices=wp.array(mesh.faces.reshape(-1).astype(np.int32), dtype=wp.int32, device=self.device),
-        )
-        self.keep.append(bvh)
-        # normals of the unit mesh are those of the mesh: centring and uniform scaling do not turn them
-        self.mesh_rows.append(
-            {
-                "id": bvh.id,
-                "first_face": _Pools.append(self.pools.faces, mesh.faces),
-                "first_vertex": _Pools.append(self.pools.vertices, vertices),
-                "first_normal": _Pools.append(self.pools.normals, mesh.normals),
-                "first_uv": _Pools.append(self.pools.uvs, mesh.uvs),
-            }
-        )
-        self.meshes[id(mesh)] = unit
-        return unit
+    def assembly(self, assembly: Assembly) -> None:
+        """Adds meshes that became one."""
+        indices = [self.materials.add(part.material, part.name) for part in assembly.parts]
+        unit = self.meshes.add(assembly.mesh, np.repeat(indices, assembly.face_counts))
+        row = {"shape": SHAPE_MESH, "track": self.tracks.add(assembly.track), "material": -1}
+        self._place(row, unit, np.eye(4), assembly.parts[0].name)
 
     def instance(self, instance: Instance) -> None:
-        """Adds an instance: its unit shape, transforms in float64 before rounding, and bounds in track space."""
+        """Adds an instance."""
+        name, shape = instance.name, instance.shape
         if instance.emission is not None:
-            raise SceneError(f"Instance {instance.name!r}: area lights (Instance.emission) are not supported yet")
-        shape, mesh_index = instance.shape, -1
-        lower, upper = -np.ones(3), np.ones(3)
-        unit_to_object = np.eye(4)
+            raise SceneError(f"Instance {name!r}: area lights (Instance.emission) are not supported yet")
+        row = {"track": self.tracks.add(instance.track), "material": self.materials.add(instance.material, name)}
         if isinstance(shape, Mesh):
-            unit = self.mesh(shape)
-            kind, mesh_index, lower, upper = SHAPE_MESH, unit.index, unit.lower, unit.upper
-            unit_to_object[:3, :3] *= unit.scale
-            unit_to_object[:3, 3] = unit.center
-        elif type(shape) in _UNIT_SHAPES:
-            kind = _UNIT_SHAPES[type(shape)]
-            if isinstance(shape, Sphere | Disk):
-                if not shape.radius > 0.0:
-                    raise SceneError(f"Instance {instance.name!r}: expected a positive radius, got {shape.radius}")
-                unit_to_object[:3, :3] *= shape.radius
-            if isinstance(shape, Disk | Rectangle):
-                lower, upper = np.array([-1.0, -1.0, 0.0]), np.array([1.0, 1.0, 0.0])
-        else:
-            raise SceneError(f"Instance {instance.name!r}: shape {type(shape).__name__} is not supported")
-        from_local = instance.to_world @ unit_to_object
+            self._place({"shape": SHAPE_MESH, **row}, self.meshes.add(shape), instance.to_world, name)
+            return
+        if type(shape) not in _UNIT_SHAPES:
+            raise SceneError(f"Instance {name!r}: shape {type(shape).__name__} is not supported")
+        scale = 1.0
+        if isinstance(shape, Sphere | Disk):
+            check_finite(shape.radius, f"Instance {name!r}: radius")
+            if not shape.radius > 0.0:
+                raise SceneError(f"Instance {name!r}: expected a positive radius, got {shape.radius}")
+            scale = shape.radius
+        corner = np.array([1.0, 1.0, 0.0 if isinstance(shape, Disk | Rectangle) else 1.0])
+        unit = UnitMesh(-1, np.zeros(3), scale, -corner, corner)
+        self._place({"shape": _UNIT_SHAPES[type(shape)], **row}, unit, instance.to_world, name)
+
+    def _place(self, row: dict, unit: UnitMesh, to_world: Matrix, name: str) -> None:
+        """Adds a unit shape: its transforms in float64 before rounding, and its bounds in track space."""
+        check_affine(to_world, f"Instance {name!r}: to_world")
+        unit_to_object = np.eye(4)
+        unit_to_object[:3, :3] *= unit.scale
+        unit_to_object[:3, 3] = unit.center
+        from_local = to_world @ unit_to_object
         to_local = np.linalg.inv(from_local)
-        corners = np.stack(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij"), -1).reshape(-1, 3)
+        for matrix in (from_local, to_local):
+            check_finite(matrix, f"Instance {name!r}: to_world of a shape of half size {unit.scale:g}")
+        corners = np.stack(np.meshgrid(*zip(unit.lower, unit.upper, strict=True), indexing="ij"), -1).reshape(-1, 3)
         placed = corners @ from_local[:3, :3].T + from_local[:3, 3]
         # a little wider, so that a flat box is not missed by a rounded ray
         margin = 4.0e-6 * (np.abs(placed).max() + np.ptp(placed, axis=0).max())
-        row = {
-            "shape": kind,
-            "track": self.tracks.add(instance.track),
-            "material": self.materials.add(instance.material, instance.name),
-            "mesh": mesh_index,
+        row |= {
+            "mesh": unit.index,
             "to_local": to_local[:3, :3],
             "to_local_offset": to_local[:3, 3],
             "from_local": from_local[:3, :3],
@@ -200,16 +141,26 @@ class _Builder:
         }
         self.instance_rows.append((row, placed.min(axis=0) - margin, placed.max(axis=0) + margin))
 
-    def groups(self) -> list[dict]:
-        """Runs of instances on one track, from instances sorted by track."""
+    def groups(self) -> tuple[list[dict], list[dict]]:
+        """Instances by track, as groups and the nodes of their trees."""
         groups: list[dict] = []
-        for index, (row, lower, upper) in enumerate(self.instance_rows):
-            if not groups or groups[-1]["track"] != row["track"]:
-                groups.append({"track": row["track"], "first": index, "radius": 0.0})
-            radius = 1.00001 * float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper))))
-            groups[-1]["end"] = index + 1
-            groups[-1]["radius"] = max(groups[-1]["radius"], radius)
-        return groups
+        nodes: list[dict] = []
+        tracks = np.array([row["track"] for row, _, _ in self.instance_rows], np.int64)
+        for track in np.unique(tracks):  # what stands still first: it hides much of the rest
+            members = np.flatnonzero(tracks == track)
+            lower, upper = (np.stack([self.instance_rows[i][corner] for i in members]) for corner in (1, 2))
+            # whatever the turn: the farthest corner of any box
+            radius = 1.00001 * float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper)), axis=1).max())
+            extent = np.ptp([lower.min(axis=0), upper.max(axis=0)], axis=0)
+            surface = 2.0 * np.pi * radius**2 if track else extent @ np.roll(extent, 1)
+            first = len(nodes)
+            for node in box_tree(lower, upper, float(surface)):
+                instance = int(members[node.item]) if node.item >= 0 else -1
+                nodes.append(
+                    {"lower": node.lower, "upper": node.upper, "skip": first + node.skip, "instance": instance}
+                )
+            groups.append({"track": track, "first": first, "end": len(nodes), "radius": radius})
+        return groups, nodes
 
     def lights(self) -> tuple[list[dict], EnvironmentLight | None]:
         """Rows of the lights that cast shadows, and the environment."""
@@ -217,11 +168,16 @@ class _Builder:
         environments = []
         for light in self.scene.lights:
             if isinstance(light, PointLight):
+                check_finite(light.position, "PointLight.position")
+                check_light(light.intensity, "PointLight.intensity")
                 rows.append({"kind": LIGHT_POINT, "place": light.position, "color": light.intensity})
             elif isinstance(light, DirectionalLight):
                 length = float(np.linalg.norm(light.direction))
-                if not length > 0.0:
-                    raise SceneError(f"DirectionalLight: expected a direction, got {light.direction}")
+                if not 0.0 < length < np.inf:
+                    raise SceneError(f"DirectionalLight.direction: expected a direction, got {light.direction}")
+                if light.angle_deg != 0.0:
+                    raise SceneError(f"DirectionalLight.angle_deg {light.angle_deg} is not supported yet, expected 0")
+                check_light(light.irradiance, "DirectionalLight.irradiance")
                 towards = -np.asarray(light.direction) / length
                 rows.append({"kind": LIGHT_DIRECTIONAL, "place": towards, "color": light.irradiance})
             elif isinstance(light, EnvironmentLight):
@@ -237,8 +193,12 @@ class _Builder:
         data.environment_level = -1
         if light is None:
             return
-        if light.image.ndim != 3 or light.image.shape[2] != 3 or not np.isfinite(light.image).all():
-            raise SceneError(f"EnvironmentLight {light.source!r}: expected a finite (h, w, 3) image")
+        name, shape = f"EnvironmentLight {light.source!r}", light.image.shape
+        if len(shape) != 3 or shape[2] != 3 or min(shape) < 1:
+            raise SceneError(f"{name}: expected an image (h, w, 3), got {shape}")
+        check_light(light.image, name)
+        check_light(light.scale, f"{name}: scale")
+        check_affine(light.to_world, f"{name}: to_world")
         data.environment_level = self.materials.add_image(light.image, mipmap=False)[0]
         rotation = np.asarray(light.to_world, np.float64)[:3, :3]
         data.environment_to_map = wp.mat33(*np.linalg.inv(rotation).astype(np.float32).reshape(-1).tolist())
@@ -250,34 +210,37 @@ class _Builder:
         data = SceneData()
         self.tracks.add(getattr(scene.camera, "track", None))
         for instance in scene.instances:
+            if isinstance(instance.shape, Mesh):
+                check_affine(instance.to_world, f"Instance {instance.name!r}: to_world")
+                check_mesh(instance.shape)
+        assemblies, single = assemble(scene.instances)
+        for instance in single:
             self.instance(instance)
+        for assembly in assemblies:
+            self.assembly(assembly)
         light_rows, environment = self.lights()
         self.environment(environment, data)
-        self.instance_rows.sort(key=lambda entry: entry[0]["track"])  # stable: one pose serves a run of instances
-        rows = [row for row, _, _ in self.instance_rows]
-        groups = self.groups()
+        check_light(scene.ambient, "Scene.ambient")
+        groups, nodes = self.groups()
         data.group_count = len(groups)
         data.groups = _upload(groups, GroupRecord, device)
-        data.instances = _upload(rows, InstanceRecord, device)
-        data.bounds_lower = _pool([low[None] for _, low, _ in self.instance_rows], 3, wp.vec3, np.float32, device)
-        data.bounds_upper = _pool([up[None] for _, _, up in self.instance_rows], 3, wp.vec3, np.float32, device)
-        data.meshes = _upload(self.mesh_rows, MeshRecord, device)
-        data.vertices = _pool(self.pools.vertices, 3, wp.vec3, np.float32, device)
-        data.faces = _pool(self.pools.faces, 3, wp.vec3i, np.int32, device)
-        data.normals = _pool(self.pools.normals, 3, wp.vec3, np.float32, device)
-        data.uvs = _pool(self.pools.uvs, 2, wp.vec2, np.float32, device)
+        data.nodes = _upload(nodes, NodeRecord, device)
+        data.instances = _upload([row for row, _, _ in self.instance_rows], InstanceRecord, device)
+        data.meshes = _upload(self.meshes.rows, MeshRecord, device)
+        for name, pool in self.meshes.pools.items():
+            setattr(data, name, pool.upload(device))
         data.materials = _upload(self.materials.rows, MaterialRecord, device)
         data.textures = _upload(self.materials.textures, TextureRecord, device)
         data.levels = _upload(self.materials.levels, LevelRecord, device)
-        data.texels = _pool(self.materials.texels, 3, wp.vec3, np.float32, device)
+        data.texels = self.materials.upload_texels(device)
         data.light_count = len(light_rows)
         data.lights = _upload(light_rows, LightRecord, device)
         data.tracks = _upload(self.tracks.rows, TrackRecord, device)
-        self.tracks.finish()
         data.key_translation, data.key_rotation, data.key_angle = self.tracks.keys()
         data.ambient = wp.vec3(*map(float, scene.ambient))
-        data.depth = UNLIMITED_DEPTH if scene.integrator.depth < 0 else int(scene.integrator.depth)
-        return SceneBuffers(data, self.tracks, self.keep, sum(len(faces) for faces in self.pools.faces))
+        depth = int(scene.integrator.depth)
+        data.depth = min(depth, DEPTH_MAX) if depth >= 0 else DEPTH_MAX
+        return SceneBuffers(data, self.tracks, self.meshes.keep, self.meshes.triangle_count)
 
 
 def build_buffers(scene: Scene, device: str) -> SceneBuffers:

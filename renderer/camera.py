@@ -33,7 +33,7 @@ def track_key(scene: SceneData, track: wp.int32, time_s: wp.float64):
 
 @wp.func
 def track_translation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp.float64) -> wp.vec3:
-    """Where a track's origin is; taken from the host where all samples of a launch share one time."""
+    """Where a track's origin is; looked up where all samples of a launch share one time."""
     if view.single_time == 1:
         return view.pose_translation[track]
     first, second, fraction = track_key(scene, track, time_s)

@@ -38,9 +38,9 @@ def meets_box(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3,
     """Whether a ray passes through an axis-aligned box before ``t_max``."""
     a = wp.cw_mul(lower - origin, inverse)
     b = wp.cw_mul(upper - origin, inverse)
-    near = wp.max(wp.max(wp.min(a[0], b[0]), wp.min(a[1], b[1])), wp.min(a[2], b[2]))
-    far = wp.min(wp.min(wp.max(a[0], b[0]), wp.max(a[1], b[1])), wp.max(a[2], b[2]))
-    return near <= far and far >= 0.0 and near < t_max
+    near = wp.max(wp.max(wp.min(a[0], b[0]), wp.min(a[1], b[1])), wp.max(wp.min(a[2], b[2]), 0.0))
+    far = wp.min(wp.min(wp.max(a[0], b[0]), wp.max(a[1], b[1])), wp.min(wp.max(a[2], b[2]), t_max))
+    return near <= far
 
 
 @wp.func
@@ -193,12 +193,17 @@ def closest_hit(
                 towards = wp.quat_rotate_inv(rotation, direction)
         if not missed:
             inverse = reciprocal(towards)
-            for i in range(group.first, group.end):
-                if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], best.t):
-                    hit = meet_instance(scene, scene.instances[i], start, towards, best.t)
+            index = wp.int32(group.first)
+            while index < group.end:
+                node = scene.nodes[index]
+                index = index + 1
+                if not meets_box(start, inverse, node.lower, node.upper, best.t):
+                    index = node.skip
+                elif node.instance >= 0:
+                    hit = meet_instance(scene, scene.instances[node.instance], start, towards, best.t)
                     if hit.instance == 0:
                         best = hit
-                        best.instance = i
+                        best.instance = node.instance
     return best
 
 
@@ -221,8 +226,13 @@ def occluded(
                 towards = wp.quat_rotate_inv(rotation, direction)
         if not missed:
             inverse = reciprocal(towards)
-            for i in range(group.first, group.end):
-                if meets_box(start, inverse, scene.bounds_lower[i], scene.bounds_upper[i], t_max):
-                    if instance_blocks(scene, scene.instances[i], start, towards, t_max):
+            index = wp.int32(group.first)
+            while index < group.end:
+                node = scene.nodes[index]
+                index = index + 1
+                if not meets_box(start, inverse, node.lower, node.upper, t_max):
+                    index = node.skip
+                elif node.instance >= 0:
+                    if instance_blocks(scene, scene.instances[node.instance], start, towards, t_max):
                         return True
     return False

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+import warp as wp
 
+from renderer.checks import check_finite, check_light
 from renderer.structs import (
     FILTER_BILINEAR,
     FILTER_MIPMAP,
@@ -52,11 +54,6 @@ def mip_levels(image: np.ndarray) -> list[np.ndarray]:
     return levels
 
 
-def _finite(values: object, what: str) -> None:
-    if not np.isfinite(np.asarray(values, np.float64)).all():
-        raise SceneError(f"{what}: holds non-finite values, got {values}")
-
-
 class MaterialTable:
     """Rows of materials, textures and mip levels, and the pool of texels."""
 
@@ -88,6 +85,11 @@ class MaterialTable:
             self._alive.append(image)
         return self._image_index[key]
 
+    def upload_texels(self, device: str) -> wp.array:
+        """All texels on a device; one black one where there are none."""
+        table = np.concatenate(self.texels) if self.texels else np.zeros((1, 3), np.float32)
+        return wp.array(table, dtype=wp.vec3, device=device)
+
     def add_texture(self, texture: Texture, where: str) -> int:
         """Index of a texture; the same object is stored once."""
         if id(texture) not in self._texture_index:
@@ -99,9 +101,12 @@ class MaterialTable:
 
     def _texture_row(self, texture: Texture, where: str) -> dict:
         if isinstance(texture, ConstantTexture):
-            _finite(texture.value, f"{where}: ConstantTexture")
+            check_light(texture.value, f"{where}: ConstantTexture")
             return {"kind": TEXTURE_CONSTANT, "value": texture.value}
         if isinstance(texture, ImageTexture):
+            name = f"{where}: ImageTexture {texture.source!r}"
+            check_light(texture.image, name)
+            check_finite((*texture.uv_scale, *texture.uv_offset), f"{name}.uv_scale, uv_offset")
             first, count = self.add_image(texture.image, texture.filter == "mipmap")
             height, width = texture.image.shape[:2]
             area = height * width * abs(texture.uv_scale[0] * texture.uv_scale[1])
@@ -117,6 +122,7 @@ class MaterialTable:
                 "filter": _FILTERS[texture.filter],
             }
         if isinstance(texture, CheckerboardTexture):
+            check_finite(texture.uv_scale, f"{where}: CheckerboardTexture.uv_scale")
             return {
                 "kind": TEXTURE_CHECKERBOARD,
                 "value": _WHITE,
@@ -164,6 +170,6 @@ class MaterialTable:
             row["emission"] = material.radiance
         else:
             raise SceneError(f"{where}: material {type(material).__name__} is not supported yet")
-        for name, value in row.items():
-            _finite(value, f"{where}: {type(material).__name__}.{name}")
+        for name in row.keys() - {"diffuse", "mirror"}:
+            check_light(row[name], f"{where}: {type(material).__name__}.{name}")
         return row

@@ -53,6 +53,7 @@ class MeshRecord:
     first_vertex: wp.int32
     first_normal: wp.int32
     first_uv: wp.int32
+    first_material: wp.int32  # of its faces' materials; where it has none, instances decide
 
 
 @wp.struct
@@ -107,8 +108,18 @@ class LightRecord:
 
 
 @wp.struct
+class NodeRecord:
+    """A box over instances of one track, in its track space; nodes below it lie between it and ``skip``."""
+
+    lower: wp.vec3
+    upper: wp.vec3
+    skip: wp.int32
+    instance: wp.int32  # of a leaf, else negative
+
+
+@wp.struct
 class GroupRecord:
-    """A run of instances on one track, and the sphere about the track's origin that holds them whatever its turn."""
+    """The instances on one track as a run of nodes, and the sphere about the track's origin that holds them all."""
 
     track: wp.int32
     first: wp.int32
@@ -118,18 +129,18 @@ class GroupRecord:
 
 @wp.struct
 class SceneData:
-    """The scene as kernels see it; instances are sorted by track."""
+    """The scene as kernels see it."""
 
     group_count: wp.int32
     groups: wp.array(dtype=GroupRecord)
+    nodes: wp.array(dtype=NodeRecord)
     instances: wp.array(dtype=InstanceRecord)
-    bounds_lower: wp.array(dtype=wp.vec3)  # of each instance, in its track space
-    bounds_upper: wp.array(dtype=wp.vec3)
     meshes: wp.array(dtype=MeshRecord)
     vertices: wp.array(dtype=wp.vec3)
     faces: wp.array(dtype=wp.vec3i)
     normals: wp.array(dtype=wp.vec3)
     uvs: wp.array(dtype=wp.vec2)
+    face_materials: wp.array(dtype=wp.int32)
     materials: wp.array(dtype=MaterialRecord)
     textures: wp.array(dtype=TextureRecord)
     levels: wp.array(dtype=LevelRecord)

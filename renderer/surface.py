@@ -52,7 +52,8 @@ def mesh_surface(scene: SceneData, record: InstanceRecord, hit: Hit) -> LocalSur
     local.position = a * hit.u + b * hit.v + c * w
     local.tangent_u = b - a
     local.tangent_v = c - a
-    local.geometric_normal = wp.cross(local.tangent_u, local.tangent_v)
+    # made unit at once: that of a tiny face in a large scene would vanish in float32
+    local.geometric_normal = wp.normalize(wp.cross(local.tangent_u, local.tangent_v))
     local.normal = local.geometric_normal
     if mesh.first_normal >= 0:
         smooth = (
@@ -138,6 +139,12 @@ def facing(normal: wp.vec3, direction: wp.vec3) -> wp.vec3:
 
 
 @wp.func
+def greatest(v: wp.vec3) -> wp.float32:
+    """Greatest component without its sign."""
+    return wp.max(wp.max(wp.abs(v[0]), wp.abs(v[1])), wp.abs(v[2]))
+
+
+@wp.func
 def surface_at(
     scene: SceneData, view: ViewData, time_s: wp.float64, hit: Hit, origin: wp.vec3, direction: wp.vec3
 ) -> Surface:
@@ -156,7 +163,9 @@ def surface_at(
     shading = to_local_transposed * local.normal
     patch = wp.length(wp.cross(record.from_local * local.tangent_u, record.from_local * local.tangent_v))
     position = record.from_local * local.position + record.from_local_offset
+    magnitude = record.extent
     if record.track != 0:
+        magnitude = magnitude + greatest(position) + greatest(translation)
         position = wp.quat_rotate(rotation, position) + translation
         geometric = wp.quat_rotate(rotation, geometric)
         shading = wp.quat_rotate(rotation, shading)
@@ -173,7 +182,8 @@ def surface_at(
     surface.normal = shading
     surface.uv = local.uv
     surface.uv_density = wp.sqrt(local.uv_area / wp.max(patch, 1.0e-30))
-    magnitude = wp.max(wp.max(wp.abs(position[0]), wp.abs(position[1])), wp.abs(position[2]))
-    surface.offset = (magnitude + record.extent) * _OFFSET
+    surface.offset = (magnitude + greatest(position)) * _OFFSET
     surface.material = record.material
+    if record.material < 0:
+        surface.material = scene.face_materials[scene.meshes[record.mesh].first_material + hit.face]
     return surface

@@ -75,8 +75,21 @@ def image_bilinear_wrapped_around(scene: SceneData, index: wp.int32, u: wp.float
 
 
 @wp.func
+def level_lookup(scene: SceneData, record: TextureRecord, index: wp.int32, u: wp.float32, v: wp.float32) -> wp.vec3:
+    """Bilinear lookup in one level of an image."""
+    level = scene.levels[record.first_level + index]
+    x = u * wp.float32(level.width)
+    y = (1.0 - v) * wp.float32(level.height)
+    return bilinear(scene, level, x, y, record.wrap, record.wrap)
+
+
+@wp.func
 def image_lookup(scene: SceneData, record: TextureRecord, uv: wp.vec2, footprint_uv: wp.float32) -> wp.vec3:
-    """Image texture at a surface's ``uv``; ``footprint_uv`` is the width of the ray's cone in units of uv."""
+    """Image texture at a surface's ``uv``; ``footprint_uv`` is the width of the ray's cone in units of uv.
+
+    Mip maps are blended between levels: otherwise a line where the level changes would run over the ground with the
+    camera.
+    """
     u = uv[0] * record.uv_scale[0] + record.uv_offset[0]
     v = uv[1] * record.uv_scale[1] + record.uv_offset[1]
     if record.wrap == _REPEAT:
@@ -87,18 +100,21 @@ def image_lookup(scene: SceneData, record: TextureRecord, uv: wp.vec2, footprint
         # far outside only the border is seen, and the texel index must stay within int32
         u = wp.clamp(u, -8.0, 9.0)
         v = wp.clamp(v, -8.0, 9.0)
-    choice = wp.int32(0)
-    if record.filter == _MIPMAP:
-        choice = wp.int32(wp.floor(wp.log2(wp.clamp(footprint_uv * record.texel_scale, 1.0, 1.0e9)) + 0.5))
-        choice = wp.min(choice, record.level_count - 1)
-    level = scene.levels[record.first_level + choice]
-    x = u * wp.float32(level.width)
-    y = (1.0 - v) * wp.float32(level.height)
     if record.filter == _NEAREST:
-        column = wrapped(wp.int32(wp.floor(x)), level.width, record.wrap)
-        row = wrapped(wp.int32(wp.floor(y)), level.height, record.wrap)
+        level = scene.levels[record.first_level]
+        column = wrapped(wp.int32(wp.floor(u * wp.float32(level.width))), level.width, record.wrap)
+        row = wrapped(wp.int32(wp.floor((1.0 - v) * wp.float32(level.height))), level.height, record.wrap)
         return texel(scene, level, column, row)
-    return bilinear(scene, level, x, y, record.wrap, record.wrap)
+    detail = wp.float32(0.0)
+    if record.filter == _MIPMAP:
+        detail = wp.log2(wp.clamp(footprint_uv * record.texel_scale, 1.0, 1.0e9))
+        detail = wp.min(detail, wp.float32(record.level_count - 1))
+    first = wp.int32(detail)
+    blend = detail - wp.float32(first)
+    color = level_lookup(scene, record, first, u, v)
+    if blend > 0.0:
+        color = color * (1.0 - blend) + level_lookup(scene, record, first + 1, u, v) * blend
+    return color
 
 
 @wp.func

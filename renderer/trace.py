@@ -13,14 +13,15 @@ from torch import Tensor
 
 from renderer import device as devices
 from renderer import kernels
-from renderer.blocks import pixel_blocks
+from renderer.blocks import BLOCK_PX, pixel_blocks
 from renderer.buffers import build_buffers
+from renderer.checks import check_affine
 from renderer.structs import ViewData
 from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from tsar.types import FrameletBatch, SampleBatch
 
 _CHUNK_SAMPLES = 1 << 18
-# Samples per launch on the CPU: enough that the fixed cost of about 20 µs is small, few enough that threads end together.
+# Samples per launch on the CPU: enough that its fixed cost of 20 µs is small, few enough that threads end together.
 _RANGE_SAMPLES = (1024, 4096)
 _RANGES_PER_THREAD = 4
 _BYTES_PER_SAMPLE = 64  # position, time, colour and counts, and their copies in flight
@@ -62,6 +63,8 @@ class Renderer:
             raise ValueError(f"threads: expected at least 1, got {threads}")
         if not footprint_resolution_px > 0.0:
             raise ValueError(f"footprint_resolution_px: expected a positive number, got {footprint_resolution_px}")
+        if not 0.0 <= throughput_cutoff < math.inf:
+            raise ValueError(f"throughput_cutoff: expected a share of at least 0, got {throughput_cutoff}")
         self.device = devices.pick(device)
         self.threads = threads or devices.core_count()
         self.footprint_resolution_px = float(footprint_resolution_px)
@@ -112,7 +115,7 @@ class Renderer:
         for name, value in (("width_px", width_px), ("height_px", height_px), ("samples_per_axis", samples_per_axis)):
             if int(value) != value or value < 1:
                 raise ValueError(f"{name}: expected a whole number of at least 1, got {value}")
-        self._check_memory(width_px, height_px)
+        self._check_memory(width_px, height_px, samples_per_axis)
         image = torch.empty(height_px * width_px, 3)
         footprint = min(width_px, height_px) * samples_per_axis
         limit = max(1, _CHUNK_SAMPLES // samples_per_axis**2)
@@ -137,7 +140,7 @@ class Renderer:
         target = torch.device(self.device)
         position = position.to(target, torch.float32).contiguous()
         time_s = time_s.to(target, torch.float64).contiguous()
-        earliest, latest = (float(bound) for bound in torch.aminmax(time_s))
+        earliest, latest = _bounds(time_s)
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
         color = torch.empty(count, 3, device=target)
@@ -150,7 +153,7 @@ class Renderer:
             wp.from_torch(rays, dtype=wp.vec2i),
         )
         self._launch(view, shared, count)
-        shadow, reflection = rays.sum(dim=0, dtype=torch.int64).tolist()
+        shadow, reflection = _totals(rays)
         return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
 
     def _launch(self, view: ViewData, shared: tuple[wp.array, ...], count: int) -> None:
@@ -182,19 +185,38 @@ class Renderer:
         view.camera_track = self._buffers.tracks.add(self._camera.track)
         view.tan_x, view.tan_y = tangent * max(aspect, 1.0), tangent * max(1.0 / aspect, 1.0)
         view.spread = 2.0 * tangent / footprint_px
-        view.single_time = int(time_s is not None)
         if time_s is not None:
-            view.pose_translation, view.pose_rotation = self._buffers.tracks.poses(time_s)
+            count = len(self._buffers.tracks.tracks)
+            poses = wp.empty(count, wp.vec3, self.device), wp.empty(count, wp.quat, self.device)
+            inputs = [self._buffers.data, view, wp.float64(time_s), *poses]
+            wp.launch(kernels.pose_tracks, dim=count, inputs=inputs, device=self.device)
+            view.pose_translation, view.pose_rotation = poses
+            view.single_time = 1
         return view
 
-    def _check_memory(self, width_px: int, height_px: int) -> None:
-        need = width_px * height_px * _BYTES_PER_PIXEL + _CHUNK_SAMPLES * _BYTES_PER_SAMPLE
+    def _check_memory(self, width_px: int, height_px: int, samples_per_axis: int) -> None:
+        chunk = max(_CHUNK_SAMPLES, (BLOCK_PX * samples_per_axis) ** 2)
+        need = width_px * height_px * _BYTES_PER_PIXEL + chunk * _BYTES_PER_SAMPLE
         have = _free_memory_bytes()
         if need > have:
             raise ValueError(
-                f"render_frame: {width_px} x {height_px} pixels need about {need / 2**30:.1f} GiB of memory, "
-                f"{have / 2**30:.1f} GiB are free"
+                f"render_frame: {width_px} x {height_px} pixels of {samples_per_axis}² samples need about "
+                f"{need / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free"
             )
+
+
+# On the host by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours.
+
+
+def _bounds(time_s: Tensor) -> tuple[float, float]:
+    values = time_s.numpy() if time_s.device.type == "cpu" else time_s
+    return float(values.min()), float(values.max())
+
+
+def _totals(rays: Tensor) -> list[int]:
+    if rays.device.type == "cpu":
+        return rays.numpy().sum(axis=0, dtype=np.int64).tolist()
+    return rays.sum(dim=0, dtype=torch.int64).tolist()
 
 
 def _free_memory_bytes() -> int:
@@ -216,6 +238,5 @@ def _check_camera(scene: Scene) -> PerspectiveCamera:
         raise SceneError(f"PerspectiveCamera.lens_radius {camera.lens_radius} is not supported yet, expected 0")
     if tuple(camera.shutter_s) != (0.0, 0.0):
         raise SceneError(f"PerspectiveCamera.shutter_s {camera.shutter_s} is not supported yet, expected (0, 0)")
-    if camera.to_world.shape != (4, 4) or not np.isfinite(camera.to_world).all():
-        raise SceneError("PerspectiveCamera.to_world: expected a finite (4, 4) matrix")
+    check_affine(camera.to_world, "PerspectiveCamera.to_world")
     return camera

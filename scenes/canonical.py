@@ -39,7 +39,7 @@ class SceneError(ValueError):
 # --- animation -------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RigidTrack:
     """A rigid motion sampled at uniform key times; between keys, translation is linear and rotation is slerped.
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.animation import Path, attached, sample_track
+from scenes.animation import Path, Times, attached, sample_track
 from scenes.body import (
     ARCH_RADIUS_M,
     AXLE_HEIGHT_M,
@@ -183,10 +183,12 @@ def _wheel_turn(path: Path, steered: bool, side: float) -> Callable[[Array], Rot
     """Orientation of a wheel in the car's frame: steering about z, rolling about the axle, outer side outwards."""
     outward = Rotation.from_euler("z", 0.0 if side > 0 else 180.0, degrees=True)
 
-    def turn(time_s: Array) -> Rotation:
+    def turn(time_s: Times) -> Rotation:
         distance = path.distance(time_s)
         steer = np.arctan(path.curvature(distance) * (FRONT_AXLE_M - REAR_AXLE_M)) * steered
-        return Rotation.from_euler("zy", np.stack([steer, distance / RADIUS_M], -1)) * outward
+        # in a bend the inner wheel goes a shorter way
+        rolled = distance - side * HUB_OFFSET_M * (path.heading(distance) - path.heading_rad)
+        return Rotation.from_euler("ZY", np.stack([steer, rolled / RADIUS_M], -1)) * outward
 
     return turn
 

@@ -32,7 +32,9 @@ class Surface:
 
     def mesh(self, source: str) -> Mesh:
         """The surface as a canonical mesh, without triangles of no area and without unused vertices."""
-        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        # as they will be: single precision flattens some more
+        vertices = self.vertices.astype(np.float32).astype(np.float64)
+        a, b, c = (vertices[self.faces[:, corner]] for corner in range(3))
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         longest = np.max([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
         faces = self.faces[area > 1e-5 * longest**2 + 1e-12]

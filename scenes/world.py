@@ -75,7 +75,7 @@ def sky() -> EnvironmentLight:
     image[horizon - tall : horizon] = image[horizon - tall : horizon] * (1.0 - solid) + distant * solid
     image[horizon:] = strip[-1].mean(axis=0) * 1.25
     image.flags.writeable = False
-    return EnvironmentLight(image.astype(np.float32), _Y_UP_TO_Z_UP, source="sky.exr, landscape_band.jpg")
+    return EnvironmentLight(image, _Y_UP_TO_Z_UP, source="sky.exr, landscape_band.jpg")
 
 
 def sun() -> DirectionalLight:
@@ -192,7 +192,8 @@ _TREES = (
     # x, y, size
     (9.5, 10.0, 1.0), (9.0, 30.0, 1.15), (28.0, 9.5, 0.95), (48.0, 10.0, 1.1), (-9.5, 9.0, 1.05), (-31.0, 9.8, 1.2),
     (-9.5, -10.5, 0.9), (-36.0, -11.0, 1.15), (-52.0, 9.0, 1.0), (10.0, -10.0, 1.1), (28.5, -11.0, 1.0),
-    (60.0, -9.5, 1.2), (66.0, 10.5, 1.0), (-66.0, -10.0, 1.1), (-9.0, 40.0, 1.0), (9.5, -40.0, 1.1), (-10.0, -34.0, 1.2), (80.0, 9.0, 1.1),
+    (60.0, -9.5, 1.2), (66.0, 10.5, 1.0), (-66.0, -10.0, 1.1), (-9.0, 40.0, 1.0), (9.5, -40.0, 1.1),
+    (-10.0, -34.0, 1.2), (80.0, 9.0, 1.1),
 )  # fmt: skip
 
 

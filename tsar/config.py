@@ -130,9 +130,7 @@ class TsarConfig:
         require(self.warmup_cycles >= 0, "warmup_cycles", "at least 0", self.warmup_cycles)
         low, high = self.level_min, self.level_max
         require(low <= high <= self.field_level, "tiling.level_max", f"between {low} and {self.field_level}", high)
-        require(
-            2**high <= self.resolution_px // 2, "tiling.level_max", "tiles of at least two output pixels", high
-        )
+        require(2**high <= self.resolution_px // 2, "tiling.level_max", "tiles of at least two output pixels", high)
         smallest = max(self.batch_size, 4**low)
         require(
             smallest <= self.tile_count_max <= 4**high,

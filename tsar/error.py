@@ -21,6 +21,9 @@ from tsar.types import Errors, FrameletBatch
 _REC709 = (0.2126, 0.7152, 0.0722)
 _OCTAVES_OF_FULL_ERROR = 8.0
 
+RADIANCE_MAX = 1e30
+"""Greatest radiance that counts as a number: sums of many samples stay below what float32 can hold."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -48,9 +51,10 @@ def estimate(
 
 
 def replace_nonfinite(color: Float[Tensor, "n samples 3"], side: int) -> tuple[Float[Tensor, "n samples 3"], int]:
-    """Replace samples with a non-finite channel by the mean of their finite 3 x 3 neighbours within the framelet, or of
-    the whole framelet where there are none, or by black where nothing is finite. Returns how many were replaced."""
-    bad = ~torch.isfinite(color).all(dim=2)
+    """Replace samples with a channel that is not finite, or beyond ``RADIANCE_MAX``, by the mean of their finite 3 x 3
+    neighbours within the framelet, or of the whole framelet where there are none, or by black where nothing is finite.
+    Returns how many were replaced."""
+    bad = ~(color.abs() <= RADIANCE_MAX).all(dim=2)
     count = int(bad.sum())
     if count == 0:
         return color, 0
@@ -130,9 +134,7 @@ def signed_error(
     return (torch.log2(signal.clamp(min=floor) / template.clamp(min=floor)) / _OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)
 
 
-def scatter_to_field(
-    values: Float[Tensor, "k n p"], batch: FrameletBatch, config: TsarConfig
-) -> Float[Tensor, "k e"]:
+def scatter_to_field(values: Float[Tensor, "k n p"], batch: FrameletBatch, config: TsarConfig) -> Float[Tensor, "k e"]:
     """Write per-position values of each framelet into the field elements it covers (float64), zero elsewhere.
 
     Where an element covers several positions it gets their mean, where a position covers several elements each gets

@@ -1,8 +1,8 @@
 """Streaming Haar wavelet transform of square tiles in Morton order. Knows nothing of rendering.
 
 Normalisation: ``h = (a + b) / 2`` and ``g = a - b`` along every axis, so approximations keep the signal's scale and a
-detail coefficient is the plain difference of two means. The orthonormal Haar coefficient of the same block is this
-approximation times ``2^(dims/2)`` per octave, and this detail times ``2^(lows - 1) ...`` (see the oracle in the tests).
+detail coefficient is the plain difference of two means. An orthonormal Haar step gives ours times ``sqrt 2`` for
+every ``h`` and ``1 / sqrt 2`` for every ``g`` in their names.
 
 Octants are named in the order x, y, t: ``hgh`` is low in x, high in y, low in time.
 
@@ -53,7 +53,9 @@ def spatial_step(field: Float[Tensor, "n samples"]) -> Float[Tensor, "n samples"
     return torch.cat(((h_upper + h_lower) / 2, h_upper - h_lower, (g_upper + g_lower) / 2, g_upper - g_lower), dim=1)
 
 
-def temporal_step(now: Float[Tensor, "n m"], before: Float[Tensor, "n m"]) -> tuple[Tensor, Tensor]:
+def temporal_step(
+    now: Float[Tensor, "n m"], before: Float[Tensor, "n m"]
+) -> tuple[Float[Tensor, "n m"], Float[Tensor, "n m"]]:
     """Low and high pass along time: ``((now + before) / 2, now - before)``."""
     return (now + before) / 2, now - before
 

@@ -52,8 +52,15 @@ def kd_min_child(k: Int64[Tensor, "*n"], depth: int) -> Int64[Tensor, "*n"]:
 
 
 def kd_overlap(k: Int64[Tensor, "*n"], depth: int) -> Int64[Tensor, "*n"]:
-    """How many tiles at ``depth`` kd tile ``k`` covers (0 when it is deeper). Source: Stephens 2011, eq. 4.7."""
-    return kd_min_child(k + 1, depth) - kd_min_child(k, depth)
+    """How many tiles at ``depth`` kd tile ``k`` covers; 0 when it is deeper.
+
+    Source: Stephens 2011, eq. 4.7.
+
+    Deviation: eq. 4.7 takes the difference to the first descendant of ``k + 1``, which for the last tile of a depth is
+    counted from another depth, so that the difference comes out negative. The number depends on the depths only.
+    """
+    shift = depth - floor_log2(k)
+    return (shift >= 0).to(k.dtype) << shift.clamp(min=0)
 
 
 def depth_first(k: Int64[Tensor, "*n"], depth_max: int) -> Int64[Tensor, "*n"]:
@@ -100,6 +107,11 @@ def tile_integral(
     """Sum of the field over each tile from its prefix sum: two look-ups a tile, whatever its size."""
     first, last = tile_interval(level, index, field_level)
     return prefix[last] - prefix[first]
+
+
+def total(field: Float[Tensor, " e"]) -> float:
+    """Sum of a field, the same bits for any number of threads: a scan has one order, a parallel sum has not."""
+    return float(torch.cumsum(field, 0)[-1]) if field.numel() else 0.0
 
 
 @lru_cache(maxsize=32)

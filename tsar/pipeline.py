@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from tsar.cache import FrameletCache
 from tsar.clock import CycleSeconds, StageTimer, checked
 from tsar.config import TsarConfig
 from tsar.error import estimate
-from tsar.morton import raster_to_morton
+from tsar.morton import raster_to_morton, total
 from tsar.reconstruction import Reconstruction, reconstruct
 from tsar.response import initial_densities, respond
 from tsar.selection import initial_history, make_batch, select
@@ -46,7 +46,7 @@ class State:
 class Outcome:
     """What one cycle produced, beside the next state."""
 
-    selected: Tensor
+    selected: Int64[Tensor, " b"]
     samples: SampleBatch
     errors: Errors
     nonfinite: int
@@ -122,7 +122,7 @@ def _record(
     before: State, after: State, outcome: Outcome, config: TsarConfig, cycle: int, time_s: float, cycle_s: float
 ) -> StepRecord:
     densities = after.densities
-    total = float(densities.combined().sum()) + densities.surplus
+    spent = total(densities.combined()) + densities.surplus
     return StepRecord(
         cycle=cycle,
         sim_time_s=time_s,
@@ -132,7 +132,7 @@ def _record(
         densities=densities,
         errors=outcome.errors,
         surplus=densities.surplus,
-        conservation_residual=abs(total - config.budget) / config.budget,
+        conservation_residual=abs(spent - config.budget) / config.budget,
         stage_s=dict(outcome.stages.seconds),
         counters=dict(outcome.samples.counters),
         nonfinite=outcome.nonfinite,
@@ -140,7 +140,7 @@ def _record(
     )
 
 
-def _age_spread(newest_s: Tensor, densities: Densities, config: TsarConfig) -> float:
+def _age_spread(newest_s: Float[Tensor, "side side"], densities: Densities, config: TsarConfig) -> float:
     """Newest minus oldest sample shown among the elements that are refreshed fast, seconds; 0 if there are none."""
     side, repeat = config.sdf_side, config.sdf_side // newest_s.shape[0]
     field = newest_s.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1).reshape(-1)

@@ -22,6 +22,7 @@ from tsar.config import TsarConfig
 from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
 
 _SHIFT_CYCLES = 0.5
+_AGE_STEPS = 2.0**16
 
 
 @dataclass(frozen=True)
@@ -81,23 +82,27 @@ def smooth_age(newest: Float[Tensor, "side side"], resolution: int, support_px: 
     """The age field at output pixels after one-sided smoothing: it may only become older, never newer.
 
     A box filter of ``support_px`` over pixels, borders repeated. The field is constant over each finest tile, so the
-    filter is a product with one small matrix on either side. Source: Stephens 2011, sec. 4.2.3 and fig. 4.6.
+    filter is a product with one small matrix on either side. It sums whole numbers, of pixels and of ``1 / 65536``
+    cycles, which float64 holds exactly: the order in which a matrix product adds depends on the number of threads.
+
+    Source: Stephens 2011, sec. 4.2.3 and fig. 4.6.
     """
     repeat = resolution // newest.shape[0]
     pixels = newest.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1)
     if support_px == 1:
         return pixels
     box = _box_matrix(resolution, newest.shape[0], support_px)
-    return torch.minimum(pixels, box @ newest @ box.T)
+    steps = (newest.to(torch.float64) * _AGE_STEPS).round()
+    return torch.minimum(pixels, (box @ steps @ box.T).to(torch.float32) / (_AGE_STEPS * support_px**2))
 
 
 @lru_cache(maxsize=8)
 def _box_matrix(resolution: int, side: int, support_px: int) -> Float[Tensor, "h side"]:
-    """Share of each of ``side`` cells in the box around each pixel along one axis."""
+    """Pixels of each of ``side`` cells in the box around each pixel along one axis, float64."""
     half = support_px // 2
     reach = torch.arange(resolution)[:, None] + torch.arange(-half, half + 1)
     cell = reach.clamp(0, resolution - 1) // (resolution // side)
-    return F.one_hot(cell, side).to(torch.float32).mean(1)
+    return F.one_hot(cell, side).sum(1).to(torch.float64)
 
 
 @lru_cache(maxsize=32)
@@ -117,6 +122,17 @@ def spatial_weights(side: int, width_px: int) -> tuple[Float[Tensor, "p side"], 
     return weight.to(torch.float32), margin
 
 
+def round_bits(value: Float[Tensor, "*n"], bits: int) -> Float[Tensor, "*n"]:
+    """Float32 values rounded to so many significant bits.
+
+    A product of such a value with a bilinear weight, a multiple of ``1 / (2 spacing)``, is then exact, and a sum of the
+    two that meet at a pixel rounds once, in whatever order, fused or not. So a matrix product that interpolates gives
+    the same bits for any number of threads, which the libraries behind it do not promise.
+    """
+    dropped = 24 - bits
+    return ((value.view(torch.int32) + (1 << dropped - 1)) & -(1 << dropped)).view(torch.float32)
+
+
 class _Accumulator:
     """Sums of weighted colour and weight over the output image.
 
@@ -125,7 +141,9 @@ class _Accumulator:
     overlap their neighbours by half a sample and accumulate in raster order, with a margin around the image.
     """
 
-    def __init__(self, config: TsarConfig, threshold: Tensor, cache: FrameletCache, time: Tensor) -> None:
+    def __init__(
+        self, config: TsarConfig, threshold: Float[Tensor, "h w"], cache: FrameletCache, time: Float[Tensor, " slots"]
+    ) -> None:
         self.config, self.cache, self.time = config, cache, time
         resolution = config.resolution_px
         self.margin = spatial_weights(config.framelet_side, resolution >> config.level_min)[1]
@@ -179,10 +197,12 @@ class _Accumulator:
         threshold = self.threshold.reshape(-1).index_select(0, pixel.reshape(-1)).reshape(pixel.shape)
         weight = self._temporal_weight(slot, threshold)
         weight = weight * (weights.sum(1)[:, None] * weights.sum(1)[None, :]).reshape(-1)
-        samples = self.cache.color[slot][:, raster_to_morton(side)].transpose(1, 2).reshape(-1, 3, side, side)
+        planes = self.cache.color.index_select(0, slot).transpose(1, 2).reshape(-1, side**2)
+        samples = planes.index_select(1, raster_to_morton(side)).reshape(-1, 3, side, side)
         # Rows of the margin sum to less than one; the colour there is the weighted mean of the samples in reach.
         unit = weights / weights.sum(1, keepdim=True)
-        color = (unit @ samples @ unit.T).flatten(2)
+        bits = 24 - (width // side).bit_length()
+        color = (round_bits(unit @ round_bits(samples, bits), bits) @ unit.T).flatten(2)
         flat = pixel.reshape(-1)
         for channel in range(3):
             self.coarse[channel].index_add_(0, flat, (color[:, channel] * weight).reshape(-1))

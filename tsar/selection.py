@@ -57,9 +57,7 @@ def _cell_centres(side: int) -> Float[Tensor, "samples 2"]:
     return (torch.stack((x, y), dim=1).to(torch.float32) + 0.5) / side
 
 
-def sample_positions(
-    level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], side: int
-) -> Float[Tensor, "n samples 2"]:
+def sample_positions(level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], side: int) -> Float[Tensor, "n samples 2"]:
     """Where each tile's samples lie on the image plane, in ``[0, 1)``: the centres of a regular grid, always the same
     for the same tile, so that a static picture gives identical samples and no temporal error.
 

@@ -77,7 +77,7 @@ def node_integrals(
     return sums[: level_high - level_low + 1]
 
 
-def _choose_splits(candidates: Tensor, integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
+def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
     """Which nodes of the levels above the finest split, as one boolean tensor a level."""
     coarse = 4**config.level_min
     most = (config.tile_count_max - coarse) // 3

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from renderer.trace import Renderer
 from scenes.canonical import (
     Cube,
     DirectionalLight,
     Emissive,
+    EnvironmentLight,
     Instance,
     Matte,
     Mesh,
@@ -15,10 +17,11 @@ from scenes.canonical import (
     PerspectiveCamera,
     PointLight,
     Rectangle,
+    RigidTrack,
     Scene,
     Sphere,
 )
-from tests.renderer.builders import WHITE, look_at, place, sphere_mesh
+from tests.renderer.builders import WHITE, colors, look_at, place, sphere_mesh
 
 SCALES = (1e-3, 1.0, 1e3)
 
@@ -125,3 +128,56 @@ def test_mirrors_do_not_see_themselves(scale: float) -> None:
         renderer = Renderer(Scene(camera, (ball, room)))
         picture = renderer.render_frame(0.0, 64, 64).numpy()
         assert (picture == 1).all()
+
+
+def _edge_positions(mesh: Mesh, camera: PerspectiveCamera, matrix: np.ndarray) -> np.ndarray:
+    """Image positions of corners, middles and other points of edges that the camera sees."""
+    rng = np.random.default_rng(0)
+    points = mesh.vertices.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    face = mesh.faces[rng.integers(len(mesh.faces), size=20000)]
+    share = rng.random((len(face), 1))
+    share[::3], share[1::3] = 0.0, 0.5
+    on_edges = points[face[:, 0]] * (1.0 - share) + points[face[:, 1]] * share
+    local = (on_edges - camera.to_world[:3, 3]) @ camera.to_world[:3, :3]
+    local = local[local[:, 2] < 0.0]
+    half = -local[:, 2] * np.tan(np.radians(camera.fov_deg) / 2.0)
+    position = np.stack([0.5 + 0.5 * local[:, 0] / half, 0.5 - 0.5 * local[:, 1] / half], -1)
+    return position[((position > 0.0) & (position < 1.0)).all(axis=1)]
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(
+    "matrix", [place(), place((3, -2, 5), (0.3, 0.5, 0.1), (0.7, 1.1, 0.9))], ids=["plain", "turned"]
+)
+def test_no_ray_slips_through_shared_edges(scale: float, matrix: np.ndarray) -> None:
+    """From within closed meshes, rays through their very edges and corners never see the bright sky."""
+    sky = EnvironmentLight(np.ones((1, 1, 3), np.float32))
+    for rings in (0, 16, 64):
+        mesh = BOX
+        if rings:
+            smooth = sphere_mesh(rings)
+            mesh = Mesh(np.round(smooth.vertices, 6) + np.float32(0.0), smooth.faces)  # closes the seam
+        placed = _scaled(matrix, scale)
+        for turn in ((0.0, 0.0, 0.0), (0.0, 1.5, 0.0), (np.pi / 2, 0.0, 0.0)):
+            camera = PerspectiveCamera(place(placed[:3, 3], turn), 100.0)
+            scene = Scene(camera, (Instance(mesh, Matte(WHITE), placed),), (sky,))
+            position = _edge_positions(mesh, camera, placed)
+            assert len(position) > 1500
+            assert (colors(scene, position) == 0.0).all()
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("shape", [Rectangle(), Cube(), Sphere(), sphere_mesh(32)], ids="flat cube ball mesh".split())
+def test_no_acne_where_a_track_brings_back_what_was_placed_far_away(scale: float, shape) -> None:
+    far, turn = scale * np.array([1000.0, -700.0, 300.0]), Rotation.from_rotvec((0.3, 0.8, -0.5))
+    back = RigidTrack(0.0, 1.0, -turn.apply(far)[None], turn.as_quat()[None])
+    matrix = _scaled(place(axis_angle=(0.2, 0.1, 0.4)), scale)
+    matrix[:3, 3] = far
+    axis = turn.apply(matrix[:3, 2] / scale)
+    scene = Scene(
+        PerspectiveCamera(look_at(4 * scale * axis, (0, 0, 0)), 20.0),
+        (Instance(shape, Matte(WHITE), matrix, back),),
+        (DirectionalLight(tuple(-(axis + 0.3 * turn.apply((1, 0, 0)))), (1, 1, 1)),),
+    )
+    picture = _frame(scene, 64)[8:56, 8:56, 0]
+    assert (picture > 0.01).all()

@@ -181,7 +181,7 @@ def test_mirror_ball_shows_the_mirrored_environment(shape) -> None:
     np.testing.assert_allclose(got[seen], expected[seen], atol=4e-3 if isinstance(shape, Sphere) else 2.5e-2)
 
 
-@pytest.mark.parametrize(("depth", "bounces"), [(0, 0), (1, 1), (5, 5), (-1, 64)])
+@pytest.mark.parametrize(("depth", "bounces"), [(0, 0), (1, 1), (5, 5), (-1, 64), (10**9, 64)])
 def test_facing_mirrors_stop_at_the_depth(depth: int, bounces: int) -> None:
     mirrors = tuple(Instance(Rectangle(), Mirror(), place((0, 0, z), scale=(9, 9, 9))) for z in (-1.0, 1.0))
     scene = Scene(PerspectiveCamera(), mirrors, integrator=Integrator(depth=depth))

@@ -88,6 +88,23 @@ def test_footprint_chooses_the_level(footprint_px: float, level: int) -> None:
     np.testing.assert_allclose(got, _lookup(stack[level], uv, 1.0, 0.0, "repeat", False), atol=2e-4)
 
 
+def test_levels_blend() -> None:
+    """Between two levels the colour lies between theirs, by the logarithm of the footprint, and nothing jumps."""
+    stack = mip_levels(RNG.random((64, 64, 3), dtype=np.float32))
+    position = np.array([[0.37, 0.61]])
+    uv = np.stack([position[:, 0], 1 - position[:, 1]], -1)
+    detail = np.linspace(-0.5, 6.5, 141)
+    got = []
+    for level in detail:
+        scene = _card(ImageTexture(stack[0]), distance=1000.0)
+        got.append(colors(scene, position, footprint_resolution_px=64.0 / 2.0**level)[0])
+        low = int(np.clip(np.floor(level), 0, 6))
+        near, far = (_lookup(stack[min(i, 6)], uv, 1.0, 0.0, "repeat", False)[0] for i in (low, low + 1))
+        share = np.clip(level - low, 0.0, 1.0) if 0 <= level < 6 else 0.0
+        np.testing.assert_allclose(got[-1], near * (1 - share) + far * share, atol=2e-3)
+    assert np.abs(np.diff(got, axis=0)).max() < 0.06
+
+
 def test_footprint_grows_with_distance_and_slant_and_shrinks_with_texture_scale() -> None:
     stack = mip_levels(RNG.random((64, 64, 3), dtype=np.float32))
     position = np.array([[0.5, 0.5]])

@@ -2,8 +2,8 @@ import pytest
 import torch
 
 from tests.oracles import pictures
-from tsar.baselines import afr, frameless
-from tsar.baselines.scatter import pull_push
+from tsar.baselines import afr, framed, frameless
+from tsar.baselines.scatter import PixelBuffer, pull_push, write
 from tsar.clock import fixed_clock
 from tsar.config import TsarConfig
 from tsar.morton import floor_log2
@@ -22,6 +22,28 @@ def test_constant_picture_is_shown_exactly_and_runs_repeat(module):
     assert shown.display_time_s - shown.sample_time_s == pytest.approx(0.02)
     again = [play(module, pictures.textured_motion)[-1].image for _ in range(2)]
     assert torch.equal(*again) and bool(torch.isfinite(again[0]).all())
+
+
+@pytest.mark.parametrize("module", [frameless, afr, framed])
+def test_baselines_do_not_depend_on_the_thread_count(module):
+    config = TsarConfig(batch_size=128, warmup_cycles=1)
+    before, runs = torch.get_num_threads(), []
+    try:
+        for threads in (1, 2, 3):
+            torch.set_num_threads(threads)
+            runs.append(play(module, pictures.textured_motion, 2, config))
+    finally:
+        torch.set_num_threads(before)
+    for other in runs[1:]:
+        assert all(torch.equal(a.image, b.image) for a, b in zip(other, runs[0], strict=True))
+
+
+def test_a_pixel_drawn_twice_keeps_its_last_sample():
+    buffer = PixelBuffer.empty(CONFIG)
+    color = torch.arange(12.0).reshape(4, 3)
+    write(buffer, torch.tensor([7, 3, 7, 3]), color, 0.25)
+    assert torch.equal(buffer.color[7], color[2]) and torch.equal(buffer.color[3], color[3])
+    assert buffer.time_s.isfinite().nonzero().squeeze(1).tolist() == [3, 7]
 
 
 def test_frameless_visits_every_pixel_once_a_sweep():
@@ -52,4 +74,5 @@ def test_pull_push_keeps_known_pixels_and_fills_the_rest():
     color, weight = torch.zeros(3, 32, 32), torch.zeros(1, 32, 32)
     color[:, ::4, ::4], weight[:, ::4, ::4] = 0.7, 1.0
     filled = pull_push(color, weight)
+    assert torch.equal(filled[:, ::4, ::4], color[:, ::4, ::4])
     assert torch.allclose(filled, torch.full_like(filled, 0.7), atol=1e-5)

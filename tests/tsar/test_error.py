@@ -136,6 +136,26 @@ def test_nonfinite_samples_are_counted_and_replaced_by_their_neighbours_mean():
     assert none == 0 and untouched is clean
 
 
+def test_radiance_near_the_end_of_float32_is_replaced_before_it_overflows():
+    color = torch.full((2, 256, 3), 0.5)
+    color[0, 40], color[1, 9, 1] = torch.finfo(torch.float32).max, -1e38
+    repaired, count = replace_nonfinite(color, 16)
+    assert count == 2 and torch.equal(repaired, torch.full_like(repaired, 0.5))
+    assert bool(torch.isfinite(compressed_luminance(torch.full((1, 3), 1e30))).all())
+
+
+def test_a_firefly_is_felt_in_its_own_framelet_only():
+    def firefly(x, y, t):
+        color = pictures.constant(x, y, t).clone()
+        color[5, 100] = 1e6
+        return color
+
+    result, _ = estimate_twice(firefly)
+    per_tile = result.errors.spatial.reshape(256, 64)
+    assert bool((per_tile[5] > 0).any()) and bool(per_tile[5].median() < 0)
+    assert bool((per_tile[:5] == -1.0).all()) and bool((per_tile[6:64] == -1.0).all())
+
+
 def test_a_nan_from_the_renderer_does_not_spread():
     def broken(x, y, t):
         color = pictures.textured_motion(x, y, t)

@@ -58,6 +58,57 @@ def test_perfect_reconstruction_of_a_spatial_step():
     assert torch.allclose(torch.stack((a, b, c, d), -1).reshape(4, 64), field, atol=1e-12)
 
 
+def stream(side, frames=4, tiles=3):
+    """Random frames through the transform: per frame the signal, the octaves, the state before and after."""
+    generator = torch.Generator().manual_seed(3)
+    known = torch.zeros(tiles, dtype=torch.bool)
+    state = torch.zeros(tiles, haar.state_size(side * side), dtype=torch.float64)
+    for _ in range(frames):
+        signal = torch.randn(tiles, side * side, generator=generator, dtype=torch.float64)
+        octaves, after = haar.transform(signal, state, known)
+        yield signal, octaves, state, after, bool(known.all())
+        state, known = after, torch.ones_like(known)
+
+
+@pytest.mark.parametrize("side", [16, 32])
+def test_every_octave_in_space_and_time_against_pywavelets(side):
+    """Octave o + 1 transforms the low-passed field of octave o against the one it had an update ago (fig. 5.9)."""
+    past = [None] * haar.octave_count(side * side)
+    for signal, octaves, *_ in stream(side):
+        field = raster(signal, side).numpy()
+        for o, octave in enumerate(octaves):
+            half = side >> (o + 1)
+            before = field if past[o] is None else past[o]
+            # Axes n, y, x, t.
+            coefficients = pywt.dwtn(np.stack([field, before], axis=3), "haar", axes=(1, 2, 3))
+            for octant in ("ghh", "hgh", "ggh", "hhg", "ghg", "hgg", "ggg"):
+                scale = np.prod([np.sqrt(2.0) if f == "h" else np.sqrt(0.5) for f in octant])
+                x, y, t = octant.replace("h", "a").replace("g", "d")
+                ours = raster(getattr(octave, octant), half).numpy() * scale
+                np.testing.assert_allclose(ours, coefficients[y + x + t][..., 0], atol=1e-12)
+            past[o], field = field, coefficients["aaa"][..., 0] / np.sqrt(8.0)
+
+
+@pytest.mark.parametrize("side", [16, 32])
+def test_perfect_reconstruction_of_all_octaves(side):
+    """From the detail octants and the cached state alone, coarse to fine, back to the signal."""
+    for signal, octaves, before, after, known in stream(side):
+        first = haar.state_size(side * side)
+        approximation = None
+        for octave in reversed(octaves):
+            positions = octave.ghh.shape[1]
+            first -= 4 * positions
+            if approximation is None:
+                now = after[:, first : first + positions]
+                approximation = (now + before[:, first : first + positions]) / 2 if known else now
+            hh, hg = approximation + octave.hhg / 2, octave.hgh + octave.hgg / 2
+            gh, gg = octave.ghh + octave.ghg / 2, octave.ggh + octave.ggg / 2
+            upper_h, lower_h, upper_g, lower_g = hh + hg / 2, hh - hg / 2, gh + gg / 2, gh - gg / 2
+            cells = (upper_h + upper_g / 2, upper_h - upper_g / 2, lower_h + lower_g / 2, lower_h - lower_g / 2)
+            approximation = torch.stack(cells, -1).flatten(1)
+        assert torch.allclose(approximation, signal, atol=1e-12)
+
+
 def test_packing_of_figure_5_15():
     """A 4 x 4 tile: quadrants one after the other, Morton order within; h and g as in eq. 5.15 and 5.16."""
     field = torch.arange(16.0, dtype=torch.float64)[None]

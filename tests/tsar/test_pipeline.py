@@ -1,12 +1,15 @@
+from itertools import pairwise
+
 import pytest
 import torch
 
 from tests.oracles import pictures
 from tsar.baselines.framed import run as run_framed
-from tsar.clock import fixed_clock
+from tsar.clock import fixed_clock, wall_clock
 from tsar.config import ConfigError, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
 from tsar.pipeline import run
+from tsar.response.transport import SOLVERS
 from tsar.types import SampleBatch
 
 CYCLE = 1 / 60
@@ -101,19 +104,33 @@ def test_framed_image_is_the_picture_at_pixel_centres():
         next(iter(run_framed(config, pictures.tracer(pictures.constant), fixed_clock(0.1), 0.0, 0.5, 3)))
 
 
-def test_results_do_not_depend_on_the_thread_count():
-    before, results = torch.get_num_threads(), []
+@pytest.mark.parametrize(
+    "config",
+    [
+        small(warmup_cycles=12),
+        small(warmup_cycles=4, sdf_side=256),
+        TsarConfig(warmup_cycles=4, batch_size=256, framelet_side=32),
+    ],
+    ids=["small", "large field", "large framelets"],
+)
+def test_results_do_not_depend_on_the_thread_count(config):
+    before, runs = torch.get_num_threads(), []
     try:
         for threads in (1, 2, 3):
             torch.set_num_threads(threads)
-            results.append(play(small(), pictures.textured_motion, 12)[-1])
+            runs.append(play(config, pictures.textured_motion, 8))
     finally:
         torch.set_num_threads(before)
-    for record, display in results[1:]:
-        assert torch.equal(display.image, results[0][1].image)
-        assert torch.equal(record.densities.spatial, results[0][0].densities.spatial)
-        assert torch.equal(record.densities.temporal, results[0][0].densities.temporal)
-        assert torch.equal(record.tiling.index, results[0][0].tiling.index)
+    for run_ in runs[1:]:
+        for (record, display), (expected, shown) in zip(run_, runs[0], strict=True):
+            assert torch.equal(display.image, shown.image)
+            assert torch.equal(record.errors.spatial, expected.errors.spatial)
+            assert torch.equal(record.errors.temporal, expected.errors.temporal)
+            assert torch.equal(record.densities.spatial, expected.densities.spatial)
+            assert torch.equal(record.densities.temporal, expected.densities.temporal)
+            assert record.surplus == expected.surplus and torch.equal(record.selected, expected.selected)
+            assert torch.equal(record.tiling.level, expected.tiling.level)
+            assert torch.equal(record.tiling.index, expected.tiling.index)
 
 
 def test_seeds_repeat_and_differ():
@@ -131,6 +148,56 @@ def test_nonfinite_samples_are_counted_and_never_shown():
         assert record.nonfinite == 32 * 16 and bool(torch.isfinite(display.image).all())
 
 
+def test_radiance_at_the_end_of_float32_reaches_neither_image_nor_densities():
+    def trace(batch):
+        color = pictures.tracer(pictures.textured_motion)(batch).color
+        color[:, ::31] = torch.finfo(torch.float32).max
+        return SampleBatch(color, {})
+
+    for record, display in run(small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
+        assert record.nonfinite == 32 * 9 and bool(torch.isfinite(display.image).all()) and display.image.max() <= 1.0
+        assert bool(torch.isfinite(record.densities.spatial).all())
+
+
+def test_wall_clock_time_advances_by_what_a_cycle_took():
+    run_ = run(small(warmup_cycles=2), pictures.tracer(pictures.constant), wall_clock, 0.0, 1e9)
+    records = [next(run_)[0] for _ in range(5)]
+    for now, after in pairwise(records):
+        assert after.sim_time_s == pytest.approx(now.sim_time_s + now.cost_s)
+        assert now.cost_s == pytest.approx(sum(now.stage_s.values()), rel=1e-6)
+
+
+def test_static_content_settles_and_is_shown_as_it_is():
+    """Nothing moves: once every tile has been rendered at its level, the image stops changing and matches the picture.
+
+    Not so within half a sample of a border between fine and coarse tiles, where ages still decide how the two blend.
+    """
+    images = [d.image for _, d in play(small(), pictures.static_stripes, 200)[-40:]]
+    steady = [torch.cat((image[:, :124], image[:, 132:]), dim=1) for image in images]
+    assert all(float((image - steady[0]).abs().max()) < 1e-5 for image in steady)
+    assert torch.allclose(steady[0][:, 124:], torch.tensor(0.3), atol=1e-6)
+    centre = (torch.arange(512) + 0.5) / 512
+    fine = pictures.static_stripes(centre[None].expand(512, 512), centre[:, None].expand(512, 512), None)
+    box = fine.reshape(256, 2, 256, 2, 3).mean((1, 3))
+    # All but the few tiles that the bound on their number keeps a level coarser.
+    wrong = (steady[0][:, :116] - box[:, :116]).abs().amax(2) > 1e-5
+    assert float(wrong.float().mean()) < 0.05
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.5, 1.0])
+def test_temporal_density_gathers_where_a_moving_edge_is_and_leaves_where_it_was(speed):
+    """Among the elements the edge crossed within the last moments temporal density is high; long after, it is low."""
+    config = small()
+    record = play(config, pictures.moving_edge(speed, start=0.05), int(0.6 / speed / CYCLE))[-1][0]
+    x = (torch.arange(128) + 0.5) / 128
+    edge = 0.05 + speed * record.sim_time_s
+    temporal = element_grid(record.densities.temporal).mean(0)
+    recent = (x <= edge) & (x > edge - max(0.06, 6 * speed * CYCLE))
+    ahead = x > edge + 0.15
+    assert float(temporal[recent].max()) > 4 * float(temporal[ahead].median())
+    assert float(temporal[recent].mean()) > 2 * float(temporal[ahead].mean())
+
+
 def test_a_clock_that_stops_time_is_refused():
     for seconds in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="finite, positive cycle time"):
@@ -143,8 +210,8 @@ def test_a_clock_that_stops_time_is_refused():
         (lambda: TsarConfig(batch_size=-3), r"batch_size: expected between 1 and 8192 framelets, got -3"),
         (lambda: TsarConfig(resolution_px=500), r"resolution_px: expected a power of two in \[64, 8192\], got 500"),
         (lambda: TsarConfig(framelet_side=8), r"framelet_side: expected 16 or 32, got 8"),
-        (lambda: TilingConfig(threshold_samples=0), r"tiling.threshold_samples: expected a positive number, got 0"),
-        (lambda: ResponseConfig(temporal_min=0), r"response.temporal_min: expected a density in \(0, 1\], got 0"),
+        (lambda: TilingConfig(threshold_samples=0.0), r"tiling.threshold_samples: expected a positive number, got 0"),
+        (lambda: ResponseConfig(temporal_min=0.0), r"response.temporal_min: expected a density in \(0, 1\], got 0"),
         (lambda: TsarConfig(batch_size=64, tiling=TilingConfig(tile_count_max=32)), r"tiling.tile_count_max: expected"),
         (lambda: TsarConfig(tiling=TilingConfig(level_max=9)), r"tiling.level_max: expected between 2 and 7, got 9"),
     ],
@@ -161,9 +228,10 @@ def test_bad_configuration_names_field_and_value(make, message):
         TsarConfig(batch_size=256, resolution_px=256, sdf_side=64, warmup_cycles=4),
         TsarConfig(batch_size=16, resolution_px=64, sdf_side=256, warmup_cycles=4),
         TsarConfig(batch_size=16, resolution_px=128, warmup_cycles=4, response=ResponseConfig(bias=1.0, gain=0.3)),
+        *(small(warmup_cycles=4, response=ResponseConfig(solver=name)) for name in SOLVERS),
     ],
 )
-def test_other_sizes_run_and_conserve(config):
+def test_other_sizes_and_solvers_run_and_conserve(config):
     for record, display in play(config, pictures.textured_motion, 6):
         assert record.conservation_residual <= 1e-9 and bool(torch.isfinite(display.image).all())
         assert record.selected.numel() == config.batch_size

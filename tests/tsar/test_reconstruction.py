@@ -1,11 +1,13 @@
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.oracles import pictures
 from tests.oracles.reconstruction_slow import slow_reconstruct
 from tsar.cache import FrameletCache
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig
-from tsar.reconstruction import newest_times, reconstruct, smooth_age
+from tsar.reconstruction import newest_times, reconstruct, round_bits, smooth_age, spatial_weights
 from tsar.selection import make_batch
 from tsar.tiling import build, uniform
 
@@ -27,9 +29,7 @@ def fill(cache, cfg, tiling, picture, time_s, selected=None):
     batch = make_batch(tiling, selected, time_s, 0, cfg)
     color = pictures.tracer(picture)(batch).color
     cache.insert(batch, color, torch.zeros(len(selected), 340))
-    return [
-        (int(lv), int(ix), time_s, c) for lv, ix, c in zip(batch.level, batch.index, color, strict=True)
-    ]
+    return [(int(lv), int(ix), time_s, c) for lv, ix, c in zip(batch.level, batch.index, color, strict=True)]
 
 
 def mixed_cache(cfg):
@@ -122,6 +122,60 @@ def test_nothing_cached_and_half_cached_give_no_hole_and_no_nan():
     image = reconstruct(cache, cfg, 0.1).image
     assert bool(torch.isfinite(image).all()) and image.min() > 0.39
     assert not torch.isfinite(newest_times(cache, cfg)).all()
+
+
+@given(seed=st.integers(0, 10_000), support=st.sampled_from([1, 5, 33]), cycle_s=st.sampled_from([1e-4, 0.05, 10.0]))
+def test_any_cache_gives_an_image_within_the_range_of_its_samples(seed, support, cycle_s):
+    """Random tilings, random parts of them, random times, more than the cache holds: no hole, no NaN, no overshoot."""
+    cfg = config(support)
+    cache, g = FrameletCache(cfg), torch.Generator().manual_seed(seed)
+    for _ in range(4):
+        tiling = build(torch.rand(256, generator=g, dtype=torch.float64).repeat_interleave(64) ** 4, cfg)
+        count = 1 + tiling.tile_count * (seed % 3) // 2
+        chosen = torch.randperm(tiling.tile_count, generator=g)[:count].sort().values
+        batch = make_batch(tiling, chosen, float(torch.rand((), generator=g)), 0, cfg)
+        color = 0.2 + 0.6 * torch.rand(len(chosen), 256, 3, generator=g)
+        cache.insert(batch, color, torch.zeros(len(chosen), 340))
+        image = reconstruct(cache, cfg, cycle_s).image
+        assert bool(torch.isfinite(image).all()) and 0.2 - 1e-5 <= image.min() and image.max() <= 0.8 + 1e-5
+
+
+@given(st.integers(0, 10_000), st.sampled_from([3, 9, 33]))
+def test_smoothing_twelve_decades_of_age_is_one_sided(seed, support):
+    g = torch.Generator().manual_seed(seed)
+    newest = -(10.0 ** (12 * torch.rand(8, 8, generator=g) - 6)).clamp(max=1e6)
+    assert bool((smooth_age(newest, 64, support) <= smooth_age(newest, 64, 1)).all())
+
+
+@pytest.mark.parametrize("spacing", [2, 4, 8, 16])
+def test_interpolation_is_exact_but_for_one_rounding(spacing):
+    """Products of rounded samples with the weights are exact, so no order of addition, nor fusing, can show."""
+    bits = 24 - spacing.bit_length()
+    sample = round_bits(10.0 ** (8 * torch.rand(64, 16, generator=torch.Generator().manual_seed(0)) - 4), bits)
+    weights, _ = spatial_weights(16, 16 * spacing)
+    unit = weights / weights.sum(1, keepdim=True)
+    product = sample[:, None, :] * unit
+    assert torch.equal(product.double(), sample.double()[:, None, :] * unit.double())
+    assert torch.equal(sample @ unit.T, (sample.double() @ unit.T.double()).float())
+    relative = (round_bits(sample * 1.37, bits) / (sample * 1.37) - 1).abs()
+    assert float(relative.max()) <= 2.0**-bits
+
+
+def test_interpolation_and_smoothing_do_not_depend_on_the_thread_count():
+    """The size of a default image, where matrix products are shared out."""
+    g = torch.Generator().manual_seed(6)
+    samples, age = round_bits(torch.rand(300, 3, 16, 16, generator=g), 22), -100 * torch.rand(64, 64, generator=g)
+    weights, _ = spatial_weights(16, 32)
+    unit = weights / weights.sum(1, keepdim=True)
+    before, results = torch.get_num_threads(), []
+    try:
+        for threads in (1, 2, 3, 4, 7):
+            torch.set_num_threads(threads)
+            results.append((round_bits(unit @ samples, 22) @ unit.T, smooth_age(age, 512, 129)))
+    finally:
+        torch.set_num_threads(before)
+    for other in results[1:]:
+        assert torch.equal(other[0], results[0][0]) and torch.equal(other[1], results[0][1])
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])

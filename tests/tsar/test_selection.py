@@ -1,9 +1,12 @@
+import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tsar.config import TsarConfig
-from tsar.morton import interleave
+from tsar.config import TilingConfig, TsarConfig
+from tsar.morton import interleave, prefix_sum, tile_integral
 from tsar.selection import initial_history, make_batch, sample_positions, select
-from tsar.tiling import uniform
+from tsar.tiling import build, tile_of_element, uniform
 
 
 def run(density, cycles, config):
@@ -29,6 +32,61 @@ def test_no_tile_starves_however_much_falls_due():
     density = torch.full((16384,), 1.0, dtype=torch.float64)
     density[-64:] = 1.0 / 64.0  # one quiet tile among 255 that ask for every cycle
     assert run(density, 1200, config).min() >= 1
+
+
+@given(seed=st.integers(0, 10_000), batch=st.sampled_from([5, 32, 64]), decades=st.floats(0.0, 6.0))
+def test_no_element_starves_and_every_batch_is_full_under_changing_tilings(seed, batch, decades):
+    """Another tiling every cycle and densities between 1/4 and 1: every element is rendered, again and again."""
+    config = TsarConfig(batch_size=batch, tiling=TilingConfig(tile_count_max=4 * max(batch, 64)))
+    g = torch.Generator().manual_seed(seed)
+    temporal = 0.25 + 0.75 * torch.rand(16384, generator=g, dtype=torch.float64)
+    history, waited = initial_history(config), torch.zeros(16384, dtype=torch.int64)
+    for _ in range(30):
+        coarse = 10.0 ** (torch.rand(256, generator=g, dtype=torch.float64) * decades)
+        tiling = build(coarse.repeat_interleave(64), config)
+        selected, history = select(tiling, temporal, history, config)
+        assert selected.unique().numel() == selected.numel() == batch
+        rendered = torch.zeros(tiling.tile_count, dtype=torch.bool).index_fill_(0, selected, True)
+        waited = torch.where(rendered[tile_of_element(tiling, 7)], 0, waited + 1)
+        assert bool(torch.isfinite(history).all())
+        if batch == 64:
+            assert int(waited.max()) <= 24
+
+
+def test_elements_are_refreshed_alike_while_tiles_change_their_size():
+    """Coarse and fine tilings in turn: the field remembers, so no element gains or loses by being re-tiled."""
+    config = TsarConfig(batch_size=32)
+    density, history = torch.full((16384,), 0.3125, dtype=torch.float64), initial_history(config)
+    counts = torch.zeros(16384, dtype=torch.int64)
+    for cycle in range(240):
+        tiling = uniform(3 + cycle % 2)
+        selected, history = select(tiling, density, history, config)
+        counts += torch.isin(tile_of_element(tiling, 7), selected)
+    assert float(counts.double().mean()) == 240 * 0.3125 and int(counts.max() - counts.min()) <= 4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_budget_is_the_number_of_tiles_that_fall_due(seed):
+    """Densities that a tiling realises exactly: it comes back, and sum(θ_s θ_t) = batch * s² means that on average a
+    batch of tiles falls due per cycle, each at its own rate."""
+    config = TsarConfig(batch_size=32)
+    g = torch.Generator().manual_seed(seed)
+    tiling = build(10.0 ** (3 * torch.rand(256, generator=g, dtype=torch.float64)).repeat_interleave(64), config)
+    owner = tile_of_element(tiling, 7)
+    rate = 0.05 + torch.rand(tiling.tile_count, generator=g, dtype=torch.float64)
+    for _ in range(50):
+        rate = (rate * config.batch_size / rate.sum()).clamp(max=1.0)
+    spatial, temporal = (config.samples * 4.0 ** tiling.level.double() / 16384)[owner], rate[owner]
+    assert float((spatial * temporal).sum()) == pytest.approx(config.budget)
+    again = build(spatial, config)
+    assert torch.equal(again.level, tiling.level) and torch.equal(again.index, tiling.index)
+    due = tile_integral(prefix_sum(spatial * temporal), tiling.level, tiling.index, 7) / config.samples
+    assert torch.allclose(due, rate) and float(due.sum()) == pytest.approx(config.batch_size)
+    counts, history = torch.zeros(tiling.tile_count, dtype=torch.float64), initial_history(config)
+    for _ in range(400):
+        selected, history = select(tiling, temporal, history, config)
+        counts[selected] += 1
+    assert float((counts / 400 - rate).abs().max()) < 0.02
 
 
 def test_selection_is_deterministic_and_depends_on_the_seed():

@@ -132,7 +132,9 @@ def adapt(tree: Tree, depth: int) -> Tree:
     return Tree(leaf, moments)
 
 
-def _image(tree: Tree, buffer: PixelBuffer, config: TsarConfig, depth: int, now_s: float, cycle_s: float) -> Tensor:
+def _image(
+    tree: Tree, buffer: PixelBuffer, config: TsarConfig, depth: int, now_s: float, cycle_s: float
+) -> Float[Tensor, "h w 3"]:
     """Newest samples weighted by ``exp(-age / refresh interval of the leaf)``, filled by pull and push."""
     leaves = tree.leaf.nonzero().squeeze(1)
     area = 2.0 ** (depth - floor_log2(leaves).to(torch.float64))

@@ -11,6 +11,8 @@ from math import log2
 
 import torch
 import torch.nn.functional as F
+from jaxtyping import Float
+from torch import Tensor
 
 from tsar.clock import CycleSeconds, checked
 from tsar.config import TsarConfig, require
@@ -31,7 +33,7 @@ def frame_batch(config: TsarConfig, time_s: float, frame: int, samples_per_axis:
     return FrameletBatch(tiling.level, tiling.index, position, time_field, cycle=frame, seed=config.seed)
 
 
-def frame_image(samples: SampleBatch, config: TsarConfig, samples_per_axis: int) -> torch.Tensor:
+def frame_image(samples: SampleBatch, config: TsarConfig, samples_per_axis: int) -> Float[Tensor, "h w 3"]:
     """``(h, w, 3)`` image, box-filtered to pixels. Tiles in Morton order of samples in Morton order are one curve."""
     side = config.resolution_px * samples_per_axis
     raster = samples.color.reshape(-1, 3)[raster_to_morton(side)].reshape(side, side, 3)

@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterator
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from tsar.baselines.scatter import PixelBuffer, generator, pull_push, render_pixels, write
 from tsar.clock import CycleSeconds, checked
@@ -46,7 +48,7 @@ def run(
         cycle, time_s = cycle + 1, time_s + cycle_s
 
 
-def _image(buffer: PixelBuffer, config: TsarConfig) -> torch.Tensor:
+def _image(buffer: PixelBuffer, config: TsarConfig) -> Float[Tensor, "h w 3"]:
     side = config.resolution_px
     color = buffer.color.reshape(side, side, 3)
     known = torch.isfinite(buffer.time_s).reshape(1, side, side)

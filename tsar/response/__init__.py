@@ -10,6 +10,7 @@ from dataclasses import replace
 import torch
 
 from tsar.config import TsarConfig
+from tsar.morton import total
 from tsar.response.local import Box, constrain
 from tsar.response.mixture import mix
 from tsar.response.transport import SOLVERS
@@ -39,7 +40,7 @@ def respond(densities: Densities, errors: Errors, config: TsarConfig) -> Densiti
         spatial=torch.where(local.active, b_s * spatial_high, densities.spatial),
         temporal=torch.where(local.active, b_t * temporal_high, densities.temporal),
     )
-    freed = float((densities.combined() - after.combined()).sum())
+    freed = total(densities.combined() - after.combined())
     return replace(after, surplus=max(densities.surplus + freed, 0.0))
 
 

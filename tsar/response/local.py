@@ -23,6 +23,7 @@ from torch import Tensor
 
 from tsar.types import Errors
 
+Field = Float[Tensor, " e"]
 _AT_WALL = 1e-9
 
 
@@ -41,46 +42,47 @@ class LocalConstraints:
     Attributes:
         a_s, a_t: densities before the decision.
         m_s, m_t: mixture, a unit vector, or zero where no move is possible.
-        k_phi: distance asked for; k_min: the same within the box; k_max: distance to the box's wall.
+        k_min: distance asked for, as far as it stays in the box; k_max: distance to the box's wall.
         desired_change: Δθ* at ``k_min``; max_change: Δθ_max, of the same sign and at least as large.
     """
 
-    a_s: Float[Tensor, " e"]
-    a_t: Float[Tensor, " e"]
-    m_s: Float[Tensor, " e"]
-    m_t: Float[Tensor, " e"]
-    k_min: Float[Tensor, " e"]
-    k_max: Float[Tensor, " e"]
-    desired_change: Float[Tensor, " e"]
-    max_change: Float[Tensor, " e"]
+    a_s: Field
+    a_t: Field
+    m_s: Field
+    m_t: Field
+    k_min: Field
+    k_max: Field
+    desired_change: Field
+    max_change: Field
 
     @property
     def active(self) -> Bool[Tensor, " e"]:
         return (self.m_s != 0) | (self.m_t != 0)
 
 
-def area_change(a_s: Tensor, a_t: Tensor, m_s: Tensor, m_t: Tensor, k: Tensor) -> Tensor:
+def area_change(a_s: Field, a_t: Field, m_s: Field, m_t: Field, k: Field) -> Field:
     """``Area(a + k m) - Area(a)`` without subtracting the areas (eq. 6.16, 6.18)."""
     return k * (a_s * m_t + a_t * m_s + m_s * m_t * k)
 
 
-def exit_distance(a: Tensor, m: Tensor, low: float, high: float) -> Tensor:
+def exit_distance(a: Field, m: Field, low: float, high: float) -> Field:
     """Distance at which a ray that starts within ``[low, high]`` leaves it along one axis; inf where ``m = 0``."""
     wall = torch.where(m > 0, high - a, low - a)
     return torch.where(m == 0, torch.inf, wall / torch.where(m == 0, 1.0, m)).clamp(min=0.0)
 
 
-def _drop_outward(a: Tensor, phi: Tensor, low: float) -> Tensor:
+def _drop_outward(a: Field, phi: Field, low: float) -> Field:
     """The error without what points out of ``[low, 1]`` from a wall (to within rounding of the wall)."""
     at_wall = ((phi < 0) & (a <= low * (1 + _AT_WALL))) | ((phi > 0) & (a >= 1 - _AT_WALL))
     return torch.where(at_wall, 0.0, phi)
 
 
-def constrain(a_s: Tensor, a_t: Tensor, errors: Errors, box: Box, gain: float) -> LocalConstraints:
+def constrain(a_s: Field, a_t: Field, errors: Errors, box: Box, gain: float) -> LocalConstraints:
     """Desired and greatest change (eq. 6.8–6.22) for normalised densities inside the box."""
     phi_s = _drop_outward(a_s, errors.spatial, box.spatial_min)
     phi_t = _drop_outward(a_t, errors.temporal, box.temporal_min)
-    length = torch.hypot(phi_s, phi_t)
+    # Not hypot: its vectorised and its scalar form differ in the last bit, and which one runs depends on the threads.
+    length = torch.sqrt(phi_s * phi_s + phi_t * phi_t)
     unit = torch.where(length > 0, length, 1.0)
     m_s, m_t = phi_s / unit, phi_t / unit
     k_max = torch.minimum(exit_distance(a_s, m_s, box.spatial_min, 1.0), exit_distance(a_t, m_t, box.temporal_min, 1.0))

@@ -9,25 +9,20 @@ Deviation: eq. 6.55–6.56 cancel where the mixture is nearly axis-aligned. The 
 from __future__ import annotations
 
 import torch
-from jaxtyping import Float
-from torch import Tensor
 
-from tsar.response.local import Box, LocalConstraints
+from tsar.response.local import Box, Field, LocalConstraints
 
 
-def smallest_root(a: Tensor, b: Tensor, d: Tensor) -> Tensor:
+def smallest_root(a: Field, b: Field, d: Field) -> Field:
     """Smallest non-negative ``k`` with ``a k² + b k + d = 0``, 0 where there is none; discriminant clamped at 0."""
     q = -0.5 * (b + torch.where(b < 0, -1.0, 1.0) * torch.sqrt((b * b - 4.0 * a * d).clamp(min=0.0)))
     first = torch.where(a != 0, q / torch.where(a != 0, a, 1.0), torch.inf)
     second = torch.where(q != 0, d / torch.where(q != 0, q, 1.0), torch.inf)
-    # -0.0 and roots that rounding put a hair below zero would otherwise be skipped for the far root.
     root = torch.minimum(torch.where(first >= 0, first, torch.inf), torch.where(second >= 0, second, torch.inf))
     return torch.where(torch.isfinite(root), root, 0.0)
 
 
-def mix(
-    local: LocalConstraints, change: Float[Tensor, " e"], box: Box, bias: float
-) -> tuple[Float[Tensor, " e"], Float[Tensor, " e"]]:
+def mix(local: LocalConstraints, change: Field, box: Box, bias: float) -> tuple[Field, Field]:
     """Point b on the ray with the granted combined density, then slid along the iso-product curve to c.
 
     Where the errors have opposite signs and less change was granted than desired, the rest of the response needs no

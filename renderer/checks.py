@@ -1,0 +1,41 @@
+"""Values of a scene that no kernel can make sense of, refused in one line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes.canonical import SceneError
+
+
+def check_finite(values: object, what: str) -> None:
+    """Raises SceneError unless all values are finite in float32."""
+    with np.errstate(over="ignore"):
+        good = np.isfinite(np.asarray(values, np.float32)).all()
+    if not good:
+        raise SceneError(f"{what}: expected finite values, got {_short(values)}")
+
+
+def check_light(values: object, what: str) -> None:
+    """Raises SceneError unless all values, of a radiance or reflectance, are finite and not negative."""
+    check_finite(values, what)
+    if (np.asarray(values) < 0.0).any():
+        raise SceneError(f"{what}: expected no negative values, got {_short(values)}")
+
+
+def check_affine(matrix: object, what: str) -> None:
+    """Raises SceneError unless a ``(4, 4)`` transform can be inverted and keeps parallel lines parallel."""
+    rows = np.asarray(matrix, np.float64)
+    if rows.shape != (4, 4) or not np.isfinite(rows).all():
+        raise SceneError(f"{what}: expected a finite (4, 4) matrix")
+    if not np.allclose(rows[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-9):
+        raise SceneError(f"{what}: expected (0, 0, 0, 1) in the last row, got {tuple(rows[3].tolist())}")
+    stretch = np.linalg.svd(rows[:3, :3], compute_uv=False)
+    if not stretch[2] > 1e-14 * stretch[0]:
+        raise SceneError(f"{what}: expected a matrix that can be inverted")
+
+
+def _short(values: object) -> str:
+    array = np.asarray(values)
+    if array.size > 4:
+        return f"{array.size} values from {array.min()} to {array.max()}"
+    return str(array.tolist())

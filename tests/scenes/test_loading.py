@@ -1,0 +1,220 @@
+"""Files become arrays with the right values, or one line that names the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from scenes import loading
+from scenes.canonical import SceneError
+from scenes.loading import asset, clamp_radiance, read_image, read_mesh
+
+SAMPLES = Path(__file__).resolve().parents[3] / "shared" / "data" / "assets"
+MESHES = sorted(path for path in SAMPLES.rglob("*") if path.suffix.lower() in (".glb", ".obj", ".stl"))
+
+TRIANGLE = b"v 0 0 0\nv 2 0 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+BINARY = bytes(range(256)) * 8
+
+
+def write_exr(path: Path, channels: dict[str, np.ndarray]) -> Path:
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
+    return path
+
+
+def noise(height: int, width: int, channels: int = 3) -> np.ndarray:
+    return np.random.default_rng(0).random((height, width, channels), dtype=np.float32) * 5.0
+
+
+def decoded(code: int) -> float:
+    """The sRGB transfer function."""
+    value = code / 255.0
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+
+
+# --- pictures --------------------------------------------------------------------------------------------------------
+
+
+def test_png_is_decoded_to_linear_values(tmp_path: Path) -> None:
+    codes = np.zeros((2, 3, 3), np.uint8)
+    codes[0, 1], codes[1, 2] = (255, 128, 5), (10, 188, 64)
+    Image.fromarray(codes).save(tmp_path / "a.png")
+    found = read_image(tmp_path / "a.png")
+    assert found.shape == (2, 3, 3) and found.dtype == np.float32
+    expected = np.vectorize(decoded)(codes)
+    assert found == pytest.approx(expected, abs=1e-6)
+    assert found[1, 2, 1] == pytest.approx(0.5029, abs=1e-3)
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "RGBA"])
+def test_other_kinds_of_png_become_rgb(tmp_path: Path, mode: str) -> None:
+    # a grey that is also in the palette of the web
+    Image.new("RGB", (4, 2), (153, 153, 153)).convert(mode).save(tmp_path / "a.png")
+    found = read_image(tmp_path / "a.png")
+    assert found.shape == (2, 4, 3) and found == pytest.approx(decoded(153), abs=1e-6)
+
+
+def test_exr_is_read_as_it_is(tmp_path: Path) -> None:
+    values = noise(3, 5)
+    assert np.array_equal(read_image(write_exr(tmp_path / "a.exr", {"RGB": values})), values)
+    four = noise(3, 5, 4)
+    assert np.array_equal(read_image(write_exr(tmp_path / "b.EXR", {"RGBA": four})), four[..., :3])
+    apart = {name: np.ascontiguousarray(values[..., place]) for place, name in enumerate("RGB")}
+    assert np.array_equal(read_image(write_exr(tmp_path / "c.exr", apart)), values)
+
+
+def test_pictures_are_shared_and_cannot_be_changed(tmp_path: Path) -> None:
+    path = write_exr(tmp_path / "a.exr", {"RGB": noise(2, 2)})
+    found = read_image(path)
+    assert read_image(path) is found
+    with pytest.raises(ValueError, match="read-only"):
+        found[0, 0, 0] = 1.0
+
+
+def broken_pictures(folder: Path) -> dict[str, Path]:
+    """Files that no picture can be read from."""
+    (folder / "whole.png").touch()
+    Image.fromarray((noise(64, 64) * 50.0).astype(np.uint8)).save(folder / "whole.png")
+    whole = (folder / "whole.png").read_bytes()
+    exr = write_exr(folder / "whole.exr", {"RGB": noise(64, 64)}).read_bytes()
+    holes = noise(2, 2)
+    holes[1, 1, 2] = np.nan
+    (folder / "folder.png").mkdir()
+    contents = {
+        "missing.png": None,
+        "missing.exr": None,
+        "folder.png": None,
+        "empty.png": b"",
+        "empty.exr": b"",
+        "garbage.png": BINARY,
+        "garbage.exr": BINARY,
+        "half.png": whole[: len(whole) // 2],
+        "half.exr": exr[: len(exr) // 2],
+        "text.jpg": b"two lines\nof text\n",
+    }
+    for name, content in contents.items():
+        if content is not None:
+            (folder / name).write_bytes(content)
+    write_exr(folder / "grey.exr", {"Y": np.ones((2, 2), np.float32)})
+    write_exr(folder / "holes.exr", {"RGB": holes})
+    return {name: folder / name for name in (*contents, "grey.exr", "holes.exr")}
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["missing.png", "missing.exr", "folder.png", "empty.png", "empty.exr", "garbage.png", "garbage.exr", "half.png",
+     "half.exr", "text.jpg", "grey.exr", "holes.exr"],
+)  # fmt: skip
+def test_broken_pictures_are_named(tmp_path: Path, name: str) -> None:
+    path = broken_pictures(tmp_path)[name]
+    with pytest.raises(SceneError) as caught:
+        read_image(path)
+    message = str(caught.value)
+    assert message.startswith(f"texture {path}: ") and "\n" not in message and len(message) > len(str(path)) + 12
+
+
+def test_assets_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert asset("sky.exr").is_file()
+    monkeypatch.setattr(loading, "ASSETS", tmp_path)
+    with pytest.raises(SceneError, match=r"^asset 'sky\.exr': expected a file at .*sky\.exr, found none$") as caught:
+        asset("sky.exr")
+    assert str(tmp_path) in str(caught.value)
+
+
+# --- radiance --------------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.tuples(*[st.floats(0.0, 1e5, width=32)] * 3), min_size=1), st.floats(0.5, 100.0))
+def test_clamping_keeps_hue_and_never_brightens(texels: list[tuple[float, ...]], limit: float) -> None:
+    image = np.array(texels, np.float32).reshape(1, -1, 3)
+    found = clamp_radiance(image, limit)
+    assert found.dtype == np.float32 and found.shape == image.shape
+    assert (found <= image * (1.0 + 1e-6)).all() and found.max() <= limit * (1.0 + 1e-6)
+    peak, after = image.max(axis=-1, keepdims=True), found.max(axis=-1, keepdims=True)
+    assert found * peak == pytest.approx(image * after, rel=1e-4, abs=1e-30), "the channels keep their proportion"
+    kept = peak[..., 0] <= limit
+    assert np.array_equal(found[kept], image[kept]), "what is below the limit stays"
+    assert after[..., 0][~kept] == pytest.approx(limit, rel=1e-5)
+
+
+# --- meshes ----------------------------------------------------------------------------------------------------------
+
+
+def test_obj_is_read_with_texture_coordinates(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_bytes(TRIANGLE)
+    mesh = read_mesh(tmp_path / "a.obj")
+    order = mesh.faces[0]
+    assert mesh.faces.dtype == np.int32 and mesh.vertices.dtype == np.float32 and mesh.source == str(tmp_path / "a.obj")
+    assert mesh.vertices[order] == pytest.approx(np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 3.0, 0.0)]))
+    assert mesh.uvs is not None and mesh.uvs[order] == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
+    assert mesh.normals is not None and mesh.normals[order] == pytest.approx(np.tile([0.0, 0.0, 1.0], (3, 1)))
+
+
+def test_other_formats_hold_the_same_triangles(tmp_path: Path) -> None:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(1)
+    for ending in ("ply", "stl", "glb", "obj"):
+        ball.export(tmp_path / f"ball.{ending}")
+        mesh = read_mesh(tmp_path / f"ball.{ending}")
+        assert len(mesh.faces) == 80
+        points = mesh.vertices.astype(np.float64)[mesh.faces]
+        volume = np.einsum("ij,ij->i", points[:, 0], np.cross(points[:, 1], points[:, 2])).sum() / 6.0
+        assert volume == pytest.approx(ball.volume, rel=1e-4)
+
+
+def test_parts_are_placed_by_their_transforms(tmp_path: Path) -> None:
+    import trimesh
+
+    whole = trimesh.Scene()
+    for at in (0.0, 10.0):
+        whole.add_geometry(trimesh.creation.box(), transform=trimesh.transformations.translation_matrix([at, 0.0, 0.0]))
+    whole.export(tmp_path / "two.glb")
+    mesh = read_mesh(tmp_path / "two.glb")
+    assert len(mesh.faces) == 24
+    assert (mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()) == pytest.approx((-0.5, 10.5))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("missing.obj", None),
+        ("missing.glb", None),
+        ("empty.obj", b""),
+        ("empty.glb", b""),
+        ("empty.stl", b""),
+        ("empty.ply", b""),
+        ("garbage.obj", BINARY),
+        ("garbage.glb", BINARY),
+        ("garbage.stl", BINARY),
+        ("garbage.ply", BINARY),
+        ("unknown.xyzzy", TRIANGLE),
+        ("comment.obj", b"# nothing\n"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"),
+        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
+        ("half.obj", TRIANGLE[:-6]),
+        ("holes.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ],
+)
+def test_broken_meshes_are_named(tmp_path: Path, name: str, content: bytes | None) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(SceneError) as caught:
+        read_mesh(path)
+    message = str(caught.value)
+    assert str(path) in message and "\n" not in message and "mesh" in message.lower()
+
+
+@pytest.mark.skipif(not MESHES, reason="no sample meshes beside the project")
+@pytest.mark.parametrize("path", MESHES, ids=lambda path: path.name)
+def test_sample_meshes_are_read(path: Path) -> None:
+    mesh = read_mesh(path)
+    assert len(mesh.faces) > 100 and np.ptp(mesh.vertices, axis=0).min() > 0.0
+    assert mesh.normals is not None and np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0, abs=1e-5)
+    assert mesh.uvs is None or np.isfinite(mesh.uvs).all()

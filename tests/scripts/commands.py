@@ -1,0 +1,40 @@
+"""Running the command lines, in a process of their own or in this one."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from analysis.cli import run_cli
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run_script(name: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs ``scripts/name`` from a folder, in a process of its own."""
+    command = [sys.executable, str(ROOT / "scripts" / name), *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=600)
+
+
+def call_script(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    """Runs the script's main function in this process as from the command line; returns the exit status."""
+    module = importlib.import_module(f"scripts.{name.removesuffix('.py')}")
+    monkeypatch.setattr(sys, "argv", [name, *arguments])
+    try:
+        run_cli(module.main)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def one_line(error: str) -> bool:
+    """Whether standard error holds one line of an error and nothing else."""
+    return error.startswith("error: ") and error.endswith("\n") and error.count("\n") == 1 and "Traceback" not in error
+
+
+def nothing_in(folder: Path) -> bool:
+    return not folder.exists() or not any(folder.iterdir())

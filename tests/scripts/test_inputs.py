@@ -1,0 +1,175 @@
+"""Repetitions over inputs: which runs there are, and that finished ones are not repeated."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import analysis.records
+import scripts.inputs as script
+from analysis.experiment import ROOT, RunOptions
+from analysis.files import write_json
+from analysis.repetitions import INPUTS, InputsOptions, row
+from scenes import catalog
+from tests.scripts.commands import call_script, nothing_in, one_line
+from tsar.config import ConfigError, TsarConfig
+
+FOUND = {
+    "ratio_median": 0.5,
+    "ratio_quartiles": [0.4, 0.6],
+    "share_suitable": 1.0,
+    "suitable_percentile": 100.0,
+    "cycles": 7,
+    "age_spread_s": 0.01,
+    "invariants": {"ok": True},
+    "stage_wall_s": {"tracing": 1.0},
+}
+
+
+def test_the_inputs_are_the_built_in_scenes() -> None:
+    assert INPUTS == catalog.NAMES
+
+
+def test_runs_over_seeds(tmp_path: Path) -> None:
+    options = InputsOptions(
+        ("chase", "fly-by"), repetitions=3, tsar=TsarConfig(seed=9, batch_size=32), seconds=0.5, out=tmp_path
+    )
+    runs = options.runs()
+    assert [(run.input, run.tsar.seed, run.phase) for run in runs] == [
+        (name, seed, 0.0) for name in ("chase", "fly-by") for seed in range(3)
+    ]
+    assert [run.out for run in runs] == [tmp_path / f"{n}-seed{k}" for n in ("chase", "fly-by") for k in range(3)]
+    assert {(run.tsar.batch_size, run.seconds, run.capacity, run.ledger) for run in runs} == {
+        (32, 0.5, options.capacity, options.ledger)
+    }
+
+
+def test_runs_over_phases(tmp_path: Path) -> None:
+    options = InputsOptions(("chase",), vary="phase", repetitions=4, tsar=TsarConfig(seed=9), out=tmp_path)
+    runs = options.runs()
+    assert [(run.phase, run.tsar.seed) for run in runs] == [(0.0, 9), (0.25, 9), (0.5, 9), (0.75, 9)]
+    assert [run.out.name for run in runs] == ["chase-phase0", "chase-phase1", "chase-phase2", "chase-phase3"]
+
+
+def test_all_inputs_by_default() -> None:
+    runs = InputsOptions().runs()
+    assert [run.input for run in runs[::3]] == list(INPUTS) and len({run.out for run in runs}) == len(runs) == 15
+
+
+@pytest.mark.parametrize("bad", [{"repetitions": 0}, {"inputs": ()}])
+def test_nothing_to_run_is_refused(bad: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(bad))):
+        InputsOptions(**bad)
+
+
+def test_a_row_says_which_run_it_was(tmp_path: Path) -> None:
+    run = RunOptions("chase", TsarConfig(seed=4), phase=0.5, out=tmp_path / "chase-seed4")
+    found = row(run, FOUND)
+    assert (found["run"], found["input"], found["seed"], found["phase"]) == ("chase-seed4", "chase", 4, 0.5)
+    assert found["ratio_median"] == 0.5 and found["invariants_ok"] is True
+    assert found["ratio_median_supersampled"] is None
+    beside = {**FOUND, "ratio_statistics_framed_supersampled": {"median": 0.8}}
+    assert row(run, beside)["ratio_median_supersampled"] == 0.8
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Stands in for the experiment: writes a summary and nothing else. Holds the names of the runs that were made."""
+    names: list[str] = []
+    provenance = analysis.records.provenance
+
+    def committed(*arguments: Any, **extra: Any) -> dict[str, Any]:
+        return {**provenance(*arguments, **extra), "uncommitted_changes": False}
+
+    def pretend(options: RunOptions) -> dict[str, Any]:
+        names.append(options.out.name)
+        found = {**FOUND, "provenance": analysis.records.provenance(ROOT, dataclasses.asdict(options))}
+        write_json(options.out / "summary.json", found)
+        return found
+
+    monkeypatch.setattr(analysis.records, "provenance", committed)
+    monkeypatch.setattr(script, "run_experiment", pretend)
+    return names
+
+
+def test_finished_runs_are_not_repeated(
+    made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    arguments = ("fly-by", "--repetitions", "2", "--out", str(tmp_path))
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    assert made == ["fly-by-seed0", "fly-by-seed1"]
+    shown = capsys.readouterr().out
+    assert shown.splitlines()[0] == "| fly-by-seed0 | 0.500 | 0.400 – 0.600 | 100 |"
+
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    assert made == ["fly-by-seed0", "fly-by-seed1"] and capsys.readouterr().out == shown
+
+    (tmp_path / "fly-by-seed1" / "summary.json").unlink()
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    assert made[2:] == ["fly-by-seed1"], "what was interrupted is run again"
+
+    assert call_script("inputs.py", monkeypatch, *arguments, "--seconds", "1") == 0
+    assert made[3:] == ["fly-by-seed0", "fly-by-seed1"], "other options, other runs"
+
+
+def test_runs_with_uncommitted_changes_are_repeated(
+    made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the source was then is not known."""
+    arguments = ("fly-by", "--repetitions", "1", "--out", str(tmp_path))
+    clean = analysis.records.provenance
+    monkeypatch.setattr(analysis.records, "provenance", lambda *a, **k: {**clean(*a, **k), "uncommitted_changes": True})
+    for _ in range(2):
+        assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    assert made == ["fly-by-seed0"] * 2
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"provenance": {}}', '{"provenance": {"commit": "other"}}'])
+def test_summaries_of_something_else_do_not_count(
+    made: list[str], content: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fly-by-seed0").mkdir()
+    (tmp_path / "fly-by-seed0" / "summary.json").write_text(content)
+    assert call_script("inputs.py", monkeypatch, "fly-by", "--repetitions", "1", "--out", str(tmp_path)) == 0
+    assert made == ["fly-by-seed0"]
+
+
+def test_the_summary_holds_every_run(made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ("chase", "fly-by", "--vary", "phase", "--repetitions", "2", "--ledger", "work", "--out", str(tmp_path))
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    found = json.loads((tmp_path / "summary.json").read_text())
+    assert [(one["run"], one["phase"]) for one in found["runs"]] == [
+        ("chase-phase0", 0.0),
+        ("chase-phase1", 0.5),
+        ("fly-by-phase0", 0.0),
+        ("fly-by-phase1", 0.5),
+    ]
+    assert found["ledger"] == "work" and found["config"]["repetitions"] == 2 and found["provenance"]["device"] == "cpu"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--repetitions", "0"), ("repetitions", "at least 1", "0")),
+        (("--vary", "weather"), ("--vary", "weather")),
+        (("--seconds", "0"), ("seconds", "positive")),
+        (("--capacity", "-1"), ("capacity", "-1.0")),
+    ],
+)
+def test_bad_input_ends_with_one_line(
+    made: list[str],
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    status = call_script("inputs.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
+    shown = capsys.readouterr()
+    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
+    assert all(part in shown.err for part in parts), shown.err
+    assert made == [] and nothing_in(tmp_path / "out")

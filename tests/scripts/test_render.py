@@ -1,0 +1,155 @@
+"""Stills, sequences that go on where they stopped, and films."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from renderer.film import read_exr
+from tests.scripts.commands import call_script, nothing_in, one_line, run_script
+
+SIZE = ("--width-px", "48", "--height-px", "32", "--samples-per-axis", "1")
+
+
+def stills(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.glob("frame*"))
+
+
+def summary(folder: Path) -> dict:
+    return json.loads((folder / "summary.json").read_text())
+
+
+def picture(path: Path) -> np.ndarray:
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+@pytest.fixture
+def render(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, tmp_path: Path):
+    """Runs the script on the folder ``out``; returns how many frames were rendered now."""
+
+    def run(*arguments: str) -> int:
+        status = call_script("render.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
+        shown = capsys.readouterr()
+        assert status == 0, shown.err
+        found = re.search(r"^\d+ frames \((\d+) rendered now, 0 values not finite\) in ", shown.out)
+        assert found is not None, shown.out
+        return int(found[1])
+
+    return run
+
+
+def test_a_still_in_a_process_of_its_own(tmp_path: Path) -> None:
+    done = run_script("render.py", tmp_path, "fly-by", *SIZE, "--time-s", "1", "--out", "out")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("1 frames (1 rendered now, 0 values not finite)")
+    out = tmp_path / "out"
+    assert sorted(path.name for path in out.iterdir()) == ["frame00000.png", "job.json", "summary.json"]
+    pixels = picture(out / "frame00000.png")
+    assert pixels.shape == (32, 48, 3) and pixels.dtype == np.uint8 and pixels.std() > 10.0
+    found = summary(out)
+    assert found["frames"] == found["rendered_now"] == 1 and found["config"]["time_s"] == 1.0
+    assert found["provenance"]["scene"] == "fly-by" and found["provenance"]["versions"]["torch"]
+
+
+def test_a_film_goes_on_where_it_stopped(render, tmp_path: Path) -> None:
+    import av
+
+    arguments = ("approach", *SIZE, "--frames", "3", "--format", "mp4", "--fps", "10")
+    out = tmp_path / "out"
+    assert render(*arguments) == 3
+    assert stills(out) == ["frame00000.png", "frame00001.png", "frame00002.png"]
+    before = {name: ((out / name).read_bytes(), os.stat(out / name).st_mtime_ns) for name in stills(out)}
+    assert len({content for content, _ in before.values()}) == 3
+    (out / "frame00001.png").unlink()
+    (out / "film.mp4").unlink()
+    assert render(*arguments) == 1
+    after = {name: ((out / name).read_bytes(), os.stat(out / name).st_mtime_ns) for name in stills(out)}
+    assert after["frame00000.png"] == before["frame00000.png"] and after["frame00002.png"] == before["frame00002.png"]
+    assert after["frame00001.png"][0] == before["frame00001.png"][0], "the same picture again"
+    assert summary(out)["rendered_now"] == 1
+    with av.open(str(out / "film.mp4")) as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert len(frames) == 3 and frames[0].shape == (32, 48, 3)
+    for number, frame in enumerate(frames):
+        shown = picture(out / f"frame{number:05d}.png").astype(float)
+        assert np.abs(frame.astype(float) - shown).mean() < 8.0
+
+
+def test_a_longer_sequence_of_the_same_job_keeps_what_is_there(render, tmp_path: Path) -> None:
+    assert render("chase", *SIZE) == 1
+    assert render("chase", *SIZE, "--frames", "2", "--threads", "1") == 1
+    assert stills(tmp_path / "out") == ["frame00000.png", "frame00001.png"]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [("chase", *SIZE), ("fly-by", *SIZE, "--time-s", "1"), ("fly-by", "--width-px", "32", "--height-px", "32"),
+     ("fly-by", *SIZE, "--phase", "0.5")],
+)  # fmt: skip
+def test_another_job_replaces_the_stills(render, tmp_path: Path, other: tuple[str, ...]) -> None:
+    out = tmp_path / "out"
+    assert render("fly-by", *SIZE, "--frames", "2") == 2
+    before = (out / "frame00000.png").read_bytes()
+    assert render(*other) == 1
+    assert stills(out) == ["frame00000.png"], "none of the other job is left"
+    assert (out / "frame00000.png").read_bytes() != before
+
+
+def test_exr_is_linear_and_png_its_encoding(render, tmp_path: Path) -> None:
+    render("fly-by", *SIZE, "--format", "exr")
+    render("fly-by", *SIZE)
+    linear = np.clip(read_exr(tmp_path / "out" / "frame00000.exr"), 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    shown = picture(tmp_path / "out" / "frame00000.png") / 255.0
+    assert np.abs(shown - encoded).max() < 2.5 / 255.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("nonsense",), ("scene", "'nonsense'")),
+        (("fly-by", "--width-px", "0"), ("width_px", "0")),
+        (("fly-by", "--frames", "-3"), ("frames", "-3")),
+        (("fly-by", "--fps", "0"), ("fps", "positive")),
+        (("fly-by", "--time-s", "inf"), ("time_s", "inf")),
+        (("fly-by", "--samples-per-axis", "65"), ("samples_per_axis", "65")),
+        (("fly-by", "--format", "gif"), ("gif", "png")),
+        (("fly-by", "--phase", "1"), ("phase", "1.0")),
+        (("fly-by", "--threads", "-1"), ("threads", "-1")),
+    ],
+)
+def test_bad_input_ends_with_one_line(
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    status = call_script("render.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
+    shown = capsys.readouterr()
+    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
+    assert all(part in shown.err for part in parts), shown.err
+    assert nothing_in(tmp_path / "out")
+
+
+def test_a_file_in_place_of_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "file").touch()
+    status = call_script("render.py", monkeypatch, "fly-by", "--out", str(tmp_path / "file" / "below"))
+    shown = capsys.readouterr()
+    assert status == 2 and one_line(shown.err) and "out: cannot write to" in shown.err
+
+
+def test_help_names_the_options(tmp_path: Path) -> None:
+    done = run_script("render.py", tmp_path, "--help")
+    assert done.returncode == 0 and done.stderr == ""
+    for name in ("--width-px", "--samples-per-axis", "--frames", "--format", "--phase", "--out"):
+        assert name in done.stdout

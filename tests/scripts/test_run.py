@@ -1,0 +1,271 @@
+"""A small comparison from end to end, and one line for whatever cannot be run."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from PIL import Image
+
+import analysis.reference
+from analysis import cli
+from analysis.cli import InputError
+from analysis.experiment import RunOptions, prepare, run_experiment
+from analysis.files import plain
+from renderer.film import read_exr
+from scenes import loading, world
+from tests.scripts.commands import call_script, nothing_in, one_line, run_script
+from tsar.config import TsarConfig
+
+BATCH, SIDE, IMAGES = 16, 64, 5
+SIZE = ("--resolution-px", str(SIDE), "--batch-size", str(BATCH), "--warmup-cycles", "8", "--capacity", "3e10")
+SPAN = ("--seconds", "0.25", "--reference-samples-per-axis", "1", "--reference-rate-hz", "20")
+
+
+def options(folder: Path, out: str, threads: int) -> RunOptions:
+    """The same run as :data:`SIZE` and :data:`SPAN` ask for."""
+    return RunOptions(
+        input="fly-by",
+        tsar=TsarConfig(batch_size=BATCH, resolution_px=SIDE, warmup_cycles=8),
+        capacity=3e10,
+        seconds=0.25,
+        reference_samples_per_axis=1,
+        reference_rate_hz=20.0,
+        threads=threads,
+        film=False,
+        out=folder / out,
+        cache=folder / "cache",
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("run")
+
+
+@pytest.fixture(scope="module")
+def printed(folder: Path) -> str:
+    """What the run prints; its results lie in ``out``."""
+    where = ("--threads", "2", "--frames", "--out", "out", "--cache", "cache")
+    done = run_script("run.py", folder, "fly-by", *SIZE, *SPAN, *where)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def summary(folder: Path, printed: str) -> dict[str, Any]:
+    return json.loads((folder / "out" / "summary.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def again(folder: Path, printed: str) -> Iterator[tuple[dict[str, Any], int]]:
+    """Summary of the run on one thread, and how many reference images it rendered."""
+    rendered = []
+    obtain = analysis.reference.obtain
+
+    def counting(*arguments: Any) -> Any:
+        found = obtain(*arguments)
+        rendered.append(found.rendered)
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(analysis.reference, "obtain", counting)
+        found = run_experiment(options(folder, "again", threads=1))
+    assert len(rendered) == 1
+    yield plain(found), rendered[0]
+
+
+# --- a run -----------------------------------------------------------------------------------------------------------
+
+
+def test_every_result_is_there(folder: Path, printed: str) -> None:
+    found = sorted(path.name for path in (folder / "out").iterdir())
+    assert found == ["comparison.mp4", "error.png", "frames", "report.html", "steps.parquet", "summary.json"]
+    for name in found:
+        assert name in printed or name == "frames"
+    with Image.open(folder / "out" / "error.png") as picture:
+        assert min(picture.size) > 200
+    page = (folder / "out" / "report.html").read_text()
+    assert "fly-by" in page and page.rstrip().endswith("</html>")
+
+
+def test_frames_are_what_the_display_shows(folder: Path, printed: str) -> None:
+    frames = sorted((folder / "out" / "frames").iterdir())
+    assert [frame.name for frame in frames] == [f"{number:06d}.exr" for number in range(IMAGES)]
+    images = np.stack([read_exr(frame) for frame in frames])
+    assert images.shape == (IMAGES, SIDE, SIDE, 3) and np.isfinite(images).all() and images.std() > 0.01
+    assert np.abs(images[1:] - images[:-1]).max() > 0.0
+
+
+def test_the_film_has_a_frame_of_every_reference_time(folder: Path, printed: str) -> None:
+    import av
+
+    with av.open(str(folder / "out" / "comparison.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == IMAGES
+
+
+def test_errors_are_given_at_every_reference_time(summary: dict[str, Any]) -> None:
+    assert summary["reference_time_s"] == pytest.approx(np.arange(IMAGES) / 20.0)
+    adaptive, framed = np.array(summary["mse_tsar"]), np.array(summary["mse_framed"])
+    assert adaptive.shape == framed.shape == (IMAGES,) and (adaptive > 0.0).all() and (framed > 0.0).all()
+    assert summary["ratio"] == pytest.approx(adaptive / framed)
+    assert max(adaptive.max(), framed.max()) < 0.1, "both resemble the reference"
+    assert summary["ratio_median"] == pytest.approx(float(np.median(summary["ratio"])))
+    assert 0.0 <= summary["suitable_percentile"] <= 100.0
+
+
+def test_work_is_accounted_for(summary: dict[str, Any], folder: Path) -> None:
+    cycles = summary["cycles"]
+    assert 20 <= cycles <= 60 and summary["warmup_cycles"] == 8
+    assert summary["samples_traced"] == cycles * BATCH * 256
+    assert pq.ParquetFile(folder / "out" / "steps.parquet").metadata.num_rows == cycles + 8
+    stages = {"selection", "tracing", "error", "response", "tiling", "reconstruction"}
+    assert stages <= set(summary["stage_wall_s"]) and stages == set(summary["stage_flops"])
+    assert min(summary["stage_wall_s"].values()) > 0.0
+    assert sum(summary["stage_flops"].values()) == pytest.approx(cycles * summary["cycle_s"] * 3e10)
+
+
+def test_invariants_hold(summary: dict[str, Any]) -> None:
+    assert summary["invariants"]["ok"] is True and summary["invariants"]["cycles"] == summary["cycles"] + 8
+    assert set(summary["nonfinite"].values()) == {0}
+
+
+def test_provenance_tells_where_it_comes_from(summary: dict[str, Any]) -> None:
+    source = summary["provenance"]
+    assert {"python", "torch", "warp-lang", "numpy"} <= set(source["versions"]) and all(source["versions"].values())
+    expected = {"seed": 0, "device": "cpu", "threads": 2, "scene": "fly-by"}
+    assert {name: source[name] for name in expected} == expected
+    assert isinstance(source["commit"], str) and len(source["config_hash"]) == 16
+    assert summary["config"]["tsar"]["batch_size"] == BATCH and summary["config"]["frames"] is True
+
+
+def test_the_table_shows_the_summary(printed: str, summary: dict[str, Any]) -> None:
+    assert f"{summary['ratio_median']:.3f}" in printed and f"{summary['samples_traced']:,}" in printed
+    assert "hold in every cycle" in printed
+
+
+def test_threads_change_nothing(summary: dict[str, Any], again: tuple[dict[str, Any], int]) -> None:
+    """On one thread and on two every error is the same to the last bit."""
+    other, _ = again
+    assert (summary["provenance"]["threads"], other["provenance"]["threads"]) == (2, 1)
+    for name in ("mse_tsar", "mse_framed", "mse_framed_supersampled", "log_mse_tsar", "counters", "framed_refresh_s"):
+        assert other[name] == summary[name], name
+
+
+def test_the_reference_is_rendered_once(folder: Path, again: tuple[dict[str, Any], int]) -> None:
+    _, rendered = again
+    assert rendered == 0
+    images = [np.load(path, mmap_mode="r") for path in (folder / "cache").glob("*.npy")]
+    assert [found.shape for found in images] == [(IMAGES, SIDE, SIDE, 3)]
+
+
+def test_options_leave_out_what_they_say(folder: Path, again: tuple[dict[str, Any], int]) -> None:
+    assert not (folder / "again" / "comparison.mp4").exists() and not (folder / "again" / "frames").exists()
+    assert json.loads((folder / "again" / "summary.json").read_text()) == again[0]
+
+
+# --- what cannot be run ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("fly-by", "--batch-size", "-1"), ("batch_size", "-1")),
+        (("fly-by", "--batch-size", "many"), ("--batch-size", "many")),
+        (("fly-by", "--capacity", "0"), ("capacity", "positive", "0.0")),
+        (("fly-by", "--capacity", "nan"), ("capacity", "nan")),
+        (("fly-by", "--resolution-px", "100"), ("resolution_px", "power of two", "100")),
+        (("fly-by", "--solver", "magic"), ("solver", "magic", "waterfill")),
+        (("fly-by", "--seconds", "-2"), ("seconds", "-2.0")),
+        (("fly-by", "--warmup-cycles", "2"), ("warmup_cycles", "at least 4")),
+        (("fly-by", "--nonsense"), ("--nonsense",)),
+        ((), ("required",)),
+        (("nonsense", *SIZE), ("scene", "fly-by", "'nonsense'")),
+        (("fly-by", "--phase", "1", *SIZE), ("phase", "[0, 1)", "1.0")),
+    ],
+)
+def test_bad_input_ends_with_one_line(
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    out = tmp_path / "out"
+    status = call_script("run.py", monkeypatch, *arguments, "--out", str(out), "--cache", str(tmp_path / "cache"))
+    shown = capsys.readouterr()
+    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
+    assert all(part in shown.err for part in parts), shown.err
+    assert nothing_in(out) and nothing_in(tmp_path / "cache")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [(("nonsense", *SIZE), "'nonsense'"), (("fly-by", "--batch-size", "-1"), "batch_size")],
+)
+def test_bad_input_of_a_process_of_its_own(arguments: tuple[str, ...], part: str, tmp_path: Path) -> None:
+    done = run_script("run.py", tmp_path, *arguments, "--out", "out", "--cache", "cache")
+    assert done.returncode == 2 and done.stdout == "" and one_line(done.stderr), done.stderr
+    assert part in done.stderr and nothing_in(tmp_path / "out")
+
+
+@pytest.mark.parametrize("what", ["out", "cache"])
+def test_folders_that_cannot_be_written(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "file").write_text("kept")
+    places = {"out": tmp_path / "out", "cache": tmp_path / "cache", what: tmp_path / "file" / "below"}
+    where = [part for name, path in places.items() for part in (f"--{name}", str(path))]
+    status = call_script("run.py", monkeypatch, "fly-by", *SIZE, *where)
+    shown = capsys.readouterr()
+    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
+    assert shown.err.startswith(f"error: {what}: cannot write to ") and str(tmp_path / "file") in shown.err
+    assert (tmp_path / "file").read_text() == "kept" and nothing_in(tmp_path / "out")
+
+
+def test_a_resolution_beyond_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    meminfo = tmp_path / "meminfo"
+    meminfo.write_text("MemAvailable: 2097152 kB\n")
+    monkeypatch.setattr(cli, "_MEMORY", meminfo)
+    where = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    status = call_script("run.py", monkeypatch, "fly-by", "--resolution-px", "8192", *where)
+    shown = capsys.readouterr()
+    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
+    assert "resolution_px: 8192 needs about" in shown.err and "2.0 GiB are free" in shown.err
+    assert nothing_in(tmp_path / "out")
+
+
+@pytest.mark.parametrize("broken", ["pavement_albedo_512.png", "sky.exr", "landscape_band.jpg"])
+def test_an_unreadable_texture_is_named(broken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assets = tmp_path / "assets"
+    shutil.copytree(loading.ASSETS, assets)
+    (assets / broken).write_bytes(b"not a picture" * 20)
+    monkeypatch.setattr(loading, "ASSETS", assets)
+    for kept in (world.instances, world.sky, loading.read_image):
+        kept.cache_clear()
+    try:
+        with pytest.raises(InputError) as caught:
+            prepare(options(tmp_path, "out", threads=1))
+    finally:
+        for kept in (world.instances, world.sky, loading.read_image):
+            kept.cache_clear()
+    message = str(caught.value)
+    assert message.startswith(f"texture {assets / broken}: ") and "\n" not in message
+    assert nothing_in(tmp_path / "out")
+
+
+def test_help_names_the_options(tmp_path: Path) -> None:
+    done = run_script("run.py", tmp_path, "--help")
+    assert done.returncode == 0 and done.stderr == ""
+    for name in ("--seconds", "--ledger", "--capacity", "--batch-size", "--resolution-px", "--solver", "--out"):
+        assert name in done.stdout
+    assert "Framelets rendered per cycle." in done.stdout and nothing_in(tmp_path)
