@@ -179,7 +179,7 @@ def instances(path: Path, start_s: float, end_s: float, interval_s: float = 1.0 
     return placed
 
 
-def _wheel_turn(path: Path, steered: bool, side: float) -> Callable[[Array], Rotation]:
+def _wheel_turn(path: Path, steered: bool, side: float) -> Callable[[Times], Rotation]:
     """Orientation of a wheel in the car's frame: steering about z, rolling about the axle, outer side outwards."""
     outward = Rotation.from_euler("z", 0.0 if side > 0 else 180.0, degrees=True)
 
