@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 STILL_FORMATS = (".exr", ".png", ".ppm")
-FORMATS = (*STILL_FORMATS, ".mp4")
 
 
 class FilmError(ValueError):

@@ -13,7 +13,6 @@ from scenes.canonical import Mesh
 from scenes.meshing import Array, Surface, extrude, grid, join, lathe, smooth_normals, transformed
 
 RADIUS_M = 0.335
-WIDTH_M = 0.235
 SPOKES = 5
 
 _RIM_RADIUS = 0.245

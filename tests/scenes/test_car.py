@@ -118,6 +118,18 @@ def test_wheels_roll_without_slipping(straight: dict[str, Instance], at: str) ->
             assert moved == pytest.approx(speed * ahead, abs=1e-2)
 
 
+def test_rear_wheels_roll_with_the_ground_in_a_bend(bend: dict[str, Instance]) -> None:
+    """Where the path bends, the touching point of either rear wheel stands still along the car."""
+    step = 1e-4
+    for at in WHEEL_NAMES[2:]:
+        tyre = bend[f"tyre {at}"]
+        for time_s in np.linspace(0.1, 1.5, 9):
+            now, ahead = pose(tyre, time_s), pose(bend["paint"], time_s)[:3, 0]
+            point = np.append(now[:3, :3].T @ [0.0, 0.0, -wheel.RADIUS_M], 1.0)
+            moved = (pose(tyre, time_s + step) @ point - pose(tyre, time_s - step) @ point)[:3] / (2.0 * step)
+            assert float(moved @ ahead) == pytest.approx(0.0, abs=0.02)
+
+
 def test_every_wheel_has_a_motion_of_its_own(straight: dict[str, Instance]) -> None:
     tracks = [straight[f"tyre {at}"].track for at in WHEEL_NAMES]
     assert len({id(track) for track in (*tracks, straight["paint"].track)}) == 5

@@ -36,5 +36,12 @@ def one_line(error: str) -> bool:
     return error.startswith("error: ") and error.endswith("\n") and error.count("\n") == 1 and "Traceback" not in error
 
 
+def assert_refused(status: int, capsys: pytest.CaptureFixture, parts: tuple[str, ...]) -> None:
+    """Bad input: status 2, nothing on standard output, and one line that holds every part."""
+    shown = capsys.readouterr()
+    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
+    assert all(part in shown.err for part in parts), shown.err
+
+
 def nothing_in(folder: Path) -> bool:
     return not folder.exists() or not any(folder.iterdir())

@@ -15,7 +15,7 @@ from analysis.experiment import ROOT, RunOptions
 from analysis.files import write_json
 from analysis.repetitions import INPUTS, InputsOptions, row
 from scenes import catalog
-from tests.scripts.commands import call_script, nothing_in, one_line
+from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import ConfigError, TsarConfig
 
 FOUND = {
@@ -169,7 +169,5 @@ def test_bad_input_ends_with_one_line(
     capsys: pytest.CaptureFixture,
 ) -> None:
     status = call_script("inputs.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    shown = capsys.readouterr()
-    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
-    assert all(part in shown.err for part in parts), shown.err
+    assert_refused(status, capsys, parts)
     assert made == [] and nothing_in(tmp_path / "out")

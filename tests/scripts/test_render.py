@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from renderer.film import read_exr
-from tests.scripts.commands import call_script, nothing_in, one_line, run_script
+from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 SIZE = ("--width-px", "48", "--height-px", "32", "--samples-per-axis", "1")
 
@@ -133,9 +133,7 @@ def test_bad_input_ends_with_one_line(
     capsys: pytest.CaptureFixture,
 ) -> None:
     status = call_script("render.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    shown = capsys.readouterr()
-    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
-    assert all(part in shown.err for part in parts), shown.err
+    assert_refused(status, capsys, parts)
     assert nothing_in(tmp_path / "out")
 
 

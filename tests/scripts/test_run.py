@@ -20,7 +20,7 @@ from analysis.experiment import RunOptions, prepare, run_experiment
 from analysis.files import plain
 from renderer.film import read_exr
 from scenes import loading, world
-from tests.scripts.commands import call_script, nothing_in, one_line, run_script
+from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 from tsar.config import TsarConfig
 
 BATCH, SIDE, IMAGES = 16, 64, 5
@@ -200,9 +200,7 @@ def test_bad_input_ends_with_one_line(
 ) -> None:
     out = tmp_path / "out"
     status = call_script("run.py", monkeypatch, *arguments, "--out", str(out), "--cache", str(tmp_path / "cache"))
-    shown = capsys.readouterr()
-    assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
-    assert all(part in shown.err for part in parts), shown.err
+    assert_refused(status, capsys, parts)
     assert nothing_in(out) and nothing_in(tmp_path / "cache")
 
 
