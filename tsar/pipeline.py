@@ -106,7 +106,8 @@ def run(
         state, outcome = step(state, config, trace, time_s, cycle, cycle_s)
         cycle_s = checked(cycle_seconds, outcome.samples.counters, outcome.stages.total)
         record = _record(before, state, outcome, config, cycle, time_s, cycle_s)
-        yield record, Display(time_s + LATENCY_CYCLES * cycle_s, time_s, outcome.reconstruction.image)
+        shown = outcome.reconstruction
+        yield record, Display(time_s + LATENCY_CYCLES * cycle_s, time_s, shown.image, shown.samples)
         cycle, time_s = cycle + 1, time_s + cycle_s
 
 
@@ -136,7 +137,7 @@ def _record(
         stage_s=dict(outcome.stages.seconds),
         counters=dict(outcome.samples.counters),
         nonfinite=outcome.nonfinite,
-        age_spread_s=_age_spread(outcome.reconstruction.newest_s, densities, config),
+        age_spread_s=_age_spread(outcome.reconstruction.samples.newest_s, densities, config),
     )
 
 

@@ -20,6 +20,7 @@ from torch import Tensor
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
 from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
+from tsar.types import SampleMap
 
 _SHIFT_CYCLES = 0.5
 _AGE_STEPS = 2.0**16
@@ -31,13 +32,12 @@ class Reconstruction:
 
     Attributes:
         image: ``(resolution, resolution, 3)`` float32 linear RGB, finite everywhere.
-        newest_s: animation time of the newest sample over each tile of the finest level, raster order; ``-inf`` where
-            nothing has been sampled yet.
+        samples: age and density of the newest samples over each tile of the finest level.
         overdraw: framelets that were accumulated, in units of the image area.
     """
 
     image: Float[Tensor, "h w 3"]
-    newest_s: Float[Tensor, "side side"]
+    samples: SampleMap
     overdraw: float
 
 
@@ -54,7 +54,8 @@ def reconstruct(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Rec
     Returns:
         The image. The same cache gives the same bits.
     """
-    newest = newest_times(cache, config)
+    samples = newest_samples(cache, config)
+    newest = samples.newest_s
     reference = newest[torch.isfinite(newest)].max() if bool(torch.isfinite(newest).any()) else newest.new_zeros(())
     # Relative to the newest sample, in cycles: small numbers that float32 holds well.
     age = ((newest - reference) / cycle_s).clamp(min=-1e6).to(torch.float32)
@@ -63,19 +64,23 @@ def reconstruct(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Rec
     for level in range(config.level_min, config.level_max + 1):
         total.add_level(level)
     image = total.normalised()
-    return Reconstruction(image, newest, total.pairs / config.resolution_px**2)
+    return Reconstruction(image, samples, total.pairs / config.resolution_px**2)
 
 
-def newest_times(cache: FrameletCache, config: TsarConfig) -> Float[Tensor, "side side"]:
-    """Newest timestamp over each tile of the finest level, raster order."""
+def newest_samples(cache: FrameletCache, config: TsarConfig) -> SampleMap:
+    """Newest timestamp over each tile of the finest level, and the level it came from, the finer of two."""
     newest = torch.full((4**config.level_min,), -torch.inf, dtype=torch.float64)
+    source = torch.full((4**config.level_min,), config.level_min)
     for level in range(config.level_min, config.level_max + 1):
         slot = (cache.level == level).nonzero().squeeze(1)
-        newest = newest.scatter_reduce(0, cache.index[slot], cache.time_s[slot], "amax")
+        here = torch.full_like(newest, -torch.inf).scatter_reduce(0, cache.index[slot], cache.time_s[slot], "amax")
+        source = torch.where((here >= newest) & torch.isfinite(here), level, source)
+        newest = torch.maximum(newest, here)
         if level < config.level_max:
-            newest = newest.repeat_interleave(4)
+            newest, source = newest.repeat_interleave(4), source.repeat_interleave(4)
     side = 2**config.level_max
-    return newest[raster_to_morton(side)].reshape(side, side)
+    order = raster_to_morton(side)
+    return SampleMap(newest[order].reshape(side, side), source[order].reshape(side, side))
 
 
 def smooth_age(newest: Float[Tensor, "side side"], resolution: int, support_px: int) -> Float[Tensor, "h w"]:

@@ -97,6 +97,19 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class SampleMap:
+    """What the samples shown in each part of an image are, raster order; the parts are equal squares.
+
+    Attributes:
+        newest_s: animation time of the newest sample, seconds; ``-inf`` where nothing has been sampled yet.
+        level: quad level of the framelet it came in, which tells how densely it was sampled there.
+    """
+
+    newest_s: Float[Tensor, "side side"]
+    level: Int64[Tensor, "side side"]
+
+
+@dataclass(frozen=True)
 class Display:
     """An image as it goes onto the display.
 
@@ -104,11 +117,13 @@ class Display:
         display_time_s: when it appears.
         sample_time_s: animation time of its newest samples.
         image: ``(height, width, 3)`` float32 linear RGB.
+        samples: of what age and density its samples are.
     """
 
     display_time_s: float
     sample_time_s: float
     image: Float[Tensor, "h w 3"]
+    samples: SampleMap | None = None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from tests.oracles import pictures
 from tests.oracles.reconstruction_slow import slow_reconstruct
 from tsar.cache import FrameletCache
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig
-from tsar.reconstruction import newest_times, reconstruct, round_bits, smooth_age, spatial_weights
+from tsar.reconstruction import newest_samples, reconstruct, round_bits, smooth_age, spatial_weights
 from tsar.selection import make_batch
 from tsar.tiling import build, uniform
 
@@ -113,6 +113,20 @@ def test_the_newest_samples_win_where_ages_are_even():
     assert int(cache.dead[cache.occupied].sum()) == 32, "the two older layers can never be seen again"
 
 
+def test_the_map_of_samples_holds_the_age_and_level_of_the_newest():
+    cfg = config()
+    cache = FrameletCache(cfg)
+    fill(cache, cfg, uniform(2), pictures.constant, 0.0)
+    fill(cache, cfg, uniform(3), pictures.constant, 1.0, [0])
+    fill(cache, cfg, uniform(3), pictures.constant, -1.0, [63])
+    found = newest_samples(cache, cfg)
+    part = found.level.shape[0] // 8
+    fresh = torch.zeros_like(found.level, dtype=torch.bool)
+    fresh[:part, :part] = True
+    assert bool((found.level == torch.where(fresh, 3, 2)).all())
+    assert bool((found.newest_s == torch.where(fresh, 1.0, 0.0).to(torch.float64)).all())
+
+
 def test_nothing_cached_and_half_cached_give_no_hole_and_no_nan():
     cfg = config()
     cache = FrameletCache(cfg)
@@ -121,7 +135,7 @@ def test_nothing_cached_and_half_cached_give_no_hole_and_no_nan():
     fill(cache, cfg, uniform(2), pictures.constant, 0.0, [0, 7])
     image = reconstruct(cache, cfg, 0.1).image
     assert bool(torch.isfinite(image).all()) and image.min() > 0.39
-    assert not torch.isfinite(newest_times(cache, cfg)).all()
+    assert not torch.isfinite(newest_samples(cache, cfg).newest_s).all()
 
 
 @given(seed=st.integers(0, 10_000), support=st.sampled_from([1, 5, 33]), cycle_s=st.sampled_from([1e-4, 0.05, 10.0]))

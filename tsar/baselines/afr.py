@@ -21,7 +21,7 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
-from tsar.baselines.scatter import PixelBuffer, generator, pull_push, render_pixels, write
+from tsar.baselines.scatter import PixelBuffer, generator, pull_push, render_pixels, sample_map, write
 from tsar.clock import CycleSeconds, checked
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
@@ -64,7 +64,7 @@ def run(
         tree = adapt(observe(tree, node, compressed_luminance(color)), depth)
         image = _image(tree, buffer, config, depth, time_s, cycle_s)
         cycle_s = checked(cycle_seconds, counters, time.perf_counter() - began)
-        yield Display(time_s + LATENCY_CYCLES * cycle_s, time_s, image)
+        yield Display(time_s + LATENCY_CYCLES * cycle_s, time_s, image, sample_map(buffer, config))
         cycle, time_s = cycle + 1, time_s + cycle_s
 
 

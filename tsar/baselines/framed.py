@@ -19,7 +19,7 @@ from tsar.config import TsarConfig, require
 from tsar.morton import raster_to_morton
 from tsar.selection import sample_positions
 from tsar.tiling import uniform
-from tsar.types import Display, FrameletBatch, SampleBatch, Trace
+from tsar.types import Display, FrameletBatch, SampleBatch, SampleMap, Trace
 
 LATENCY_FRAMES = 2
 """A framed renderer shows what was sampled two frames ago."""
@@ -67,5 +67,7 @@ def run(
             # The first frame only tells what a frame costs; the run proper starts early by the latency.
             frame_s, time_s = cost, start_s - (LATENCY_FRAMES + 1) * cost
             continue
-        yield Display(time_s + LATENCY_FRAMES * cost, time_s, image)
+        age = torch.full((1, 1), time_s, dtype=torch.float64)
+        level = torch.full((1, 1), int(log2(config.resolution_px * samples_per_axis / config.framelet_side)))
+        yield Display(time_s + LATENCY_FRAMES * cost, time_s, image, SampleMap(age, level))
         frame_s, time_s, frame = cost, time_s + cost, frame + 1

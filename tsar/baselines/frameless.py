@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from tsar.baselines.scatter import PixelBuffer, generator, pull_push, render_pixels, write
+from tsar.baselines.scatter import PixelBuffer, generator, pull_push, render_pixels, sample_map, write
 from tsar.clock import CycleSeconds, checked
 from tsar.config import TsarConfig
 from tsar.types import Display, Trace
@@ -44,7 +44,7 @@ def run(
         write(buffer, pixel, color, time_s)
         image = _image(buffer, config)
         cycle_s = checked(cycle_seconds, counters, time.perf_counter() - began)
-        yield Display(time_s + LATENCY_CYCLES * cycle_s, time_s, image)
+        yield Display(time_s + LATENCY_CYCLES * cycle_s, time_s, image, sample_map(buffer, config))
         cycle, time_s = cycle + 1, time_s + cycle_s
 
 

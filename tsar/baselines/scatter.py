@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log2
 
 import torch
 import torch.nn.functional as F
@@ -11,7 +12,7 @@ from torch import Tensor
 
 from tsar.config import TsarConfig
 from tsar.error import replace_nonfinite
-from tsar.types import FrameletBatch, Trace
+from tsar.types import FrameletBatch, SampleMap, Trace
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,13 @@ class PixelBuffer:
     def empty(config: TsarConfig) -> PixelBuffer:
         pixels = config.resolution_px**2
         return PixelBuffer(torch.zeros(pixels, 3), torch.full((pixels,), -torch.inf, dtype=torch.float64))
+
+
+def sample_map(buffer: PixelBuffer, config: TsarConfig) -> SampleMap:
+    """One sample a pixel, each of its own age."""
+    side = config.resolution_px
+    level = torch.full((side, side), int(log2(side / config.framelet_side)))
+    return SampleMap(buffer.time_s.reshape(side, side).clone(), level)
 
 
 def generator(config: TsarConfig, cycle: int) -> torch.Generator:
