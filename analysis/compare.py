@@ -11,13 +11,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from analysis.pictures import webp_bytes
+from analysis.player import Step
 from analysis.quality import ErrorTrace, Hold, pixel_errors
-from analysis.report import Moment
-from analysis.video import ComparisonFilm, FrameSink, Scales, View, panels
+from analysis.video import PHOTOGRAPHS, ComparisonFilm, FrameSink, Scales, View, panels
 from tsar.types import Display, FrameletBatch, SampleBatch, StepRecord, Trace
 
-MOMENTS = 5
-MOMENT_PX = 256
+STEPS_MAX = 60
+"""Positions of the slider in the report at most."""
+STEP_PX = 256
+"""Width of the pictures in the report."""
 
 
 @dataclass
@@ -84,7 +87,7 @@ class Comparison:
         adaptive: errors of the adaptive run.
         framed: errors of the framed runs.
         refresh_s: display times of the first framed run.
-        moments: pictures of some times.
+        steps: pictures of evenly spaced times, for the report.
         framed_nonfinite: non-finite values in framed images, each image counted once.
     """
 
@@ -92,7 +95,7 @@ class Comparison:
     adaptive: ErrorTrace
     framed: dict[str, ErrorTrace]
     refresh_s: list[float]
-    moments: list[Moment]
+    steps: list[Step]
     framed_nonfinite: dict[str, int]
 
 
@@ -105,6 +108,7 @@ def compare(
     sink: FrameSink | None,
     on_view: Callable[[int, View], None] = lambda number, view: None,
     film_stride: int = 1,
+    steps_max: int = STEPS_MAX,
 ) -> Comparison:
     """Holds what each display shows at every reference time and measures it.
 
@@ -116,14 +120,15 @@ def compare(
         film, sink: composer of frames and where they go; None for no film.
         on_view: called with the number and the view of every reference time.
         film_stride: a film frame every so many reference times.
+        steps_max: how many times the report shows at most; every k-th, with the least k that keeps to it.
     """
     nonfinite = dict.fromkeys(streams.framed, 0)
     adaptive = Hold(streams.adaptive)
     framed = {name: Hold(_counting(name, run, nonfinite)) for name, run in streams.framed.items()}
     main = next(iter(framed))
     errors, framed_errors = ErrorTrace(), {name: ErrorTrace() for name in framed}
-    wanted = set(np.linspace(0, len(times_s) - 1, MOMENTS + 2).round().astype(int)[1:-1].tolist())
-    moments: list[Moment] = []
+    step_stride = -(-len(times_s) // steps_max)
+    steps: list[Step] = []
     for number, time_s in enumerate(times_s.tolist()):
         truth = torch.from_numpy(reference[number].astype(np.float32))
         shown = {name: hold.at(time_s)[1].image for name, hold in framed.items()}
@@ -131,13 +136,23 @@ def compare(
         errors.add(pixel_errors(display.image, truth))
         for name, image in shown.items():
             framed_errors[name].add(pixel_errors(image, truth))
-        view = View(time_s, truth, shown[main], display.image, record.tiling, record.densities)
+        newest_s = display.samples.newest_s if display.samples else None
+        view = View(time_s, truth, shown[main], display.image, record.tiling, record.densities, newest_s)
         if film is not None and sink is not None and number % film_stride == 0:
             sink.add(film.frame(view, times_s[: number + 1].tolist(), errors.mse, framed_errors[main].mse))
-        if number in wanted:
-            moments.append(Moment(time_s, panels(view, scales, MOMENT_PX)))
+        if number % step_stride == 0:
+            steps.append(_step(number, view, scales))
         on_view(number, view)
-    return Comparison(times_s, errors, framed_errors, framed[main].refresh_s, moments, nonfinite)
+    return Comparison(times_s, errors, framed_errors, framed[main].refresh_s, steps, nonfinite)
+
+
+def _step(number: int, view: View, scales: Scales) -> Step:
+    # encoded at once: the pixels of all steps together would take as much memory as the run
+    pictures = {
+        label: None if pixels is None else webp_bytes(pixels, lossless=label not in PHOTOGRAPHS)
+        for label, pixels in panels(view, scales, STEP_PX).items()
+    }
+    return Step(number, pictures)
 
 
 def _counting(name: str, run: Iterable[Display], nonfinite: dict[str, int]) -> Iterator[tuple[None, Display]]:

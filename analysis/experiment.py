@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from analysis.cli import bad_input, full_disk, require_memory
-from analysis.cost_model import CAPACITY_DEFAULT, CostParameters, Ledger, cycle_seconds, frame_seconds
+from analysis.cost_model import CAPACITY_DEFAULT, CostParameters, Ledger, cycle_seconds, frame_seconds, parameters_of
 from analysis.files import writable_folder, write_json
 from tsar.config import TsarConfig, require
 
@@ -99,18 +99,8 @@ class RunOptions:
 
     @property
     def cost(self) -> CostParameters:
-        """Parameters of the cost model for this run. What the pipeline does not decide stays as in table 7.1."""
-        c = self.tsar
-        return CostParameters(
-            batch_size=c.batch_size,
-            sdf_size=c.sdf_side**2,
-            framelet_size=c.samples,
-            recon_res=c.resolution_px**2,
-            cache_size=c.cache_slots,
-            trace_segments=self.trace_segments,
-            tiling_size=c.tile_count_max,
-            dwt_coeffs=448 * c.samples / 256,
-        )
+        """Parameters of the cost model for this run."""
+        return parameters_of(self.tsar, self.trace_segments)
 
     @property
     def framed(self) -> dict[str, int]:
@@ -205,21 +195,13 @@ def finished(options: RunOptions) -> dict[str, Any] | None:
 
 
 def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:
-    import importlib.metadata
-
-    from analysis.reference import ReferenceSpec, content_hash, obtain, source_hash
+    from analysis.reference import ReferenceSpec, content_hash, obtain, renderer_hash
 
     side, axis = options.tsar.resolution_px, options.reference_samples_per_axis
     spec = ReferenceSpec(
         scene=f"{options.input} phase {options.phase:g}",
         scene_hash=content_hash(setup.scene),
-        renderer_hash="-".join(
-            (
-                source_hash(ROOT / "renderer", skip=("film.py",))[:16],
-                importlib.metadata.version("warp-lang"),
-                options.device.partition(":")[0],
-            )
-        ),
+        renderer_hash=renderer_hash(ROOT, options.device),
         start_s=options.start_s,
         rate_hz=options.reference_rate_hz,
         count=count,

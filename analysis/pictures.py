@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +22,9 @@ Pixels = NDArray[np.uint8]
 
 DENSITY_MAP = "viridis"
 RATE_MAP = "inferno"
+AGE_MAP = "YlGnBu"
+NEVER = (176, 48, 48)
+"""Colour, in no map, of what has not been sampled yet."""
 
 
 @lru_cache(maxsize=8)
@@ -32,7 +36,7 @@ def font(size_px: int) -> ImageFont.FreeTypeFont:
 
 @lru_cache(maxsize=4)
 def palette(name: str) -> Pixels:
-    """``(256, 3)`` colours of a perceptually uniform map."""
+    """``(256, 3)`` colours of a map whose lightness only rises or only falls."""
     return (matplotlib.colormaps[name](np.arange(256))[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
 
@@ -99,6 +103,16 @@ def density_image(
     return enlarge(colour(raster, bounds, name), resolution_px)
 
 
+def age_image(
+    newest_s: Float[Tensor, "s s"], time_s: float, bounds_s: tuple[float, float], resolution_px: int
+) -> Pixels:
+    """Age at ``time_s`` of the newest samples, on a logarithmic colour scale; ``NEVER`` where there are none."""
+    age_s = time_s - newest_s.numpy().astype(np.float64)
+    image = colour(np.where(np.isfinite(age_s), age_s, bounds_s[1]), bounds_s, AGE_MAP)
+    image[~np.isfinite(age_s)] = NEVER
+    return enlarge(image, resolution_px)
+
+
 def enlarge(image: Pixels, side_px: int) -> Pixels:
     """A square picture at another size: whole pixels when it grows by a whole number, a smooth average otherwise."""
     old = image.shape[0]
@@ -133,4 +147,11 @@ def number(value: float) -> str:
     """Three digits, and fractions below one as 1/n where they are that."""
     if 0 < value < 1 and abs(1 / value - round(1 / value)) < 1e-9:
         return f"1/{round(1 / value)}"
-    return f"{value:.3g}"
+    return f"{value:.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
+
+
+def webp_bytes(pixels: Pixels, lossless: bool) -> bytes:
+    """An array ``(h, w, 3)`` uint8 as WebP, exact or at a quality fit for photographs."""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, format="WEBP", lossless=lossless, quality=60 if lossless else 90, method=4)
+    return buffer.getvalue()

@@ -64,6 +64,17 @@ def _flat(tensor: Tensor, dtype: type) -> np.ndarray:
     return tensor.detach().cpu().numpy().astype(dtype)
 
 
+def _fields(record: StepRecord) -> dict[str, np.ndarray]:
+    """Arrays of a record that its invariants are checked from, as they are stored."""
+    return {
+        "tile_level": _flat(record.tiling.level, np.int8),
+        "tile_index": _flat(record.tiling.index, np.int32),
+        "selected": _flat(record.selected, np.int32),
+        "density_spatial": _flat(record.densities.spatial, np.float32),
+        "density_temporal": _flat(record.densities.temporal, np.float32),
+    }
+
+
 class StepWriter:
     """Streams step records to Parquet in row groups; the file appears under its name when it is closed in good order.
 
@@ -97,11 +108,7 @@ class StepWriter:
             "nonfinite": record.nonfinite,
             "age_spread_s": record.age_spread_s,
             "tile_count": record.tiling.tile_count,
-            "tile_level": _flat(record.tiling.level, np.int8),
-            "tile_index": _flat(record.tiling.index, np.int32),
-            "selected": _flat(record.selected, np.int32),
-            "density_spatial": _flat(record.densities.spatial, np.float32),
-            "density_temporal": _flat(record.densities.temporal, np.float32),
+            **_fields(record),
             "error_spatial": _flat(record.errors.spatial, np.float32),
             "error_temporal": _flat(record.errors.temporal, np.float32),
         }
@@ -172,14 +179,7 @@ def check_invariants(path: Path) -> dict[str, Any]:
         which densities were out of bounds, the tiling did not cover the image exactly once, or the batch was not full;
         and ``ok``.
     """
-    limits = read_limits(path)
-    found: dict[str, Any] = {
-        "cycles": 0,
-        "conservation_residual": 0.0,
-        "densities_out_of_bounds": 0,
-        "tiling_not_a_cover": 0,
-        "batch_not_full": 0,
-    }
+    check = InvariantCheck(read_limits(path))
     columns = ["conservation_residual", "surplus", "tile_level", "tile_index", "selected"]
     columns += ["density_spatial", "density_temporal"]
     for part in pq.ParquetFile(path).iter_batches(batch_size=16, columns=columns):
@@ -187,16 +187,39 @@ def check_invariants(path: Path) -> dict[str, Any]:
         for row in range(part.num_rows):
             item = {name: values[name][row] for name in columns}
             fields = {name: item[name].values.to_numpy() for name in columns[2:]}
-            residual = _residual(fields, item["surplus"].as_py(), limits)
-            worst = max(_or_infinite(residual), _or_infinite(item["conservation_residual"].as_py()))
-            found["cycles"] += 1
-            found["conservation_residual"] = max(found["conservation_residual"], worst)
-            found["densities_out_of_bounds"] += not _within(fields, limits)
-            found["tiling_not_a_cover"] += not covers_once(fields["tile_level"], fields["tile_index"])
-            found["batch_not_full"] += not _full(fields, limits)
-    counted = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full")
-    found["ok"] = bool(found["conservation_residual"] <= _CONSERVATION and not any(found[name] for name in counted))
-    return found
+            check.add_fields(fields, item["surplus"].as_py(), item["conservation_residual"].as_py())
+    return check.result()
+
+
+class InvariantCheck:
+    """What :func:`check_invariants` finds, from records as they come. Changes in place."""
+
+    _COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full")
+
+    def __init__(self, limits: RecordLimits) -> None:
+        self._limits = limits
+        self._found: dict[str, Any] = {"cycles": 0, "conservation_residual": 0.0, **dict.fromkeys(self._COUNTED, 0)}
+
+    def add(self, record: StepRecord) -> None:
+        """Checks one cycle; densities are rounded to float32 as they are in a file."""
+        fields = _fields(record)
+        self.add_fields(fields, record.surplus, record.conservation_residual)
+
+    def add_fields(self, fields: dict[str, np.ndarray], surplus: float, recorded: float) -> None:
+        """Checks one cycle from its arrays, the surplus, and the residual that the pipeline found."""
+        found, limits = self._found, self._limits
+        worst = max(_or_infinite(_residual(fields, surplus, limits)), _or_infinite(recorded))
+        found["cycles"] += 1
+        found["conservation_residual"] = max(found["conservation_residual"], worst)
+        found["densities_out_of_bounds"] += not _within(fields, limits)
+        found["tiling_not_a_cover"] += not covers_once(fields["tile_level"], fields["tile_index"])
+        found["batch_not_full"] += not _full(fields, limits)
+
+    def result(self) -> dict[str, Any]:
+        """Counts and ``ok``."""
+        counts = (self._found[name] for name in self._COUNTED)
+        ok = self._found["conservation_residual"] <= _CONSERVATION and not any(counts)
+        return {**self._found, "ok": bool(ok)}
 
 
 def _residual(fields: dict[str, np.ndarray], surplus: float, limits: RecordLimits) -> float:

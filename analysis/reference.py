@@ -7,13 +7,12 @@ name, so that an interrupted rendering goes on where it stopped.
 from __future__ import annotations
 
 import dataclasses
-import fcntl
 import hashlib
+import importlib.metadata
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from analysis.files import PARTIAL, write_json
+from analysis.files import PARTIAL, locked, write_json
 
 _HALF_MAX = float(np.finfo(np.float16).max)
 
@@ -118,6 +117,12 @@ def source_hash(folder: Path, skip: tuple[str, ...] = ()) -> str:
     return digest.hexdigest()
 
 
+def renderer_hash(root: Path, device: str) -> str:
+    """Hash of what of the renderer decides a picture: its source without the file formats, Warp, the kind of device."""
+    version = importlib.metadata.version("warp-lang")
+    return "-".join((source_hash(root / "renderer", skip=("film.py",))[:16], version, device.partition(":")[0]))
+
+
 @dataclass(frozen=True)
 class Reference:
     """Reference images on disk.
@@ -155,7 +160,7 @@ def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[
     """
     cache.mkdir(parents=True, exist_ok=True)
     final, sidecar = cache / f"{spec.key}.npy", cache / f"{spec.key}.json"
-    with _locked(cache / f"{spec.key}.lock"):
+    with locked(cache / f"{spec.key}.lock"):
         before = spec.count if final.exists() else None
         if before is None:
             before = _render_missing(cache, spec, render, progress)
@@ -204,11 +209,3 @@ def _resume(partial: Path, state: Path, spec: ReferenceSpec) -> tuple[int, int]:
     except (OSError, ValueError, EOFError):
         return 0, 0
     return (found["done"], found["nonfinite"]) if shape == spec.shape else (0, 0)
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Holds a lock that the system releases even if this process is killed."""
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

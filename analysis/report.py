@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,25 +13,19 @@ from typing import Any
 
 from PIL import Image
 
+from analysis import player as played
 from analysis.files import atomic
 from analysis.pictures import Pixels
+from analysis.player import Player
 
 _STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;max-width:1180px;margin:2em auto;padding:0 1em;color:#222}
-h1{font-size:1.6em;margin-bottom:.2em} h2{font-size:1.15em;margin-top:2em;border-bottom:1px solid #ddd}
+body{font:15px/1.5 system-ui,sans-serif;max-width:1060px;margin:2em auto;padding:0 1em;color:#222;
+overflow-wrap:break-word} h1{font-size:1.6em;margin-bottom:.2em;line-height:1.25}
+h2{font-size:1.15em;margin-top:2em;border-bottom:1px solid #ddd}
 table{border-collapse:collapse;margin:.6em 0} td,th{padding:.2em .9em .2em 0;text-align:left;vertical-align:top}
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums} tr{border-bottom:1px solid #eee}
-img{max-width:100%} .strip{display:grid;grid-template-columns:4.5em repeat(6,1fr);gap:4px;font-size:12px}
-.strip img{width:100%;display:block} .note{color:#555} code{font-size:.92em}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums} tr{border-bottom:1px solid #eee} .wide{overflow-x:auto}
+img{max-width:100%} .note{color:#555} code{font-size:.92em;overflow-wrap:anywhere}
 """
-
-
-@dataclass(frozen=True)
-class Moment:
-    """Pictures of one time by label."""
-
-    time_s: float
-    pictures: Mapping[str, Pixels]
 
 
 @dataclass(frozen=True)
@@ -51,8 +46,8 @@ class Report:
         title: of the page.
         lead: paragraphs that say what was compared and what came out.
         key_numbers: table before the figures.
-        figures: caption and PNG bytes; the moments stand after the first.
-        moments: strip of pictures.
+        figures: caption and PNG bytes.
+        player: pictures behind a slider, before everything else; None for a page without one.
         tables: in order, after the figures.
         details: nested mappings shown as lists of names and values (configuration, provenance).
     """
@@ -61,7 +56,7 @@ class Report:
     lead: Sequence[str]
     key_numbers: Table
     figures: Sequence[tuple[str, bytes]] = ()
-    moments: Sequence[Moment] = ()
+    player: Player | None = None
     tables: Sequence[Table] = ()
     details: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
@@ -75,20 +70,30 @@ def write_report(path: Path, report: Report) -> None:
 
 def render(report: Report) -> str:
     """The page as text."""
+    script = played.SCRIPT.read_text(encoding="utf-8") if report.player else ""
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
-        f"<title>{escape(report.title)}</title><style>{_STYLE}</style></head><body>",
-        f"<h1>{escape(report.title)}</h1>",
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>",
+        f"<meta http-equiv='Content-Security-Policy' content=\"{_policy(script)}\">",
+        f"<title>{escape(report.title)}</title><style>{_STYLE}{played.STYLE if report.player else ''}</style></head>",
+        f"<body><h1>{escape(report.title)}</h1>",
         *(f"<p>{escape(paragraph)}</p>" for paragraph in report.lead),
+        played.markup(report.player) if report.player else "",
         _table(report.key_numbers),
-        *(_figure(caption, png) for caption, png in report.figures[:1]),
-        _strip(report.moments),
-        *(_figure(caption, png) for caption, png in report.figures[1:]),
+        *(_figure(caption, png) for caption, png in report.figures),
         *(_table(table) for table in report.tables),
         *(_details(title, values) for title, values in report.details.items()),
+        f"<script>{script}</script>" if script else "",
         "</body></html>\n",
     ]
     return "\n".join(parts)
+
+
+def _policy(script: str) -> str:
+    """Nothing may be loaded, and nothing run but the script of the page."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    run = f"'sha256-{digest}'" if script else "'none'"
+    return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {run}; base-uri 'none'"
 
 
 def png_bytes(pixels: Pixels) -> bytes:
@@ -98,22 +103,9 @@ def png_bytes(pixels: Pixels) -> bytes:
     return buffer.getvalue()
 
 
-def _image(png: bytes, label: str) -> str:
-    return f"<img alt='{escape(label, quote=True)}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
-
-
 def _figure(caption: str, png: bytes) -> str:
-    return f"<h2>{escape(caption)}</h2>{_image(png, caption)}"
-
-
-def _strip(moments: Sequence[Moment]) -> str:
-    if not moments:
-        return ""
-    cells = ["<span></span>", *(f"<b>{escape(label)}</b>" for label in moments[0].pictures)]
-    for moment in moments:
-        cells.append(f"<span>{moment.time_s:.3f} s</span>")
-        cells += [_image(png_bytes(p), f"{label} at {moment.time_s:.3f} s") for label, p in moment.pictures.items()]
-    return f"<h2>Moments</h2><div class='strip'>{''.join(cells)}</div>"
+    label = escape(caption, quote=True)
+    return f"<h2>{escape(caption)}</h2><img alt='{label}' src='{played.source(png)}'>"
 
 
 def _table(table: Table) -> str:
@@ -123,14 +115,14 @@ def _table(table: Table) -> str:
 
     note = f"<p class='note'>{escape(table.note)}</p>" if table.note else ""
     body = "".join(row(cells, "td") for cells in table.rows)
-    return f"<h2>{escape(table.title)}</h2><table>{row(table.header, 'th')}{body}</table>{note}"
+    return f"<h2>{escape(table.title)}</h2><div class='wide'><table>{row(table.header, 'th')}{body}</table></div>{note}"
 
 
 def _details(title: str, values: Mapping[str, Any]) -> str:
     rows = "".join(
         f"<tr><td>{escape(name)}</td><td><code>{escape(str(value))}</code></td></tr>" for name, value in flat(values)
     )
-    return f"<details><summary><b>{escape(title)}</b></summary><table>{rows}</table></details>"
+    return f"<details><summary><b>{escape(title)}</b></summary><div class='wide'><table>{rows}</table></div></details>"
 
 
 def flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from analysis import plots
 from analysis.cost_model import stage_flops
+from analysis.player import Curve, Player
 from analysis.records import density_quantiles, read_limits
 from analysis.report import Report, write_report
 from analysis.summary import Measured, key_table, ledger_table, stage_table
@@ -40,6 +41,25 @@ def write_figures(out: Path, summary: Mapping[str, Any], measured: Measured) -> 
     plots.save(_error_figure(summary, measured), out / "error.png")
 
 
+def _player(summary: Mapping[str, Any], measured: Measured) -> Player:
+    c = measured.comparison
+    inks = zip(c.framed.items(), (plots.FRAMED, plots.OTHER), strict=False)
+    return Player(
+        times_s=c.times_s,
+        steps=c.steps,
+        curves=[
+            Curve("TSAR", plots.ADAPTIVE, c.adaptive.mse),
+            *(Curve(name, ink, trace.mse) for (name, trace), ink in inks),
+        ],
+        quantity="mean squared error",
+        marks_s=c.refresh_s,
+        readings={f"TSAR / {measured.main}": [f"{value:.3f}" for value in summary["ratio"]]},
+        note="Every view shows what stands on the display at that time, latency included. Move the slider, also by "
+        "the arrow keys, or click into the curves. Dotted: the framed display changes. Ages are of the newest sample "
+        "in each place of the TSAR image.",
+    )
+
+
 def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> None:
     """Writes ``report.html``."""
     limits = read_limits(out / "steps.parquet")
@@ -57,7 +77,7 @@ def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> Non
             lead=_lead(summary),
             key_numbers=key_table(measured, framed_period_s(summary)),
             figures=[(caption, _png(figure)) for caption, figure in figures.items()],
-            moments=measured.comparison.moments,
+            player=_player(summary, measured),
             tables=[stage_table(measured), ledger_table(measured)],
             details={"Configuration": summary["config"], "Provenance": summary["provenance"]},
         ),

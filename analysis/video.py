@@ -11,12 +11,26 @@ import numpy as np
 from PIL import Image, ImageDraw
 from torch import Tensor
 
-from analysis.pictures import DENSITY_MAP, RATE_MAP, Pixels, density_image, enlarge, font, tiling_image, with_scale
+from analysis.pictures import (
+    AGE_MAP,
+    DENSITY_MAP,
+    RATE_MAP,
+    Pixels,
+    age_image,
+    density_image,
+    enlarge,
+    font,
+    tiling_image,
+    with_scale,
+)
 from analysis.quality import encode
 from tsar.types import Densities, Tiling
 
 INK, PAPER = (235, 235, 235), (24, 24, 24)
 ADAPTIVE, FRAMED = (255, 176, 64), (96, 176, 255)
+
+PHOTOGRAPHS = ("reference", "framed", "TSAR")
+"""The panels that are images of the scene; the others are maps."""
 
 
 class FrameSink(Protocol):
@@ -33,6 +47,7 @@ class View:
         time_s: simulated time.
         reference, framed, adaptive: ``(h, w, 3)`` linear RGB.
         tiling, densities: of the cycle whose image is on the display.
+        newest_s: animation time of the newest sample in each part of the adaptive image, ``(s, s)``; None: not known.
     """
 
     time_s: float
@@ -41,14 +56,16 @@ class View:
     adaptive: Tensor
     tiling: Tiling
     densities: Densities
+    newest_s: Tensor | None = None
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Bounds of the colour scales, the same in every frame: least and greatest density."""
+    """Bounds of the colour scales, the same in every frame: least and greatest density, and age in seconds."""
 
     spatial: tuple[float, float]
     temporal: tuple[float, float]
+    age_s: tuple[float, float] = (0.01, 1.0)
 
 
 def to_pixels(image: Tensor) -> Pixels:
@@ -57,11 +74,14 @@ def to_pixels(image: Tensor) -> Pixels:
     return (encode(finite) * 255.0 + 0.5).clamp(0, 255).byte().contiguous().numpy()
 
 
-def panels(view: View, scales: Scales, side_px: int) -> dict[str, Pixels]:
-    """Every picture of a view by its label, ``side_px`` wide."""
+def panels(view: View, scales: Scales, side_px: int) -> dict[str, Pixels | None]:
+    """Every picture of a view by its label, ``side_px`` wide; None where the view lacks what it shows."""
     spatial = density_image(view.densities.spatial, scales.spatial, side_px)
     temporal = density_image(view.densities.temporal, scales.temporal, side_px, RATE_MAP)
     tiling = tiling_image(view.tiling, view.densities.temporal, side_px, scales.temporal)
+    age, age_ms = None, (1e3 * scales.age_s[0], 1e3 * scales.age_s[1])
+    if view.newest_s is not None:
+        age = with_scale(age_image(view.newest_s, view.time_s, scales.age_s, side_px), age_ms, "ms", AGE_MAP)
     return {
         "reference": enlarge(to_pixels(view.reference), side_px),
         "framed": enlarge(to_pixels(view.framed), side_px),
@@ -69,11 +89,12 @@ def panels(view: View, scales: Scales, side_px: int) -> dict[str, Pixels]:
         "tiling by refresh rate": with_scale(tiling, scales.temporal, "refreshes per cycle", RATE_MAP),
         "spatial density": with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP),
         "temporal density": with_scale(temporal, scales.temporal, "refreshes per cycle", RATE_MAP),
+        "age of samples": age,
     }
 
 
 class ComparisonFilm:
-    """Composes frames of two rows of four panels; the last two hold the error so far. Keeps no images.
+    """Composes frames of two rows of four panels; the last holds the error so far. Keeps no images.
 
     Attributes:
         width_px, height_px: size of a frame, even.
@@ -92,11 +113,12 @@ class ComparisonFilm:
         draw = ImageDraw.Draw(canvas)
         for slot, (label, pixels) in enumerate(panels(view, self._scales, self._side).items()):
             left, top = self._corner(slot)
-            canvas.paste(Image.fromarray(pixels), (left, top + self._strip))
-            self._label(draw, left, top, label)
-        left, top = self._corner(6)
-        self._label(draw, left, top, f"mean squared error    t = {view.time_s:7.3f} s")
-        box = (left, top + self._strip, left + 2 * self._side, top + self._strip + self._side)
+            if pixels is not None:
+                canvas.paste(Image.fromarray(pixels), (left, top + self._strip))
+            self._label(draw, left, top, label if pixels is not None else f"{label}: missing")
+        left, top = self._corner(7)
+        self._label(draw, left, top, f"squared error, t = {view.time_s:.3f} s")
+        box = (left, top + self._strip, left + self._side, top + self._strip + self._side)
         draw_errors(draw, box, self._span, times_s, {"framed": (framed, FRAMED), "TSAR": (adaptive, ADAPTIVE)})
         return np.asarray(canvas)
 
@@ -105,7 +127,9 @@ class ComparisonFilm:
 
     def _label(self, draw: ImageDraw.ImageDraw, left: int, top: int, text: str) -> None:
         size = self._strip * 2 // 3
-        draw.text((left + size // 2, top + self._strip // 2), text, font=font(size), fill=INK, anchor="lm")
+        room = (self._side - size) / draw.textlength(text, font=font(size))
+        fitting = font(max(6, int(size * min(1.0, room))))
+        draw.text((left + size // 2, top + self._strip // 2), text, font=fitting, fill=INK, anchor="lm")
 
 
 def draw_errors(

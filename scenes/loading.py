@@ -66,9 +66,10 @@ def read_image(path: Path) -> Picture:
 
 def _read_srgb(path: Path) -> Picture:
     with Image.open(path) as image:
-        encoded = np.array(image.convert("RGB"), np.float32) / 255.0
-    planes = torch.from_numpy(encoded).permute(2, 0, 1)
-    return np.ascontiguousarray(kornia.color.rgb_to_linear_rgb(planes).permute(1, 2, 0).numpy())
+        encoded = np.array(image.convert("RGB"))
+    # by a table: the power of a whole picture has other bits for another number of threads
+    steps = torch.arange(256, dtype=torch.float32).expand(3, 1, 256) / 255.0
+    return kornia.color.rgb_to_linear_rgb(steps)[0, 0].numpy()[encoded]
 
 
 def _read_exr(path: Path) -> Picture:

@@ -56,8 +56,14 @@ def sun_towards() -> Array:
 
 
 def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    planes = torch.tensor(image).permute(2, 0, 1)[None]
-    return np.ascontiguousarray(resize(planes, (height, width), "bilinear", antialias=True)[0].permute(1, 2, 0).numpy())
+    """On one thread: the bits of the filter depend on their number."""
+    planes, threads = torch.tensor(image).permute(2, 0, 1)[None], torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        small = resize(planes, (height, width), "bilinear", antialias=True)[0]
+    finally:
+        torch.set_num_threads(threads)
+    return np.ascontiguousarray(small.permute(1, 2, 0).numpy())
 
 
 @lru_cache(maxsize=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Iterator, Sequence
 
@@ -10,11 +11,12 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
-from analysis.compare import MOMENTS, Comparison, Meter, Streams, Totals, compare
-from analysis.video import ComparisonFilm
+from analysis.compare import STEP_PX, STEPS_MAX, Comparison, Meter, Streams, Totals, compare
+from analysis.video import PHOTOGRAPHS, ComparisonFilm, panels
 from tests.analysis.builders import SCALES, good_record
-from tsar.types import Display, FrameletBatch, SampleBatch, StepRecord
+from tsar.types import Display, FrameletBatch, SampleBatch, SampleMap, StepRecord
 
 SIDE = 4
 DARK = np.zeros((40, SIDE, SIDE, 3), np.float16)
@@ -35,7 +37,8 @@ def adaptive(display_s: Sequence[float]) -> list[tuple[StepRecord, Display]]:
 
 
 def run(times_s: Sequence[float], streams: Streams, reference: np.ndarray = DARK, **options) -> Comparison:
-    return compare(np.array(times_s), reference, streams, SCALES, options.pop("film", None), **options)
+    few = {"steps_max": 1, **options}
+    return compare(np.array(times_s), reference, streams, SCALES, few.pop("film", None), **few)
 
 
 def white(errors: Sequence[float]) -> list[int]:
@@ -119,15 +122,44 @@ def test_the_film_has_a_frame_every_stride(stride: int, expected: int) -> None:
     assert not np.array_equal(sink.frames[0], sink.frames[-1])
 
 
-@pytest.mark.parametrize("count", [1, 2, 6, 40])
-def test_moments_are_spread_within_the_span(count: int) -> None:
-    ask = np.arange(count) / 10
-    found = run(ask, Streams(adaptive([0.0]), {"framed": framed([0.0])}), sink=None)
-    at = [moment.time_s for moment in found.moments]
-    assert at == sorted(set(at)) and set(at) <= set(ask) and 1 <= len(at) <= MOMENTS
-    if count == 40:
-        assert np.abs(np.array(at) - ask[-1] * np.arange(1, 6) / 6).max() <= 0.051
-    assert {"reference", "framed", "TSAR"} <= set(found.moments[0].pictures)
+@pytest.mark.parametrize(("count", "steps"), [(1, 1), (2, 2), (60, 60), (61, 31), (119, 60), (121, 41)])
+def test_steps_are_evenly_spaced_over_the_span(count: int, steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("analysis.compare.STEP_PX", 96)
+    reference = np.zeros((count, SIDE, SIDE, 3), np.float16)
+    streams = Streams(adaptive([0.0]), {"framed": framed([0.0])})
+    found = compare(np.arange(count) / 10, reference, streams, SCALES, None, None)
+    at = [step.number for step in found.steps]
+    assert len(at) == steps <= STEPS_MAX and at == list(range(0, count, at[1] if steps > 1 else 1))
+
+
+def decoded(picture: bytes | None) -> np.ndarray:
+    assert picture is not None
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)
+
+
+def test_steps_hold_what_is_shown_then() -> None:
+    """Maps to the last bit, images nearly."""
+    views = []
+    streams = Streams(adaptive([0.0, 0.1, 0.3]), {"framed": framed([0.0, 0.2], 5)})
+    reference = np.stack([image(i).numpy().astype(np.float16) for i in range(5)])
+    times_s = [0.0, 0.1, 0.2, 0.3, 0.4]
+    found = run(times_s, streams, reference, sink=None, on_view=lambda _, view: views.append(view), steps_max=5)
+    assert [step.number for step in found.steps] == [0, 1, 2, 3, 4]
+    for step, view in zip(found.steps, views, strict=True):
+        expected = panels(view, SCALES, STEP_PX)
+        assert list(step.pictures) == list(expected) and expected.pop("age of samples") is None
+        assert step.pictures["age of samples"] is None, "these streams do not know"
+        for label, pixels in expected.items():
+            error = np.abs(decoded(step.pictures[label]) - pixels)
+            assert error.mean() < 1.0 if label in PHOTOGRAPHS else not error.any(), label
+
+
+def test_ages_are_of_the_image_on_the_display() -> None:
+    maps = [SampleMap(torch.full((2, 2), t, dtype=torch.float64), torch.zeros(2, 2, dtype=torch.int64)) for t in (3, 4)]
+    shown = [(good_record(i), Display(i * 0.2, 0.0, image(i), maps[i])) for i in range(2)]
+    views = []
+    run([0.1, 0.3], Streams(shown, {"f": framed([0.0])}), sink=None, on_view=lambda number, view: views.append(view))
+    assert [view.newest_s is maps[i].newest_s for i, view in enumerate(views)] == [True, True]
 
 
 def test_both_streams_are_read_side_by_side() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from fractions import Fraction
 
 import numpy as np
@@ -9,8 +10,22 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 
-from analysis.pictures import colour, density_image, enlarge, number, palette, tile_map, tiling_image, with_scale
+from analysis.pictures import (
+    AGE_MAP,
+    NEVER,
+    age_image,
+    colour,
+    density_image,
+    enlarge,
+    number,
+    palette,
+    tile_map,
+    tiling_image,
+    webp_bytes,
+    with_scale,
+)
 from tests.analysis.builders import random_tiling, tiling
 from tsar.morton import deinterleave, morton_to_raster
 from tsar.types import Tiling
@@ -101,6 +116,24 @@ def test_density_image_is_in_raster_order(x: int, y: int, side: int) -> None:
     assert np.array_equal(image, expected)
 
 
+def test_age_image_is_in_raster_order_and_says_where_nothing_was_sampled() -> None:
+    """At 2 s, samples of 1.99, 1.9 and 1 s are 10, 100 and 1000 ms old; what lies beyond the scale is at its end."""
+    newest_s = torch.tensor([[1.99, 1.9, 1.0], [-torch.inf, -50.0, 2.0]], dtype=torch.float64)
+    image = age_image(torch.cat((newest_s, newest_s[:1])), 2.0, (0.01, 1.0), 6)
+    low, middle, high = palette(AGE_MAP)[[0, 128, 255]].tolist()
+    assert image[::2, ::2].tolist() == [[low, middle, high], [list(NEVER), high, low], [low, middle, high]]
+    assert np.array_equal(image, image[::2, ::2].repeat(2, 0).repeat(2, 1))
+    assert not any(list(NEVER) == ink for ink in palette(AGE_MAP).tolist())
+
+
+def test_webp_is_exact_or_near() -> None:
+    ramp = np.linspace(0, 255, 64).astype(np.uint8)
+    pixels = np.stack((*np.meshgrid(ramp, ramp), np.full((64, 64), 90, np.uint8)), -1)
+    exact, near = (webp_bytes(pixels, lossless) for lossless in (True, False))
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(exact))), pixels)
+    assert 0.0 < np.abs(np.asarray(Image.open(io.BytesIO(near))).astype(int) - pixels).mean() < 3.0
+
+
 def test_enlarge() -> None:
     image = np.random.default_rng(0).integers(0, 256, (4, 4, 3), dtype=np.uint8)
     assert np.array_equal(enlarge(image, 4), image)
@@ -123,7 +156,8 @@ def test_a_scale_covers_the_lower_edge_only(side: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(1 / 64, "1/64"), (1 / 3, "1/3"), (0.3, "0.3"), (1.0, "1"), (64.0, "64"), (0.015, "0.015")]
+    ("value", "text"),
+    [(1 / 64, "1/64"), (1 / 3, "1/3"), (0.3, "0.3"), (1.0, "1"), (64.0, "64"), (0.015, "0.015"), (1000.0, "1000")],
 )
 def test_number(value: float, text: str) -> None:
     assert number(value) == text

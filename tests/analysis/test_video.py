@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import av
@@ -12,22 +13,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
-from analysis.video import ADAPTIVE, FRAMED, PAPER, ComparisonFilm, draw_errors, panels, to_pixels
+from analysis.pictures import AGE_MAP, palette
+from analysis.video import ADAPTIVE, FRAMED, PAPER, PHOTOGRAPHS, ComparisonFilm, draw_errors, panels, to_pixels
 from renderer.film import Mp4Writer
 from tests.analysis.builders import SCALES, grey, view
 
 SIDE = 96
-LABELS = ["reference", "framed", "TSAR", "tiling by refresh rate", "spatial density", "temporal density"]
+MAPS = ["tiling by refresh rate", "spatial density", "temporal density", "age of samples"]
+LABELS = [*PHOTOGRAPHS, *MAPS]
 
 
 def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> ComparisonFilm:
     return ComparisonFilm(side, SCALES, span)
 
 
-def panel(frame: np.ndarray, slot: int, strip: int, columns: int = 1) -> np.ndarray:
+def panel(frame: np.ndarray, slot: int, strip: int) -> np.ndarray:
     """Pixels below the label of one of two times four slots."""
     top, left = slot // 4 * (SIDE + strip) + strip, slot % 4 * SIDE
-    return frame[top : top + SIDE, left : left + columns * SIDE]
+    return frame[top : top + SIDE, left : left + SIDE]
 
 
 def has(pixels: np.ndarray, ink: tuple[int, int, int]) -> np.ndarray:
@@ -45,37 +48,66 @@ def test_a_frame_has_the_size_it_says_and_that_is_even(side: int) -> None:
 
 
 def test_every_picture_has_its_place_and_its_label() -> None:
-    """Three displays on top, then tiling and fields; the last two slots hold the errors."""
+    """Three displays on top, then tiling, fields and ages; the last slot holds the errors."""
     made = film()
     strip = made.height_px // 2 - SIDE
     frame, shown = made.frame(view(), [0.0], [0.1], [0.2]), panels(view(), SCALES, SIDE)
     assert list(shown) == LABELS
     for slot, pixels in enumerate(shown.values()):
-        assert np.array_equal(panel(frame, slot, strip), pixels), LABELS[slot]
+        assert pixels is not None and np.array_equal(panel(frame, slot, strip), pixels), LABELS[slot]
     for slot, value in enumerate((0, 188, 255)):
         assert (panel(frame, slot, strip) == value).all(), "sRGB of linear 0, 0.5 and 1"
-    labels = [frame[s // 4 * (SIDE + strip) :, s % 4 * SIDE :][:strip, :SIDE] for s in range(7)]
+    labels = [frame[s // 4 * (SIDE + strip) :, s % 4 * SIDE :][:strip, :SIDE] for s in range(8)]
     assert all((~has(label, PAPER)).sum() > 20 for label in labels)
-    assert len({label.tobytes() for label in labels}) == 7
+    assert len({label.tobytes() for label in labels}) == 8
+
+
+def test_ages_are_of_the_time_shown() -> None:
+    """The same samples are older later; the scale is logarithmic from 10 ms to 1 s."""
+    sampled = replace(view(), newest_s=torch.zeros(2, 2, dtype=torch.float64))
+    shown = [panels(replace(sampled, time_s=t), SCALES, SIDE)["age of samples"] for t in (0.01, 0.2, 0.5, 1.0)]
+    found = [palette(AGE_MAP).tolist().index(pixels[0, 0].tolist()) for pixels in shown if pixels is not None]
+    assert found == [0, round(255 * np.log10(20) / 2), round(255 * np.log10(50) / 2), 255]
+
+
+def test_unknown_ages_leave_their_place_empty() -> None:
+    lacking, made = replace(view(), newest_s=None), film()
+    assert panels(lacking, SCALES, SIDE)["age of samples"] is None
+    known, unknown = (made.frame(shown, [0.0], [0.1], [0.2]) for shown in (view(), lacking))
+    strip = made.height_px // 2 - SIDE
+    assert (panel(unknown, 6, strip) == PAPER).all() and not (panel(known, 6, strip) == PAPER).all()
+    label = slice(SIDE + strip, SIDE + 2 * strip), slice(2 * SIDE, 3 * SIDE)
+    assert not np.array_equal(known[label], unknown[label]), "the label says so"
+
+
+@pytest.mark.parametrize("side", [96, 256, 512])
+def test_labels_do_not_run_into_the_next_panel(side: int) -> None:
+    made = film(side)
+    frame, width, strip = made.frame(view(), [0.0], [0.1], [0.2]), made.width_px // 4, made.height_px // 2 - side
+    for slot in range(8):
+        top, left = slot // 4 * (side + strip), slot % 4 * width
+        label = frame[top : top + strip, left : left + width]
+        assert not has(label, PAPER).all() and has(label[:, -2:], PAPER).all(), slot
 
 
 def test_the_time_is_shown() -> None:
     early, late = (film().frame(view(time), [0.0], [0.1], [0.2]) for time in (0.1, 0.9))
     changed = (early != late).any(-1).nonzero()
-    assert len(changed[0]) and changed[1].min() >= 2 * SIDE and changed[0].min() >= film().height_px // 2
+    assert len(changed[0]) and changed[1].min() >= 3 * SIDE and changed[0].min() >= film().height_px // 2
 
 
 def test_curves_lie_where_their_values_are() -> None:
     """The greater error above the lesser one, both up to the present and no further."""
-    made = film()
-    strip, times = made.height_px // 2 - SIDE, np.linspace(0.0, 0.75, 30).tolist()
-    box = panel(made.frame(view(0.75), times, [1e-3] * 30, [1e-1] * 30), 6, strip, 2)
-    drawn = {ink: has(box, ink)[:, SIDE:] for ink in (ADAPTIVE, FRAMED)}
+    side, text = 256, 170  # pixels: of a panel, and how far its legend reaches
+    made = film(side)
+    top, times = made.height_px - side, np.linspace(0.0, 0.75, 30).tolist()
+    box = made.frame(view(0.75), times, [1e-3] * 30, [1e-1] * 30)[top:, 3 * side :]
+    drawn = {ink: has(box, ink)[:, text:] for ink in (ADAPTIVE, FRAMED)}
     rows = {ink: np.median(mask.nonzero()[0]) for ink, mask in drawn.items()}
-    assert rows[FRAMED] < rows[ADAPTIVE] - SIDE / 4
-    ends = [mask.any(0).nonzero()[0].max() + SIDE for mask in drawn.values()]
-    size = max(9, SIDE // 24)
-    expected = 4 * size + 0.75 * (2 * SIDE - 5 * size)
+    assert rows[FRAMED] < rows[ADAPTIVE] - side / 4
+    ends = [mask.any(0).nonzero()[0].max() + text for mask in drawn.values()]
+    size = side // 24
+    expected = 4 * size + 0.75 * (side - 5 * size)
     assert all(abs(end - expected) <= 2 for end in ends)
 
 
@@ -108,7 +140,7 @@ def test_a_film_reads_back(tmp_path: Path) -> None:
         assert stream.average_rate == 30
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert [frame.shape for frame in frames] == [(made.height_px, made.width_px, 3)] * len(values)
-    density = panels(view(), SCALES, SIDE)["temporal density"].astype(int)
+    density = np.asarray(panels(view(), SCALES, SIDE)["temporal density"], int)
     for value, frame in zip(values, frames, strict=True):
         expected = to_pixels(grey(value))[0, 0].astype(int)
         assert np.abs(panel(frame, 1, strip)[20:-20, 20:-20].astype(int) - expected).max() <= 6

@@ -78,11 +78,11 @@ def pull_push(color: Float[Tensor, "3 h w"], weight: Float[Tensor, "1 h w"]) -> 
     total = 4.0 * F.avg_pool2d(weight[None], 2)[0]
     mean = 4.0 * F.avg_pool2d((color * weight)[None], 2)[0] / total.clamp(min=1e-12)
     coarse = pull_push(mean, total.clamp(max=1.0))
-    fine = _double(_double(coarse).transpose(1, 2)).transpose(1, 2)
+    fine = double_width(double_width(coarse).transpose(1, 2)).transpose(1, 2)
     return weight * color + (1.0 - weight) * fine
 
 
-def _double(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
+def double_width(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
     """Twice as many columns, bilinear, the border repeated. Not ``F.interpolate``: it takes another path, with other
     rounding, when there is one thread."""
     padded = F.pad(plane, (1, 1), mode="replicate")

@@ -1,0 +1,257 @@
+"""Runs one case of a study and puts its result on disk.
+
+Beside ``experiment.py`` the one module of this package that wires scenes, renderer and pipeline. A result is two files:
+a table over the reference times (Parquet), and what was measured of the whole run (JSON), which is written last: where
+it is, the case is done. Nothing in either depends on the number of threads, processes or machines, except the entry
+``machine`` of the JSON file, which holds measured seconds and memory.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+import json
+import resource
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import torch
+import torch.nn.functional as F
+from PIL import Image
+
+from analysis.cases import Case, Scale
+from analysis.causes import Truths
+from analysis.cost_model import cycle_seconds, frame_seconds
+from analysis.files import atomic, locked, write_json
+from analysis.observation import Shown, observe
+from analysis.perceptual import jod, one_thread
+from analysis.pictures import Pixels
+from analysis.quality import reference_times
+from analysis.records import InvariantCheck, RecordLimits
+from analysis.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash, source_hash
+
+if TYPE_CHECKING:
+    from renderer.trace import Renderer
+    from tsar.types import Trace
+
+ROOT = Path(__file__).resolve().parent.parent
+
+_MEASURING = ("cases", "causes", "cost_model", "evaluation", "observation", "perceptual", "quality", "reference")
+_PACKAGES = ("torch", "warp-lang", "numpy", "kornia", "cvvdp", "flip-evaluator")
+_ORACLE_WARMUP = 16  # its first cycles already go where the error is
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where results and references are kept, and how many threads trace.
+
+    Attributes:
+        results: folder of results, one for all studies of a kind.
+        references: folder of references, shared with all other runs.
+        threads: for tracing; everything else runs on one.
+    """
+
+    results: Path
+    references: Path
+    threads: int = 1
+
+    def files(self, key: str) -> dict[str, Path]:
+        """Files of a result."""
+        return {"summary": self.results / f"{key}.json", "times": self.results / f"{key}.parquet"}
+
+    def still(self, key: str, what: str, number: int) -> Path:
+        """Picture number ``number`` of ``what``: shown, reference, or tiling."""
+        return self.results / "stills" / f"{key}-{number}-{what}.png"
+
+
+@lru_cache(maxsize=1)
+def source_of_results() -> str:
+    """Hash of the source and libraries that decide a result."""
+    folders = ("tsar", "tsar/response", "tsar/baselines", "renderer", "scenes")
+    parts = [source_hash(ROOT / folder) for folder in folders]
+    parts += [(ROOT / "analysis" / f"{name}.py").read_text() for name in _MEASURING]
+    parts += [importlib.metadata.version(name) for name in _PACKAGES]
+    return content_hash(parts)[:16]
+
+
+def finished(key: str, place: Place) -> dict[str, Any] | None:
+    """The summary of a result that is on disk, or None."""
+    files = place.files(key)
+    try:
+        found = json.loads(files["summary"].read_text())
+    except (OSError, ValueError):
+        return None
+    return found if files["times"].exists() else None
+
+
+def evaluate(case: Case, key: str, place: Place) -> str:
+    """Runs a case unless its result is on disk; two processes that want the same do not both run it.
+
+    Args:
+        case: what to run.
+        key: the name of its result, which tells the source that is meant to make it.
+        place: where it goes.
+
+    Returns:
+        The key.
+
+    Raises:
+        ValueError: this process runs another source than the one that asked.
+    """
+    if key != case.key(source_of_results()):
+        raise ValueError(f"{case.name}: expected source {key}, this worker runs another one")
+    (place.results / "stills").mkdir(parents=True, exist_ok=True)
+    if finished(key, place) is not None:
+        return key
+    with locked(place.results / f"{key}.lock"), one_thread():
+        if finished(key, place) is None:
+            _run(case, key, place)
+    (place.results / f"{key}.lock").unlink(missing_ok=True)
+    return key
+
+
+def render_reference(input: str, phase: float, start_s: float, scale: Scale, place: Place) -> Reference:
+    """The reference of an input, from disk or rendered now, on all threads of the place."""
+    with one_thread():
+        renderer = _renderer(input, phase, scale.reference_px, place.threads)
+        spec = ReferenceSpec(
+            scene=f"{input} phase {phase:g}",
+            scene_hash=_scene_hash(input, phase),
+            renderer_hash=renderer_hash(ROOT, "cpu"),
+            start_s=start_s,
+            rate_hz=scale.reference_rate_hz,
+            count=len(reference_times(start_s, start_s + scale.seconds, scale.reference_rate_hz)),
+            resolution_px=scale.reference_px,
+            samples_per_axis=scale.reference_samples_per_axis,
+        )
+        side, axis = scale.reference_px, scale.reference_samples_per_axis
+        return obtain(
+            place.references, spec, lambda t: renderer.render_frame(t, side, side, axis), lambda done, count: None
+        )
+
+
+@lru_cache(maxsize=4)
+def _renderer(input: str, phase: float, footprint_px: int, threads: int) -> Renderer:
+    from renderer.trace import Renderer
+    from scenes import catalog
+
+    return Renderer(catalog.load(input, phase), "cpu", threads, footprint_resolution_px=footprint_px)
+
+
+@lru_cache(maxsize=16)
+def _scene_hash(input: str, phase: float) -> str:
+    from scenes import catalog
+
+    return content_hash(catalog.load(input, phase))
+
+
+def _truths(case: Case, reference: Reference) -> Truths:
+    """Reference images averaged down to the resolution of the case."""
+    factor = case.scale.reference_px // case.tsar.resolution_px
+
+    def image(number: int) -> torch.Tensor:
+        found = torch.from_numpy(reference.images[number].astype(np.float32))
+        if factor == 1:
+            return found
+        return F.avg_pool2d(found.permute(2, 0, 1)[None], factor)[0].permute(1, 2, 0).contiguous()
+
+    return Truths(image, case.start_s, case.scale.reference_rate_hz, reference.spec.count)
+
+
+def _run(case: Case, key: str, place: Place) -> None:
+    began = time.perf_counter()
+    reference = render_reference(case.input, case.phase, case.start_s, case.scale, place)
+    truths = _truths(case, reference)
+    began_run = time.perf_counter()
+    check = _Check(case)
+
+    def keep(number: int, pictures: dict[str, Pixels]) -> None:
+        for what, pixels in pictures.items():
+            with atomic(place.still(key, what, number)) as temporary:
+                Image.fromarray(pixels).save(temporary)
+
+    seen = observe(case, truths, check.passing(_displays(case, place, truths)), keep)
+    table = pd.DataFrame(seen.rows)
+    with atomic(place.files(key)["times"]) as temporary:
+        table.to_parquet(temporary)
+    scored = time.perf_counter()
+    found = {
+        "key": key,
+        "case": case,
+        "images": seen.images,
+        "nonfinite": seen.nonfinite,
+        "reference_nonfinite": reference.nonfinite,
+        "jod": jod(*map(np.stack, seen.frames), case.scale.reference_rate_hz, case.display) if case.jod else None,
+        "regions": seen.regions(),
+        **check.result(),
+        "machine": {
+            "reference_s": began_run - began,
+            "run_s": scored - began_run,
+            "jod_s": time.perf_counter() - scored,
+            "threads": place.threads,
+            # of the process, so of the largest case it has run
+            "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        },
+    }
+    write_json(place.files(key)["summary"], found)
+
+
+def _displays(case: Case, place: Place, truths: Truths) -> Iterator[Shown]:
+    """Records, where the policy makes any, and images of a run."""
+    from tsar import pipeline
+    from tsar.baselines import afr, framed, frameless, oracle
+
+    config, span = case.tsar, (case.start_s, case.start_s + case.scale.seconds)
+
+    def trace(factor: int = 1) -> Trace:
+        return _renderer(case.input, case.phase, config.resolution_px * factor, place.threads).trace
+
+    clock = cycle_seconds(case.ledger, case.capacity, case.cost)
+    if case.policy == "tsar":
+        return pipeline.run(config, trace(), clock, *span)
+    if case.policy in ("framed", "framed supersampled"):
+        axis = 1 if case.policy == "framed" else 2
+        price = frame_seconds(case.ledger, case.capacity, case.cost, axis)
+        return ((None, shown) for shown in framed.run(config, trace(axis), price, *span, samples_per_axis=axis))
+    if case.policy == "oracle":
+        early = dataclasses.replace(config, warmup_cycles=_ORACLE_WARMUP)
+        return ((None, shown) for shown in oracle.run(early, trace(), clock, *span, truth=truths.at))
+    other = {"frameless": frameless, "afr": afr}[case.policy]
+    return ((None, shown) for shown in other.run(config, trace(), clock, *span))
+
+
+class _Check:
+    """Invariants and counts of the cycles of an adaptive run. Changes in place."""
+
+    def __init__(self, case: Case) -> None:
+        c = case.tsar
+        self._check = InvariantCheck(RecordLimits(c.batch_size, c.budget, c.spatial_bounds, c.temporal_bounds))
+        self._cycles, self._spread_s, self._simulated_s, self._nonfinite = 0, 0.0, 0.0, 0
+
+    def passing(self, displays: Iterator[Shown]) -> Iterator[Shown]:
+        for record, display in displays:
+            if record is not None:
+                self._check.add(record)
+                if record.cycle >= 0:
+                    self._cycles += 1
+                    self._simulated_s += record.cost_s
+                    self._spread_s += record.age_spread_s
+                    self._nonfinite += record.nonfinite
+            yield record, display
+
+    def result(self) -> dict[str, Any]:
+        if self._cycles == 0:
+            return {}
+        return {
+            "cycles": self._cycles,
+            "cycle_s": self._simulated_s / self._cycles,
+            "age_spread_s": self._spread_s / self._cycles,
+            "nonfinite_samples": self._nonfinite,
+            "invariants": self._check.result(),
+        }

@@ -1,0 +1,44 @@
+"""Run the suitability study: five inputs at sixteen settings, over seeds and phases, beside the thesis' results.
+
+Examples: python scripts/suitability.py --scale quick --out out/study-quick
+          python scripts/suitability.py --inputs fly-by --rows 6 7 8 --scale half --out out/fly-by
+          python scripts/suitability.py --scale thesis --scheduler tcp://host:8786 --out /shared/study
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import parse, run_cli
+from analysis.suitability import SuitabilityOptions
+
+
+def main() -> None:
+    """Runs what is missing; prints the tables."""
+    options = parse(SuitabilityOptions, __doc__ or "")
+    from analysis.suitability_report import study
+
+    summary, tables = study(options)
+
+    from rich.console import Console
+
+    from analysis.suitability_report import console_tables
+
+    console = Console()
+    for table in console_tables(tables):
+        console.print(table)
+    for name, reason in summary["failures"].items():
+        console.print(f"failed: {name}: {reason}")
+    done = summary["runs_done"]
+    console.print(
+        f"{done} of {summary['runs']} runs; written to {options.out}: summary.json, tables/, figures/, report.html"
+    )
+    if summary["failures"]:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    run_cli(main)

@@ -1,0 +1,179 @@
+"""The sensitivity study from the command line, on results made up beforehand, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from analysis import cases, farm, sensitivity
+from analysis.cases import Scale
+from analysis.cli import parse
+from analysis.evaluation import Place, finished, source_of_results
+from analysis.files import write_json
+from analysis.sensitivity import Run, SensitivityOptions, Setting, runs
+from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tsar.config import TsarConfig
+
+SMALL = ("--inputs", "chase", "fast-crossing", "--offsets", "-2", "0", "2", "--biases", "0", "1")
+FIGURES = {"fig_7_23.png", "fig_7_24.png", "fig_7_25.png", "slopes.png", "sweeps.png"}
+
+
+def options(*arguments: str) -> SensitivityOptions:
+    return parse(SensitivityOptions, "", list(arguments))
+
+
+def error(run: Run) -> float:
+    """The least lies at the steepest spatial slope and the default temporal one; the framed renderer has 1."""
+    if run.setting is None:
+        return 1.0
+    return float(np.exp(0.1 * (run.setting.spatial_slope + 2) + 0.2 * (run.setting.temporal_slope + 1) ** 2 - 0.3))
+
+
+def fill(out: Path, planned: list[Run]) -> None:
+    """Results as the runs would leave them, without the runs."""
+    place = Place(out / "runs", out / "cache")
+    (out / "runs" / "stills").mkdir(parents=True)
+    rng, source = np.random.default_rng(0), source_of_results()
+    for run in planned:
+        key = run.case.key(source)
+        files = place.files(key)
+        pd.DataFrame({"time_s": [0.0, 0.1], "mse": [error(run)] * 2}).to_parquet(files["times"])
+        write_json(files["summary"], {"key": key, "case": run.case})
+        for what in ("shown", "reference", "tiling"):
+            noise = rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)
+            Image.fromarray(noise).save(place.still(key, what, 0))
+
+
+def summary(out: Path) -> dict[str, Any]:
+    return json.loads((out / "summary.json").read_text())
+
+
+def slopes(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {line["input"]: line for line in found["optima"] if line["sweep"] == "slopes"}
+
+
+def test_results_on_disk_are_read_and_not_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    out, cache = tmp_path / "out", tmp_path / "cache"
+    fill(out, runs(options(*SMALL)))
+    before = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*") if path.is_file()}
+    assert call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(cache)) == 0
+    shown = capsys.readouterr().out
+    assert all(part in shown for part in ("slopes, best", "slopes, flatness", "bias, best", "30 of 30 runs", str(out)))
+    found = summary(out)
+    assert (found["runs"], found["runs_done"], found["failures"], found["ledger"]) == (30, 30, {}, "thesis")
+    assert found["config"]["offsets"] == [-2.0, 0.0, 2.0] and len(found["provenance"]["config_hash"]) == 16
+    for name in ("chase", "fast-crossing", "all inputs"):
+        best = slopes(found)[name]
+        assert (best["spatial_slope"], best["temporal_slope"]) == (-2.0, -1.0)
+        assert best["to_default"] == pytest.approx(np.exp(-0.1)) and best["edge"] == "steepest spatial slope"
+    table = pd.read_csv(out / "tables" / "settings.csv")
+    assert len(table) == len(found["settings"]) == 2 * (9 + 3 + 3 + 2)
+    assert table["ratio"].to_list() == pytest.approx([line["ratio"] for line in found["settings"]])
+    assert len(pd.read_csv(out / "tables" / "optima.csv")) == len(found["optima"]) == 4 * 3
+    assert {path.name for path in (out / "figures").iterdir()} == FIGURES
+    for name in FIGURES:
+        with Image.open(out / "figures" / name) as picture:
+            assert min(picture.size) > 300 and np.asarray(picture.convert("L"), float).std() > 5.0
+    assert {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*") if path.is_file()} == before
+
+
+def test_failures_are_listed_and_the_rest_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    out, source = tmp_path / "out", source_of_results()
+    planned = runs(options(*SMALL))
+    steep = Setting.of(TsarConfig()).changed(spatial_slope=-2.0, temporal_slope=-1.0)
+    flat = steep.changed(temporal_slope=0.0)
+    failed = [run for run in planned if run.input == "chase" and run.setting in (steep, flat)]
+    fill(out, [run for run in planned if run not in failed])
+
+    def no_workers(asked: Any, *rest: Any) -> tuple[dict[Any, str], dict[str, str]]:
+        return {case: case.key(source) for case in asked}, {failed[0].case.name: "RuntimeError: out of luck"}
+
+    monkeypatch.setattr(farm, "run_cases", no_workers)
+    status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
+    assert status == 1
+    shown = capsys.readouterr().out
+    names = [f"{run.case.name} {run.setting}" for run in failed]
+    assert len(set(names)) == 2 and all(f"failed: {name}: RuntimeError: out of luck" in shown for name in names)
+    assert "28 of 30 runs" in shown
+    found = summary(out)
+    assert found["failures"] == dict.fromkeys(names, "RuntimeError: out of luck")
+    best = slopes(found)
+    assert best["fast-crossing"]["spatial_slope"] == -2.0 and best["fast-crossing"]["settings"] == 9
+    assert best["chase"]["spatial_slope"] == -1.0 and best["chase"]["settings"] == 7
+    assert {path.name for path in (out / "figures").iterdir()} == FIGURES
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--inputs", "moon"), ("inputs", "moon")),
+        (("--row", "16"), ("row", "16")),
+        (("--scale", "huge"), ("--scale", "huge")),
+        (("--still-s", "-1"), ("still_s", "-1")),
+        (("--figure-input", "fly-by", "--inputs", "chase"), ("figure_input", "fly-by")),
+        (("--spatial-slopes", "-1", "-1"), ("spatial_slopes", "none twice")),
+        (("--spatial-slopes", "99"), ("error.spatial_slope", "99")),
+        (("--offsets", "nan"), ("error.spatial_offset", "nan")),
+        (("--biases", "9"), ("response.bias", "9")),
+        (("--repetitions", "0"), ("repetitions", "0")),
+        (("--ledger", "wall"), ("ledger", "wall")),
+        (("--workers", "-1"), ("workers", "-1")),
+        (("--nonsense",), ("--nonsense",)),
+    ],
+)
+def test_bad_input_ends_with_one_line(
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    out, cache = tmp_path / "out", tmp_path / "cache"
+    status = call_script("sensitivity.py", monkeypatch, *arguments, "--out", str(out), "--cache", str(cache))
+    assert_refused(status, capsys, parts)
+    assert nothing_in(out)
+
+
+def test_a_folder_that_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "file").write_text("kept")
+    status = call_script("sensitivity.py", monkeypatch, "--out", str(tmp_path / "file" / "below"))
+    assert_refused(status, capsys, ("out: cannot write to", str(tmp_path / "file")))
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.slow
+def test_a_study_from_end_to_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Runs on a cluster of one process, at a size far below any of the study's."""
+    tiny = Scale(8, seconds=0.2, reference_rate_hz=15.0, reference_samples_per_axis=1, stride=2)
+    monkeypatch.setitem(cases.SCALES, "quick", tiny)
+    assert sensitivity.SCALES is cases.SCALES
+    out, cache = tmp_path / "out", tmp_path / "cache"
+    chosen = ("--inputs", "fast-crossing", "--temporal-slopes", "-1", "--offsets", "--biases", "2", "--still-s", "0.1")
+    chosen = (*chosen, "--workers", "1", "--out", str(out), "--cache", str(cache))
+    assert call_script("sensitivity.py", monkeypatch, *chosen) == 0
+    assert "5 of 5 runs" in capsys.readouterr().out and "distributed" in sys.modules
+    first = summary(out)
+    errors = [line["mse"] for line in first["settings"]]
+    assert min(errors) > 0 and len(set(errors)) > 1 and all(line["ratio"] > 0 for line in first["settings"])
+    assert {path.name for path in (out / "figures").iterdir()} == FIGURES
+    place = Place(out / "runs", cache)
+    planned = runs(options(*chosen))
+    kept = [finished(run.case.key(source_of_results()), place) for run in planned]
+    assert all(found is not None for found in kept)
+    assert call_script("sensitivity.py", monkeypatch, *chosen) == 0
+    assert summary(out)["settings"] == first["settings"]
