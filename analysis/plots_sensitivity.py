@@ -27,8 +27,8 @@ Lines = Sequence[Mapping[str, Any]]
 
 _INKS = (ADAPTIVE, FRAMED, OTHER, "#8d4fa8", "0.35")
 _GRID = {"color": "0.88", "linewidth": 0.6}
-_COLOURS = 4.0
-"""The colours of the maps end at this factor above and below the default."""
+_FACTORS = (1.1, 1.25, 1.5, 2.0, 4.0)
+"""The colours of the maps end at one of these factors above and below the default."""
 _MAP = "RdBu_r"
 _SPATIAL = "spatial slope   ← steeper, more sensitive"
 _TEMPORAL = "temporal slope   steeper, more sensitive →"
@@ -115,7 +115,8 @@ def grid_figure(
     if not any(path is not None and path.exists() for path in pictures.values()):
         return None
     rows, columns = (sorted({pair[number] for pair in pictures}) for number in (0, 1))
-    figure = Figure(figsize=(0.6 + 3.0 * len(columns), 0.8 + 3.1 * len(rows)), layout="constrained")
+    width = 0.6 + 3.0 * len(columns) + (1.2 if bounds else 0.0)
+    figure = Figure(figsize=(width, 0.9 + 3.2 * len(rows)), layout="constrained")
     axes = figure.subplots(len(rows), len(columns), squeeze=False)
     for (row, column), axis in np.ndenumerate(axes):
         pair = rows[row], columns[column]
@@ -157,34 +158,36 @@ def map_figure(lines: Lines) -> Figure | None:
     axes = figure.subplots(rows, columns, squeeze=False)
     for axis in axes.flat[len(maps) :]:
         axis.set_visible(False)
-    norm = LogNorm(1 / _COLOURS, _COLOURS)
+    reach = max(max(line["to_default"], 1 / line["to_default"]) for part in maps.values() for line in part)
+    end = next((factor for factor in _FACTORS if reach <= factor), _FACTORS[-1])
+    norm = LogNorm(1 / end, end)
     places = [sorted({line[name] for line in lines}) for name in ("temporal_slope", "spatial_slope")]
     for axis, (name, part) in zip(axes.flat, maps.items(), strict=False):
-        _map(axis, part, places, norm)
+        _map(axis, part, places, end)
         axis.set_title(name, fontsize=10, loc="left")
     bar = figure.colorbar(ScalarMappable(norm, _MAP), ax=axes, shrink=0.7, label="error / error of the default")
-    ticks = [1 / _COLOURS, 1 / 2, 1, 2, _COLOURS]
+    ticks = [1 / end, end**-0.5, 1.0, end**0.5, end]
     bar.set_ticks(ticks, labels=[number(tick) for tick in ticks])
     bar.minorticks_off()
-    figure.suptitle("Error of TSAR / framed (* default, framed: best)", fontsize=10, x=0.01, ha="left")
+    figure.suptitle("Error of TSAR / framed (* default, box: best)", fontsize=10, x=0.01, ha="left")
     figure.supxlabel(_SPATIAL, fontsize=9)
     figure.supylabel(_TEMPORAL, fontsize=9)
     return figure
 
 
-def _map(axis: Axes, lines: Lines, places: Sequence[list[float]], norm: LogNorm) -> None:
+def _map(axis: Axes, lines: Lines, places: Sequence[list[float]], end: float) -> None:
     rows, columns = places
     best = min(lines, key=lambda line: line["mse"])
     values = np.full((len(rows), len(columns)), np.nan)
     for line in lines:
         row, column = rows.index(line["temporal_slope"]), columns.index(line["spatial_slope"])
         values[row, column] = line["to_default"]
-        dark = not 0.45 < line["to_default"] < 2.2
+        dark = abs(np.log(line["to_default"])) > 0.6 * np.log(end)
         text = "—" if np.isnan(line["ratio"]) else f"{line['ratio']:.3g}{'*' if line['default'] else ''}"
         axis.text(column, row, text, ha="center", va="center", fontsize=10, color="white" if dark else "black")
         if line is best:
             axis.add_patch(Rectangle((column - 0.46, row - 0.46), 0.92, 0.92, fill=False, linewidth=2.2))
-    axis.imshow(np.clip(values, 1 / _COLOURS, _COLOURS), norm=norm, cmap=_MAP)
+    axis.imshow(np.clip(values, 1 / end, end), norm=LogNorm(1 / end, end), cmap=_MAP)
     axis.set_xticks(range(len(columns)), [f"{value:g}" for value in columns])
     axis.set_yticks(range(len(rows)), [f"{value:g}" for value in rows])
 
@@ -210,7 +213,7 @@ def line_figure(lines: Lines) -> Figure | None:
         axis.set_xlabel(f"{kind}{', octaves' if kind == 'bias' else ', log2 of power'}")
         axis.set_xticks(sorted({line[column] for line in part}))
     axes[0].set_ylabel("error of TSAR / framed (* default)")
-    axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
+    axes[0].yaxis.set_major_locator(LogLocator(subs=tuple(range(1, 10))))
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].yaxis.set_minor_formatter("")
     handles, names = axes[0].get_legend_handles_labels()
@@ -223,7 +226,9 @@ def _line(axis: Axes, lines: Lines, column: str, ink: str, name: str) -> None:
         np.array([line[key] for line in lines]) for key in (column, "ratio", "ratio_least", "ratio_most")
     )
     reach = np.maximum([ratio - least, most - ratio], 0.0)
-    axis.errorbar(at, ratio, reach, color=ink, marker="o", markersize=3.5, label=name, capsize=2)
+    axis.errorbar(
+        at, ratio, reach if reach.any() else None, color=ink, marker="o", markersize=3.5, label=name, capsize=2
+    )
     marked = [line for line in lines if line["default"]]
     where, height = ([line[key] for line in marked] for key in (column, "ratio"))
     axis.plot(where, height, "*", color=ink, markeredgecolor="black", markersize=13, zorder=4)

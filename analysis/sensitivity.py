@@ -31,8 +31,6 @@ Floats = NDArray[np.float64]
 
 ALL = "all inputs"
 """In place of an input: the geometric mean of the errors of all."""
-NEAR = 1.05
-"""A setting within this factor of the best one counts as near it."""
 BEST = ("to_default", "edge", "low", "high", "held_out", "beyond_spread")
 """Columns of the table of optima that say how good the best setting is; the others say how flat the sweep is."""
 _FLAT = 1e-9
@@ -233,7 +231,8 @@ def _optimum(found: Floats, base: Floats, settings: Sequence[Setting], axes: tup
     best = int(mean.argmin())
     line: Line = dict(zip(axes, points[best], strict=True))
     line |= {"to_default": mean[best] / base.mean(), "edge": edge(points[best], points, axes) or "inside"}
-    line |= {"range": mean.max() / mean[best], "near": int((mean <= NEAR * mean[best]).sum()), "settings": len(mean)}
+    near = int((mean <= 1.05 * mean[best]).sum())
+    line |= {"worst_to_best": mean.max() / mean[best], "within_5_percent": near, "settings": len(mean)}
     line |= beyond_spread(found, base)
     return line | (bowl(points, mean) if len(axes) == 2 else {})
 

@@ -28,6 +28,8 @@ def main() -> None:
     from analysis.suitability_report import console_tables
 
     console = Console()
+    if console.width < 110:
+        console = Console(width=110)
     for table in console_tables(tables):
         console.print(table)
     for name, reason in summary["failures"].items():

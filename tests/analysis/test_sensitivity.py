@@ -161,8 +161,8 @@ def test_optima() -> None:
         assert slopes["edge"] == "steepest spatial slope, flattest temporal slope"
         # the default is a step away in each slope, the worst pair two
         assert slopes["to_default"] == pytest.approx(np.exp(-0.2))
-        assert slopes["range"] == pytest.approx(np.exp(0.8))
-        assert (slopes["near"], slopes["settings"]) == (1, 9)
+        assert slopes["worst_to_best"] == pytest.approx(np.exp(0.8))
+        assert (slopes["within_5_percent"], slopes["settings"]) == (1, 9)
         assert slopes["beyond_spread"] == "unknown"
         assert slopes["convex"] and slopes["residual"] < 1e-9
         assert slopes["fit_spatial_slope"] == pytest.approx(-2.0) and slopes["fit_temporal_slope"] == pytest.approx(0.0)
@@ -171,7 +171,7 @@ def test_optima() -> None:
         assert bias["to_default"] == pytest.approx(np.exp(-0.1))
         offset = lines["spatial offset", name]
         assert offset["spatial_offset"] == -7.0 and offset["to_default"] == pytest.approx(1.0)
-        assert (offset["near"], offset["range"]) == (3, pytest.approx(np.exp(0.16)))
+        assert (offset["within_5_percent"], offset["worst_to_best"]) == (3, pytest.approx(np.exp(0.16)))
 
 
 def test_all_inputs_are_judged_by_factors() -> None:

@@ -159,7 +159,7 @@ def test_a_study_from_end_to_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     """Runs on a cluster of one process, at a size far below any of the study's."""
-    tiny = Scale(8, seconds=0.2, reference_rate_hz=15.0, reference_samples_per_axis=1, stride=2)
+    tiny = Scale(4, seconds=0.2, reference_rate_hz=15.0, reference_samples_per_axis=1, stride=2)
     monkeypatch.setitem(cases.SCALES, "quick", tiny)
     assert sensitivity.SCALES is cases.SCALES
     out, cache = tmp_path / "out", tmp_path / "cache"
