@@ -29,7 +29,7 @@ from analysis.cases import Case, Scale
 from analysis.causes import Truths
 from analysis.cost_model import cycle_seconds, frame_seconds
 from analysis.files import atomic, locked, write_json
-from analysis.observation import Shown, observe
+from analysis.observation import Seen, Shown, observe
 from analysis.perceptual import jod, one_thread
 from analysis.pictures import Pixels
 from analysis.quality import reference_times
@@ -187,7 +187,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "images": seen.images,
         "nonfinite": seen.nonfinite,
         "reference_nonfinite": reference.nonfinite,
-        "jod": jod(*map(np.stack, seen.frames), case.scale.reference_rate_hz, case.display) if case.jod else None,
+        "jod": _score(case, seen),
         "regions": seen.regions(),
         **check.result(),
         "machine": {
@@ -200,6 +200,13 @@ def _run(case: Case, key: str, place: Place) -> None:
         },
     }
     write_json(place.files(key)["summary"], found)
+
+
+def _score(case: Case, seen: Seen) -> float | None:
+    if not case.jod:
+        return None
+    shown, reference = (np.stack(frames) for frames in seen.frames)
+    return jod(shown, reference, case.scale.reference_rate_hz, case.display)
 
 
 def _displays(case: Case, place: Place, truths: Truths) -> Iterator[Shown]:
