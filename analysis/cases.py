@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from analysis.cost_model import CostParameters, Ledger, nonadaptive_flops, parameters_of
+from analysis.display_model import DisplayModel
 from analysis.files import plain
-from analysis.perceptual import DisplayModel
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, require
 
 Policy = Literal["tsar", "framed", "framed supersampled", "frameless", "afr", "oracle"]

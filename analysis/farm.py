@@ -70,7 +70,7 @@ def connected(options: FarmOptions) -> Iterator[Client]:
         n_workers=options.processes,
         threads_per_worker=1,
         processes=True,
-        dashboard_address=None,  # pyright: ignore[reportArgumentType]
+        dashboard_address=":0",  # any free port, so that two studies do not meet
         memory_limit=0,
         silence_logs=logging.ERROR,
     )
@@ -80,7 +80,7 @@ def connected(options: FarmOptions) -> Iterator[Client]:
 
 def run_cases(
     cases: Sequence[Case], place: Place, options: FarmOptions, on_done: Callable[[int], None] = lambda done: None
-) -> tuple[dict[Case, str], dict[str, str]]:
+) -> tuple[dict[Case, str], dict[Case, str]]:
     """Runs every case whose result is not on disk yet; a case that fails does not stop the others.
 
     Args:
@@ -90,14 +90,14 @@ def run_cases(
         on_done: told how many cases are done.
 
     Returns:
-        The key of every case's result, and the reason of every failure by the name of its case.
+        The key of every case's result, and the reason of every failure.
     """
     from analysis.evaluation import finished, source_of_results
 
     source = source_of_results()
     keys = {case: case.key(source) for case in dict.fromkeys(cases)}
     missing = [case for case in keys if finished(keys[case], place) is None]
-    done, failures = len(keys) - len(missing), {}
+    done, failures = len(keys) - len(missing), dict[Case, str]()
     on_done(done)
     if not missing:
         return keys, failures
@@ -108,7 +108,7 @@ def run_cases(
         for future in as_completed(list(waiting)):
             error = future.exception()
             if error is not None:
-                failures[waiting[future].name] = _reason(error)
+                failures[waiting[future]] = _reason(error)
             done += 1
             on_done(done)
     return keys, failures

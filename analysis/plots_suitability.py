@@ -158,7 +158,9 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].yaxis.set_minor_formatter("")
-    handles = [_patch(color, f"{side}²") for side, color in _INK.items()]
+    divisor = results.all[0].run.case.scale.divisor
+    here = {side: f"{side}²" + (f", at {side // divisor}²" if divisor > 1 else "") for side in _INK}
+    handles = [_patch(color, here[side]) for side, color in _INK.items()]
     axes[-1].legend(handles=handles, fontsize=7, frameon=False, title="resolution", title_fontsize=7)
     note = f"; {unbounded} infinite ratios not drawn" if unbounded else ""
     figure.suptitle(f"{title}: below 1 TSAR is better{note}", fontsize=10, x=0.01, ha="left")

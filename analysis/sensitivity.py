@@ -19,7 +19,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from analysis.cases import INPUTS, ROWS, SCALES, Case
+from analysis.cases import INPUTS, ROWS, SCALES, Case, framed_config
 from analysis.cost_model import Ledger
 from analysis.farm import FarmOptions
 from tsar.config import TsarConfig, require
@@ -164,7 +164,7 @@ def runs(options: SensitivityOptions) -> list[Run]:
     scale = SCALES[options.scale]
     row = scale.config(options.row, options.tsar)
     settings = dict.fromkeys([Setting.of(options.tsar), *itertools.chain(*sweeps(options).values())])
-    framed, found = TsarConfig(resolution_px=row.resolution_px), []
+    framed, found = framed_config(row.resolution_px), []
     for repetition, name in itertools.product(range(options.repetitions), options.inputs):
         seeded = dataclasses.replace(row, seed=repetition)
         for setting in (None, *settings):

@@ -16,8 +16,8 @@ import tyro
 
 from analysis.cases import INPUTS, POLICIES, ROWS, SCALES, Case, Policy, framed_config
 from analysis.cost_model import Ledger
+from analysis.display_model import DisplayModel
 from analysis.farm import FarmOptions
-from analysis.perceptual import DisplayModel
 from tsar.config import Solver, TsarConfig, require
 
 

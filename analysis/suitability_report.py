@@ -112,7 +112,7 @@ def _summary(
     planned: list[Run],
     keys: Mapping[Case, str],
     place: Place,
-    failures: Mapping[str, str],
+    failures: Mapping[Case, str],
     tables: Tables,
 ) -> dict[str, Any]:
     config = dataclasses.asdict(options)
@@ -127,7 +127,7 @@ def _summary(
     return {
         "runs": len(cases),
         "runs_done": len(measured),
-        "failures": dict(sorted(failures.items())),
+        "failures": {keys[case]: reason for case, reason in sorted(failures.items(), key=lambda one: keys[one[0]])},
         "invariants_ok": bool(len(runs_table) and runs_table["invariants_ok"].all()),
         "ledger": options.ledger,
         "display": options.display,
