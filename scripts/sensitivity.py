@@ -43,7 +43,8 @@ def main() -> None:
     results = {run.place: pd.read_parquet(place.files(key)["times"]) for run, key in done.items()}
     tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}
     stills = {run.setting: key for run, key in done.items() if run.place == (options.figure_input, run.setting, 0)}
-    failed = {keys[run.case]: failures.get(run.case, "no result") for run in planned if run not in done}
+    missing = [run for run in planned if run not in done]
+    failed = {f"{run.case.name} {run.setting or ''}".strip(): failures.get(run.case, "no result") for run in missing}
     head = {"runs": len(planned), "runs_done": len(done), "failures": failed, "ledger": options.ledger}
     with full_disk(out):
         for name, lines in tables.items():

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from analysis import plots_sensitivity as plots
-from analysis.cases import INPUTS, SCALES
+from analysis.cases import INPUTS, SCALES, framed_config
 from analysis.sensitivity import (
     ALL,
     Results,
@@ -72,7 +72,7 @@ def test_a_case_is_the_row_at_its_setting() -> None:
     row = SCALES["half"].config(8, base)
     for run in runs(options):
         if run.setting is None:
-            assert run.case.tsar == TsarConfig(resolution_px=row.resolution_px)
+            assert run.case.tsar == framed_config(row.resolution_px)
             continue
         assert Setting.of(run.case.tsar) == run.setting
         back = Setting.of(base).applied(dataclasses.replace(run.case.tsar, seed=0))

@@ -96,18 +96,19 @@ def test_failures_are_listed_and_the_rest_is_shown(
     failed = [run for run in planned if run.input == "chase" and run.setting in (steep, flat)]
     fill(out, [run for run in planned if run not in failed])
 
-    def no_workers(asked: Any, *rest: Any) -> tuple[dict[Any, str], dict[str, str]]:
-        return {case: case.key(source) for case in asked}, {failed[0].case.name: "RuntimeError: out of luck"}
+    def no_workers(asked: Any, *rest: Any) -> tuple[dict[Any, str], dict[Any, str]]:
+        return {case: case.key(source) for case in asked}, {failed[0].case: "RuntimeError: out of luck"}
 
     monkeypatch.setattr(farm, "run_cases", no_workers)
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
     assert status == 1
     shown = capsys.readouterr().out
     names = [f"{run.case.name} {run.setting}" for run in failed]
-    assert len(set(names)) == 2 and all(f"failed: {name}: RuntimeError: out of luck" in shown for name in names)
+    reasons = dict(zip(names, ("RuntimeError: out of luck", "no result"), strict=True))
+    assert len(reasons) == 2 and all(f"failed: {name}: {reason}" in shown for name, reason in reasons.items())
     assert "28 of 30 runs" in shown
     found = summary(out)
-    assert found["failures"] == dict.fromkeys(names, "RuntimeError: out of luck")
+    assert found["failures"] == reasons
     best = slopes(found)
     assert best["fast-crossing"]["spatial_slope"] == -2.0 and best["fast-crossing"]["settings"] == 9
     assert best["chase"]["spatial_slope"] == -1.0 and best["chase"]["settings"] == 7

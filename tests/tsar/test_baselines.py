@@ -1,9 +1,10 @@
 import pytest
 import torch
+import torch.nn.functional as F
 
 from tests.oracles import pictures
 from tsar.baselines import afr, framed, frameless
-from tsar.baselines.scatter import PixelBuffer, pull_push, write
+from tsar.baselines.scatter import PixelBuffer, double_width, pull_push, write
 from tsar.clock import fixed_clock
 from tsar.config import TsarConfig
 from tsar.morton import floor_log2
@@ -76,3 +77,51 @@ def test_pull_push_keeps_known_pixels_and_fills_the_rest():
     filled = pull_push(color, weight)
     assert torch.equal(filled[:, ::4, ::4], color[:, ::4, ::4])
     assert torch.allclose(filled, torch.full_like(filled, 0.7), atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(3, 8, 8), (1, 5, 7), (2, 1, 1), (3, 4, 256)])
+def test_double_width_is_bilinear_interpolation(shape):
+    plane = torch.randn(shape, generator=torch.Generator().manual_seed(0))
+    expected = F.interpolate(plane[None], scale_factor=(1, 2), mode="bilinear", align_corners=False)[0]
+    assert double_width(plane).shape == expected.shape == (*shape[:2], 2 * shape[2])
+    assert torch.allclose(double_width(plane), expected, rtol=0.0, atol=1e-6)
+
+
+def pixel_truth(picture, time_s):
+    """A picture at the pixel centres, each pixel at a time of its own."""
+    centre = (torch.arange(128) + 0.5) / 128
+    return picture(centre[None].expand(128, 128), centre[:, None].expand(128, 128), time_s.to(torch.float32))
+
+
+@pytest.mark.parametrize("module", [frameless, afr])
+def test_a_pixel_shows_the_picture_of_the_age_it_claims(module):
+    """Frameless: every pixel that has been sampled. AFR blends older ones: those of this cycle."""
+    displays = play(module, pictures.textured_motion, 1)
+    ages = set()
+    for shown in displays:
+        newest_s, level = shown.samples.newest_s, shown.samples.level
+        assert newest_s.shape == level.shape == (128, 128)
+        assert bool((level == 3).all()), "128 pixels are 2^3 framelets of 16 samples wide"
+        fresh = newest_s == shown.sample_time_s
+        assert 0 < int(fresh.sum()) <= CONFIG.budget and float(newest_s.max()) == shown.sample_time_s
+        exact = torch.isfinite(newest_s) if module is frameless else fresh
+        expected = pixel_truth(pictures.textured_motion, newest_s)
+        assert torch.allclose(shown.image[exact], expected[exact], atol=1e-6)
+        ages |= set(newest_s.unique().tolist())
+    assert -torch.inf in ages, "nothing has been sampled everywhere in the first cycle"
+    assert ages - {-torch.inf} == {shown.sample_time_s for shown in displays}
+    assert len(displays[-1].samples.newest_s.unique()) > 1, "of several ages"
+
+
+def test_maps_of_earlier_images_stay_as_they_were():
+    first, *_, last = play(frameless, pictures.constant)
+    assert float(first.samples.newest_s.max()) == first.sample_time_s < last.sample_time_s
+
+
+@pytest.mark.parametrize(("per_axis", "level"), [(1, 3), (2, 4)])
+def test_a_frame_is_of_one_age_and_density(per_axis, level):
+    run = framed.run(CONFIG, pictures.tracer(pictures.textured_motion), fixed_clock(0.02), 0.0, 0.1, per_axis)
+    for shown in run:
+        assert shown.samples.newest_s.tolist() == [[shown.sample_time_s]] and shown.samples.level.tolist() == [[level]]
+        expected = pixel_truth(pictures.textured_motion, torch.tensor(shown.sample_time_s))
+        assert float((shown.image - expected).abs().mean()) < (1e-6 if per_axis == 1 else 0.02)

@@ -110,7 +110,7 @@ def _benefit(
     return per_tile.reshape(-1)[morton_to_raster(2**level)]
 
 
-def choose(benefit: list[Float[Tensor, " n"]], count: int) -> list[Int64[Tensor, " k"]]:
+def choose(benefit: list[Float[Tensor, " _"]], count: int) -> list[Int64[Tensor, " _"]]:
     """At most ``count`` disjoint nodes of a quadtree of greatest total benefit.
 
     Args:
@@ -137,7 +137,7 @@ def choose(benefit: list[Float[Tensor, " n"]], count: int) -> list[Int64[Tensor,
     return best
 
 
-def _take(benefit: list[Float[Tensor, " n"]], price: float) -> list[Int64[Tensor, " k"]]:
+def _take(benefit: list[Float[Tensor, " _"]], price: float) -> list[Int64[Tensor, " _"]]:
     worth = torch.zeros_like(benefit[-1]).repeat_interleave(4)
     own: list[Tensor] = []
     for level in reversed(benefit):
