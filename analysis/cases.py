@@ -103,7 +103,8 @@ class Case:
         framed_rate_hz: images a second of the framed renderer with one sample a pixel; sets the machine's speed.
         trace_segments: ray segments per sample in the cost model.
         start_s: where in the animation the measurement starts.
-        jod: whether the whole sequence is scored by ColorVideoVDP, which costs more than all the rest.
+        jod_span_s: part of the run, from and to, seconds after its start, that ColorVideoVDP scores, which costs more a
+            second than all the rest; None for no score.
         display: the display it is scored for.
         stills_s: times whose pictures are kept, seconds after the start.
     """
@@ -117,7 +118,7 @@ class Case:
     framed_rate_hz: float = 8.0
     trace_segments: float = 4.0
     start_s: float = 0.0
-    jod: bool = False
+    jod_span_s: tuple[float, float] | None = None
     display: DisplayModel = field(default_factory=DisplayModel)
     stills_s: tuple[float, ...] = ()
 
@@ -126,6 +127,9 @@ class Case:
         require(self.policy in POLICIES, "policy", f"one of {', '.join(POLICIES)}", self.policy)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
+        span = self.jod_span_s
+        ok = span is None or 0 <= span[0] < span[1] <= self.scale.seconds
+        require(ok, "jod_span_s", f"from and to within the {self.scale.seconds:g} s of a run", span)
         require(self.scale.reference_px % self.tsar.resolution_px == 0, "resolution_px", "a divisor of the reference's",
                 self.tsar.resolution_px)  # fmt: skip
 

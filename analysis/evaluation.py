@@ -203,7 +203,7 @@ def _run(case: Case, key: str, place: Place) -> None:
 
 
 def _score(case: Case, seen: Seen) -> float | None:
-    if not case.jod:
+    if case.jod_span_s is None:
         return None
     shown, reference = (np.stack(frames) for frames in seen.frames)
     return jod(shown, reference, case.scale.reference_rate_hz, case.display)

@@ -61,6 +61,7 @@ def observe(
     times = reference_times(case.start_s, case.start_s + scale.seconds, scale.reference_rate_hz)
     stills = {min(round(at * scale.reference_rate_hz), len(times) - 1): k for k, at in enumerate(case.stills_s)}
     step = max(1, round(_MOTION_S * scale.reference_rate_hz))
+    scored = [round(at * scale.reference_rate_hz) for at in case.jod_span_s or (0.0, 0.0)]
     before: tuple[Any, Any] | None = None
     for number, time_s in enumerate(times.tolist()):
         record, display = hold.at(time_s)
@@ -78,7 +79,7 @@ def observe(
                 seen.splits.append(found)
                 row |= {**found.causes, "causes_mse": found.mse} if found.known else {}
                 row["causes_known"] = found.known
-        if case.jod:
+        if scored[0] <= number < scored[1]:
             for kept, one in zip(seen.frames, (shown, wanted), strict=True):
                 kept.append((one * 255.0 + 0.5).to(torch.uint8).numpy())
         if number in stills:

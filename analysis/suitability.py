@@ -51,7 +51,9 @@ class SuitabilityOptions:
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
     jod_repetitions: int = 1
-    """Repetitions that ColorVideoVDP scores; it costs more than the runs themselves."""
+    """Repetitions that ColorVideoVDP scores."""
+    jod_span_s: tuple[float, float] = (0.4, 0.9)
+    """Part of each that it scores, seconds after the start; a second of it costs more than the run."""
     display: DisplayModel = field(default_factory=DisplayModel)
     """The display it scores for."""
     farm: Annotated[FarmOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=FarmOptions)
@@ -122,7 +124,7 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
             framed_rate_hz=options.framed_rate_hz,
             trace_segments=options.trace_segments,
             start_s=options.start_s,
-            jod=repetition < options.jod_repetitions,
+            jod_span_s=options.jod_span_s if repetition < options.jod_repetitions else None,
             display=options.display,
             stills_s=tuple(share * scale.seconds for share in STILLS),
         )

@@ -193,7 +193,9 @@ def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures:
         f"{config['repetitions']} repetitions, each with its seed and phase. The ratio is the mean squared error "
         f"of TSAR over that of the framed renderer at each reference time. A framed image of one sample a pixel is "
         f"shown {config['framed_rate_hz']:g} times a second.",
-        f"JOD by ColorVideoVDP for the display {summary['display'].name} at {summary['display'].rate_hz:g} Hz.",
+        f"JOD by ColorVideoVDP for the display {summary['display'].name} at {summary['display'].rate_hz:g} Hz, from "
+        f"{config['jod_span_s'][0]:g} s to {config['jod_span_s'][1]:g} s of the first {config['jod_repetitions']} "
+        "repetitions.",
     ]
     if summary["failures"]:
         lead.append(f"Failed: {'; '.join(f'{name}: {reason}' for name, reason in summary['failures'].items())}")

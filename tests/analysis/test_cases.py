@@ -65,7 +65,7 @@ def test_a_key_names_all_that_decides_a_result() -> None:
     one = case()
     assert one.key("a") == case().key("a") and one.key("a").startswith(one.name)
     others = [
-        case(phase=0.5), case(policy="afr"), case(input="chase"), case(framed_rate_hz=9.0), case(jod=True),
+        case(phase=0.5), case(policy="afr"), case(input="chase"), case(framed_rate_hz=9.0), case(jod_span_s=(0.0, 1.0)),
         case(stills_s=(0.5,)), case(display=DisplayModel(rate_hz=120.0)), case(trace_segments=5.0), case(start_s=0.1),
         case(tsar=dataclasses.replace(one.tsar, seed=1)), case(ledger="work"),
         case(scale=dataclasses.replace(QUICK, seconds=1.0)),
@@ -81,6 +81,8 @@ def test_a_key_names_all_that_decides_a_result() -> None:
         ({"policy": "magic"}, "policy"),
         ({"ledger": "wall"}, "ledger.*wall"),
         ({"framed_rate_hz": 0.0}, "framed_rate_hz"),
+        ({"jod_span_s": (1.0, 0.5)}, "jod_span_s"),
+        ({"jod_span_s": (0.0, 9.0)}, "jod_span_s"),
         ({"tsar": TsarConfig(resolution_px=512)}, "resolution_px"),
     ],
 )

@@ -49,7 +49,7 @@ def place(tmp_path: Path, references: Path) -> Place:
 
 
 def test_a_result_holds_every_reference_time(place: Place) -> None:
-    one = case(stills_s=(0.1,), jod=True)
+    one = case(stills_s=(0.1,), jod_span_s=(0.0, 0.2))
     name = evaluate(one, key(one), place)
     table, found = pd.read_parquet(place.files(name)["times"]), finished(name, place)
     assert found is not None and name == key(one)
@@ -133,7 +133,7 @@ def test_another_source_is_refused(place: Place) -> None:
 def test_other_rates_of_the_display_are_refused(place: Place) -> None:
     odd = dataclasses.replace(TINY, reference_rate_hz=25.0)
     with pytest.raises(ConfigError, match="reference_rate_hz"):
-        evaluate(case(scale=odd, jod=True), key(case(scale=odd, jod=True)), place)
+        evaluate(case(scale=odd, jod_span_s=(0.0, 0.2)), key(case(scale=odd, jod_span_s=(0.0, 0.2))), place)
 
 
 def test_two_processes_give_what_one_gives_and_a_failure_stops_no_other(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -14,7 +15,15 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.records import StepWriter, check_invariants, covers_once, density_quantiles, provenance, read_limits
+from analysis.records import (
+    InvariantCheck,
+    StepWriter,
+    check_invariants,
+    covers_once,
+    density_quantiles,
+    provenance,
+    read_limits,
+)
 from tests.analysis.builders import ELEMENTS, LIMITS, SPATIAL, TEMPORAL, good_record, random_tiling, tiling
 from tsar.morton import deinterleave
 from tsar.types import StepRecord
@@ -27,6 +36,20 @@ def write(path: Path, records: Iterable[StepRecord], rows_per_group: int = 32) -
         for record in records:
             writer.add(record)
     return path
+
+
+def checked(path: Path, records: Iterable[StepRecord], rows_per_group: int = 32) -> dict[str, Any]:
+    """What is found in the file; the records as they come must tell the same."""
+    check = InvariantCheck(LIMITS)
+
+    def passing() -> Iterator[StepRecord]:
+        for record in records:
+            check.add(record)
+            yield record
+
+    found = check_invariants(write(path, passing(), rows_per_group))
+    assert check.result() == found
+    return found
 
 
 def field(value: float, element: int = 5, elsewhere: float = 1.0) -> torch.Tensor:
@@ -83,8 +106,8 @@ def test_a_failure_at_the_very_end_leaves_nothing(tmp_path: Path) -> None:
 @settings(max_examples=15)
 @given(st.integers(0, 10_000), st.integers(1, 40))
 def test_a_good_run_passes(tmp_path_factory: pytest.TempPathFactory, seed: int, count: int) -> None:
-    path = write(tmp_path_factory.mktemp("run") / "steps.parquet", (good_record(seed + i) for i in range(count)), 7)
-    found = check_invariants(path)
+    path = tmp_path_factory.mktemp("run") / "steps.parquet"
+    found = checked(path, (good_record(seed + i) for i in range(count)), 7)
     assert found["ok"] is True and found["cycles"] == count and not any(found[name] for name in COUNTED)
     assert found["conservation_residual"] < 1e-6
 
@@ -113,8 +136,7 @@ BROKEN = {
 @pytest.mark.parametrize("case", BROKEN)
 def test_each_broken_invariant_is_counted_once_and_alone(tmp_path: Path, case: str) -> None:
     changes, name = BROKEN[case]
-    path = write(tmp_path / "a.parquet", (good_record(i, **(changes if i == 20 else {})) for i in range(24)), 9)
-    found = check_invariants(path)
+    found = checked(tmp_path / "a.parquet", (good_record(i, **(changes if i == 20 else {})) for i in range(24)), 9)
     assert {key: found[key] for key in COUNTED} == {key: int(key == name) for key in COUNTED}
     assert found["ok"] is False and found["cycles"] == 24 and found["conservation_residual"] < 1e-6
 
@@ -123,7 +145,7 @@ def test_each_broken_invariant_is_counted_once_and_alone(tmp_path: Path, case: s
 def test_lost_and_gained_density_is_found_from_the_stored_fields(tmp_path: Path, off: float) -> None:
     """The record claims that all is well."""
     broken = replace(good_record(1), surplus=good_record(1).surplus + off)
-    found = check_invariants(write(tmp_path / "a.parquet", [good_record(0), broken, good_record(2)]))
+    found = checked(tmp_path / "a.parquet", [good_record(0), broken, good_record(2)])
     assert found["ok"] is False and found["conservation_residual"] == pytest.approx(1e-3, rel=0.01)
     assert not any(found[name] for name in COUNTED)
 
@@ -131,16 +153,38 @@ def test_lost_and_gained_density_is_found_from_the_stored_fields(tmp_path: Path,
 @pytest.mark.parametrize("residual", [1e-3, math.nan, math.inf])
 def test_a_residual_on_record_is_believed(tmp_path: Path, residual: float) -> None:
     records = [good_record(0), good_record(1, conservation_residual=residual), good_record(2)]
-    found = check_invariants(write(tmp_path / "a.parquet", records))
+    found = checked(tmp_path / "a.parquet", records)
     assert found["ok"] is False and found["conservation_residual"] >= 1e-3
 
 
 @pytest.mark.parametrize("name", ["spatial", "temporal"])
 def test_nan_densities_are_found(tmp_path: Path, name: str) -> None:
     broken = good_record(1, **{name: field(math.nan)})
-    found = check_invariants(write(tmp_path / "a.parquet", [good_record(0), broken, good_record(2)]))
+    found = checked(tmp_path / "a.parquet", [good_record(0), broken, good_record(2)])
     assert found["ok"] is False and found["densities_out_of_bounds"] == 1
     assert found["conservation_residual"] == math.inf
+
+
+def test_a_check_tells_at_any_time_what_it_has_seen() -> None:
+    check = InvariantCheck(LIMITS)
+    assert check.result() == {"cycles": 0, "conservation_residual": 0.0, **dict.fromkeys(COUNTED, 0), "ok": True}
+    check.add(good_record(0))
+    first = check.result()
+    assert first["ok"] is True and first["cycles"] == 1
+    for number in (1, 2):
+        check.add(good_record(number, selected=torch.tensor([0, 1, 2, 1])))
+        found = check.result()
+        assert found["ok"] is False and (found["cycles"], found["batch_not_full"]) == (number + 1, number)
+    check.add(good_record(3))
+    assert check.result()["ok"] is False, "once broken, broken"
+    assert first["cycles"] == 1 and first["batch_not_full"] == 0, "earlier results stay as they were"
+
+
+def test_densities_are_rounded_as_in_a_file(tmp_path: Path) -> None:
+    """A density over its bound by less than float32 can tell passes both ways, one that it can tell fails both ways."""
+    for excess, broken in ((1e-9, 0), (3e-6, 1)):
+        record = good_record(1, spatial=field(SPATIAL[1] * (1 + excess)))
+        assert checked(tmp_path / f"{broken}.parquet", [record])["densities_out_of_bounds"] == broken
 
 
 def painted_once(level: list[int], index: list[int]) -> bool:

@@ -38,7 +38,7 @@ def test_the_whole_study() -> None:
     assert len(framed) == len({run.case for run in framed}) == 2 * 5 * 3
     assert {run.case.tsar.seed for run in adaptive if run.repetition == 1} == {1}
     assert {run.case.phase for run in planned if run.repetition == 1} == {0.5}
-    assert {run.repetition for run in planned if run.case.jod} == {0}
+    assert {run.repetition for run in planned if run.case.jod_span_s} == {0}
     assert len({run.case for run in planned}) == len(planned)
 
 
@@ -75,7 +75,7 @@ def result(run: Run, mse, **columns) -> Result:
     table = pd.DataFrame({"time_s": np.arange(TIMES) / 30, "mse": errors, "log_mse": errors})
     for name, value in {"flip": errors, "ssim": 1 - errors, "flicker": 0.0, **columns}.items():
         table[name] = value
-    summary = {"jod": 10 - 100 * float(errors.mean()) if run.case.jod else None, "cycles": 9, "cycle_s": 0.01}
+    summary = {"jod": 10 - 100 * float(errors.mean()) if run.case.jod_span_s else None, "cycles": 9, "cycle_s": 0.01}
     return Result(run, {**summary, "invariants": {"ok": True}, "nonfinite_samples": 0}, table)
 
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
 import numpy as np
 import pytest
+import torch
+from PIL import Image
 
-from scenes import world
+from analysis.reference import content_hash
+from scenes import catalog, world
 from scenes.canonical import ConstantTexture, EnvironmentLight, ImageTexture, Instance, Mesh, Phong, Rectangle
-from scenes.loading import asset, read_image
+from scenes.loading import ASSETS, asset, read_image
 from tests.scenes.builders import areas, corners, face_normals
 
 NAMES = [instance.name for instance in world.instances()]
@@ -130,3 +138,57 @@ def test_textures_repeat_without_a_seam() -> None:
     inner = np.abs(np.diff(image, axis=1)).mean()
     assert np.abs(image[:, 0] - image[:, -1]).mean() < 1.3 * inner
     assert np.abs(image[0] - image[-1]).mean() < 1.3 * inner
+
+
+Value = TypeVar("Value")
+
+
+def afresh_on(threads: int, make: Callable[[], Value]) -> Value:
+    """Makes something with so many threads of torch, nothing of the scenes being known from before."""
+
+    def forget() -> None:
+        for name, module in list(sys.modules.items()):
+            if name.split(".")[0] == "scenes":
+                for value in vars(module).values():
+                    getattr(value, "cache_clear", lambda: None)()
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads)
+    forget()
+    try:
+        return make()
+    finally:
+        torch.set_num_threads(before)
+        forget()
+
+
+def test_pictures_are_the_same_on_any_number_of_threads(tmp_path: Path) -> None:
+    """Also one whose number of texels no number of threads divides."""
+    odd = np.random.default_rng(0).integers(0, 256, (301, 401, 3), np.uint8)
+    Image.fromarray(odd).save(tmp_path / "odd.png")
+    pictures = sorted(path for path in ASSETS.iterdir() if path.suffix in (".png", ".jpg", ".exr"))
+    assert len(pictures) >= 3
+    for path in (*pictures, tmp_path / "odd.png"):
+        one, two, three = (afresh_on(threads, lambda path=path: read_image(path)) for threads in (1, 2, 3))
+        assert one is not two and one.tobytes() == two.tobytes() == three.tobytes(), path.name
+
+
+def test_the_sky_and_the_textures_are_the_same_on_any_number_of_threads() -> None:
+    one, two = (
+        afresh_on(threads, lambda: (content_hash(world.sky()), content_hash(world.instances()))) for threads in (1, 2)
+    )
+    assert one == two
+
+
+def test_making_the_sky_leaves_the_number_of_threads_alone() -> None:
+    def number_after() -> int:
+        world.sky()
+        return torch.get_num_threads()
+
+    assert [afresh_on(threads, number_after) for threads in (1, 2)] == [1, 2]
+
+
+def test_a_scene_has_the_same_hash_on_any_number_of_threads() -> None:
+    """References are found by it."""
+    one, two = (afresh_on(threads, lambda: content_hash(catalog.load("fly-by"))) for threads in (1, 2))
+    assert one == two

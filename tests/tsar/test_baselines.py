@@ -87,6 +87,11 @@ def test_double_width_is_bilinear_interpolation(shape):
     assert torch.allclose(double_width(plane), expected, rtol=0.0, atol=1e-6)
 
 
+def map_of(shown):
+    assert shown.samples is not None
+    return shown.samples.newest_s, shown.samples.level
+
+
 def pixel_truth(picture, time_s):
     """A picture at the pixel centres, each pixel at a time of its own."""
     centre = (torch.arange(128) + 0.5) / 128
@@ -99,7 +104,7 @@ def test_a_pixel_shows_the_picture_of_the_age_it_claims(module):
     displays = play(module, pictures.textured_motion, 1)
     ages = set()
     for shown in displays:
-        newest_s, level = shown.samples.newest_s, shown.samples.level
+        newest_s, level = map_of(shown)
         assert newest_s.shape == level.shape == (128, 128)
         assert bool((level == 3).all()), "128 pixels are 2^3 framelets of 16 samples wide"
         fresh = newest_s == shown.sample_time_s
@@ -110,18 +115,19 @@ def test_a_pixel_shows_the_picture_of_the_age_it_claims(module):
         ages |= set(newest_s.unique().tolist())
     assert -torch.inf in ages, "nothing has been sampled everywhere in the first cycle"
     assert ages - {-torch.inf} == {shown.sample_time_s for shown in displays}
-    assert len(displays[-1].samples.newest_s.unique()) > 1, "of several ages"
+    assert len(map_of(displays[-1])[0].unique()) > 1, "of several ages"
 
 
 def test_maps_of_earlier_images_stay_as_they_were():
     first, *_, last = play(frameless, pictures.constant)
-    assert float(first.samples.newest_s.max()) == first.sample_time_s < last.sample_time_s
+    assert float(map_of(first)[0].max()) == first.sample_time_s < last.sample_time_s
 
 
 @pytest.mark.parametrize(("per_axis", "level"), [(1, 3), (2, 4)])
 def test_a_frame_is_of_one_age_and_density(per_axis, level):
+    """128 pixels are 2^3 framelets of 16 samples wide, 256 samples 2^4."""
     run = framed.run(CONFIG, pictures.tracer(pictures.textured_motion), fixed_clock(0.02), 0.0, 0.1, per_axis)
     for shown in run:
-        assert shown.samples.newest_s.tolist() == [[shown.sample_time_s]] and shown.samples.level.tolist() == [[level]]
+        assert [field.tolist() for field in map_of(shown)] == [[[shown.sample_time_s]], [[level]]]
         expected = pixel_truth(pictures.textured_motion, torch.tensor(shown.sample_time_s))
         assert float((shown.image - expected).abs().mean()) < (1e-6 if per_axis == 1 else 0.02)
