@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import torch
 
-from analysis import perceptual
-from analysis.perceptual import DisplayModel, Frames, flip, jod, one_thread, ssim
+from analysis.display_model import DisplayModel
+from analysis.perceptual import Frames, flip, jod, one_thread, ssim
 from tsar.config import ConfigError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -185,5 +185,5 @@ def test_the_metric_asks_for_the_declaration(monkeypatch: pytest.MonkeyPatch) ->
     asked: list[None] = []
     declare = torchvision_operators.declare_missing
     monkeypatch.setattr(torchvision_operators, "declare_missing", lambda: asked.append(declare()))
-    perceptual.jod(still()[:1], still()[:1], 60.0, AT_60)
+    jod(still()[:1], still()[:1], 60.0, AT_60)
     assert asked == [None]
