@@ -161,7 +161,7 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     divisor = results.all[0].run.case.scale.divisor
     here = {side: f"{side}²" + (f", at {side // divisor}²" if divisor > 1 else "") for side in _INK}
     handles = [_patch(color, here[side]) for side, color in _INK.items()]
-    axes[-1].legend(handles=handles, fontsize=7, frameon=False, title="resolution", title_fontsize=7)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     note = f"; {unbounded} infinite ratios not drawn" if unbounded else ""
     figure.suptitle(f"{title}: below 1 TSAR is better{note}", fontsize=10, x=0.01, ha="left")
     return figure
@@ -238,7 +238,8 @@ def write_strip(
     path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Place
 ) -> Path | None:
     """Reference, framed renderer and TSAR of growing batch at one time, finest resolution there is of each batch."""
-    first, number = results.repetitions[0], len(STILLS) - 1
+    # the fast vehicle is gone by the second
+    first, number = results.repetitions[0], 0 if name == INPUTS[4] else len(STILLS) - 1
     found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
     framed = _finest(results, "framed", name)
     if framed is None:

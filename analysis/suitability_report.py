@@ -27,6 +27,7 @@ from analysis.suitability_tables import (
     percentile_table,
     policy_table,
     rank_table,
+    region_table,
     run_table,
     share_table,
 )
@@ -90,6 +91,7 @@ def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
         "shares": share_table(results),
         "policies": policy_table(results, options.policy_row, side),
         "causes": cause_table(results, options.policy_row, side),
+        "regions": region_table(results, options.policy_row, side),
         "disagreements": disagreement_table(results),
         "ranks": rank_table(results),
         "runs": run_table(results),
@@ -161,10 +163,13 @@ def shown_tables(tables: Tables) -> dict[str, tuple[list[str], list[list[str]]]]
         ("Causes of the error", "causes", 5),
         ("Agreement of metrics on the ranks of runs", "ranks", 3),
     ):
-        table = tables[name]
-        body = [[_cell(value, digits) for value in line.values()] for line in table.to_dict("records")]
-        shown[title] = ([str(column) for column in table.columns], body)
+        shown[title] = _as_text(tables[name], digits)
     return shown
+
+
+def _as_text(table: pd.DataFrame, digits: int) -> tuple[list[str], list[list[str]]]:
+    body = [[_cell(value, digits) for value in line.values()] for line in table.to_dict("records")]
+    return [str(column) for column in table.columns], body
 
 
 def console_tables(tables: Tables) -> list[Table]:
@@ -187,7 +192,10 @@ def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures:
     from analysis.report import Report, Table, write_report
 
     config = summary["config"]
-    shown = [Table(title, header, rows) for title, (header, rows) in shown_tables(tables).items()]
+    pages = shown_tables(tables)
+    pages["Causes of the error by region"] = _as_text(tables["regions"], 5)
+    pages["Runs on which metrics disagree which renderer is better (1: TSAR)"] = _as_text(tables["disagreements"], 0)
+    shown = [Table(title, header, rows) for title, (header, rows) in pages.items()]
     lead = [
         f"{summary['runs_done']} of {summary['runs']} runs at scale {config['scale']}, ledger {summary['ledger']}, "
         f"{config['repetitions']} repetitions, each with its seed and phase. The ratio is the mean squared error "

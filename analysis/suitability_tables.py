@@ -261,6 +261,19 @@ def cause_table(results: Results, row: int, side_px: int) -> pd.DataFrame:
     return frame.mean()
 
 
+def region_table(results: Results, row: int, side_px: int) -> pd.DataFrame:
+    """Causes of the error of every policy at one row by region of the picture, as parts of the whole error."""
+    lines = []
+    for one in results.all:
+        if one.run.side_px == side_px and one.run.row in (row, None):
+            head = {"input": one.run.case.input, "policy": one.run.label}
+            lines += [{**head, "region": region, **found} for region, found in one.summary["regions"].items()]
+    if not lines:
+        return pd.DataFrame()
+    frame: Any = pd.DataFrame(lines).groupby(["input", "policy", "region"], sort=False, as_index=False)
+    return frame.mean()
+
+
 def _cause_lines(name: str, one: Result) -> list[dict[str, Any]]:
     known = one.times[one.times["causes_known"] > 0.999]
     if known.empty:

@@ -150,3 +150,13 @@ def test_two_processes_give_what_one_gives_and_a_failure_stops_no_other(
         assert content(many, keys[one]) == content(place, evaluate(one, key(one), place))
     again, failures = run_cases(cases[2:], many, FarmOptions(scheduler="tcp://nowhere:1"))
     assert not failures and again[case()] == keys[case()], "what is on disk needs no cluster"
+
+
+def test_a_running_cluster_is_used_by_its_address(place: Place) -> None:
+    from distributed import LocalCluster
+
+    one = case("framed")
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+        keys, failures = run_cases([one], place, FarmOptions(scheduler=cluster.scheduler_address))
+        assert len(cluster.scheduler.workers) == 1, "the cluster is not ours to close"
+    assert not failures and finished(keys[one], place) is not None

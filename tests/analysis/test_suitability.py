@@ -18,6 +18,7 @@ from analysis.suitability_tables import (
     percentile_table,
     policy_table,
     rank_table,
+    region_table,
     run_table,
     share_table,
 )
@@ -173,6 +174,18 @@ def test_causes_are_averaged_where_they_are_known() -> None:
     table = cause_table(Results(found), 7, 128).set_index(["input", "policy"]).loc["chase"]
     assert set(table.index) == {*ERRORS, "framed"}
     assert (table["lag"] == 0.25).all() and (table["aliasing"] == 0.5).all() and (table["times"] == TIMES / 2).all()
+
+
+def test_regions_are_averaged_over_repetitions() -> None:
+    found = []
+    for run in runs(OPTIONS):
+        one = result(run, 1.0)
+        regions = {"still plain": {"lag": 0.25 + run.repetition, "share": 0.5}}
+        found.append(Result(run, {**one.summary, "regions": regions}, one.times))
+    table = region_table(Results(found), 7, 128).set_index(["input", "policy"]).loc["chase"]
+    assert set(table.index) == {*ERRORS, "framed"} and set(table["region"]) == {"still plain"}
+    assert (table["lag"] == 0.75).all() and (table["share"] == 0.5).all()
+    assert region_table(Results([]), 7, 128).empty
 
 
 def test_missing_runs_leave_the_others() -> None:
