@@ -10,11 +10,10 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from analysis.cases import INPUTS
 from analysis.cost_model import CAPACITY_DEFAULT, Ledger
 from analysis.experiment import RunOptions
 from tsar.config import TsarConfig, require
-
-INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
 
 
 @dataclass(frozen=True)

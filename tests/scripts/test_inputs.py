@@ -11,10 +11,10 @@ import pytest
 
 import analysis.records
 import scripts.inputs as script
+from analysis.cases import INPUTS
 from analysis.experiment import ROOT, RunOptions
 from analysis.files import write_json
-from analysis.repetitions import INPUTS, InputsOptions, row
-from scenes import catalog
+from analysis.repetitions import InputsOptions, row
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import ConfigError, TsarConfig
 
@@ -28,10 +28,6 @@ FOUND = {
     "invariants": {"ok": True},
     "stage_wall_s": {"tracing": 1.0},
 }
-
-
-def test_the_inputs_are_the_built_in_scenes() -> None:
-    assert INPUTS == catalog.NAMES
 
 
 def test_runs_over_seeds(tmp_path: Path) -> None:
