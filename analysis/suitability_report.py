@@ -30,6 +30,7 @@ from analysis.suitability_tables import (
     region_table,
     run_table,
     share_table,
+    vote_table,
 )
 
 if TYPE_CHECKING:
@@ -93,6 +94,7 @@ def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
         "causes": cause_table(results, options.policy_row, side),
         "regions": region_table(results, options.policy_row, side),
         "disagreements": disagreement_table(results),
+        "votes": vote_table(results),
         "ranks": rank_table(results),
         "runs": run_table(results),
     }
@@ -161,6 +163,7 @@ def shown_tables(tables: Tables) -> dict[str, tuple[list[str], list[list[str]]]]
         ("Summary shares", "shares", 3),
         ("Policies, and their share of the oracle's gain", "policies", 4),
         ("Causes of the error", "causes", 5),
+        ("Runs in which TSAR is better, by metric", "votes", 0),
         ("Agreement of metrics on the ranks of runs", "ranks", 3),
     ):
         shown[title] = _as_text(tables[name], digits)

@@ -235,6 +235,17 @@ def disagreement_table(results: Results) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=["input", "row", "repetition", *METRICS])
 
 
+def vote_table(results: Results) -> pd.DataFrame:
+    """In how many runs each metric says that TSAR is better than the framed renderer."""
+    runs = run_table(results)
+    lines = []
+    for metric, sign in METRICS.items() if len(runs) else ():
+        gain = sign * (runs[f"{metric}_tsar"] - runs[f"{metric}_framed"]).to_numpy()
+        known = ~np.isnan(gain)
+        lines.append({"metric": metric, "TSAR better": int((gain[known] > 0).sum()), "runs": int(known.sum())})
+    return pd.DataFrame(lines, columns=["metric", "TSAR better", "runs"])
+
+
 def rank_table(results: Results) -> pd.DataFrame:
     """Spearman's correlation between metrics of the ranks of all adaptive runs; 1 where they rank alike."""
     runs = run_table(results)

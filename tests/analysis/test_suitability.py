@@ -21,6 +21,7 @@ from analysis.suitability_tables import (
     region_table,
     run_table,
     share_table,
+    vote_table,
 )
 from analysis.thesis import SHARES, SUITABLE_PERCENTILE
 from tsar.config import ConfigError
@@ -157,6 +158,13 @@ def test_disagreements_of_metrics_are_listed() -> None:
     assert set(table["input"]) == {"chase"} and len(table) == 4
     assert (table["mse"] == -1).all() and (table["ssim"] == 1).all()
     assert disagreement_table(made(lambda run: 0.5)).empty
+
+
+def test_votes() -> None:
+    table = vote_table(made(lambda run: 0.5 if run.case.input == "chase" else 2.0)).set_index("metric")
+    assert table.loc["mse"].tolist() == [4, 8] and table.loc["ssim"].tolist() == [4, 8]
+    assert table.loc["jod"].tolist() == [2, 4], "only the first repetition has a score"
+    assert vote_table(Results([])).empty
 
 
 def test_ranks() -> None:
