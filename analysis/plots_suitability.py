@@ -229,7 +229,11 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
     axis.yaxis.set_minor_formatter("")
     axis.set_xlabel("simulated time, s   (dotted: the framed display changes)")
     axis.set_ylabel("error of TSAR / framed")
-    axis.set_title(f"{results.inputs[0]}, batch {ROWS[row][0]}, {ROWS[row][1]}²", loc="left", fontsize=10)
+    axis.set_title(
+        f"{results.inputs[0]}, row {row}: batch {ROWS[row][0]}, {ROWS[row][1]}², drawn at {pairs[0][0].run.side_px}²",
+        loc="left",
+        fontsize=10,
+    )
     axis.legend(fontsize=7, frameon=False, ncols=2)
     return figure
 
