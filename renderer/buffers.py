@@ -82,11 +82,11 @@ def _upload(rows: list[dict], record: type, device: str) -> wp.array:
 class _Builder:
     """Collects the tables of a scene, then uploads them."""
 
-    def __init__(self, scene: Scene, device: str) -> None:
+    def __init__(self, scene: Scene, device: str, packets: bool) -> None:
         self.scene, self.device = scene, device
         self.materials = MaterialTable()
         self.tracks = TrackTable(device)
-        self.meshes = MeshTable(device)
+        self.meshes = MeshTable(device, packets)
         self.instance_rows: list[tuple[dict, np.ndarray, np.ndarray]] = []
 
     def assembly(self, assembly: Assembly) -> None:
@@ -243,14 +243,15 @@ class _Builder:
         return SceneBuffers(data, self.tracks, self.meshes.keep, self.meshes.triangle_count)
 
 
-def build_buffers(scene: Scene, device: str) -> SceneBuffers:
+def build_buffers(scene: Scene, device: str, packets: bool) -> SceneBuffers:
     """Uploads a scene.
 
     Args:
         scene: canonical scene.
         device: from :func:`renderer.device.pick`.
+        packets: whether meshes get the trees of ``packets.py``, instead of Warp's.
 
     Raises:
         SceneError: for anything the renderer does not support, or values that cannot be rendered.
     """
-    return _Builder(scene, device).build()
+    return _Builder(scene, device, packets).build()

@@ -7,7 +7,9 @@ import ctypes.util
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from types import ModuleType
 
 import torch
@@ -16,6 +18,8 @@ import warp as wp
 DEVICES = ("cpu", "cuda:0")
 
 _SLOW_LOAD_S = 0.4
+_LINE_INTERVAL_S = 2.0
+_STATUS_INTERVAL_S = 0.2
 _WARNINGS_ONLY = 30
 _loaded: set[tuple[str, str]] = set()
 _lock = threading.Lock()
@@ -69,32 +73,61 @@ def pick(device: str) -> str:
     return device
 
 
-def _report(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
-def load_kernels(module: ModuleType, device: str, report: Callable[[str], None] = _report) -> None:
-    """Loads a module of kernels before its first launch, and says so when that takes a while.
+def load_kernels(
+    modules: ModuleType | Sequence[ModuleType], device: str, report: Callable[[str], None] | None = None
+) -> None:
+    """Loads modules of kernels before their first launch, and says how far it is when that takes a while.
 
     Compiling a module that is not in the cache takes seconds; loading a cached one takes milliseconds. Loading before
-    the first launch also keeps worker threads from compiling the same module at once.
+    the first launch also keeps worker threads from compiling the same module at once. Several modules are compiled side
+    by side: Warp locks what they share while it writes their source, and not while it compiles that.
 
     Args:
-        module: Python module that defines kernels.
+        modules: Python modules that define kernels.
         device: from :func:`pick`.
-        report: called with one line of text if kernels have to be compiled.
+        report: called with a line of text at times while kernels are compiled; by default a status on a terminal, or
+            lines on standard error.
     """
-    key = (module.__name__, device)
     with _lock:
-        if key in _loaded:
+        asked = [modules] if isinstance(modules, ModuleType) else modules
+        missing = [module for module in asked if (module.__name__, device) not in _loaded]
+        if not missing:
             return
-        timer = threading.Timer(_SLOW_LOAD_S, report, (f"compiling kernels for {device}, once, takes some seconds…",))
-        timer.start()
-        try:
-            wp.load_module(module, device=device)
-        finally:
-            timer.cancel()
-        _loaded.add(key)
+        with ThreadPoolExecutor(min(len(missing), core_count())) as pool:
+            loads = {pool.submit(wp.load_module, module, device=device): module.__name__ for module in missing}
+            _watch(loads, device, report)
+        for load, name in loads.items():
+            load.result()
+            _loaded.add((name, device))
+
+
+def _watch(loads: Mapping[Future, str], device: str, report: Callable[[str], None] | None) -> None:
+    """Waits until all loads have ended, and reports on them if that is not at once."""
+    began = time.perf_counter()
+    if not wait(loads, timeout=_SLOW_LOAD_S).not_done:
+        return
+    with _shown(report) as (show, interval_s):
+        while under_way := [name for load, name in loads.items() if not load.done()]:
+            done = f"{len(loads) - len(under_way)} of {len(loads)} modules ready"
+            seconds = time.perf_counter() - began
+            show(f"compiling kernels for {device}, once: {done}, {seconds:.0f} s, to come: {', '.join(under_way)}")
+            wait([load for load in loads if not load.done()], interval_s, FIRST_COMPLETED)
+        show(f"kernels for {device} ready after {time.perf_counter() - began:.1f} s")
+
+
+@contextlib.contextmanager
+def _shown(report: Callable[[str], None] | None) -> Iterator[tuple[Callable[[str], object], float]]:
+    """What takes lines of text, and the seconds from one to the next."""
+    if report is not None:
+        yield report, _LINE_INTERVAL_S
+    # where a progress bar stands on the terminal it has put itself in the place of the stream
+    elif sys.stderr is sys.__stderr__ and sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status("") as status:
+            yield status.update, _STATUS_INTERVAL_S
+    else:
+        yield lambda line: print(line, file=sys.stderr, flush=True), _LINE_INTERVAL_S
 
 
 def core_count() -> int:

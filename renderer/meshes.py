@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
+from renderer.trees import build_tree
 from scenes.canonical import Mesh, SceneError
 
 _BOX_PADDING = 2.0e-5
@@ -49,19 +51,21 @@ class _Pool:
     def upload(self, device: str) -> wp.array:
         """Everything on a device; one row of zeros where there is nothing."""
         table = np.concatenate(self.arrays) if self.arrays else np.zeros((1, self.width), self.scalar)
-        flat = table.reshape(-1) if self.width == 1 else table
+        flat = table.reshape(-1) if self.dtype in (wp.int32, wp.float32) else table
         return wp.array(np.ascontiguousarray(flat), dtype=self.dtype, device=device)
 
 
 class MeshTable:
     """The unique meshes of a scene."""
 
-    def __init__(self, device: str) -> None:
-        self.device = device
+    def __init__(self, device: str, packets: bool) -> None:
+        self.device, self.packets = device, packets
         self.rows: list[dict] = []
         self.triangle_count = 0
         self.keep: list[object] = []  # kernels know a Warp mesh by number only; ids of meshes must not be used again
         self.pools = {
+            "tree_nodes": _Pool(NODE_FLOATS, np.float32, wp.float32),
+            "tree_blocks": _Pool(BLOCK_FLOATS, np.float32, wp.float32),
             "vertices": _Pool(3, np.float32, wp.vec3),
             "faces": _Pool(3, np.int32, wp.vec3i),
             "normals": _Pool(3, np.float32, wp.vec3),
@@ -82,13 +86,23 @@ class MeshTable:
         """
         if id(mesh) not in self._units:
             unit, vertices = _unit_mesh(mesh, len(self.rows))
-            bvh = padded_mesh(vertices[mesh.faces], self.device)
-            self.keep += [bvh, mesh]
             pools = self.pools
+            self.keep.append(mesh)
+            tree: dict[str, object]
+            if self.packets:
+                built = build_tree(vertices, mesh.faces)
+                tree = {
+                    "first_node": pools["tree_nodes"].append(built.nodes),
+                    "first_block": pools["tree_blocks"].append(built.blocks),
+                }
+            else:
+                bvh = padded_mesh(vertices[mesh.faces], self.device)
+                self.keep.append(bvh)
+                tree = {"id": bvh.id}
             # normals of the unit mesh are those of the mesh: centring and uniform scaling do not turn them
             self.rows.append(
                 {
-                    "id": bvh.id,
+                    **tree,
                     "first_face": pools["faces"].append(mesh.faces),
                     "first_vertex": pools["vertices"].append(vertices),
                     "first_normal": pools["normals"].append(mesh.normals),

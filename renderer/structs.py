@@ -46,9 +46,14 @@ class InstanceRecord:
 
 @wp.struct
 class MeshRecord:
-    """A mesh: its BVH, and where its arrays lie in the pools. A negative first index means it has none."""
+    """A mesh: its tree, and where its arrays lie in the pools. A negative first index means it has none.
+
+    The CPU's packets walk the tree that starts at ``first_node``; elsewhere Warp's own is known by ``id``.
+    """
 
     id: wp.uint64
+    first_node: wp.int32
+    first_block: wp.int32
     first_face: wp.int32
     first_vertex: wp.int32
     first_normal: wp.int32
@@ -136,6 +141,8 @@ class SceneData:
     nodes: wp.array(dtype=NodeRecord)
     instances: wp.array(dtype=InstanceRecord)
     meshes: wp.array(dtype=MeshRecord)
+    tree_nodes: wp.array(dtype=wp.float32)  # records of native/tree.h
+    tree_blocks: wp.array(dtype=wp.float32)
     vertices: wp.array(dtype=wp.vec3)
     faces: wp.array(dtype=wp.vec3i)
     normals: wp.array(dtype=wp.vec3)

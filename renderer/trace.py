@@ -13,6 +13,7 @@ from torch import Tensor
 
 from renderer import device as devices
 from renderer import kernels
+from renderer import packets as packet_kernels
 from renderer.blocks import BLOCK_PX, pixel_blocks
 from renderer.buffers import build_buffers
 from renderer.checks import check_affine
@@ -44,6 +45,7 @@ class Renderer:
         threads: int | None = None,
         footprint_resolution_px: float = 512.0,
         throughput_cutoff: float = 2.0e-3,
+        packets: bool = True,
     ) -> None:
         """Builds acceleration structures and loads kernels.
 
@@ -54,6 +56,8 @@ class Renderer:
             footprint_resolution_px: see the class. It is fixed for all batches, so that a coarse tile is as sharp as a
                 fine one, and a framed renderer as sharp as an adaptive one.
             throughput_cutoff: a chain of mirrors ends where it would contribute less than this share.
+            packets: trace sixteen samples at a time (``cpu`` only); without, one by one as other devices do. Pictures
+                differ by rounding.
 
         Raises:
             SceneError: if the scene holds what the renderer does not support.
@@ -70,9 +74,12 @@ class Renderer:
         self.footprint_resolution_px = float(footprint_resolution_px)
         self._camera = _check_camera(scene)
         self._scene = scene
-        self._buffers = build_buffers(scene, self.device)
+        self._kernels = packet_kernels if packets and self.device == "cpu" else kernels
+        self._lanes = packet_kernels.LANES if self._kernels is packet_kernels else 1
+        # before the buffers are built, which takes kernels too: all are compiled side by side
+        devices.load_kernels([kernels, self._kernels], self.device)
+        self._buffers = build_buffers(scene, self.device, self._lanes > 1)
         self._buffers.data.throughput_cutoff = float(throughput_cutoff)
-        devices.load_kernels(kernels, self.device)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 and self.device == "cpu" else None
 
     def trace(self, batch: FrameletBatch) -> SampleBatch:
@@ -160,9 +167,8 @@ class Renderer:
         """One launch on a GPU; on the CPU many over sub-ranges, which release the interpreter lock."""
 
         def run(first: int, dim: int) -> None:
-            wp.launch(
-                kernels.shade_samples, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device
-            )
+            inputs = [self._buffers.data, view, first, *shared]
+            wp.launch(self._kernels.shade_samples, dim=-(-dim // self._lanes), inputs=inputs, device=self.device)
 
         if self.device != "cpu":
             torch.cuda.synchronize()  # Warp launches on a stream of its own
@@ -172,6 +178,7 @@ class Renderer:
             run(0, count)
         else:
             step = min(max(count // (_RANGES_PER_THREAD * self.threads), _RANGE_SAMPLES[0]), _RANGE_SAMPLES[1])
+            step -= step % self._lanes  # packets are the same for any number of threads
             for _ in self._pool.map(lambda first: run(first, min(step, count - first)), range(0, count, step)):
                 pass
 

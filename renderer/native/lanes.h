@@ -1,0 +1,91 @@
+// Sixteen (or eight) floats that go through the same arithmetic side by side.
+//
+// Clang's vector types take the usual operators; a comparison gives a vector of 0 and -1, and `condition ? a : b` picks
+// lane by lane. The widths are fixed: a machine with narrower registers splits them, with the same results.
+#pragma once
+
+namespace packets {
+
+typedef float f8 __attribute__((ext_vector_type(8)));
+typedef float f16 __attribute__((ext_vector_type(16)));
+typedef int i8 __attribute__((ext_vector_type(8)));
+typedef int i16 __attribute__((ext_vector_type(16)));
+
+constexpr int LANES = 16;
+constexpr unsigned ALL = 0xffffu;
+constexpr float FAR = 1.0e30f;
+
+template <class F> struct IntOf;
+template <> struct IntOf<f8> { typedef i8 type; };
+template <> struct IntOf<f16> { typedef i16 type; };
+
+typedef bool b8 __attribute__((ext_vector_type(8)));
+typedef bool b16 __attribute__((ext_vector_type(16)));
+
+// One bit a lane from a comparison, and back.
+inline unsigned bits(i8 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b8)); }
+inline unsigned bits(i16 c) { return __builtin_bit_cast(unsigned short, __builtin_convertvector(c, b16)); }
+inline i16 lanes_of(unsigned mask) {
+    return __builtin_convertvector(__builtin_bit_cast(b16, (unsigned short)mask), i16) != 0;
+}
+
+inline int first_bit(unsigned mask) { return __builtin_ctz(mask); }
+
+template <class F> inline F vmin(F a, F b) { return __builtin_elementwise_min(a, b); }
+template <class F> inline F vmax(F a, F b) { return __builtin_elementwise_max(a, b); }
+template <class F> inline F vabs(F a) { return __builtin_elementwise_abs(a); }
+template <class F> inline F vfma(F a, F b, F c) { return __builtin_elementwise_fma(a, b, c); }
+template <class F> inline F vsqrt(F a) { return __builtin_elementwise_sqrt(a); }
+template <class F> inline F vfloor(F a) { return __builtin_elementwise_floor(a); }
+inline f16 clamped(f16 a, float low, float high) { return vmin(vmax(a, (f16)low), (f16)high); }
+inline i16 to_int(f16 a) { return __builtin_convertvector(a, i16); }
+inline f16 to_float(i16 a) { return __builtin_convertvector(a, f16); }
+
+template <class F> inline F load(const float* from) {
+    F value;
+    __builtin_memcpy(&value, from, sizeof(F));
+    return value;
+}
+template <class F> inline void store(float* to, F value) { __builtin_memcpy(to, &value, sizeof(F)); }
+
+inline float least(f16 a) { return __builtin_reduce_min(a); }
+inline float greatest(f16 a) { return __builtin_reduce_max(a); }
+
+// base[index] in every lane; every index must be one that may be read.
+inline f16 gather(const float* base, i16 index) {
+    f16 value;
+    for (int lane = 0; lane < LANES; ++lane) value[lane] = base[index[lane]];
+    return value;
+}
+inline i16 gather(const int* base, i16 index) {
+    i16 value;
+    for (int lane = 0; lane < LANES; ++lane) value[lane] = base[index[lane]];
+    return value;
+}
+
+template <class F> struct Vec {
+    F x, y, z;
+    const F& operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+};
+typedef Vec<f16> Vec16;
+
+template <class F> inline Vec<F> operator+(Vec<F> a, Vec<F> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+template <class F> inline Vec<F> operator-(Vec<F> a, Vec<F> b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+template <class F> inline Vec<F> operator-(Vec<F> a) { return {-a.x, -a.y, -a.z}; }
+template <class F> inline Vec<F> operator*(Vec<F> a, Vec<F> b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+template <class F> inline Vec<F> operator*(Vec<F> a, F s) { return {a.x * s, a.y * s, a.z * s}; }
+template <class F> inline F dot(Vec<F> a, Vec<F> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class F> inline Vec<F> cross(Vec<F> a, Vec<F> b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Vec16 pick(i16 condition, Vec16 a, Vec16 b) {
+    return {condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z};
+}
+inline f16 length(Vec16 a) { return vsqrt(dot(a, a)); }
+// The zero vector stays as it is, as in Warp.
+inline Vec16 unit(Vec16 a) {
+    f16 size = length(a);
+    return a * (size > 0.0f ? 1.0f / size : (f16)0.0f);
+}
+
+}  // namespace packets

@@ -1,0 +1,35 @@
+// Rays from a list through one mesh.
+#pragma once
+#include "rays.h"
+
+namespace packets {
+
+// Traces rays `first` to `first + 15` of a list, as far as there are so many.
+template <bool any, class Queries> inline void trace_packet(const Queries& list, int first) {
+    const Tree tree = {(const Node*)list.nodes.data, (const Block*)list.blocks.data};
+    const int count = list.origin.shape[0], used = count - first < LANES ? count - first : LANES;
+    Vec16 from, along;
+    PacketHit hit;
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int i = first + (lane < used ? lane : used - 1);
+        const auto &origin = list.origin.data[i], &direction = list.direction.data[i];
+        from.x[lane] = origin[0], from.y[lane] = origin[1], from.z[lane] = origin[2];
+        along.x[lane] = direction[0], along.y[lane] = direction[1], along.z[lane] = direction[2];
+        hit.t[lane] = lane < used ? list.reach.data[i] : -1.0f;
+    }
+    hit.u = hit.v = 0.0f;
+    hit.face = -1;
+    const unsigned found = trace<any>(tree, from, along, hit);
+    for (int lane = 0; lane < used; ++lane) {
+        const int i = first + lane;
+        const bool met = found >> lane & 1u;
+        list.face.data[i] = any ? (int)met : met ? hit.face[lane] : -1;
+        if (!any) list.t.data[i] = hit.t[lane], list.u.data[i] = hit.u[lane], list.v.data[i] = hit.v[lane];
+    }
+}
+
+template <class Queries> inline void trace_queries(const Queries& list, int first, bool nearest) {
+    nearest ? trace_packet<false>(list, first) : trace_packet<true>(list, first);
+}
+
+}  // namespace packets

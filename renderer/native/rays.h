@@ -1,0 +1,327 @@
+// Rays against one mesh: sixteen rays that keep together walk the tree as one packet, others walk it alone.
+//
+// Whether a ray meets a triangle, and where, is computed by the same operations either way, and of equally near faces
+// the one with the lower number counts. So a ray's hit does not depend on its company, nor on the order of traversal.
+#pragma once
+#include "lanes.h"
+#include "tree.h"
+
+namespace packets {
+
+constexpr int STACK = 640;
+constexpr float TINY = 1.0e-20f;
+// How far a box test may be out after rounding, from above: Ize 2013, "Robust BVH Ray Traversal".
+constexpr float ROUNDING_UP = 1.0000005f;
+// A triangle's corners are rounded when they are moved to the ray's origin. Boxes are wider by as much, so that a ray
+// that the test of a triangle would let pass is not lost at its box, however far away it starts.
+constexpr float PADDING = 4.0e-7f;
+// Packets whose directions differ by more than this along an axis are walked ray by ray.
+constexpr float SPREAD_MAX = 0.25f;
+
+template <class F> inline F reciprocal(F x) { return 1.0f / (vabs(x) > TINY ? x : (F)TINY); }
+inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TINY); }
+
+struct Tree {
+    const Node* nodes;
+    const Block* blocks;
+};
+
+// Ray against triangle after Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": in a frame whose z
+// axis is the ray, the triangle is hit where the origin lies on the same side of all its edges. The two triangles at an
+// edge see the same two products with opposite signs, so one of them is hit; contraction to fused operations would
+// break that, hence the pragma.
+//
+// Corners are relative to the ray's origin, their axes turned so that z is the one along which the ray is fastest.
+// `t`, `u`, `v` are valid where the result is true; u and v weigh corners a and b.
+template <class F>
+inline typename IntOf<F>::type meets_triangle(const Vec<F>& a, const Vec<F>& b, const Vec<F>& c, const Vec<F>& shear,
+                                              F& t, F& u, F& v) {
+#pragma clang fp contract(off)
+    F ax = vfma(-shear.x, a.z, a.x), ay = vfma(-shear.y, a.z, a.y);
+    F bx = vfma(-shear.x, b.z, b.x), by = vfma(-shear.y, b.z, b.y);
+    F cx = vfma(-shear.x, c.z, c.x), cy = vfma(-shear.y, c.z, c.y);
+    F at_a = cx * by - cy * bx, at_b = ax * cy - ay * cx, at_c = bx * ay - by * ax;
+    F lowest = vmin(vmin(at_a, at_b), at_c), highest = vmax(vmax(at_a, at_b), at_c);
+    F area = at_a + at_b + at_c;
+    auto inside = ((lowest >= 0.0f) | (highest <= 0.0f)) & (area != 0.0f);
+    if (!bits(inside)) return inside;
+    F share = 1.0f / area;
+    t = vfma(at_a, a.z, vfma(at_b, b.z, at_c * c.z)) * shear.z * share;
+    u = at_a * share;
+    v = at_b * share;
+    return inside & (t >= 0.0f);
+}
+
+// The axis along which a direction is longest.
+inline int fastest_axis(float x, float y, float z) {
+    x = __builtin_fabsf(x), y = __builtin_fabsf(y), z = __builtin_fabsf(z);
+    return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+}
+
+// One ray, or the part of a packet that is the same for one lane.
+struct Single {
+    float origin[3], inverse[3];
+    float near_origin[3], far_origin[3];  // moved by the padding, outwards
+    float shear[3];
+    int kx, ky, kz;
+    bool backwards[3];
+
+    Single(const float* from, const float* along) {
+        kz = fastest_axis(along[0], along[1], along[2]), kx = (kz + 1) % 3, ky = (kz + 2) % 3;
+        float fast = 1.0f / along[kz];
+        shear[0] = along[kx] * fast, shear[1] = along[ky] * fast, shear[2] = fast;
+        float pad = 1.0f;
+        for (int axis = 0; axis < 3; ++axis) {
+            float size = __builtin_fabsf(from[axis]);
+            pad = size > pad ? size : pad;
+        }
+        pad *= PADDING;
+        for (int axis = 0; axis < 3; ++axis) {
+            origin[axis] = from[axis], inverse[axis] = reciprocal(along[axis]);
+            backwards[axis] = inverse[axis] < 0.0f;
+            near_origin[axis] = backwards[axis] ? from[axis] - pad : from[axis] + pad;
+            far_origin[axis] = backwards[axis] ? from[axis] + pad : from[axis] - pad;
+        }
+    }
+};
+
+struct RayHit {
+    float t, u, v;
+    int face;
+};
+
+// One ray from the root. `any` ends at the first hit; `hit.t` holds how far to look.
+template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit) {
+    struct Entry {
+        float near;
+        int child;
+    } stack[STACK];
+    int size = 0;
+    int current = 0;
+    bool found = false;
+    const f8 shear_x = ray.shear[0], shear_y = ray.shear[1], shear_z = ray.shear[2];
+    while (true) {
+        if (current >= 0) {
+            const Node& node = tree.nodes[current];
+            f8 near = 0.0f, far = hit.t;
+            for (int axis = 0; axis < 3; ++axis) {
+                const bool back = ray.backwards[axis];
+                f8 close = load<f8>(back ? node.upper[axis] : node.lower[axis]);
+                f8 away = load<f8>(back ? node.lower[axis] : node.upper[axis]);
+                near = vmax(near, (close - ray.near_origin[axis]) * ray.inverse[axis]);
+                far = vmin(far, (away - ray.far_origin[axis]) * ray.inverse[axis]);
+            }
+            unsigned met = bits(near <= far * ROUNDING_UP);
+            if (met) {
+                int lane = first_bit(met);
+                met &= met - 1;
+                if (!met) {
+                    current = node.child[lane];
+                    continue;
+                }
+                // Nearest last, so that it is taken first.
+                int base = size;
+                stack[size++] = {near[lane], node.child[lane]};
+                for (; met; met &= met - 1) {
+                    lane = first_bit(met);
+                    float at = near[lane];
+                    int slot = size++;
+                    for (; slot > base && stack[slot - 1].near < at; --slot) stack[slot] = stack[slot - 1];
+                    stack[slot] = {at, node.child[lane]};
+                }
+                current = stack[--size].child;
+                continue;
+            }
+        } else {
+            const Block& block = tree.blocks[~current >> 3];
+            Vec<f8> corner[3];
+            for (int i = 0; i < 3; ++i) {
+                corner[i].x = load<f8>(block.corner[i][ray.kx]) - ray.origin[ray.kx];
+                corner[i].y = load<f8>(block.corner[i][ray.ky]) - ray.origin[ray.ky];
+                corner[i].z = load<f8>(block.corner[i][ray.kz]) - ray.origin[ray.kz];
+            }
+            f8 t, u, v;
+            i8 inside = meets_triangle(corner[0], corner[1], corner[2], {shear_x, shear_y, shear_z}, t, u, v);
+            if (bits(inside)) {
+                for (unsigned in = bits(inside & (t <= hit.t)); in; in &= in - 1) {
+                    int lane = first_bit(in);
+                    if (t[lane] < hit.t || (t[lane] == hit.t && block.face[lane] < hit.face)) {
+                        hit = {t[lane], u[lane], v[lane], block.face[lane]};
+                        found = true;
+                        if (any) return true;
+                    }
+                }
+            }
+        }
+        do {
+            if (!size) return found;
+            --size;
+        } while (stack[size].near > hit.t);
+        current = stack[size].child;
+    }
+}
+
+// Sixteen rays. A lane with a negative `t` in its hit is idle; it should hold the ray of a busy one.
+struct Packet {
+    Vec16 origin, direction, inverse;
+    Vec16 low_origin, high_origin;  // moved by the padding, for lower and upper sides of boxes
+    Vec16 shear;
+    int kx, ky, kz;
+    bool backwards[3];
+    float near_origin[3], far_origin[3], inverse_least[3], inverse_most[3];
+    bool together;  // worth walking as one
+    bool same_signs;
+
+    Packet(const Vec16& from, const Vec16& along) : origin(from), direction(along) {
+        f16 x = vabs(along.x), y = vabs(along.y), z = vabs(along.z);
+        unsigned by_x = bits((x >= y) & (x >= z)), by_y = bits(y >= z) & ~by_x;
+        kz = by_x & 1u ? 0 : by_y & 1u ? 1 : 2, kx = (kz + 1) % 3, ky = (kz + 2) % 3;
+        unsigned agree = kz == 0 ? by_x : kz == 1 ? by_y : ALL & ~(by_x | by_y);
+        float longest = greatest(along[kz] < 0.0f ? -along[kz] : along[kz]);
+        float spread = 0.0f;
+        for (int axis = 0; axis < 3; ++axis) {
+            float width = greatest(along[axis]) - least(along[axis]);
+            spread = width > spread ? width : spread;
+        }
+        together = agree == ALL && spread <= SPREAD_MAX * longest;
+        if (!together) return;
+        inverse = {reciprocal(along.x), reciprocal(along.y), reciprocal(along.z)};
+        f16 fast = 1.0f / along[kz];
+        shear = {along[kx] * fast, along[ky] * fast, fast};
+        f16 pad = PADDING * vmax(vmax(vmax(vabs(from.x), vabs(from.y)), vabs(from.z)), (f16)1.0f);
+        low_origin = {from.x + pad, from.y + pad, from.z + pad};
+        high_origin = {from.x - pad, from.y - pad, from.z - pad};
+        same_signs = true;
+        for (int axis = 0; axis < 3; ++axis) {
+            unsigned negative = bits(inverse[axis] < 0.0f);
+            same_signs = same_signs && (negative == 0 || negative == ALL);
+            backwards[axis] = negative != 0;
+            near_origin[axis] = backwards[axis] ? least(high_origin[axis]) : greatest(low_origin[axis]);
+            far_origin[axis] = backwards[axis] ? greatest(low_origin[axis]) : least(high_origin[axis]);
+            inverse_least[axis] = least(inverse[axis]);
+            inverse_most[axis] = greatest(inverse[axis]);
+        }
+    }
+
+    // Which lanes pass a child's box before their `reach`.
+    unsigned passing(const Node& node, int child, const f16& reach) const {
+        f16 near = 0.0f, far = reach;
+        for (int axis = 0; axis < 3; ++axis) {
+            f16 a = (node.lower[axis][child] - low_origin[axis]) * inverse[axis];
+            f16 b = (node.upper[axis][child] - high_origin[axis]) * inverse[axis];
+            near = vmax(near, vmin(a, b));
+            far = vmin(far, vmax(a, b));
+        }
+        return bits(near <= far * ROUNDING_UP);
+    }
+};
+
+struct PacketHit {
+    f16 t, u, v;
+    i16 face;
+};
+
+// Which children some ray of the packet may pass, and a lower bound of where. Interval arithmetic over the packet tests
+// all eight boxes at once: Boulos, Wald and Shirley 2006, "Geometric and Arithmetic Culling Methods for Entire Ray
+// Packets".
+inline unsigned children_met(const Node& node, const Packet& rays, const PacketHit& hit, float reach, f8& near) {
+    near = 0.0f;
+    if (rays.same_signs) {
+        f8 far = reach;
+        for (int axis = 0; axis < 3; ++axis) {
+            const bool back = rays.backwards[axis];
+            f8 close = load<f8>(back ? node.upper[axis] : node.lower[axis]) - rays.near_origin[axis];
+            f8 away = load<f8>(back ? node.lower[axis] : node.upper[axis]) - rays.far_origin[axis];
+            near = vmax(near, vmin(close * rays.inverse_least[axis], close * rays.inverse_most[axis]));
+            far = vmin(far, vmax(away * rays.inverse_least[axis], away * rays.inverse_most[axis]));
+        }
+        return bits(near <= far * ROUNDING_UP);
+    }
+    unsigned met = 0;
+    for (int child = 0; child < WIDTH; ++child)
+        if (node.child[child] != EMPTY_CHILD && rays.passing(node, child, hit.t)) met |= 1u << child;
+    return met;
+}
+
+// A packet from the root. Returns the lanes that found a hit; `any` drops a lane (by a negative `hit.t`) at its first.
+template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, PacketHit& hit) {
+    struct Entry {
+        float near;
+        int child;
+        const Node* parent;
+        int slot;
+    } stack[STACK];
+    int size = 0;
+    unsigned found = 0;
+    float reach = greatest(hit.t);
+    stack[size++] = {0.0f, 0, nullptr, 0};
+    while (size) {
+        const Entry entry = stack[--size];
+        if (entry.near > reach) continue;
+        // Now by each ray, and only as far as its own hit.
+        if (entry.parent && !rays.passing(*entry.parent, entry.slot, hit.t)) continue;
+        if (entry.child >= 0) {
+            const Node& node = tree.nodes[entry.child];
+            f8 near;
+            int base = size;
+            for (unsigned met = children_met(node, rays, hit, reach, near); met; met &= met - 1) {
+                int lane = first_bit(met);
+                float at = near[lane];
+                int slot = size++;
+                for (; slot > base && stack[slot - 1].near < at; --slot) stack[slot] = stack[slot - 1];
+                stack[slot] = {at, node.child[lane], &node, lane};
+            }
+            continue;
+        }
+        const Block& block = tree.blocks[~entry.child >> 3];
+        const int count = (~entry.child & 7) + 1;
+        unsigned changed = 0;
+        for (int i = 0; i < count; ++i) {
+            Vec16 corner[3];
+            for (int k = 0; k < 3; ++k) {
+                corner[k].x = block.corner[k][rays.kx][i] - rays.origin[rays.kx];
+                corner[k].y = block.corner[k][rays.ky][i] - rays.origin[rays.ky];
+                corner[k].z = block.corner[k][rays.kz][i] - rays.origin[rays.kz];
+            }
+            f16 t, u, v;
+            i16 inside = meets_triangle(corner[0], corner[1], corner[2], rays.shear, t, u, v);
+            if (!bits(inside)) continue;
+            const int face = block.face[i];
+            inside = inside & ((t < hit.t) | ((t == hit.t) & (face < hit.face)));
+            if (any) {
+                hit.t = inside ? (f16)-1.0f : hit.t;
+            } else {
+                hit.t = inside ? t : hit.t;
+                hit.u = inside ? u : hit.u;
+                hit.v = inside ? v : hit.v;
+                hit.face = inside ? (i16)face : hit.face;
+            }
+            changed |= bits(inside);
+        }
+        if (changed) {
+            found |= changed;
+            reach = greatest(hit.t);
+            if (any && reach < 0.0f) break;
+        }
+    }
+    return found;
+}
+
+// The busy lanes of sixteen rays, together or one by one. Returns those that found a hit.
+template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, const Vec16& along, PacketHit& hit) {
+    Packet rays(from, along);
+    if (rays.together) return walk<any>(tree, rays, hit);
+    unsigned found = 0;
+    for (unsigned busy = bits(hit.t >= 0.0f); busy; busy &= busy - 1) {
+        int lane = first_bit(busy);
+        float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
+        float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
+        RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
+        if (!walk<any>(tree, Single(origin, direction), one)) continue;
+        found |= 1u << lane;
+        hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
+    }
+    return found;
+}
+
+}  // namespace packets

@@ -1,0 +1,114 @@
+"""Kernels that trace sixteen neighbouring samples at once: the fast path of the CPU.
+
+Sixteen consecutive samples on the Morton curve are a block of 4 x 4, so their rays take nearly the same way. The C++ in
+``native/`` carries them through the scene side by side, in vector registers; Warp's own compiler builds it together
+with these kernels. The same computation for one sample, in Python, is :func:`renderer.kernels.shade_samples`: what CUDA
+runs and what tests compare with.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import warp as wp
+
+from renderer.structs import SceneData, ViewData
+
+LANES = wp.constant(16)
+"""Samples a kernel thread handles, as in ``native/lanes.h``."""
+
+NODE_FLOATS, BLOCK_FLOATS = 56, 80
+"""Sizes of a tree's records in units of four bytes, as in ``native/tree.h``."""
+
+
+@wp.struct
+class Queries:
+    """Rays through one mesh, and where their hits go: ``face`` is -1 for a miss, or a flag where any hit will do."""
+
+    nodes: wp.array(dtype=wp.float32)
+    blocks: wp.array(dtype=wp.float32)
+    origin: wp.array(dtype=wp.vec3)
+    direction: wp.array(dtype=wp.vec3)
+    reach: wp.array(dtype=wp.float32)
+    face: wp.array(dtype=wp.int32)
+    t: wp.array(dtype=wp.float32)
+    u: wp.array(dtype=wp.float32)
+    v: wp.array(dtype=wp.float32)
+
+
+_NATIVE = Path(__file__).resolve().parent / "native"
+_HEADERS = sorted(_NATIVE.glob("*.h"))
+
+wp.set_module_options(
+    {
+        "enable_backward": False,
+        "extra_build_options": wp.ModuleBuildOptions(
+            extra_cpu_include_dirs=[str(_NATIVE)],
+            extra_cpu_preamble="".join(f'#include "{header.name}"\n' for header in _HEADERS),
+            extra_build_dependencies=[str(header) for header in _HEADERS],
+        ),
+    }
+)
+
+
+@wp.func_native("packets::build_tree(vertices, faces, boxes, order, nodes, blocks, counts);")
+def native_build_tree(
+    vertices: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    boxes: wp.array(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    nodes: wp.array(dtype=wp.float32),
+    blocks: wp.array(dtype=wp.float32),
+    counts: wp.array(dtype=wp.int32),
+): ...
+
+
+@wp.func_native("packets::trace_queries(rays, first, nearest != 0);")
+def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
+
+
+@wp.func_native("packets::shade_packet(scene, view, first, count, position.data, time_s.data, color.data, rays.data);")
+def native_shade_packet(
+    scene: SceneData,
+    view: ViewData,
+    first: wp.int32,
+    count: wp.int32,
+    position: wp.array(dtype=wp.vec2),
+    time_s: wp.array(dtype=wp.float64),
+    color: wp.array(dtype=wp.vec3),
+    rays: wp.array(dtype=wp.vec2i),
+): ...
+
+
+@wp.kernel(enable_backward=False)
+def build_tree(
+    vertices: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    boxes: wp.array(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    nodes: wp.array(dtype=wp.float32),
+    blocks: wp.array(dtype=wp.float32),
+    counts: wp.array(dtype=wp.int32),
+):
+    """Fills ``nodes`` and ``blocks`` and how many of each there are; ``boxes`` and ``order`` are scratch."""
+    native_build_tree(vertices, faces, boxes, order, nodes, blocks, counts)
+
+
+@wp.kernel(enable_backward=False)
+def trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32):
+    """Traces sixteen rays a thread, from ray ``first`` on."""
+    native_trace_queries(rays, first + LANES * wp.tid(), nearest)
+
+
+@wp.kernel(enable_backward=False)
+def shade_samples(
+    scene: SceneData,
+    view: ViewData,
+    first: wp.int32,
+    position: wp.array(dtype=wp.vec2),
+    time_s: wp.array(dtype=wp.float64),
+    color: wp.array(dtype=wp.vec3),
+    rays: wp.array(dtype=wp.vec2i),
+):
+    """As the kernel of the same name in ``kernels.py``, sixteen samples a thread; ``first`` is a multiple of 16."""
+    native_shade_packet(scene, view, first + LANES * wp.tid(), position.shape[0], position, time_s, color, rays)

@@ -1,0 +1,65 @@
+"""Trees of boxes over the triangles of a mesh, as the kernels of ``packets.py`` walk them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from renderer import device as devices
+from renderer import packets
+from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Records of ``native/tree.h``, laid out as floats.
+
+    Attributes:
+        nodes: ``(n, 56)`` boxes of eight children and what these are.
+        blocks: ``(m, 80)`` one to eight triangles.
+    """
+
+    nodes: NDArray[np.float32]
+    blocks: NDArray[np.float32]
+
+
+def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
+    """Builds a tree on the CPU, in ``O(f log f)``.
+
+    Args:
+        vertices: ``(v, 3)`` finite, best within ``[-1, 1]³``.
+        faces: ``(f, 3)`` indices of corners, at least one face.
+
+    Returns:
+        The tree; the same mesh gives the same bits.
+
+    Raises:
+        ValueError: if a mesh has no faces, an index is out of range, or a vertex is not finite.
+    """
+    points = np.ascontiguousarray(vertices, np.float32)
+    corners = np.ascontiguousarray(faces, np.int32)
+    if points.ndim != 2 or points.shape[1] != 3 or corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
+        raise ValueError(f"mesh: expected vertices (v, 3) and faces (f, 3), got {points.shape} and {corners.shape}")
+    if corners.min() < 0 or corners.max() >= len(points):
+        raise ValueError(f"faces: expected indices below {len(points)}, got {corners.min()} to {corners.max()}")
+    if not np.isfinite(points).all():
+        raise ValueError("vertices: expected finite numbers")
+    count = len(corners)
+    # One node more than there can be: an inner node has at least two children. Pages that stay empty cost nothing.
+    nodes, blocks = np.empty(count * NODE_FLOATS, np.float32), np.empty(count * BLOCK_FLOATS, np.float32)
+    boxes, order, used = np.empty(6 * count, np.float32), np.empty(count, np.int32), np.zeros(2, np.int32)
+    devices.load_kernels(packets, "cpu")
+    arrays = [wp.array(points, dtype=wp.vec3, copy=False), wp.array(corners, dtype=wp.vec3i, copy=False)]
+    arrays += [_shared(values) for values in (boxes, order, nodes, blocks, used)]
+    wp.launch(packets.build_tree, dim=1, inputs=arrays, device="cpu")
+    return Tree(
+        nodes.reshape(-1, NODE_FLOATS)[: used[0]].copy(),
+        blocks.reshape(-1, BLOCK_FLOATS)[: used[1]].copy(),
+    )
+
+
+def _shared(values: NDArray) -> wp.array:
+    return wp.array(values, dtype=wp.float32 if values.dtype == np.float32 else wp.int32, device="cpu", copy=False)
