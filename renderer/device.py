@@ -112,7 +112,8 @@ def _watch(loads: Mapping[Future, str], device: str, report: Callable[[str], Non
             seconds = time.perf_counter() - began
             show(f"compiling kernels for {device}, once: {done}, {seconds:.0f} s, to come: {', '.join(under_way)}")
             wait([load for load in loads if not load.done()], interval_s, FIRST_COMPLETED)
-        show(f"kernels for {device} ready after {time.perf_counter() - began:.1f} s")
+        if not any(load.exception() for load in loads):
+            show(f"kernels for {device} ready after {time.perf_counter() - began:.1f} s")
 
 
 @contextlib.contextmanager

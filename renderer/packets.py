@@ -80,6 +80,19 @@ def native_shade_packet(
 ): ...
 
 
+@wp.func_native(
+    "packets::render_block(scene, view, block, image.shape[1], image.shape[0], samples, time_s, image.data);"
+)
+def native_render_block(
+    scene: SceneData,
+    view: ViewData,
+    block: wp.int32,
+    samples: wp.int32,
+    time_s: wp.float64,
+    image: wp.array2d(dtype=wp.vec3),
+): ...
+
+
 @wp.kernel(enable_backward=False)
 def build_tree(
     vertices: wp.array(dtype=wp.vec3),
@@ -112,3 +125,16 @@ def shade_samples(
 ):
     """As the kernel of the same name in ``kernels.py``, sixteen samples a thread; ``first`` is a multiple of 16."""
     native_shade_packet(scene, view, first + LANES * wp.tid(), position.shape[0], position, time_s, color, rays)
+
+
+@wp.kernel(enable_backward=False)
+def render_pixels(
+    scene: SceneData,
+    view: ViewData,
+    first: wp.int32,
+    samples: wp.int32,
+    time_s: wp.float64,
+    image: wp.array2d(dtype=wp.vec3),
+):
+    """As the kernel of the same name in ``kernels.py``, sixteen pixels a thread; ``first`` is a multiple of 16."""
+    native_render_block(scene, view, first / LANES + wp.tid(), samples, time_s, image)

@@ -14,19 +14,20 @@ from torch import Tensor
 from renderer import device as devices
 from renderer import kernels
 from renderer import packets as packet_kernels
-from renderer.blocks import BLOCK_PX, pixel_blocks
 from renderer.buffers import build_buffers
 from renderer.checks import check_affine
 from renderer.structs import ViewData
 from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from tsar.types import FrameletBatch, SampleBatch
 
-_CHUNK_SAMPLES = 1 << 18
 # Samples per launch on the CPU: enough that its fixed cost of 20 µs is small, few enough that threads end together.
 _RANGE_SAMPLES = (1024, 4096)
 _RANGES_PER_THREAD = 4
-_BYTES_PER_SAMPLE = 64  # position, time, colour and counts, and their copies in flight
-_BYTES_PER_PIXEL = 12 + 8  # colour, and its place in the order of rendering
+_RANGE_OF_FRAME = 1 << 14
+_BLOCK_PX = 16  # as the kernels' order of pixels
+_BYTES_PER_PIXEL = 12
+_SAMPLES_PER_PIXEL_AXIS_MAX = 1024
+_SAMPLES_PER_AXIS_MAX = 1 << 22  # float32 tells two of so many apart
 
 
 class Renderer:
@@ -117,20 +118,20 @@ class Renderer:
             ``(height, width, 3)`` float32 linear RGB on the CPU, row 0 at the top.
 
         Raises:
-            ValueError: if a size is below 1, or the picture does not fit into memory.
+            ValueError: if a size is below 1 or beyond its limit, or the picture does not fit into memory.
         """
         for name, value in (("width_px", width_px), ("height_px", height_px), ("samples_per_axis", samples_per_axis)):
             if int(value) != value or value < 1:
                 raise ValueError(f"{name}: expected a whole number of at least 1, got {value}")
-        self._check_memory(width_px, height_px, samples_per_axis)
-        image = torch.empty(height_px * width_px, 3)
-        footprint = min(width_px, height_px) * samples_per_axis
-        limit = max(1, _CHUNK_SAMPLES // samples_per_axis**2)
-        for pixels, position in pixel_blocks(width_px, height_px, samples_per_axis, limit):
-            time = torch.full((position.shape[0],), float(time_s), dtype=torch.float64)
-            color, _ = self._shade(position, time, width_px / height_px, footprint)
-            image[pixels] = color.reshape(len(pixels), -1, 3).mean(dim=1)
-        return image.reshape(height_px, width_px, 3)
+        _check_size(width_px, height_px, samples_per_axis)
+        target = torch.device(self.device)
+        image = torch.empty(height_px, width_px, 3, device=target)
+        view = self._view(float(time_s), width_px / height_px, min(width_px, height_px) * samples_per_axis)
+        shared = samples_per_axis, wp.float64(time_s), wp.from_torch(image, dtype=wp.vec3)
+        blocks = -(-width_px // _BLOCK_PX) * -(-height_px // _BLOCK_PX)
+        step = max(_RANGE_OF_FRAME // samples_per_axis**2 // _BLOCK_PX**2, 1) * _BLOCK_PX**2
+        self._launch(self._kernels.render_pixels, view, shared, blocks * _BLOCK_PX**2, step)
+        return image.cpu()
 
     def close(self) -> None:
         """Ends the worker threads; the renderer must not be used afterwards."""
@@ -159,28 +160,29 @@ class Renderer:
             wp.from_torch(color, dtype=wp.vec3),
             wp.from_torch(rays, dtype=wp.vec2i),
         )
-        self._launch(view, shared, count)
+        step = min(max(count // (_RANGES_PER_THREAD * self.threads), _RANGE_SAMPLES[0]), _RANGE_SAMPLES[1])
+        self._launch(self._kernels.shade_samples, view, shared, count, step - step % packet_kernels.LANES)
         shadow, reflection = _totals(rays)
         return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
 
-    def _launch(self, view: ViewData, shared: tuple[wp.array, ...], count: int) -> None:
-        """One launch on a GPU; on the CPU many over sub-ranges, which release the interpreter lock."""
+    def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int, step: int) -> None:
+        """One launch on a GPU; on the CPU ranges of ``step`` elements, which release the interpreter lock.
 
-        def run(first: int, dim: int) -> None:
-            inputs = [self._buffers.data, view, first, *shared]
-            wp.launch(self._kernels.shade_samples, dim=-(-dim // self._lanes), inputs=inputs, device=self.device)
+        ``step`` is a multiple of 16: packets are the same for any number of threads.
+        """
+
+        def run(first: int) -> None:
+            dim = -(-min(step, count - first) // self._lanes)
+            wp.launch(kernel, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device)
 
         if self.device != "cpu":
+            step = count
             torch.cuda.synchronize()  # Warp launches on a stream of its own
-            run(0, count)
+            run(0)
             wp.synchronize_device(self.device)
-        elif self._pool is None:
-            run(0, count)
-        else:
-            step = min(max(count // (_RANGES_PER_THREAD * self.threads), _RANGE_SAMPLES[0]), _RANGE_SAMPLES[1])
-            step -= step % self._lanes  # packets are the same for any number of threads
-            for _ in self._pool.map(lambda first: run(first, min(step, count - first)), range(0, count, step)):
-                pass
+            return
+        for _ in (map if self._pool is None else self._pool.map)(run, range(0, count, step)):
+            pass
 
     def _view(self, time_s: float | None, aspect: float, footprint_px: float) -> ViewData:
         """Camera record; with a time, poses of all tracks at it."""
@@ -201,15 +203,21 @@ class Renderer:
             view.single_time = 1
         return view
 
-    def _check_memory(self, width_px: int, height_px: int, samples_per_axis: int) -> None:
-        chunk = max(_CHUNK_SAMPLES, (BLOCK_PX * samples_per_axis) ** 2)
-        need = width_px * height_px * _BYTES_PER_PIXEL + chunk * _BYTES_PER_SAMPLE
-        have = _free_memory_bytes()
-        if need > have:
-            raise ValueError(
-                f"render_frame: {width_px} x {height_px} pixels of {samples_per_axis}² samples need about "
-                f"{need / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free"
-            )
+
+def _check_size(width_px: int, height_px: int, samples_per_axis: int) -> None:
+    if samples_per_axis > _SAMPLES_PER_PIXEL_AXIS_MAX:
+        raise ValueError(f"samples_per_axis: expected at most {_SAMPLES_PER_PIXEL_AXIS_MAX}, got {samples_per_axis}")
+    if max(width_px, height_px) * samples_per_axis > _SAMPLES_PER_AXIS_MAX:
+        raise ValueError(
+            f"render_frame: expected at most {_SAMPLES_PER_AXIS_MAX:,} samples along an axis, got "
+            f"{max(width_px, height_px)} pixels of {samples_per_axis}"
+        )
+    need, have = width_px * height_px * _BYTES_PER_PIXEL, _free_memory_bytes()
+    if need > have:
+        raise ValueError(
+            f"render_frame: {width_px} x {height_px} pixels need about {need / 2**30:.1f} GiB of memory, "
+            f"{have / 2**30:.1f} GiB are free"
+        )
 
 
 # On the host by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours.

@@ -306,6 +306,53 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
     return total;
 }
 
+// Renders a block of 4 x 4 pixels, `samples` squared samples each; blocks go along the Morton curve within 16 x 16
+// pixels, those by rows. Consecutive samples share a pixel as far as they can.
+template <class Scene, class View, class Pixel>
+inline void render_block(const Scene& scene, const View& view, int block, int width, int height, int samples,
+                         double time_s, Pixel* image) {
+    const int columns = (width + 15) / 16, place = block / 16, inner = block % 16;
+    const int left = place % columns * 16 + (inner & 1) * 4 + (inner >> 2 & 1) * 8;
+    const int top = place / columns * 16 + (inner >> 1 & 1) * 4 + (inner >> 3) * 8;
+    if (left >= width || top >= height) return;
+    Stage<Scene, View> stage = {scene, view, {}};
+    for (int lane = 0; lane < LANES; ++lane) stage.time_s[lane] = time_s;
+    const int per_pixel = samples * samples;
+    const float across = (float)(width * samples), down = (float)(height * samples);
+    float sums[LANES][3] = {};
+    int at = 0, within_x = 0, within_y = 0;  // pixel of the block, and sample of the pixel
+    for (int packet = 0; packet < per_pixel; ++packet) {
+        int pixel[LANES];
+        f16 x, y;
+        unsigned busy = 0;
+        for (int lane = 0; lane < LANES; ++lane) {
+            const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+            pixel[lane] = at;
+            busy |= (unsigned)(column < width && row < height) << lane;
+            x[lane] = (float)(column * samples + within_x), y[lane] = (float)(row * samples + within_y);
+            if (++within_x < samples) continue;
+            within_x = 0;
+            if (++within_y < samples) continue;
+            within_y = 0, ++at;
+        }
+        if (!busy) continue;
+        Vec16 origin, direction;
+        camera_rays(stage, (x + 0.5f) / across, (y + 0.5f) / down, origin, direction);
+        i16 shadow_rays, bounces;
+        const Vec16 color = radiance(stage, origin, direction, busy, shadow_rays, bounces);
+        for (int lane = 0; lane < LANES; ++lane) {
+            float* sum = sums[pixel[lane]];
+            sum[0] += color.x[lane], sum[1] += color.y[lane], sum[2] += color.z[lane];
+        }
+    }
+    const float share = 1.0f / (float)per_pixel;
+    for (at = 0; at < LANES; ++at) {
+        const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+        if (column < width && row < height)
+            image[row * width + column] = Pixel(sums[at][0] * share, sums[at][1] * share, sums[at][2] * share);
+    }
+}
+
 // Shades samples `first` to `first + 15`, as far as there are `count` of them.
 template <class Scene, class View, class Position, class Color, class Counts>
 inline void shade_packet(const Scene& scene, const View& view, int first, int count, const Position* position,

@@ -50,9 +50,9 @@ def test_supersampling_is_the_mean_of_a_finer_frame(driving) -> None:
     assert ((coarse - expected).abs().amax(-1) > 1e-3).float().mean() < 0.02
 
 
-def test_chunks_do_not_change_a_bit(driving, monkeypatch) -> None:
+def test_ranges_do_not_change_a_bit(driving, monkeypatch) -> None:
     whole = driving.render_frame(0.3, 70, 50, 2)
-    monkeypatch.setattr("renderer.trace._CHUNK_SAMPLES", 1024)
+    monkeypatch.setattr("renderer.trace._RANGE_OF_FRAME", 1024)
     assert torch.equal(driving.render_frame(0.3, 70, 50, 2), whole)
 
 

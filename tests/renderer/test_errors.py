@@ -125,8 +125,10 @@ def test_devices_and_options() -> None:
 def test_frames_beyond_memory_and_odd_sizes(driving) -> None:
     with pytest.raises(ValueError, match="GiB are free"):
         driving.render_frame(0.0, 4_000_000, 4_000_000)
-    with pytest.raises(ValueError, match="GiB are free"):
+    with pytest.raises(ValueError, match="samples_per_axis: expected at most 1024, got 50000"):
         driving.render_frame(0.0, 4, 4, samples_per_axis=50_000)
+    with pytest.raises(ValueError, match="samples along an axis"):
+        driving.render_frame(0.0, 5000, 1, samples_per_axis=1000)
     for size in ((0, 4), (4, -1), (2.5, 4)):
         with pytest.raises(ValueError, match="whole number"):
             driving.render_frame(0.0, *size)
