@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
-from renderer.trees import build_tree
+from renderer.trees import aligned, build_tree
 from scenes.canonical import Mesh, SceneError
 
 _BOX_PADDING = 2.0e-5
@@ -51,7 +51,9 @@ class _Pool:
     def upload(self, device: str) -> wp.array:
         """Everything on a device; one row of zeros where there is nothing."""
         table = np.concatenate(self.arrays) if self.arrays else np.zeros((1, self.width), self.scalar)
-        flat = table.reshape(-1) if self.dtype in (wp.int32, wp.float32) else table
+        if self.dtype is wp.float32:  # trees, of the CPU
+            return wp.array(aligned(table), dtype=wp.float32, device=device, copy=device != "cpu")
+        flat = table.reshape(-1) if self.dtype is wp.int32 else table
         return wp.array(np.ascontiguousarray(flat), dtype=self.dtype, device=device)
 
 

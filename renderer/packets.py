@@ -17,7 +17,7 @@ from renderer.structs import SceneData, ViewData
 LANES = wp.constant(16)
 """Samples a kernel thread handles, as in ``native/lanes.h``."""
 
-NODE_FLOATS, BLOCK_FLOATS = 56, 80
+NODE_FLOATS, BLOCK_FLOATS = 64, 40
 """Sizes of a tree's records in units of four bytes, as in ``native/tree.h``."""
 
 

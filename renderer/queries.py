@@ -10,7 +10,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from renderer import packets
-from renderer.trees import build_tree
+from renderer.trees import aligned, build_tree
 
 _RANGE_RAYS = 1 << 14
 _FAR = 1.0e30
@@ -53,7 +53,7 @@ class RayQueries:
         if threads < 1:
             raise ValueError(f"threads: expected at least 1, got {threads}")
         tree = build_tree(vertices, faces)
-        self._nodes, self._blocks = (_shared(part.reshape(-1), wp.float32) for part in (tree.nodes, tree.blocks))
+        self._nodes, self._blocks = (_shared(aligned(part), wp.float32) for part in (tree.nodes, tree.blocks))
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def closest(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None = None) -> RayHits:

@@ -13,13 +13,16 @@ from renderer import packets
 from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
 
 
+_LINE_FLOATS = 16
+
+
 @dataclass(frozen=True, eq=False)
 class Tree:
     """Records of ``native/tree.h``, laid out as floats.
 
     Attributes:
-        nodes: ``(n, 56)`` boxes of eight children and what these are.
-        blocks: ``(m, 80)`` one to eight triangles.
+        nodes: ``(n, 64)`` boxes of eight children and what these are.
+        blocks: ``(m, 40)`` one to four triangles.
     """
 
     nodes: NDArray[np.float32]
@@ -59,6 +62,14 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
         nodes.reshape(-1, NODE_FLOATS)[: used[0]].copy(),
         blocks.reshape(-1, BLOCK_FLOATS)[: used[1]].copy(),
     )
+
+
+def aligned(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A flat copy that starts at a cache line, as nodes should."""
+    room = np.empty(values.size + _LINE_FLOATS, np.float32)
+    first = -room.ctypes.data // 4 % _LINE_FLOATS
+    room[first : first + values.size] = values.reshape(-1)
+    return room[first : first + values.size]
 
 
 def _shared(values: NDArray) -> wp.array:

@@ -1,4 +1,4 @@
-// Sixteen (or eight) floats that go through the same arithmetic side by side.
+// Sixteen (or eight, or four) floats that go through the same arithmetic side by side.
 //
 // Clang's vector types take the usual operators; a comparison gives a vector of 0 and -1, and `condition ? a : b` picks
 // lane by lane. The widths are fixed: a machine with narrower registers splits them, with the same results.
@@ -6,8 +6,10 @@
 
 namespace packets {
 
+typedef float f4 __attribute__((ext_vector_type(4)));
 typedef float f8 __attribute__((ext_vector_type(8)));
 typedef float f16 __attribute__((ext_vector_type(16)));
+typedef int i4 __attribute__((ext_vector_type(4)));
 typedef int i8 __attribute__((ext_vector_type(8)));
 typedef int i16 __attribute__((ext_vector_type(16)));
 
@@ -16,13 +18,16 @@ constexpr unsigned ALL = 0xffffu;
 constexpr float FAR = 1.0e30f;
 
 template <class F> struct IntOf;
+template <> struct IntOf<f4> { typedef i4 type; };
 template <> struct IntOf<f8> { typedef i8 type; };
 template <> struct IntOf<f16> { typedef i16 type; };
 
+typedef bool b4 __attribute__((ext_vector_type(4)));
 typedef bool b8 __attribute__((ext_vector_type(8)));
 typedef bool b16 __attribute__((ext_vector_type(16)));
 
 // One bit a lane from a comparison, and back.
+inline unsigned bits(i4 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b4)) & 15u; }
 inline unsigned bits(i8 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b8)); }
 inline unsigned bits(i16 c) { return __builtin_bit_cast(unsigned short, __builtin_convertvector(c, b16)); }
 inline i16 lanes_of(unsigned mask) {

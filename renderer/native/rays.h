@@ -90,6 +90,36 @@ struct RayHit {
     int face;
 };
 
+// Asks the caches for what is walked into later.
+inline void prefetch(const Tree& tree, int child) {
+    const char* at = child >= 0 ? (const char*)(tree.nodes + child) : (const char*)(tree.blocks + (~child >> 3));
+    for (int line = 0; line < 3; ++line) __builtin_prefetch(at + 64 * line);
+}
+
+// One ray against a leaf, four triangles at a time. Keeps the nearest hit, of equally near ones the face with the lower
+// number; whether there is a new one.
+inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, const Vec<f4>& shear, int kx, int ky,
+                      int kz, RayHit& hit) {
+    bool found = false;
+    for (; triangles > 0; triangles -= BLOCK_WIDTH, ++block) {
+        Vec<f4> corner[3];
+        for (int i = 0; i < 3; ++i)
+            corner[i] = Vec<f4>{load<f4>(block->corner[i][kx]), load<f4>(block->corner[i][ky]),
+                                load<f4>(block->corner[i][kz])} - origin;
+        f4 t, u, v;
+        const i4 inside = meets_triangle(corner[0], corner[1], corner[2], shear, t, u, v);
+        if (!bits(inside)) continue;
+        for (unsigned in = bits(inside & (t <= hit.t)); in; in &= in - 1) {
+            const int lane = first_bit(in);
+            if (t[lane] < hit.t || (t[lane] == hit.t && block->face[lane] < hit.face)) {
+                hit = {t[lane], u[lane], v[lane], block->face[lane]};
+                found = true;
+            }
+        }
+    }
+    return found;
+}
+
 // One ray from the root. `any` ends at the first hit; `hit.t` holds how far to look.
 template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit) {
     struct Entry {
@@ -99,7 +129,8 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
     int size = 0;
     int current = 0;
     bool found = false;
-    const f8 shear_x = ray.shear[0], shear_y = ray.shear[1], shear_z = ray.shear[2];
+    const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
+    const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
     while (true) {
         if (current >= 0) {
             const Node& node = tree.nodes[current];
@@ -124,6 +155,7 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
                 stack[size++] = {near[lane], node.child[lane]};
                 for (; met; met &= met - 1) {
                     lane = first_bit(met);
+                    prefetch(tree, node.child[lane]);
                     float at = near[lane];
                     int slot = size++;
                     for (; slot > base && stack[slot - 1].near < at; --slot) stack[slot] = stack[slot - 1];
@@ -133,25 +165,9 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
                 continue;
             }
         } else {
-            const Block& block = tree.blocks[~current >> 3];
-            Vec<f8> corner[3];
-            for (int i = 0; i < 3; ++i) {
-                corner[i].x = load<f8>(block.corner[i][ray.kx]) - ray.origin[ray.kx];
-                corner[i].y = load<f8>(block.corner[i][ray.ky]) - ray.origin[ray.ky];
-                corner[i].z = load<f8>(block.corner[i][ray.kz]) - ray.origin[ray.kz];
-            }
-            f8 t, u, v;
-            i8 inside = meets_triangle(corner[0], corner[1], corner[2], {shear_x, shear_y, shear_z}, t, u, v);
-            if (bits(inside)) {
-                for (unsigned in = bits(inside & (t <= hit.t)); in; in &= in - 1) {
-                    int lane = first_bit(in);
-                    if (t[lane] < hit.t || (t[lane] == hit.t && block.face[lane] < hit.face)) {
-                        hit = {t[lane], u[lane], v[lane], block.face[lane]};
-                        found = true;
-                        if (any) return true;
-                    }
-                }
-            }
+            const Block* leaf = tree.blocks + (~current >> 3);
+            found |= meet_leaf(leaf, (~current & 7) + 1, from, shear, ray.kx, ray.ky, ray.kz, hit);
+            if (any && found) return true;
         }
         do {
             if (!size) return found;
@@ -259,13 +275,15 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
         const Entry entry = stack[--size];
         if (entry.near > reach) continue;
         // Now by each ray, and only as far as its own hit.
-        if (entry.parent && !rays.passing(*entry.parent, entry.slot, hit.t)) continue;
+        const unsigned active = entry.parent ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
+        if (!active) continue;
         if (entry.child >= 0) {
             const Node& node = tree.nodes[entry.child];
             f8 near;
             int base = size;
             for (unsigned met = children_met(node, rays, hit, reach, near); met; met &= met - 1) {
                 int lane = first_bit(met);
+                prefetch(tree, node.child[lane]);
                 float at = near[lane];
                 int slot = size++;
                 for (; slot > base && stack[slot - 1].near < at; --slot) stack[slot] = stack[slot - 1];
@@ -273,10 +291,25 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
             }
             continue;
         }
-        const Block& block = tree.blocks[~entry.child >> 3];
+        const Block* leaf = tree.blocks + (~entry.child >> 3);
         const int count = (~entry.child & 7) + 1;
         unsigned changed = 0;
-        for (int i = 0; i < count; ++i) {
+        if (__builtin_popcount(active) <= count / 2) {
+            // Few rays are left of the packet: each tests four triangles at once.
+            for (unsigned left = active; left; left &= left - 1) {
+                const int lane = first_bit(left);
+                RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
+                const Vec<f4> from = {(f4)rays.origin[rays.kx][lane], (f4)rays.origin[rays.ky][lane],
+                                      (f4)rays.origin[rays.kz][lane]};
+                const Vec<f4> shear = {(f4)rays.shear.x[lane], (f4)rays.shear.y[lane], (f4)rays.shear.z[lane]};
+                if (!meet_leaf(leaf, count, from, shear, rays.kx, rays.ky, rays.kz, one)) continue;
+                changed |= 1u << lane;
+                hit.t[lane] = any ? -1.0f : one.t;
+                hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
+            }
+        } else for (int number = 0; number < count; ++number) {
+            const Block& block = leaf[number / BLOCK_WIDTH];
+            const int i = number % BLOCK_WIDTH;
             Vec16 corner[3];
             for (int k = 0; k < 3; ++k) {
                 corner[k].x = block.corner[k][rays.kx][i] - rays.origin[rays.kx];

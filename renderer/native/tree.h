@@ -7,21 +7,24 @@
 
 namespace packets {
 
-constexpr int WIDTH = 8;
+constexpr int WIDTH = 8;        // children of a node, and triangles of a leaf at most
+constexpr int BLOCK_WIDTH = 4;  // triangles of a block
 constexpr int EMPTY_CHILD = -2147483647 - 1;
 
-// Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (`~(block * 8 + triangles - 1)`) or
+// Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (`~(first block * 8 + triangles - 1)`) or
 // EMPTY_CHILD, whose box is inside out.
 struct Node {
     float lower[3][WIDTH];
     float upper[3][WIDTH];
     int child[WIDTH];
+    int unused[WIDTH];  // whole cache lines
 };
 
-// One to eight triangles: corner by corner, axis by axis, lane by lane. Unused lanes have face -1 and no extent.
+// One to four triangles: corner by corner, axis by axis, lane by lane. Unused lanes have face -1 and no extent. Blocks
+// are small, for a mesh of a million triangles is bound by what the caches hold.
 struct Block {
-    float corner[3][3][WIDTH];
-    int face[WIDTH];
+    float corner[3][3][BLOCK_WIDTH];
+    int face[BLOCK_WIDTH];
 };
 
 struct Bounds {
@@ -137,16 +140,19 @@ class TreeBuilder {
     }
 
     int leaf(const Range& run) {
-        Block& block = blocks[used_blocks];
-        for (int lane = 0; lane < WIDTH; ++lane) {
-            int triangle = lane < run.count() ? order[run.first + lane] : -1;
-            block.face[lane] = triangle;
-            for (int corner = 0; corner < 3; ++corner)
-                for (int axis = 0; axis < 3; ++axis)
-                    block.corner[corner][axis][lane] =
-                        triangle < 0 ? 0.0f : vertices[3 * faces[3 * triangle + corner] + axis];
+        const int first_block = used_blocks;
+        for (int first = 0; first < run.count(); first += BLOCK_WIDTH) {
+            Block& block = blocks[used_blocks++];
+            for (int lane = 0; lane < BLOCK_WIDTH; ++lane) {
+                const int triangle = first + lane < run.count() ? order[run.first + first + lane] : -1;
+                block.face[lane] = triangle;
+                for (int corner = 0; corner < 3; ++corner)
+                    for (int axis = 0; axis < 3; ++axis)
+                        block.corner[corner][axis][lane] =
+                            triangle < 0 ? 0.0f : vertices[3 * faces[3 * triangle + corner] + axis];
+            }
         }
-        return ~(used_blocks++ * WIDTH + run.count() - 1);
+        return ~(first_block * WIDTH + run.count() - 1);
     }
 
     struct Cut {
