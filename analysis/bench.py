@@ -1,80 +1,140 @@
-"""Samples per second of a renderer, measured in turns so that a machine's ups and downs fall on all alike."""
+"""What a benchmark is made of: its options, a row of its table, and turns between ours and a peer.
+
+Cases take turns, so that a machine's ups and downs fall on all alike, and a ratio is the median of the ratios of the
+rounds. Rows are measured by ``analysis/bench_*.py``; :mod:`analysis.bench_run` puts them together.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from statistics import median, quantiles
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import torch
 import tyro
 
 from tsar.config import require
-from tsar.morton import deinterleave
-from tsar.types import FrameletBatch, Trace
+
+if TYPE_CHECKING:
+    from analysis.progress import Bars
+
+GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "overhead", "growth", "start")
+"""Groups of rows, in the order of the table."""
+
+ON_CPU_ONLY = ("coherent", "incoherent", "cores", "start")
+"""Groups of what does not run on a GPU."""
+
+SPREAD = "quartiles of the ratio over the repetitions"
+NOT_INSTALLED = "peer not installed"
+
+_FEWEST_REPETITIONS = 7
 
 
 @dataclass(frozen=True)
 class BenchOptions:
-    """Samples per second of the ray tracer: threads, and the order of samples in a batch."""
+    """How fast the simulator is, and beside whom: rays, shaded samples, overhead, growth, start."""
 
-    out: Path
-    """Folder for summary.json."""
-    input: Annotated[str, tyro.conf.Positional] = "fly-by"
-    """Built-in scene, by name or number."""
-    threads: int = 2
-    """Threads that are compared with one."""
+    out: Path = Path("out/bench")
+    """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
+    only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
+    cores, order, overhead, growth, start."""
+    compare: tuple[Path, Path] | None = None
+    """Two bench.json whose figures of ours are compared; runs nothing."""
+    device: Literal["cpu", "cuda:0"] = "cpu"
+    """Where our side runs; peers stay on the CPU."""
     repetitions: int = 9
-    """Measurements of each case; their median counts."""
+    """Turns of each case; medians count."""
+    resolution_px: int = 512
+    """Side of the pictures, pixels, a power of two."""
+    subdivisions: tuple[int, ...] = (4, 5, 6, 8)
+    """Meshes of the groups coherent and incoherent, of 20 * 4^subdivisions triangles."""
     batch_size: int = 128
     """Framelets per batch."""
-    framelet_side: int = 16
-    """Samples along a framelet's side, a power of two."""
-    level: int = 5
-    """Quad level of the tiles: the picture is cut into 4^level of them."""
+    cycles: int = 10_000
+    """Cycles over which the group growth watches memory."""
+    scenes: tuple[str, ...] = ()
+    """Built-in scenes; all where none is named."""
 
     def __post_init__(self) -> None:
-        require(self.threads >= 2, "threads", "at least 2", self.threads)
-        require(self.repetitions >= 7, "repetitions", "at least 7", self.repetitions)
-        require(0 <= self.level <= 8, "level", "between 0 and 8", self.level)
-        require(1 <= self.batch_size <= 4**self.level, "batch_size", "between 1 and 4^level", self.batch_size)
-        side = self.framelet_side
-        require(1 <= side <= 64 and side & (side - 1) == 0, "framelet_side", "a power of two up to 64", side)
+        for name in self.groups:
+            require(name in GROUPS, "only", f"one of {', '.join(GROUPS)}", name)
+        least = _FEWEST_REPETITIONS
+        require(self.repetitions >= least, "repetitions", f"at least {least}", self.repetitions)
+        side = self.resolution_px
+        require(64 <= side <= 4096 and side & (side - 1) == 0, "resolution_px", "a power of two in [64, 4096]", side)
+        for name in self.subdivisions:
+            require(0 <= name <= 9, "subdivisions", "between 0 and 9", name)
+        most = (side // FRAMELET_SIDE) ** 2
+        require(1 <= self.batch_size <= most, "batch_size", f"between 1 and {most}, a picture's", self.batch_size)
+        require(self.cycles >= 100, "cycles", "at least 100", self.cycles)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups to run, in the order of the table."""
+        asked = [name.strip() for part in self.only for name in part.split(",")] or list(GROUPS)
+        known = [name for name in GROUPS if name in asked]
+        return tuple(known + [name for name in asked if name not in GROUPS])
+
+    @property
+    def file_ending(self) -> str:
+        """What sets apart the names of files that hold figures of a GPU."""
+        return "" if self.device == "cpu" else "-cuda"
 
 
-def morton_batches(options: BenchOptions, duration_s: float) -> list[FrameletBatch]:
-    """Batches that cover the picture once between them, each spread over all of it as the pipeline's are.
+FRAMELET_SIDE = 16
 
-    Args:
-        options: sizes.
-        duration_s: length of the animation, over which the batches are spread too.
+
+@dataclass(frozen=True)
+class Row:
+    """One measured figure beside a peer's, or beside the limit that it is to keep.
+
+    Attributes:
+        ours, peer: medians in ``unit``; ``peer`` is None where there is none to compare with.
+        peer_name: who, or what limit.
+        ratio: above 1 ours is faster than the peer, or within the limit.
+        spread: quartiles of the ratio over the repetitions.
+        target: least ratio that is asked for; None where none is.
+        repetitions: rounds, or cycles, that the medians are over.
+        less_is_better: whether ``ours`` is a time or a share rather than a rate.
+        note: what else must be known to judge the figure.
     """
-    count = -(-(4**options.level) // options.batch_size)
-    side = options.framelet_side
-    offset = (torch.stack(deinterleave(torch.arange(side * side)), dim=1) + 0.5) / side
-    batches = []
-    for number in range(count):
-        index = torch.arange(number, 4**options.level, count)
-        corner = torch.stack(deinterleave(index), dim=1)
-        position = ((corner[:, None, :] + offset) * 0.5**options.level).to(torch.float32)
-        time_s = torch.full(position.shape[:2], duration_s * (number + 0.5) / count, dtype=torch.float64)
-        batches.append(FrameletBatch(torch.full_like(index, options.level), index, position, time_s))
-    return batches
+
+    group: str
+    name: str
+    unit: str
+    ours: float
+    peer_name: str = ""
+    peer: float | None = None
+    ratio: float | None = None
+    spread: tuple[float, float] | None = None
+    target: float | None = None
+    repetitions: int = 1
+    less_is_better: bool = False
+    note: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the target is reached; None where there is no target, or nobody to compare with."""
+        return None if self.target is None or self.ratio is None else self.ratio >= self.target
+
+    def record(self) -> dict[str, Any]:
+        """The row as it is stored."""
+        return {**dataclasses.asdict(self), "met": self.met}
 
 
-def in_rows(batch: FrameletBatch) -> FrameletBatch:
-    """The same samples in the order of reading: row by row across all tiles of the batch."""
-    flat = batch.position.reshape(-1, 2)
-    order = torch.argsort(flat[:, 0], stable=True)
-    order = order[torch.argsort(flat[order, 1], stable=True)]
-    return replace(
-        batch,
-        position=flat[order].reshape(batch.position.shape),
-        time_s=batch.time_s.reshape(-1)[order].reshape(batch.time_s.shape),
-    )
+Group = Callable[["BenchOptions", "Bars"], Iterator[Row]]
+"""Measures the rows of one group and shows how far it is."""
+
+
+def counted(show: Callable[[int], None]) -> Callable[..., None]:
+    """A function that moves a bar on by one at each call, whatever it is called with."""
+    done = count(1)
+    return lambda *_: show(next(done))
 
 
 def take_turns(
@@ -96,56 +156,47 @@ def take_turns(
     return seconds
 
 
-def measure(
-    options: BenchOptions,
-    tracers: Mapping[int, Trace],
-    duration_s: float,
-    on_round: Callable[[int], None] = lambda done: None,
-) -> dict[str, Any]:
-    """Times tracing in Morton and in row order.
+def spread_of(ratios: Sequence[float]) -> tuple[float, float] | None:
+    """Quartiles; None where there are fewer than two values."""
+    if len(ratios) < 2:
+        return None
+    low, _, high = quantiles(ratios, n=4)
+    return low, high
+
+
+def rate_row(
+    row: Row, work: float, ours_s: Sequence[float], peer_s: Sequence[float] | None, target: float | None = None
+) -> Row:
+    """Fills a row with rates.
 
     Args:
-        options: sizes and repetitions.
-        tracers: a renderer for each number of threads.
-        duration_s: length of the animation.
-        on_round: told how many repetitions are done.
-
-    Returns:
-        Counts of samples and rays, a row per case with samples per second (median, quartiles, all values), and the
-        median ratios that the cases are compared by.
+        row: group, name, unit, name of the peer, and note.
+        work: what is done in one round, in the numerator of ``unit``.
+        ours_s, peer_s: seconds of each round; None for the peer where it cannot be had.
+        target: least ratio.
     """
-    morton = morton_batches(options, duration_s)
-    orders = {"Morton": morton, "rows": [in_rows(batch) for batch in morton]}
-    cases = {
-        (threads, order): (lambda trace=trace, batches=batches: [trace(batch) for batch in batches])
-        for order, batches in orders.items()
-        for threads, trace in tracers.items()
-    }
-    seconds = take_turns(
-        {f"{threads} {order}": run for (threads, order), run in cases.items()}, options.repetitions, on_round
+    filled = dataclasses.replace(row, ours=work / median(ours_s), target=target, repetitions=len(ours_s))
+    if peer_s is None:
+        return filled
+    ratios = [theirs / mine for mine, theirs in zip(ours_s, peer_s, strict=True)]
+    return dataclasses.replace(filled, peer=work / median(peer_s), ratio=median(ratios), spread=spread_of(ratios))
+
+
+def limit_row(row: Row, values: Sequence[float], limit: float) -> Row:
+    """Fills a row with positive values that are to stay within a limit: the ratio is the limit over the value, and the
+    target 1."""
+    return limited_row(row, values, limit, [limit / value for value in values])
+
+
+def limited_row(row: Row, values: Sequence[float], limit: float, ratios: Sequence[float]) -> Row:
+    """As :func:`limit_row`, with ratios of the caller's: at least 1 within the limit."""
+    return dataclasses.replace(
+        row,
+        ours=median(values),
+        peer=limit,
+        ratio=median(ratios),
+        spread=spread_of(ratios),
+        target=1.0,
+        repetitions=len(values),
+        less_is_better=True,
     )
-    counters: dict[str, int] = {}
-    for batch in morton:
-        for name, value in next(iter(tracers.values()))(batch).counters.items():
-            counters[name] = counters.get(name, 0) + value
-    samples = sum(batch.position.shape[0] * batch.position.shape[1] for batch in morton)
-    rows = []
-    for threads, order in cases:
-        rates = [samples / taken for taken in seconds[f"{threads} {order}"]]
-        low, _, high = quantiles(rates, n=4)
-        row = {"threads": threads, "order": order, "samples_per_s": median(rates), "quartiles": (low, high)}
-        rows.append({**row, "all": rates})
-
-    def ratio(slower: str, faster: str) -> float:
-        return median(a / b for a, b in zip(seconds[slower], seconds[faster], strict=True))
-
-    one, many = min(tracers), max(tracers)
-    return {
-        "samples": samples,
-        "counters": counters,
-        "cases": rows,
-        "speed_up_of_threads": {order: ratio(f"{one} {order}", f"{many} {order}") for order in orders},
-        "speed_up_of_morton_order": {
-            str(threads): ratio(f"{threads} rows", f"{threads} Morton") for threads in tracers
-        },
-    }

@@ -1,38 +1,12 @@
-"""Measuring samples per second: what is asked of the renderer, and how turns are taken."""
+"""What a benchmark is made of: options, rows, turns."""
 
 from pathlib import Path
 
 import pytest
-import torch
 
-from analysis.bench import BenchOptions, in_rows, measure, morton_batches, take_turns
-from tsar.selection import sample_positions
-from tsar.types import FrameletBatch, SampleBatch
+from analysis.bench import GROUPS, BenchOptions, Row, counted, limit_row, limited_row, rate_row, take_turns
 
-SMALL = BenchOptions(Path("unused"), level=2, batch_size=6, framelet_side=4, repetitions=7)
-
-
-def test_batches_cover_the_picture_once_in_morton_order() -> None:
-    batches = morton_batches(SMALL, 3.0)
-    assert [batch.level.shape[0] for batch in batches] == [6, 5, 5]
-    for batch in batches:
-        assert torch.equal(batch.position, sample_positions(batch.level, batch.index, 4))
-        assert batch.time_s.unique().numel() == 1
-    assert [batch.time_s[0, 0].item() for batch in batches] == [0.5, 1.5, 2.5]
-    everything = torch.cat([batch.position.reshape(-1, 2) for batch in batches])
-    assert everything.unique(dim=0).shape[0] == everything.shape[0] == 16 * 16
-
-
-def test_rows_hold_the_same_samples_from_top_to_bottom() -> None:
-    batch = morton_batches(SMALL, 3.0)[1]
-    rows = in_rows(batch)
-    x, y = rows.position.reshape(-1, 2).T
-    key = y * 1000 + x
-    assert (key.diff() > 0).all()
-    assert torch.equal(
-        key.sort().values, (batch.position[..., 1] * 1000 + batch.position[..., 0]).flatten().sort().values
-    )
-    assert rows.time_s.shape == batch.time_s.shape
+ROW = Row("coherent", "camera rays", "M rays/s", 0.0, "Embree", note="kept")
 
 
 def test_cases_take_turns_both_ways() -> None:
@@ -42,34 +16,80 @@ def test_cases_take_turns_both_ways() -> None:
     assert rounds == [1, 2, 3] and all(len(values) == 3 for values in seconds.values())
 
 
-def test_measurement_counts_samples_and_rays() -> None:
-    asked = []
+def test_rates_and_the_median_of_the_ratios_of_the_rounds() -> None:
+    row = rate_row(ROW, 12.0, [1.0, 2.0, 4.0], [2.0, 2.0, 40.0], target=2.0)
+    assert (row.ours, row.peer, row.repetitions, row.note) == (6.0, 6.0, 3, "kept")
+    # of the rounds 2, 1 and 10; the ratio of the medians would be 1
+    assert row.ratio == 2.0 and row.met is True
+    assert row.spread == (1.0, 10.0)
 
-    def trace(batch: FrameletBatch) -> SampleBatch:
-        asked.append(batch)
-        count = batch.time_s.numel()
-        return SampleBatch(torch.zeros(*batch.time_s.shape, 3), {"primary_rays": count, "shadow_rays": 2 * count})
 
-    summary = measure(SMALL, {1: trace, 2: trace}, 3.0)
-    assert summary["samples"] == 256
-    assert summary["counters"] == {"primary_rays": 256, "shadow_rays": 512}
-    assert {(case["threads"], case["order"]) for case in summary["cases"]} == {
-        (threads, order) for threads in (1, 2) for order in ("Morton", "rows")
-    }
-    assert all(len(case["all"]) == 7 and case["samples_per_s"] > 0 for case in summary["cases"])
-    assert set(summary["speed_up_of_threads"]) == {"Morton", "rows"}
-    assert set(summary["speed_up_of_morton_order"]) == {"1", "2"}
-    assert len(asked) == 3 * (4 * 8 + 1)
+def test_a_target_is_missed_just_below_it() -> None:
+    seconds = [1.0] * 7
+    assert rate_row(ROW, 1.0, seconds, [1.999] * 7, target=2.0).met is False
+    assert rate_row(ROW, 1.0, seconds, [2.0] * 7, target=2.0).met is True
+    assert rate_row(ROW, 1.0, seconds, [2.0] * 7).met is None
+
+
+def test_without_a_peer_only_our_rate_is_known() -> None:
+    row = rate_row(ROW, 10.0, [2.0, 2.0, 2.0], None, target=3.0)
+    assert (row.ours, row.peer, row.ratio, row.spread, row.met) == (5.0, None, None, None, None)
+    assert row.target == 3.0
+
+
+def test_a_limit_is_kept_up_to_itself() -> None:
+    row = limit_row(ROW, [0.10, 0.15, 0.60], 0.15)
+    assert (row.ours, row.peer, row.target, row.met) == (0.15, 0.15, 1.0, True)
+    assert row.ratio == 1.0 and row.spread == pytest.approx((0.25, 1.5)) and row.less_is_better
+    assert limit_row(ROW, [0.16] * 3, 0.15).met is False
+
+
+def test_one_value_has_no_spread() -> None:
+    row = limited_row(ROW, [3.0], 2.0, [0.5])
+    assert row.spread is None and row.repetitions == 1 and row.met is False
+
+
+def test_a_stored_row_says_whether_it_met_its_target() -> None:
+    stored = limit_row(ROW, [1.0, 1.0], 2.0).record()
+    wanted = {"group", "name", "unit", "ours", "peer_name", "peer", "ratio", "spread", "target", "met", "repetitions"}
+    assert wanted <= set(stored) and stored["met"] is True
+
+
+def test_a_bar_moves_on_by_one_a_call() -> None:
+    shown = []
+    tick = counted(shown.append)
+    tick()
+    tick(17)
+    assert shown == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("only", "groups"),
+    [
+        ((), GROUPS),
+        (("start,coherent",), ("coherent", "start")),
+        (("order", "cores , order"), ("cores", "order")),
+    ],
+)
+def test_groups_are_asked_for_once_or_with_commas(only: tuple[str, ...], groups: tuple[str, ...]) -> None:
+    assert BenchOptions(only=only).groups == groups
+
+
+def test_figures_of_a_gpu_go_into_files_of_their_own() -> None:
+    assert BenchOptions().file_ending == "" and BenchOptions(device="cuda:0").file_ending == "-cuda"
 
 
 @pytest.mark.parametrize(
     ("change", "name"),
     [
-        ({"threads": 1}, "threads"),
+        ({"only": ("coherent,nonsense",)}, "nonsense"),
         ({"repetitions": 6}, "repetitions"),
-        ({"level": 9}, "level"),
-        ({"batch_size": 2000}, "batch_size"),
-        ({"framelet_side": 12}, "framelet_side"),
+        ({"resolution_px": 500}, "resolution_px"),
+        ({"resolution_px": 32}, "resolution_px"),
+        ({"batch_size": 1025}, "batch_size"),
+        ({"batch_size": 0}, "batch_size"),
+        ({"subdivisions": (4, 10)}, "subdivisions"),
+        ({"cycles": 99}, "cycles"),
     ],
 )
 def test_bad_options_are_named(change: dict, name: str) -> None:

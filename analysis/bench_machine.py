@@ -1,0 +1,65 @@
+"""The machine and the versions that a benchmark's figures belong to."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import os
+import platform
+from pathlib import Path
+from typing import Any
+
+PACKAGES = {
+    "torch": "torch",
+    "warp": "warp-lang",
+    "numpy": "numpy",
+    "embreex": "embreex",
+    "mitsuba": "mitsuba",
+    "PyWavelets": "PyWavelets",
+}
+"""Ours and the peers: name in the report and name of the distribution."""
+
+_CPU_INFO = Path("/proc/cpuinfo")
+
+
+def machine(device: str = "cpu") -> dict[str, Any]:
+    """CPU model, cores this process may use, memory, the GPU where one is used, and what other programs were at: the
+    load average of the last minute."""
+    import psutil
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    found = {"cpu": cpu_model(), "cores": cores, "memory_gib": round(psutil.virtual_memory().total / 2**30, 1)}
+    found["load_average"] = round(psutil.getloadavg()[0], 2)
+    if device != "cpu":
+        import torch
+
+        found["gpu"] = torch.cuda.get_device_name(device)
+    return found
+
+
+def cpu_model() -> str:
+    """Name of the processor as the system tells it."""
+    try:
+        with _CPU_INFO.open() as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def versions() -> dict[str, str | None]:
+    """Version of each package that ours is made of or compared with; None where it is not installed."""
+    found: dict[str, str | None] = {"python": platform.python_version()}
+    for name, distribution in PACKAGES.items():
+        try:
+            found[name] = importlib.metadata.version(distribution)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = None
+    return found
+
+
+def installed(module: str) -> bool:
+    """Whether a peer can be imported."""
+    return importlib.util.find_spec(module) is not None

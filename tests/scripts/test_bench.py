@@ -1,0 +1,73 @@
+"""The benchmark's command line: a part of it run, files compared, bad input refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.scripts.commands import assert_refused, call_script, nothing_in
+
+SMALL = ("--resolution-px", "64", "--batch-size", "8", "--scenes", "fly-by", "--repetitions", "7")
+
+
+def test_a_part_is_run_and_compared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    arguments = ("--only", "order", "--only", "cores", *SMALL, "--out", str(tmp_path))
+    assert call_script("bench.py", monkeypatch, *arguments) == 0
+    shown = capsys.readouterr().out
+    found = json.loads((tmp_path / "bench.json").read_text())
+    rows = {(row["group"], row["name"]): row for row in found["rows"]}
+    names = {("order", "fly-by, Morton order"), ("order", "bumpy sphere, Morton order")}
+    assert names <= set(rows) and {group for group, _ in rows} <= {"order", "cores"}
+    for key in names:
+        row = rows[key]
+        assert row["peer_name"] == "row order" and row["met"] is None and row["repetitions"] == 7
+        low, high = row["spread"]
+        assert 0.0 < low <= row["ratio"] <= high
+    assert found["machine"]["cpu"] in shown and "row order" in shown
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["rows"] == len(rows) and summary["config"]["only"] == ["order", "cores"]
+    assert set(summary["provenance"]) >= {"commit", "config_hash", "versions"}
+
+    same = str(tmp_path / "bench.json")
+    out = tmp_path / "unused"
+    assert call_script("bench.py", monkeypatch, "--compare", same, same, "--out", str(out)) == 0
+    assert "fly-by, Morton order" in capsys.readouterr().out and nothing_in(out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--only", "order,nonsense"), ("only", "nonsense")),
+        (("--repetitions", "3"), ("repetitions", "3")),
+        (("--resolution-px", "100"), ("resolution_px", "100")),
+        (("--scenes", "nonsense", "--only", "order"), ("nonsense", "fly-by")),
+        (("--compare", "missing-a.json", "missing-b.json"), ("compare", "missing-a.json")),
+        (("--nonsense",), ("--nonsense",)),
+    ],
+)
+def test_bad_input_ends_with_one_line(
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    out = tmp_path / "out"
+    status = call_script("bench.py", monkeypatch, *arguments, "--out", str(out))
+    assert_refused(status, capsys, parts)
+    assert nothing_in(out)
+
+
+def test_a_missing_gpu_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    import torch
+
+    if torch.cuda.is_available():
+        pytest.skip("there is one")
+    arguments = ("--device", "cuda:0", "--only", "order", "--out", str(tmp_path))
+    status = call_script("bench.py", monkeypatch, *arguments)
+    assert_refused(status, capsys, ("cuda:0",))
+    assert nothing_in(tmp_path)
