@@ -20,6 +20,10 @@ class Bars:
         number = self._progress.add_task(label, total=total)
         return lambda done: self._progress.update(number, completed=done)
 
+    def say(self, line: str) -> None:
+        """Prints a line above the bars."""
+        self._progress.console.print(line, highlight=False, markup=False, soft_wrap=True)
+
 
 @contextmanager
 def bars() -> Iterator[Bars]:

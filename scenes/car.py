@@ -24,7 +24,8 @@ from scenes.body import (
     wheel_housing,
 )
 from scenes.canonical import ConstantTexture, Instance, Material, Mesh, Phong, Rgb
-from scenes.meshing import Array, Surface, box, carve, ellipsoid, join, lathe, mirrored_y, moved, transformed, tube
+from scenes.cutting import carve
+from scenes.meshing import Array, Surface, box, ellipsoid, join, lathe, mirrored_y, moved, transformed, tube
 from scenes.wheel import RADIUS_M, brake, caliper, rim, tyre
 
 WHEELS = tuple((axle, side) for axle in (FRONT_AXLE_M, REAR_AXLE_M) for side in (1.0, -1.0))

@@ -9,7 +9,6 @@ import kornia.color
 import numpy as np
 import OpenEXR
 import torch
-import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -107,6 +106,8 @@ def read_mesh(path: Path) -> Mesh:
     path = Path(path)
     if not path.is_file():
         raise SceneError(f"mesh {path}: expected a mesh file, found none")
+    import trimesh  # slow, and the built-in scenes read no mesh
+
     try:
         loaded = trimesh.load_mesh(path, process=False)
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded

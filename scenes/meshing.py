@@ -1,9 +1,10 @@
-"""Building blocks of procedural meshes: grids, lathes, boxes, smooth normals, joining, and cutting along curves."""
+"""Building blocks of procedural meshes: grids, lathes, boxes, smooth normals, joining."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +60,16 @@ def unit(vectors: Array) -> Array:
     return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), np.array([0.0, 0.0, 1.0]))
 
 
-def smooth_normals(vertices: Array, faces: Indices, weld_m: float = 1e-6) -> Array:
+def smooth_normals(vertices: Array, faces: Indices, weld_m: float = 1e-6, piece: Indices | None = None) -> Array:
     """Normals averaged over the faces around each place, weighted by angle; coincident vertices share theirs.
 
     Args:
         vertices: ``(v, 3)``.
         faces: ``(f, 3)``.
         weld_m: vertices closer than about this count as one place.
+        piece: ``(v,)`` what each vertex belongs to; vertices of different pieces share nothing.
     """
-    _, place = np.unique(np.round(vertices / weld_m).astype(np.int64), axis=0, return_inverse=True)
-    place = place.reshape(-1)
+    place = _places(np.round(vertices / weld_m).astype(np.int64), piece)
     sums = np.zeros((place.max() + 1, 3))
     corners = vertices[faces]
     face_normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -80,6 +81,16 @@ def smooth_normals(vertices: Array, faces: Indices, weld_m: float = 1e-6) -> Arr
         angle = np.arccos(np.clip(np.einsum("ij,ij->i", ahead, behind), -1.0, 1.0)) * proper
         np.add.at(sums, place[faces[:, corner]], face_normal * angle[:, None])
     return unit(sums[place])
+
+
+def _places(cells: Indices, piece: Indices | None) -> Indices:
+    """Numbers ``(v,)`` that are equal where rows of cells ``(v, 3)`` and pieces are."""
+    keys = np.array([*cells.T, *([] if piece is None else [piece])])
+    order = np.lexsort(keys)
+    fresh = (keys[:, order[1:]] != keys[:, order[:-1]]).any(axis=0)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.concatenate([[0], np.cumsum(fresh)])
+    return place
 
 
 def from_faces(vertices: Array, faces: Indices, uvs: Array | None = None) -> Surface:
@@ -105,12 +116,20 @@ def grid(points: Array) -> Surface:
     Args:
         points: ``(m, n, 3)``; outside is where ``∂/∂m × ∂/∂n`` points. uv runs from 0 to 1 along ``(m, n)``.
     """
-    rows, columns = points.shape[:2]
-    index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return grids(points[None])
+
+
+def grids(nets: Array) -> Surface:
+    """Surfaces through nets ``(k, m, n, 3)`` as :func:`grid` makes them, joined; edges between them stay sharp."""
+    count, rows, columns = nets.shape[:3]
+    index = np.arange(count * rows * columns).reshape(count, rows, columns)
+    a, b, c, d = index[:, :-1, :-1], index[:, 1:, :-1], index[:, 1:, 1:], index[:, :-1, 1:]
+    halves = [np.stack(corners, -1).reshape(count, -1, 3) for corners in ((a, b, c), (a, c, d))]
+    vertices, faces = np.asarray(nets, np.float64).reshape(-1, 3), np.concatenate(halves, axis=1).reshape(-1, 3)
     u, v = np.meshgrid(np.linspace(0.0, 1.0, rows), np.linspace(0.0, 1.0, columns), indexing="ij")
-    return from_faces(points.reshape(-1, 3), faces, np.stack([u, v], -1).reshape(-1, 2))
+    uvs = np.tile(np.stack([u, v], -1).reshape(-1, 2), (count, 1))
+    piece = np.repeat(np.arange(count), rows * columns)
+    return Surface(vertices, faces, smooth_normals(vertices, faces, piece=piece), uvs)
 
 
 def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> Surface:
@@ -136,20 +155,23 @@ def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> Surface:
 
 def box(lower: Sequence[float], upper: Sequence[float]) -> Surface:
     """An axis-aligned box with flat faces; uv in metres along the faces."""
-    low, high = np.asarray(lower, np.float64), np.asarray(upper, np.float64)
-    sides = []
+    return boxes([(lower, upper)])
+
+
+def boxes(spans: Sequence[tuple[Sequence[float], Sequence[float]]]) -> Surface:
+    """Boxes by their lower and upper corners, joined: as :func:`box`, but all at once."""
+    ends = np.asarray(spans, np.float64)
+    corners = np.empty((len(ends), 3, 2, 2, 2, 3))  # box, axis, side, net
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
-        for side in (0, 1):
-            corners = np.zeros((2, 2, 3))
-            corners[..., axis] = (low, high)[side][axis]
-            for i, j in np.ndindex(2, 2):
-                corners[i, j, u], corners[i, j, v] = (low, high)[i][u], (low, high)[j][v]
-            sheet = grid(corners if side else corners.transpose(1, 0, 2))
-            # u is always the horizontal axis of a wall and v its height
-            pair = (u, v) if axis != 1 else (v, u)
-            sides.append(replace(sheet, uvs=sheet.vertices[:, pair]))
-    return join(sides)
+        net = corners[:, axis]
+        net[..., axis] = ends[:, :, None, None, axis]
+        net[..., u], net[..., v] = ends[:, None, :, None, u], ends[:, None, None, :, v]
+        net[:, 0] = net[:, 0].transpose(0, 2, 1, 3).copy()  # turned over: the lower side faces down the axis
+    sheets = grids(corners.reshape(-1, 2, 2, 3))
+    # u is always the horizontal axis of a wall and v its height
+    uvs = np.stack([corners[:, axis][..., pair] for axis, pair in enumerate(([1, 2], [0, 2], [0, 1]))], axis=1)
+    return replace(sheets, uvs=uvs.reshape(-1, 2))
 
 
 def extrude(outline: Array, lower: float, upper: float) -> Surface:
@@ -179,11 +201,17 @@ def tube(start: Sequence[float], end: Sequence[float], radius: float, end_radius
 
 def ellipsoid(center: Sequence[float], radii: Sequence[float], rings: int = 10, segments: int = 16) -> Surface:
     """An ellipsoid with its axes along x, y and z."""
-    turn = np.linspace(np.pi, 0.0, rings + 1)
-    ball = lathe(np.stack([np.sin(turn), np.cos(turn)], -1), segments)
+    ball = _ball(rings, segments)
     scale = np.asarray(radii, np.float64)
     vertices = ball.vertices * scale + np.asarray(center, np.float64)
     return replace(ball, vertices=vertices, normals=unit(ball.normals / scale))
+
+
+@lru_cache(maxsize=8)
+def _ball(rings: int, segments: int) -> Surface:
+    """A ball of radius one; shared, so never changed in place."""
+    turn = np.linspace(np.pi, 0.0, rings + 1)
+    return lathe(np.stack([np.sin(turn), np.cos(turn)], -1), segments)
 
 
 def transformed(surface: Surface, rotation: Array, translation: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Surface:
@@ -212,65 +240,3 @@ def join(parts: Sequence[Surface]) -> Surface:
         np.concatenate([part.normals for part in parts]),
         np.concatenate([part.uvs for part in parts]),
     )
-
-
-def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
-    """Cuts a surface along the zero line of a function, splitting the triangles it crosses.
-
-    Args:
-        surface: what to cut.
-        value: ``(v,)`` the function at the vertices, linear in between.
-
-    Returns:
-        The part where the function is negative, and the rest; normals and uv are interpolated on the cut.
-    """
-    value = np.where(np.abs(value) < 1e-9, 1e-9, value)
-    below = value < 0.0
-    count = below[surface.faces].sum(axis=1)
-    inside = [surface.faces[count == 3]]
-    outside = [surface.faces[count == 0]]
-    crossed = surface.faces[(count == 1) | (count == 2)]
-    if len(crossed) == 0:
-        return replace(surface, faces=inside[0]).compact(), replace(surface, faces=outside[0]).compact()
-    lone = below[crossed] == (below[crossed].sum(axis=1) == 1)[:, None]
-    shift = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(crossed, shift, axis=1).T  # a is alone on its side
-    both = np.sort(np.concatenate([np.stack([a, b], -1), np.stack([a, c], -1)]), axis=1)
-    edges, which = np.unique(both, axis=0, return_inverse=True)
-    low, high = edges.T
-    share = (value[low] / (value[low] - value[high]))[:, None]
-    fresh = which.reshape(-1) + len(surface.vertices)
-    ab, ac = fresh[: len(a)], fresh[len(a) :]
-
-    def blend(array: Array) -> Array:
-        return np.concatenate([array, array[low] * (1.0 - share) + array[high] * share])
-
-    tip = np.stack([a, ab, ac], -1)
-    rest = np.concatenate([np.stack([ab, b, c], -1), np.stack([ab, c, ac], -1)])
-    tip_below = below[a]
-    inside += [tip[tip_below], rest[np.tile(~tip_below, 2)]]
-    outside += [tip[~tip_below], rest[np.tile(tip_below, 2)]]
-    whole = Surface(blend(surface.vertices), np.concatenate(inside), unit(blend(surface.normals)), blend(surface.uvs))
-    return whole.compact(), replace(whole, faces=np.concatenate(outside)).compact()
-
-
-def carve(surface: Surface, *sides: Callable[[Array], Array]) -> tuple[Surface, Surface]:
-    """Cuts out where every one of several functions of the vertices ``(v, 3)`` is negative, one after the other, so
-    that corners between them stay sharp.
-
-    Returns:
-        What was cut out, and the rest.
-    """
-    inside, rest = surface, []
-    for side in sides:
-        inside, outside = cut(inside, side(inside.vertices))
-        rest.append(outside)
-    return inside, join(rest)
-
-
-def boundary_edges(surface: Surface) -> Indices:
-    """Edges ``(k, 2)`` that belong to one triangle only, in that triangle's direction."""
-    edges = np.concatenate([surface.faces[:, [i, (i + 1) % 3]] for i in range(3)])
-    key, place, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    del key
-    return edges[place[count == 1]]

@@ -8,6 +8,7 @@ Source: Stephens 2011, sec. 7.1.1.1, which describes such a world; geometry and 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -27,7 +28,7 @@ from scenes.canonical import (
     Rgb,
 )
 from scenes.loading import asset, clamp_radiance, read_image
-from scenes.meshing import Array, Surface, box, ellipsoid, extrude, grid, join, moved, tube
+from scenes.meshing import Array, Surface, box, boxes, ellipsoid, extrude, grid, grids, join, moved, tube
 
 ROAD_HALF_WIDTH_M = 6.0
 ROAD_LENGTH_M = 240.0
@@ -119,17 +120,22 @@ def _facade() -> NDArray[np.float32]:
     return image.astype(np.float32)
 
 
-def _sheet(x: tuple[float, float], y: tuple[float, float], height: float) -> Surface:
-    """A level rectangle that faces up; uv is ``(x, y)`` in metres."""
-    corners = np.array([[[x[0], y[0], height], [x[0], y[1], height]], [[x[1], y[0], height], [x[1], y[1], height]]])
-    level = grid(corners)
-    return Surface(level.vertices, level.faces, level.normals, level.vertices[:, :2])
+Span = tuple[float, float]
+
+
+def _sheets(spans: Sequence[tuple[Span, Span]], height: float) -> Surface:
+    """Level rectangles that face up, each from its spans along x and y; uv is ``(x, y)`` in metres."""
+    (west, east), (south, north) = np.moveaxis(np.asarray(spans, np.float64), 0, -1)
+    level = np.full_like(west, height)
+    corners = [np.stack([x, y, level], -1) for x in (west, east) for y in (south, north)]
+    sheets = grids(np.stack(corners, 1).reshape(-1, 2, 2, 3))
+    return Surface(sheets.vertices, sheets.faces, sheets.normals, sheets.vertices[:, :2])
 
 
 def _paving() -> Surface:
     half, far = ROAD_HALF_WIDTH_M, ROAD_LENGTH_M
-    arms = [_sheet((-half, half), side, 0.0) for side in ((-far, -half), (half, far))]
-    return join([_sheet((-far, far), (-half, half), 0.0), *arms])
+    arms = [((-half, half), side) for side in ((-far, -half), (half, far))]
+    return _sheets([((-far, far), (-half, half)), *arms], 0.0)
 
 
 def _markings() -> Surface:
@@ -138,11 +144,11 @@ def _markings() -> Surface:
     dashes = []
     for start in np.arange(half + 3.0, ROAD_LENGTH_M, 6.0):
         for low, high in ((start, start + 3.0), (-start - 3.0, -start)):
-            dashes += [_sheet((low, high), (-0.08, 0.08), 0.004), _sheet((-0.08, 0.08), (low, high), 0.004)]
+            dashes += [((low, high), (-0.08, 0.08)), ((-0.08, 0.08), (low, high))]
     stops = [((half + 0.8, half + 1.2), (0.3, half - 0.3)), ((-half - 1.2, -half - 0.8), (0.3 - half, -0.3))]
     for along, across in stops:
-        dashes += [_sheet(along, across, 0.004), _sheet((-across[1], -across[0]), along, 0.004)]
-    return join(dashes)
+        dashes += [(along, across), ((-across[1], -across[0]), along)]
+    return _sheets(dashes, 0.004)
 
 
 def _kerbs() -> Surface:
@@ -152,9 +158,9 @@ def _kerbs() -> Surface:
         for low, high in ((start, start + 1.985), (-start - 1.985, -start)):
             for side in (-1.0, 1.0):
                 near, far = sorted((side * half, side * (half + 0.22)))
-                stones.append(box((low, near, -0.1), (high, far, 0.12)))
-                stones.append(box((near, low, -0.1), (far, high, 0.12)))
-    return join(stones)
+                stones.append(((low, near, -0.1), (high, far, 0.12)))
+                stones.append(((near, low, -0.1), (far, high, 0.12)))
+    return boxes(stones)
 
 
 _HOUSES = (
@@ -190,7 +196,7 @@ def _roofs() -> Surface:
             lower = [np.append(eaves[side], low), np.append(eaves[after], low)]
             upper = [np.append(ridge[side], high), np.append(ridge[after], high)]
             roofs.append(grid(np.array([[lower[0], upper[0]], [lower[1], upper[1]]])))
-        roofs.append(_sheet((ridge[0, 0], ridge[1, 0]), (ridge[0, 1], ridge[2, 1]), high))
+        roofs.append(_sheets([((ridge[0, 0], ridge[1, 0]), (ridge[0, 1], ridge[2, 1]))], high))
     return join(roofs)
 
 

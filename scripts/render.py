@@ -14,7 +14,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import writable_folder, write_json
-from analysis.records import provenance
 from analysis.render_options import RenderOptions, previous_job
 
 
@@ -25,6 +24,7 @@ def main() -> None:
         writable_folder(options.out, "out")
 
     from analysis.progress import bars
+    from analysis.records import provenance
     from renderer.film import FilmError
     from renderer.sequence import render_stills, still_path, write_film
     from renderer.trace import Renderer

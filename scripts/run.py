@@ -11,13 +11,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import parse, run_cli
-from analysis.experiment import RunOptions, run_experiment
+from analysis.experiment import run_experiment
+from analysis.run_options import RunOptions
+from analysis.start import process_began_s
 
 
 def main() -> None:
     """Parses, runs, prints what came out and where it is."""
     options = parse(RunOptions, __doc__ or "")
-    summary = run_experiment(options)
+    summary = run_experiment(options, process_began_s())
 
     from rich.console import Console
     from rich.table import Table

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import errno
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -103,6 +106,39 @@ def test_run_cli_hides_neither_success_nor_faults_of_the_program() -> None:
     assert done == [1]
     with pytest.raises(ValueError, match="a fault"):
         run_cli(raising(ValueError("a fault")))
+
+
+def test_idle_threads_spin_briefly_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
+    for name in names:
+        monkeypatch.setenv(name, "")
+        monkeypatch.delenv(name)
+    found: list[tuple[str | None, ...]] = []
+
+    def main() -> None:
+        found.append(tuple(os.environ.get(name) for name in names))
+
+    run_cli(main)
+    monkeypatch.setenv("GOMP_SPINCOUNT", "7")
+    run_cli(main)
+    monkeypatch.delenv("GOMP_SPINCOUNT")
+    monkeypatch.setenv("OMP_WAIT_POLICY", "active")
+    run_cli(main)
+    brief = found[0][0]
+    assert brief is not None and 0 < int(brief) < 100_000
+    assert found == [(brief, None), ("7", None), (None, "active")]
+
+
+def test_the_spinning_is_settled_before_torch_is_imported() -> None:
+    """The library reads it once; a script that imports torch at its top would come too late."""
+    answer = "print('torch' in sys.modules, 'GOMP_SPINCOUNT' in os.environ)"
+    program = f"import os, sys, analysis.cli as c\nc.run_cli(lambda: {answer})"
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
+    }
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run([sys.executable, "-c", program], cwd=root, env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == ["False", "True"], done.stderr
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenes.cutting import boundary_edges, carve, cut
 from scenes.meshing import (
     Surface,
-    boundary_edges,
     box,
-    carve,
-    cut,
+    boxes,
     ellipsoid,
     extrude,
     flat,
     from_faces,
     grid,
+    grids,
     join,
     lathe,
     mirrored_y,
@@ -23,6 +23,7 @@ from scenes.meshing import (
     smooth_normals,
     transformed,
     tube,
+    unit,
 )
 from tests.scenes.builders import areas, corners, face_normals, open_edges, volume
 
@@ -114,6 +115,32 @@ def test_box_has_flat_faces_and_uv_in_metres() -> None:
     assert np.abs(wall.normals).max(axis=1) == pytest.approx(1.0)
     uprights = np.abs(wall.normals[:, 2]) < 0.5
     assert wall.uvs[uprights, 1] == pytest.approx(wall.vertices[uprights, 2])
+
+
+def bits(surface: Surface) -> list[bytes]:
+    """Everything of a surface, to the last bit and the sign of zeros."""
+    return [array.tobytes() for array in (surface.vertices, surface.faces, surface.normals, surface.uvs)]
+
+
+def test_many_grids_at_once_are_the_same_as_one_by_one() -> None:
+    """Also where nets share an edge: each keeps normals of its own."""
+    nets = np.random.default_rng(1).standard_normal((5, 4, 3, 3))
+    nets[1, 0], nets[3] = nets[0, -1], nets[2]
+    found = grids(nets)
+    assert bits(found) == bits(join([grid(net) for net in nets]))
+    shared = [found.normals.reshape(5, 4, 3, 3)[1, 0], found.normals.reshape(5, 4, 3, 3)[0, -1]]
+    assert not np.allclose(*shared)
+
+
+def test_many_boxes_at_once_are_the_same_as_one_by_one() -> None:
+    """A side of a box is the net of its corners, walked so that it faces outwards."""
+    low = np.random.default_rng(2).standard_normal((6, 3))
+    spans = [(tuple(corner), tuple(corner + size)) for corner, size in zip(low, np.abs(low) + 0.1, strict=True)]
+    spans[3] = (spans[2][0], spans[2][1])
+    found = boxes(spans)
+    assert bits(found) == bits(join([box(*span) for span in spans]))
+    assert volume(found) == pytest.approx(sum(np.prod(np.subtract(*span[::-1])) for span in spans))
+    assert np.allclose(np.repeat(unit(face_normals(found)), 3, axis=0), found.normals[found.faces.reshape(-1)])
 
 
 def test_flat_separates_triangles() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -50,12 +52,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def printed(folder: Path) -> str:
-    """What the run prints; its results lie in ``out``."""
+def done(folder: Path) -> subprocess.CompletedProcess[str]:
+    """A run in a process of its own; its results lie in ``out``."""
     where = ("--threads", "2", "--frames", "--out", "out", "--cache", "cache")
     done = run_script("run.py", folder, "fly-by", *SIZE, *SPAN, *where)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+    return done
+
+
+@pytest.fixture(scope="module")
+def printed(done: subprocess.CompletedProcess[str]) -> str:
+    """What the run prints."""
     return done.stdout
 
 
@@ -130,6 +138,27 @@ def test_work_is_accounted_for(summary: dict[str, Any], folder: Path) -> None:
     assert stages <= set(summary["stage_wall_s"]) and stages == set(summary["stage_flops"])
     assert min(summary["stage_wall_s"].values()) > 0.0
     assert sum(summary["stage_flops"].values()) == pytest.approx(cycles * summary["cycle_s"] * 3e10)
+
+
+def test_the_time_to_the_first_cycle_is_told(
+    done: subprocess.CompletedProcess[str], summary: dict[str, Any], again: tuple[dict[str, Any], int]
+) -> None:
+    told = re.findall(r"^first cycle after ([0-9.]+) s$", done.stderr, re.MULTILINE)
+    found = summary["start"]["first_cycle_s"]
+    assert len(told) == 1 and float(told[0]) == pytest.approx(found, abs=0.006)
+    assert 0.0 < again[0]["start"]["first_cycle_s"] < 60.0, "from the call where no process start is given"
+
+
+def test_the_first_cycle_does_not_wait_for_the_reference(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    def obtain(*arguments: Any) -> None:
+        raise ValueError("no room for the reference")
+
+    monkeypatch.setattr(analysis.reference, "obtain", obtain)
+    with pytest.raises(InputError, match="no room for the reference"):
+        run_experiment(options(tmp_path, "out", threads=1))
+    assert "first cycle after" in capsys.readouterr().err and nothing_in(tmp_path / "out")
 
 
 def test_invariants_hold(summary: dict[str, Any]) -> None:

@@ -1,0 +1,66 @@
+"""The start of a run: how long it takes until the first cycle has ended, and imports that do not wait for the collector
+of garbage."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import chain, islice
+from pathlib import Path
+from typing import TypeVar
+
+Item = TypeVar("Item")
+
+_STAT = Path("/proc/self/stat")
+_START_FIELD = 22 - 3  # of those after the name: clock ticks from boot to the start of the process
+
+
+def process_began_s() -> float:
+    """When this process began, on the clock of :func:`time.monotonic`, seconds; good to 10 ms."""
+    try:
+        ticks = int(_STAT.read_text().rpartition(")")[2].split()[_START_FIELD])
+        age_s = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, AttributeError):  # not Linux; elsewhere psutil is as exact, here it knows whole seconds only
+        import psutil
+
+        age_s = time.time() - psutil.Process().create_time()
+    return time.monotonic() - age_s
+
+
+@contextmanager
+def first_imports() -> Iterator[None]:
+    """Marks a block that imports large packages.
+
+    What they make stays for good, so the collector of garbage need not look through it: neither now, over and over, nor
+    later.
+    """
+    before, collecting = len(sys.modules), gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
+        if len(sys.modules) > before:
+            gc.freeze()
+
+
+def first_made(items: Iterator[Item], began_s: float, say: Callable[[str], None]) -> tuple[Iterator[Item], float]:
+    """Makes the first item of a run now, and says how long that took from the beginning.
+
+    Args:
+        items: cycles of the adaptive run.
+        began_s: the beginning, on the clock of :func:`time.monotonic`.
+        say: takes one line of text.
+
+    Returns:
+        The same items, and the seconds.
+    """
+    first = list(islice(items, 1))
+    seconds = time.monotonic() - began_s
+    say(f"first cycle after {seconds:.2f} s")
+    return chain(first, items), seconds

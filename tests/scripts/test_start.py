@@ -1,0 +1,56 @@
+"""Command lines answer before anything large is imported."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.scripts.commands import ROOT
+
+SCRIPTS = sorted(path.name for path in (ROOT / "scripts").glob("*.py") if path.name != "__init__.py")
+HEAVY = (
+    *("torch", "warp", "kornia", "scipy", "matplotlib", "pandas", "pyarrow", "av", "trimesh", "OpenEXR", "mitsuba"),
+    *("embreex", "pywt", "dask", "distributed", "renderer", "scenes"),
+)
+PROGRAM = """
+import json, runpy, sys
+sys.argv, status = sys.argv[1:], 0
+try:
+    runpy.run_path(sys.argv[0], run_name="__main__")
+except SystemExit as stop:
+    status = stop.code or 0
+print("\\n" + json.dumps([status, sorted({name.partition(".")[0] for name in sys.modules})]))
+"""
+
+
+def start(folder: Path, *arguments: str) -> tuple[int, set[str], str]:
+    """Exit status of a script, top-level packages it has imported, and what it printed."""
+    command = [sys.executable, "-c", PROGRAM, *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
+    shown, _, last = done.stdout.rstrip().rpartition("\n")
+    status, modules = json.loads(last)
+    return status, set(modules), shown + done.stderr
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_help_imports_nothing_large(name: str, tmp_path: Path) -> None:
+    status, modules, shown = start(tmp_path, str(ROOT / "scripts" / name), "--help")
+    assert status == 0 and "usage" in shown.lower() and "tyro" in modules
+    assert not modules & set(HEAVY)
+
+
+def test_a_bad_option_is_refused_as_early(tmp_path: Path) -> None:
+    status, modules, shown = start(tmp_path, str(ROOT / "scripts" / "run.py"), "fly-by", "--batch-size", "-1")
+    assert status == 2 and "batch_size" in shown
+    assert not modules & set(HEAVY)
+
+
+def test_a_large_import_is_seen(tmp_path: Path) -> None:
+    """The check above can fail."""
+    (tmp_path / "slow.py").write_text("import sys, scipy, scenes.canonical\nsys.exit(3)\n")
+    status, modules, _ = start(ROOT, str(tmp_path / "slow.py"))
+    assert status == 3 and modules & set(HEAVY) >= {"scipy", "scenes"}
