@@ -39,16 +39,14 @@ class Queries:
 _NATIVE = Path(__file__).resolve().parent / "native"
 _HEADERS = sorted(_NATIVE.glob("*.h"))
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "extra_build_options": wp.ModuleBuildOptions(
-            extra_cpu_include_dirs=[str(_NATIVE)],
-            extra_cpu_preamble="".join(f'#include "{header.name}"\n' for header in _HEADERS),
-            extra_build_dependencies=[str(header) for header in _HEADERS],
-        ),
-    }
+BUILD_OPTIONS = wp.ModuleBuildOptions(
+    extra_cpu_include_dirs=[str(_NATIVE)],
+    extra_cpu_preamble="".join(f'#include "{header.name}"\n' for header in _HEADERS),
+    extra_build_dependencies=[str(header) for header in _HEADERS],
 )
+"""What a module of kernels needs to call what is in ``native/``."""
+
+wp.set_module_options({"enable_backward": False, "extra_build_options": BUILD_OPTIONS})
 
 
 @wp.func_native("packets::build_tree(vertices, faces, boxes, order, nodes, blocks, counts);")

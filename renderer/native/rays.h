@@ -17,6 +17,8 @@ constexpr float ROUNDING_UP = 1.0000005f;
 constexpr float PADDING = 4.0e-7f;
 // Packets whose directions differ by more than this along an axis are walked ray by ray.
 constexpr float SPREAD_MAX = 0.25f;
+// Where no more lanes than this pass a box, they go on alone.
+constexpr int FEW = 2;
 
 template <class F> inline F reciprocal(F x) { return 1.0f / (vabs(x) > TINY ? x : (F)TINY); }
 inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TINY); }
@@ -64,7 +66,7 @@ struct Single {
     float near_origin[3], far_origin[3];  // moved by the padding, outwards
     float shear[3];
     int kx, ky, kz;
-    bool backwards[3];
+    int near_side[3], far_side[3];  // where a node holds the sides that are met first and last
 
     Single(const float* from, const float* along) {
         kz = fastest_axis(along[0], along[1], along[2]), kx = (kz + 1) % 3, ky = (kz + 2) % 3;
@@ -78,9 +80,10 @@ struct Single {
         pad *= PADDING;
         for (int axis = 0; axis < 3; ++axis) {
             origin[axis] = from[axis], inverse[axis] = reciprocal(along[axis]);
-            backwards[axis] = inverse[axis] < 0.0f;
-            near_origin[axis] = backwards[axis] ? from[axis] - pad : from[axis] + pad;
-            far_origin[axis] = backwards[axis] ? from[axis] + pad : from[axis] - pad;
+            const bool backwards = inverse[axis] < 0.0f;
+            near_origin[axis] = backwards ? from[axis] - pad : from[axis] + pad;
+            far_origin[axis] = backwards ? from[axis] + pad : from[axis] - pad;
+            near_side[axis] = (backwards ? 3 + axis : axis) * WIDTH, far_side[axis] = (backwards ? axis : 3 + axis) * WIDTH;
         }
     }
 };
@@ -120,14 +123,13 @@ inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, 
     return found;
 }
 
-// One ray from the root. `any` ends at the first hit; `hit.t` holds how far to look.
-template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit) {
+// One ray from a node, or a leaf, on. `any` ends at the first hit; `hit.t` holds how far to look.
+template <bool any> inline bool walk(const Tree& tree, int current, const Single& ray, RayHit& hit) {
     struct Entry {
         float near;
         int child;
     } stack[STACK];
     int size = 0;
-    int current = 0;
     bool found = false;
     const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
     const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
@@ -136,9 +138,8 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
             const Node& node = tree.nodes[current];
             f8 near = 0.0f, far = hit.t;
             for (int axis = 0; axis < 3; ++axis) {
-                const bool back = ray.backwards[axis];
-                f8 close = load<f8>(back ? node.upper[axis] : node.lower[axis]);
-                f8 away = load<f8>(back ? node.lower[axis] : node.upper[axis]);
+                const f8 close = load<f8>(node.lower[0] + ray.near_side[axis]);
+                const f8 away = load<f8>(node.lower[0] + ray.far_side[axis]);
                 near = vmax(near, (close - ray.near_origin[axis]) * ray.inverse[axis]);
                 far = vmin(far, (away - ray.far_origin[axis]) * ray.inverse[axis]);
             }
@@ -259,7 +260,51 @@ inline unsigned children_met(const Node& node, const Packet& rays, const PacketH
     return met;
 }
 
-// A packet from the root. Returns the lanes that found a hit; `any` drops a lane (by a negative `hit.t`) at its first.
+// The packet against a leaf, triangle by triangle. Returns the lanes with a new hit; `any` idles them.
+template <bool any>
+inline unsigned meet_leaf(const Block* leaf, int triangles, const Packet& rays, PacketHit& hit) {
+    unsigned changed = 0;
+    for (int number = 0; number < triangles; ++number) {
+        const Block& block = leaf[number / BLOCK_WIDTH];
+        const int lane = number % BLOCK_WIDTH;
+        Vec16 corner[3];
+        for (int k = 0; k < 3; ++k) {
+            corner[k].x = block.corner[k][rays.kx][lane] - rays.origin[rays.kx];
+            corner[k].y = block.corner[k][rays.ky][lane] - rays.origin[rays.ky];
+            corner[k].z = block.corner[k][rays.kz][lane] - rays.origin[rays.kz];
+        }
+        f16 t, u, v;
+        i16 inside = meets_triangle(corner[0], corner[1], corner[2], rays.shear, t, u, v);
+        if (!bits(inside)) continue;
+        const int face = block.face[lane];
+        inside = inside & ((t < hit.t) | ((t == hit.t) & (face < hit.face)));
+        changed |= bits(inside);
+        hit.t = inside ? any ? (f16)-1.0f : t : hit.t;
+        if (any) continue;
+        hit.u = inside ? u : hit.u, hit.v = inside ? v : hit.v;
+        hit.face = inside ? (i16)face : hit.face;
+    }
+    return changed;
+}
+
+// Some lanes one by one, from a node or leaf on. Returns those with a new hit; `any` idles them.
+template <bool any>
+inline unsigned walk_alone(const Tree& tree, int child, const Vec16& from, const Vec16& along, unsigned lanes,
+                           PacketHit& hit) {
+    unsigned changed = 0;
+    for (; lanes; lanes &= lanes - 1) {
+        const int lane = first_bit(lanes);
+        const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
+        const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
+        RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
+        if (!walk<any>(tree, child, Single(origin, direction), one)) continue;
+        changed |= 1u << lane;
+        hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
+    }
+    return changed;
+}
+
+// A packet from the root. Returns the lanes that found a hit; `any` idles a lane (by a negative `hit.t`) at its first.
 template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, PacketHit& hit) {
     struct Entry {
         float near;
@@ -277,65 +322,29 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
         // Now by each ray, and only as far as its own hit.
         const unsigned active = entry.parent ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
         if (!active) continue;
-        if (entry.child >= 0) {
+        unsigned changed;
+        if (__builtin_popcount(active) <= FEW) {
+            changed = walk_alone<any>(tree, entry.child, rays.origin, rays.direction, active, hit);
+        } else if (entry.child < 0) {
+            changed = meet_leaf<any>(tree.blocks + (~entry.child >> 3), (~entry.child & 7) + 1, rays, hit);
+        } else {
             const Node& node = tree.nodes[entry.child];
+            const int base = size;
             f8 near;
-            int base = size;
             for (unsigned met = children_met(node, rays, hit, reach, near); met; met &= met - 1) {
-                int lane = first_bit(met);
+                const int lane = first_bit(met);
                 prefetch(tree, node.child[lane]);
-                float at = near[lane];
+                const float at = near[lane];
                 int slot = size++;
                 for (; slot > base && stack[slot - 1].near < at; --slot) stack[slot] = stack[slot - 1];
                 stack[slot] = {at, node.child[lane], &node, lane};
             }
             continue;
         }
-        const Block* leaf = tree.blocks + (~entry.child >> 3);
-        const int count = (~entry.child & 7) + 1;
-        unsigned changed = 0;
-        if (__builtin_popcount(active) <= count / 2) {
-            // Few rays are left of the packet: each tests four triangles at once.
-            for (unsigned left = active; left; left &= left - 1) {
-                const int lane = first_bit(left);
-                RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
-                const Vec<f4> from = {(f4)rays.origin[rays.kx][lane], (f4)rays.origin[rays.ky][lane],
-                                      (f4)rays.origin[rays.kz][lane]};
-                const Vec<f4> shear = {(f4)rays.shear.x[lane], (f4)rays.shear.y[lane], (f4)rays.shear.z[lane]};
-                if (!meet_leaf(leaf, count, from, shear, rays.kx, rays.ky, rays.kz, one)) continue;
-                changed |= 1u << lane;
-                hit.t[lane] = any ? -1.0f : one.t;
-                hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
-            }
-        } else for (int number = 0; number < count; ++number) {
-            const Block& block = leaf[number / BLOCK_WIDTH];
-            const int i = number % BLOCK_WIDTH;
-            Vec16 corner[3];
-            for (int k = 0; k < 3; ++k) {
-                corner[k].x = block.corner[k][rays.kx][i] - rays.origin[rays.kx];
-                corner[k].y = block.corner[k][rays.ky][i] - rays.origin[rays.ky];
-                corner[k].z = block.corner[k][rays.kz][i] - rays.origin[rays.kz];
-            }
-            f16 t, u, v;
-            i16 inside = meets_triangle(corner[0], corner[1], corner[2], rays.shear, t, u, v);
-            if (!bits(inside)) continue;
-            const int face = block.face[i];
-            inside = inside & ((t < hit.t) | ((t == hit.t) & (face < hit.face)));
-            if (any) {
-                hit.t = inside ? (f16)-1.0f : hit.t;
-            } else {
-                hit.t = inside ? t : hit.t;
-                hit.u = inside ? u : hit.u;
-                hit.v = inside ? v : hit.v;
-                hit.face = inside ? (i16)face : hit.face;
-            }
-            changed |= bits(inside);
-        }
-        if (changed) {
-            found |= changed;
-            reach = greatest(hit.t);
-            if (any && reach < 0.0f) break;
-        }
+        if (!changed) continue;
+        found |= changed;
+        reach = greatest(hit.t);
+        if (any && reach < 0.0f) break;
     }
     return found;
 }
@@ -344,17 +353,7 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
 template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, const Vec16& along, PacketHit& hit) {
     Packet rays(from, along);
     if (rays.together) return walk<any>(tree, rays, hit);
-    unsigned found = 0;
-    for (unsigned busy = bits(hit.t >= 0.0f); busy; busy &= busy - 1) {
-        int lane = first_bit(busy);
-        float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
-        float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
-        RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
-        if (!walk<any>(tree, Single(origin, direction), one)) continue;
-        found |= 1u << lane;
-        hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
-    }
-    return found;
+    return walk_alone<any>(tree, 0, from, along, bits(hit.t >= 0.0f), hit);
 }
 
 }  // namespace packets

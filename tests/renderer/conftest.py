@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from renderer import device, kernels
+from renderer import device, kernels, packets
 from renderer.trace import Renderer
 from tests.renderer.builders import driving_scene
 
 
 @pytest.fixture(scope="session", autouse=True)
 def warm_kernels() -> None:
-    device.load_kernels(kernels, "cpu")
+    device.load_kernels([kernels, packets], "cpu")
 
 
 @pytest.fixture(scope="session")
