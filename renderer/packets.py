@@ -65,12 +65,11 @@ def native_build_tree(
 def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
 
 
-@wp.func_native("packets::shade_packet(scene, view, first, count, position.data, time_s.data, color.data, rays.data);")
-def native_shade_packet(
+@wp.func_native("packets::shade_samples(scene, view, taken.data, position, time_s, color, rays);")
+def native_shade_samples(
     scene: SceneData,
     view: ViewData,
-    first: wp.int32,
-    count: wp.int32,
+    taken: wp.array(dtype=wp.int32),
     position: wp.array(dtype=wp.vec2),
     time_s: wp.array(dtype=wp.float64),
     color: wp.array(dtype=wp.vec3),
@@ -78,13 +77,11 @@ def native_shade_packet(
 ): ...
 
 
-@wp.func_native(
-    "packets::render_block(scene, view, block, image.shape[1], image.shape[0], samples, time_s, image.data);"
-)
-def native_render_block(
+@wp.func_native("packets::render_pixels(scene, view, taken.data, samples, time_s, image);")
+def native_render_pixels(
     scene: SceneData,
     view: ViewData,
-    block: wp.int32,
+    taken: wp.array(dtype=wp.int32),
     samples: wp.int32,
     time_s: wp.float64,
     image: wp.array2d(dtype=wp.vec3),
@@ -115,24 +112,27 @@ def trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32):
 def shade_samples(
     scene: SceneData,
     view: ViewData,
-    first: wp.int32,
+    taken: wp.array(dtype=wp.int32),
     position: wp.array(dtype=wp.vec2),
     time_s: wp.array(dtype=wp.float64),
     color: wp.array(dtype=wp.vec3),
     rays: wp.array(dtype=wp.vec2i),
 ):
-    """As the kernel of the same name in ``kernels.py``, sixteen samples a thread; ``first`` is a multiple of 16."""
-    native_shade_packet(scene, view, first + LANES * wp.tid(), position.shape[0], position, time_s, color, rays)
+    """As the kernel of the same name in ``kernels.py``, for all samples that no other launch has taken.
+
+    Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero.
+    """
+    native_shade_samples(scene, view, taken, position, time_s, color, rays)
 
 
 @wp.kernel(enable_backward=False)
 def render_pixels(
     scene: SceneData,
     view: ViewData,
-    first: wp.int32,
+    taken: wp.array(dtype=wp.int32),
     samples: wp.int32,
     time_s: wp.float64,
     image: wp.array2d(dtype=wp.vec3),
 ):
-    """As the kernel of the same name in ``kernels.py``, sixteen pixels a thread; ``first`` is a multiple of 16."""
-    native_render_block(scene, view, first / LANES + wp.tid(), samples, time_s, image)
+    """As the kernel of the same name in ``kernels.py``, shared between launches like :func:`shade_samples`."""
+    native_render_pixels(scene, view, taken, samples, time_s, image)

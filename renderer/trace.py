@@ -20,10 +20,7 @@ from renderer.structs import ViewData
 from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from tsar.types import FrameletBatch, SampleBatch
 
-# Samples per launch on the CPU: enough that its fixed cost of 20 µs is small, few enough that threads end together.
-_RANGE_SAMPLES = (1024, 4096)
-_RANGES_PER_THREAD = 4
-_RANGE_OF_FRAME = 1 << 14
+_RANGE = 1024  # samples or pixels per launch without packets: few enough that threads end together
 _BLOCK_PX = 16  # as the kernels' order of pixels
 _BYTES_PER_PIXEL = 12
 _SAMPLES_PER_PIXEL_AXIS_MAX = 1024
@@ -76,10 +73,9 @@ class Renderer:
         self._camera = _check_camera(scene)
         self._scene = scene
         self._kernels = packet_kernels if packets and self.device == "cpu" else kernels
-        self._lanes = packet_kernels.LANES if self._kernels is packet_kernels else 1
         # before the buffers are built, which takes kernels too: all are compiled side by side
         devices.load_kernels([kernels, self._kernels], self.device)
-        self._buffers = build_buffers(scene, self.device, self._lanes > 1)
+        self._buffers = build_buffers(scene, self.device, self._kernels is packet_kernels)
         self._buffers.data.throughput_cutoff = float(throughput_cutoff)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 and self.device == "cpu" else None
 
@@ -128,9 +124,8 @@ class Renderer:
         image = torch.empty(height_px, width_px, 3, device=target)
         view = self._view(float(time_s), width_px / height_px, min(width_px, height_px) * samples_per_axis)
         shared = samples_per_axis, wp.float64(time_s), wp.from_torch(image, dtype=wp.vec3)
-        blocks = -(-width_px // _BLOCK_PX) * -(-height_px // _BLOCK_PX)
-        step = max(_RANGE_OF_FRAME // samples_per_axis**2 // _BLOCK_PX**2, 1) * _BLOCK_PX**2
-        self._launch(self._kernels.render_pixels, view, shared, blocks * _BLOCK_PX**2, step)
+        pixels = -(-width_px // _BLOCK_PX) * -(-height_px // _BLOCK_PX) * _BLOCK_PX**2
+        self._launch(self._kernels.render_pixels, view, shared, pixels)
         return image.cpu()
 
     def close(self) -> None:
@@ -160,28 +155,36 @@ class Renderer:
             wp.from_torch(color, dtype=wp.vec3),
             wp.from_torch(rays, dtype=wp.vec2i),
         )
-        step = min(max(count // (_RANGES_PER_THREAD * self.threads), _RANGE_SAMPLES[0]), _RANGE_SAMPLES[1])
-        self._launch(self._kernels.shade_samples, view, shared, count, step - step % packet_kernels.LANES)
+        self._launch(self._kernels.shade_samples, view, shared, count)
         shadow, reflection = _totals(rays)
         return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
 
-    def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int, step: int) -> None:
-        """One launch on a GPU; on the CPU ranges of ``step`` elements, which release the interpreter lock.
+    def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int) -> None:
+        """Runs a kernel over ``count`` elements: one launch on a GPU, one a host thread on the CPU.
 
-        ``step`` is a multiple of 16: packets are the same for any number of threads.
+        Launches on the CPU release the interpreter lock. Those of packets take what is left to do from one counter;
+        single samples are dealt out in ranges.
         """
+        if self._kernels is packet_kernels:
+            taken = wp.zeros(1, dtype=wp.int32, device="cpu")
+            inputs = [self._buffers.data, view, taken, *shared]
+            command = wp.launch(kernel, dim=1, inputs=inputs, device="cpu", record_cmd=True)
+            others = [self._pool.submit(command.launch) for _ in range(self.threads - 1)] if self._pool else []
+            command.launch()
+            for other in others:
+                other.result()
+            return
 
-        def run(first: int) -> None:
-            dim = -(-min(step, count - first) // self._lanes)
+        def run(first: int, dim: int) -> None:
             wp.launch(kernel, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device)
 
         if self.device != "cpu":
-            step = count
             torch.cuda.synchronize()  # Warp launches on a stream of its own
-            run(0)
+            run(0, count)
             wp.synchronize_device(self.device)
             return
-        for _ in (map if self._pool is None else self._pool.map)(run, range(0, count, step)):
+        firsts = range(0, count, _RANGE)
+        for _ in (map if self._pool is None else self._pool.map)(lambda i: run(i, min(_RANGE, count - i)), firsts):
             pass
 
     def _view(self, time_s: float | None, aspect: float, footprint_px: float) -> ViewData:

@@ -375,4 +375,28 @@ inline void shade_packet(const Scene& scene, const View& view, int first, int co
     }
 }
 
+// Calls `work(item)` for items below `count` that no other caller has taken; `taken` counts them for all callers.
+template <class Work> inline void share(int* taken, int count, int at_once, Work work) {
+    for (int first; (first = __atomic_fetch_add(taken, at_once, __ATOMIC_RELAXED)) < count;)
+        for (int item = first; item < first + at_once && item < count; ++item) work(item);
+}
+
+template <class Scene, class View, class Positions, class Times, class Colors, class Counts>
+inline void shade_samples(const Scene& scene, const View& view, int* taken, const Positions& position,
+                          const Times& time_s, const Colors& color, const Counts& rays) {
+    const int count = position.shape[0];
+    share(taken, (count + LANES - 1) / LANES, 16, [&](int packet) {
+        shade_packet(scene, view, packet * LANES, count, position.data, time_s.data, color.data, rays.data);
+    });
+}
+
+template <class Scene, class View, class Image>
+inline void render_pixels(const Scene& scene, const View& view, int* taken, int samples, double time_s,
+                          const Image& image) {
+    const int width = image.shape[1], height = image.shape[0];
+    share(taken, (width + 15) / 16 * ((height + 15) / 16) * 16, 16, [&](int block) {
+        render_block(scene, view, block, width, height, samples, time_s, image.data);
+    });
+}
+
 }  // namespace packets
