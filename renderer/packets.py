@@ -73,7 +73,7 @@ def native_shade_samples(
     position: wp.array(dtype=wp.vec2),
     time_s: wp.array(dtype=wp.float64),
     color: wp.array(dtype=wp.vec3),
-    rays: wp.array(dtype=wp.vec2i),
+    rays: wp.array(dtype=wp.int64),
 ): ...
 
 
@@ -116,11 +116,12 @@ def shade_samples(
     position: wp.array(dtype=wp.vec2),
     time_s: wp.array(dtype=wp.float64),
     color: wp.array(dtype=wp.vec3),
-    rays: wp.array(dtype=wp.vec2i),
+    rays: wp.array(dtype=wp.int64),
 ):
     """As the kernel of the same name in ``kernels.py``, for all samples that no other launch has taken.
 
-    Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero.
+    Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero. ``rays``
+    receives the totals.
     """
     native_shade_samples(scene, view, taken, position, time_s, color, rays)
 

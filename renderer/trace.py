@@ -147,13 +147,15 @@ class Renderer:
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
         color = torch.empty(count, 3, device=target)
-        rays = torch.empty(count, 2, dtype=torch.int32, device=target)
+        # packets add up their rays, single samples cannot: host threads would disturb each other
+        as_totals = self._kernels is packet_kernels
+        rays = torch.zeros(1 if as_totals else count, 2, dtype=torch.int64 if as_totals else torch.int32, device=target)
         view = self._view(earliest if earliest == latest else None, aspect, footprint_px)
         shared = (
             wp.from_torch(position, dtype=wp.vec2),
             wp.from_torch(time_s, dtype=wp.float64),
             wp.from_torch(color, dtype=wp.vec3),
-            wp.from_torch(rays, dtype=wp.vec2i),
+            wp.from_torch(rays.reshape(-1), dtype=wp.int64) if as_totals else wp.from_torch(rays, dtype=wp.vec2i),
         )
         self._launch(self._kernels.shade_samples, view, shared, count)
         shadow, reflection = _totals(rays)

@@ -354,9 +354,10 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
 }
 
 // Shades samples `first` to `first + 15`, as far as there are `count` of them.
-template <class Scene, class View, class Position, class Color, class Counts>
+// Adds the shadow rays and reflections it took to `rays`.
+template <class Scene, class View, class Position, class Color>
 inline void shade_packet(const Scene& scene, const View& view, int first, int count, const Position* position,
-                         const double* time_s, Color* color, Counts* rays) {
+                         const double* time_s, Color* color, long long* rays) {
     Stage<Scene, View> stage = {scene, view, {}};
     const int used = count - first < LANES ? count - first : LANES;
     f16 x, y;
@@ -371,7 +372,7 @@ inline void shade_packet(const Scene& scene, const View& view, int first, int co
     const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces);
     for (int lane = 0; lane < used; ++lane) {
         color[first + lane] = Color(result.x[lane], result.y[lane], result.z[lane]);
-        rays[first + lane] = Counts(shadow_rays[lane], bounces[lane]);
+        rays[0] += shadow_rays[lane], rays[1] += bounces[lane];
     }
 }
 
@@ -385,9 +386,11 @@ template <class Scene, class View, class Positions, class Times, class Colors, c
 inline void shade_samples(const Scene& scene, const View& view, int* taken, const Positions& position,
                           const Times& time_s, const Colors& color, const Counts& rays) {
     const int count = position.shape[0];
+    long long mine[2] = {};
     share(taken, (count + LANES - 1) / LANES, 16, [&](int packet) {
-        shade_packet(scene, view, packet * LANES, count, position.data, time_s.data, color.data, rays.data);
+        shade_packet(scene, view, packet * LANES, count, position.data, time_s.data, color.data, mine);
     });
+    for (int kind = 0; kind < 2; ++kind) __atomic_fetch_add((long long*)rays.data + kind, mine[kind], __ATOMIC_RELAXED);
 }
 
 template <class Scene, class View, class Image>
