@@ -165,11 +165,12 @@ class _Adaptive:
     counters: list[dict[str, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        from renderer.control import stages
         from tsar.clock import fixed_clock
         from tsar.pipeline import run
 
-        clock = fixed_clock(self.options.cycle_s)
-        self._cycles = run(self.config, self.renderer.trace, clock, 0.0, math.inf)
+        clock, chosen = fixed_clock(self.options.cycle_s), stages(self.config, threads=self.renderer.threads)
+        self._cycles = run(self.config, self.renderer.trace, clock, 0.0, math.inf, chosen)
 
     def warm_up(self) -> None:
         for _ in islice(self._cycles, self.config.warmup_cycles):
@@ -263,6 +264,7 @@ def watch_memory(
     """Resident memory over a run of the centre setting that takes ``span_s`` of animation time at most."""
     import psutil
 
+    from renderer.control import stages
     from tsar.clock import fixed_clock
     from tsar.pipeline import run
 
@@ -270,7 +272,8 @@ def watch_memory(
     before = resident().rss
     clock = fixed_clock(min(options.cycle_s, span_s / options.memory_cycles if span_s > 0 else math.inf))
     cycles, bytes_ = [], []
-    for record, _ in islice(run(config, renderer.trace, clock, 0.0, math.inf), _total(config, options)):
+    endless = run(config, renderer.trace, clock, 0.0, math.inf, stages(config, threads=renderer.threads))
+    for record, _ in islice(endless, _total(config, options)):
         if record.cycle >= 0 and record.cycle % options.memory_every == 0:
             cycles.append(record.cycle)
             bytes_.append(resident().rss)

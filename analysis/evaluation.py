@@ -54,7 +54,7 @@ class Place:
     Attributes:
         results: folder of results, one for all studies of a kind.
         references: folder of references, shared with all other runs.
-        threads: for tracing; everything else runs on one.
+        threads: for tracing and reconstruction; everything else runs on one.
     """
 
     results: Path
@@ -211,6 +211,7 @@ def _score(case: Case, seen: Seen) -> float | None:
 
 def _displays(case: Case, place: Place, truths: Truths) -> Iterator[Shown]:
     """Records, where the policy makes any, and images of a run."""
+    from renderer.control import stages
     from tsar import pipeline
     from tsar.baselines import afr, framed, frameless, oracle
 
@@ -221,7 +222,7 @@ def _displays(case: Case, place: Place, truths: Truths) -> Iterator[Shown]:
 
     clock = cycle_seconds(case.ledger, case.capacity, case.cost)
     if case.policy == "tsar":
-        return pipeline.run(config, trace(), clock, *span)
+        return pipeline.run(config, trace(), clock, *span, stages(config, threads=place.threads))
     if case.policy in ("framed", "framed supersampled"):
         axis = 1 if case.policy == "framed" else 2
         price = frame_seconds(case.ledger, case.capacity, case.cost, axis)

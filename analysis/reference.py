@@ -109,18 +109,26 @@ def content_hash(value: Any) -> str:
 
 
 def source_hash(folder: Path, skip: tuple[str, ...] = ()) -> str:
-    """Hash of the Python files in a folder, by name and content."""
+    """Hash of the Python files and C++ headers in and below a folder, by name and content.
+
+    Args:
+        folder: where they lie.
+        skip: patterns of names that are left out.
+    """
     digest = hashlib.sha256()
-    for path in sorted(folder.glob("*.py")):
-        if path.name not in skip:
+    for path in sorted([*folder.glob("*.py"), *folder.glob("*/*.h")]):
+        if not any(path.match(pattern) for pattern in skip):
             digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
 
+_NOT_TRACING = ("film.py", "sequence.py", "queries.py", "control*.py", "display*.py", "launching.py")
+
+
 def renderer_hash(root: Path, device: str) -> str:
-    """Hash of what of the renderer decides a picture: its source without the file formats, Warp, the kind of device."""
+    """Hash of what of the renderer decides a picture: its source without file formats and stages, Warp, the kind of device."""
     version = importlib.metadata.version("warp-lang")
-    return "-".join((source_hash(root / "renderer", skip=("film.py",))[:16], version, device.partition(":")[0]))
+    return "-".join((source_hash(root / "renderer", skip=_NOT_TRACING)[:16], version, device.partition(":")[0]))
 
 
 @dataclass(frozen=True)

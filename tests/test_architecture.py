@@ -21,6 +21,15 @@ FORBIDDEN = {
 
 # these wire packages together: what they may import beside the above
 WIRING = {
+    "analysis/bench_cycles.py": ("renderer", "tsar"),
+    "analysis/bench_mitsuba.py": ("scenes",),
+    "analysis/bench_mitsuba_scene.py": ("scenes",),
+    "analysis/bench_overhead.py": ("tsar",),
+    "analysis/bench_rays.py": ("renderer", "scenes"),
+    "analysis/bench_run.py": ("renderer",),
+    "analysis/bench_scenes.py": ("renderer", "scenes"),
+    "analysis/bench_shading.py": ("renderer", "scenes"),
+    "analysis/bench_threads.py": ("renderer", "scenes"),
     "analysis/cost_measurement.py": ("renderer", "scenes", "tsar"),
     "analysis/estimate_check.py": ("tsar",),
     "analysis/evaluation.py": ("renderer", "scenes", "tsar"),

@@ -28,6 +28,8 @@ class FrameletCache:
         coefficients: ``(slots, state)`` float32, the wavelet state left by each framelet.
         level, index: tile of each slot; level is ``EMPTY`` in an unused one.
         time_s: animation time of each slot, ``-inf`` in an unused one.
+        slot_of_node: slot of the newest framelet of each quadtree node, coarser levels first; ``EMPTY`` where there is
+            none.
         dead: set by reconstruction; a dead framelet can never contribute again, for the age field only gets newer.
     """
 
@@ -40,7 +42,7 @@ class FrameletCache:
         self.index = torch.zeros(slots, dtype=torch.int64)
         self.time_s = torch.full((slots,), -torch.inf, dtype=torch.float64)
         self.dead = torch.ones(slots, dtype=torch.bool)
-        self._slot_of_node = torch.full((_node_id(self.level_max + 1, 0),), EMPTY, dtype=torch.int64)
+        self.slot_of_node = torch.full((_node_id(self.level_max + 1, 0),), EMPTY, dtype=torch.int64)
 
     @property
     def occupied(self) -> Bool[Tensor, " slots"]:
@@ -50,7 +52,7 @@ class FrameletCache:
         self, level: Int64[Tensor, " n"], index: Int64[Tensor, " n"]
     ) -> tuple[Float[Tensor, "n state"], Bool[Tensor, " n"]]:
         """Wavelet state of the newest cached framelet of each tile, and whether there is one."""
-        slot = self._slot_of_node[_node_id(level, index)]
+        slot = self.slot_of_node[_node_id(level, index)]
         return self.coefficients[slot.clamp(min=0)], slot != EMPTY
 
     def insert(
@@ -68,14 +70,24 @@ class FrameletCache:
         self.index[slot] = batch.index
         self.time_s[slot] = batch.time_s[:, 0].to(torch.float64)
         self.dead[slot] = False
-        self._slot_of_node[_node_id(batch.level, batch.index)] = slot
+        self.slot_of_node[_node_id(batch.level, batch.index)] = slot
         return slot
 
     def _forget(self, slot: Int64[Tensor, " n"]) -> None:
         """Drop the look-up entries that still point at these slots (a newer framelet of the tile may have taken it)."""
         used = slot[self.level[slot] != EMPTY]
         node = _node_id(self.level[used], self.index[used])
-        self._slot_of_node[node[self._slot_of_node[node] == used]] = EMPTY
+        self.slot_of_node[node[self.slot_of_node[node] == used]] = EMPTY
+
+
+def insert(
+    cache: FrameletCache,
+    batch: FrameletBatch,
+    color: Float[Tensor, "n samples 3"],
+    coefficients: Float[Tensor, "n state"],
+) -> Int64[Tensor, " n"]:
+    """:meth:`FrameletCache.insert` as a stage."""
+    return cache.insert(batch, color, coefficients)
 
 
 def _node_id(level, index):

@@ -9,6 +9,9 @@ from typing import Literal
 
 Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "diffusion", "trivial"]
 
+StagesName = Literal["compiled", "reference"]
+"""What runs the stages around tracing: kernels on the CPU, or the tensor operations they are checked against."""
+
 
 class ConfigError(ValueError):
     """A field out of range; the message names the field, what it expects and what arrived."""

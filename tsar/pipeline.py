@@ -10,26 +10,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from tsar.accounting import Account
 from tsar.cache import FrameletCache
 from tsar.clock import CycleSeconds, StageTimer, checked
 from tsar.config import TsarConfig
-from tsar.error import estimate
-from tsar.morton import raster_to_morton, total
-from tsar.reconstruction import Reconstruction, reconstruct
-from tsar.response import initial_densities, respond
-from tsar.selection import initial_history, make_batch, select
+from tsar.reconstruction import Reconstruction
+from tsar.response import initial_densities
+from tsar.selection import initial_history
+from tsar.stages import REFERENCE, Stages
 from tsar.tiling import build
 from tsar.types import Densities, Display, Errors, SampleBatch, StepRecord, Tiling, Trace
 
 LATENCY_CYCLES = 3
 """TSAR shows what was sampled three cycles ago (sec. 3.4.4)."""
-
-FAST_REFRESH = 0.5
-"""Elements refreshed at least this often per cycle count as moving when the spread of ages is measured."""
 
 
 @dataclass(frozen=True)
@@ -61,31 +57,42 @@ def initial_state(config: TsarConfig) -> State:
 
 
 def step(
-    state: State, config: TsarConfig, trace: Trace, time_s: float, cycle: int, cycle_s: float
+    state: State,
+    config: TsarConfig,
+    trace: Trace,
+    time_s: float,
+    cycle: int,
+    cycle_s: float,
+    stages: Stages = REFERENCE,
 ) -> tuple[State, Outcome]:
     """One cycle at animation time ``time_s``; ``cycle_s`` is the length of the last cycle, the unit of age."""
     stage = StageTimer()
     with stage("selection"):
-        selected, history = select(state.tiling, state.densities.temporal, state.history, config)
-        batch = make_batch(state.tiling, selected, time_s, cycle, config)
+        selected, history = stages.select(state.tiling, state.densities.temporal, state.history, config)
+        batch = stages.make_batch(state.tiling, selected, time_s, cycle, config)
     with stage("tracing"):
         samples = trace(batch)
     with stage("error"):
-        estimated = estimate(batch, samples.color, state.cache, config)
+        estimated = stages.estimate(batch, samples.color, state.cache, config)
     with stage("cache"):
-        state.cache.insert(batch, estimated.color, estimated.coefficients)
+        stages.insert(state.cache, batch, estimated.color, estimated.coefficients)
     with stage("response"):
-        densities = respond(state.densities, estimated.errors, config)
+        densities = stages.respond(state.densities, estimated.errors, config)
     with stage("tiling"):
-        tiling = build(densities.spatial, config)
+        tiling = stages.build(densities.spatial, config)
     with stage("reconstruction"):
-        image = reconstruct(state.cache, config, cycle_s)
+        image = stages.reconstruct(state.cache, config, cycle_s)
     after = State(tiling, densities, history, state.cache)
     return after, Outcome(selected, samples, estimated.errors, estimated.nonfinite, image, stage)
 
 
 def run(
-    config: TsarConfig, trace: Trace, cycle_seconds: CycleSeconds, start_s: float, end_s: float
+    config: TsarConfig,
+    trace: Trace,
+    cycle_seconds: CycleSeconds,
+    start_s: float,
+    end_s: float,
+    stages: Stages = REFERENCE,
 ) -> Iterator[tuple[StepRecord, Display]]:
     """Cycles from a warm start until the animation time passes ``end_s``.
 
@@ -97,54 +104,53 @@ def run(
         trace: the renderer.
         cycle_seconds: the clock.
         start_s, end_s: span of animation time to cover, seconds.
+        stages: what runs the stages.
     """
-    cycle_s = _probe(config, trace, cycle_seconds, start_s)
+    cycle_s = _probe(config, trace, cycle_seconds, start_s, stages)
     state = initial_state(config)
     cycle, time_s = -config.warmup_cycles, start_s - config.warmup_cycles * cycle_s
     while time_s < end_s:
         before = state
-        state, outcome = step(state, config, trace, time_s, cycle, cycle_s)
+        state, outcome = step(state, config, trace, time_s, cycle, cycle_s, stages)
         cycle_s = checked(cycle_seconds, outcome.samples.counters, outcome.stages.total)
-        record = _record(before, state, outcome, config, cycle, time_s, cycle_s)
         shown = outcome.reconstruction
+        account = stages.account(state.densities, shown.samples.newest_s, config)
+        record = _record(before, state, outcome, account, config, cycle, time_s, cycle_s)
         yield record, Display(time_s + LATENCY_CYCLES * cycle_s, time_s, shown.image, shown.samples)
         cycle, time_s = cycle + 1, time_s + cycle_s
 
 
-def _probe(config: TsarConfig, trace: Trace, cycle_seconds: CycleSeconds, start_s: float) -> float:
+def _probe(config: TsarConfig, trace: Trace, cycle_seconds: CycleSeconds, start_s: float, stages: Stages) -> float:
     """Length of a cycle, from two throw-away ones (the first may compile kernels)."""
     state = initial_state(config)
     for cycle in range(2):
-        state, outcome = step(state, config, trace, start_s, cycle, 1.0)
+        state, outcome = step(state, config, trace, start_s, cycle, 1.0, stages)
     return checked(cycle_seconds, outcome.samples.counters, outcome.stages.total)
 
 
 def _record(
-    before: State, after: State, outcome: Outcome, config: TsarConfig, cycle: int, time_s: float, cycle_s: float
+    before: State,
+    after: State,
+    outcome: Outcome,
+    account: Account,
+    config: TsarConfig,
+    cycle: int,
+    time_s: float,
+    cycle_s: float,
 ) -> StepRecord:
-    densities = after.densities
-    spent = total(densities.combined()) + densities.surplus
+    surplus = after.densities.surplus
     return StepRecord(
         cycle=cycle,
         sim_time_s=time_s,
         cost_s=cycle_s,
         tiling=before.tiling,
         selected=outcome.selected,
-        densities=densities,
+        densities=after.densities,
         errors=outcome.errors,
-        surplus=densities.surplus,
-        conservation_residual=abs(spent - config.budget) / config.budget,
+        surplus=surplus,
+        conservation_residual=abs(account.combined + surplus - config.budget) / config.budget,
         stage_s=dict(outcome.stages.seconds),
         counters=dict(outcome.samples.counters),
         nonfinite=outcome.nonfinite,
-        age_spread_s=_age_spread(outcome.reconstruction.samples.newest_s, densities, config),
+        age_spread_s=account.age_spread_s,
     )
-
-
-def _age_spread(newest_s: Float[Tensor, "side side"], densities: Densities, config: TsarConfig) -> float:
-    """Newest minus oldest sample shown among the elements that are refreshed fast, seconds; 0 if there are none."""
-    side, repeat = config.sdf_side, config.sdf_side // newest_s.shape[0]
-    field = newest_s.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1).reshape(-1)
-    fast = densities.temporal[raster_to_morton(side)] >= FAST_REFRESH
-    shown = field[fast & torch.isfinite(field)]
-    return float(shown.max() - shown.min()) if shown.numel() else 0.0

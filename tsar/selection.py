@@ -51,7 +51,7 @@ def select(
 
 
 @lru_cache(maxsize=8)
-def _cell_centres(side: int) -> Float[Tensor, "samples 2"]:
+def cell_centres(side: int) -> Float[Tensor, "samples 2"]:
     """Sample offsets within a tile, in tile widths, Morton order."""
     x, y = deinterleave(torch.arange(side * side))
     return (torch.stack((x, y), dim=1).to(torch.float32) + 0.5) / side
@@ -65,7 +65,7 @@ def sample_positions(level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], sid
     """
     corner = torch.stack(deinterleave(index), dim=1).to(torch.float32)
     width = torch.exp2(-level.to(torch.float32))
-    return (corner[:, None, :] + _cell_centres(side)) * width[:, None, None]
+    return (corner[:, None, :] + cell_centres(side)) * width[:, None, None]
 
 
 def make_batch(

@@ -77,14 +77,19 @@ def node_integrals(
     return sums[: level_high - level_low + 1]
 
 
-def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
-    """Which nodes of the levels above the finest split, as one boolean tensor a level."""
+def split_bounds(config: TsarConfig) -> tuple[int, int]:
+    """Least and greatest number of splits: enough tiles for a batch, no more than ``tile_count_max``."""
     coarse = 4**config.level_min
     most = (config.tile_count_max - coarse) // 3
-    least = min(-(-max(config.batch_size - coarse, 0) // 3), most)
+    return min(-(-max(config.batch_size - coarse, 0) // 3), most), most
+
+
+def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
+    """Which nodes of the levels above the finest split, as one boolean tensor a level."""
+    least, most = split_bounds(config)
     wanted = int((candidates > config.tiling.threshold_samples).sum())
     count = min(max(wanted, least), most, candidates.numel())
-    ranks = _tie_order(config.level_min, config.level_max)
+    ranks = tie_order(config.level_min, config.level_max)
     order = ranks[torch.sort(candidates[ranks], descending=True, stable=True).indices]
     chosen = torch.zeros(candidates.numel(), dtype=torch.bool)
     chosen[order[:count]] = True
@@ -92,7 +97,7 @@ def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor],
 
 
 @lru_cache(maxsize=16)
-def _tie_order(level_low: int, level_high: int) -> Int64[Tensor, " nodes"]:
+def tie_order(level_low: int, level_high: int) -> Int64[Tensor, " nodes"]:
     """Order in which equal nodes split: coarse before fine, so that a parent comes before its child, and within a level
     by bit-reversed index, so that where the bound on the tiles leaves only some of many equal nodes to split, they are
     spread over the whole image instead of filling it from its first corner."""

@@ -292,6 +292,30 @@ def test_without_granted_density_the_axes_are_still_redistributed(s, t):
     assert float(full) == pytest.approx(s + 0.05), "with everything granted, b is b*"
 
 
+def test_with_everything_granted_all_get_to_where_they_wanted():
+    """Those too that want to go past the greatest product on their way, where the ray has a nearer point of as much."""
+    past = 0
+    for seed in range(20):
+        local = random_problem(seed)
+        b_s, b_t = mix(local, local.desired_change, BOX, 0.0)
+        assert torch.allclose(b_s, local.a_s + local.k_min * local.m_s, atol=1e-9)
+        assert torch.allclose(b_t, local.a_t + local.k_min * local.m_t, atol=1e-9)
+        product = local.m_s * local.m_t
+        past += int(
+            ((product < 0) & (local.k_min * 2 * product < -(local.a_s * local.m_t + local.a_t * local.m_s))).sum()
+        )
+    assert past > 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_side_that_gets_all_it_wants_gets_it_to_the_bit(sign):
+    """However its sum rounds; some have no more room than they want, and the surplus gives or takes what is missing."""
+    g = torch.Generator().manual_seed(5)
+    desired = sign * (0.1 + torch.rand(999, generator=g, dtype=torch.float64))
+    bound = desired * (0.9 + torch.rand(999, generator=g, dtype=torch.float64)).clamp(min=1.0)
+    assert torch.equal(SOLVERS["waterfill"].solve(desired, bound, 2e3, 4e3), desired)
+
+
 @pytest.mark.parametrize("name", [n if n == "waterfill" else pytest.param(n, marks=pytest.mark.slow) for n in SOLVERS])
 def test_ten_thousand_cycles_do_not_drift(name, monkeypatch):
     # Shapes are checked by the other tests; here the checks would take longer than the decisions.

@@ -25,7 +25,7 @@ def smallest_root(a: Field, b: Field, d: Field) -> Field:
 def mix(local: LocalConstraints, change: Field, box: Box, bias: float) -> tuple[Field, Field]:
     """Point b on the ray with the granted combined density, then slid along the iso-product curve to c.
 
-    Where the errors have opposite signs and less change was granted than desired, the rest of the response needs no
+    Where the errors have opposite signs and no more change was granted than desired, the rest of the response needs no
     density at all: b is then the point with the granted product and the ratio of the axes that b* has (sec. 6.3 and
     6.4 say that such elements may redistribute; the ray alone would leave them where they are, for it meets the curve
     again only at ``2 k*``, if at all). It is b* itself when everything was granted.
@@ -46,7 +46,7 @@ def mix(local: LocalConstraints, change: Field, box: Box, bias: float) -> tuple[
     k = smallest_root(product, slope, -change)
     k = torch.minimum(torch.where(change == 0, 0.0, k), local.k_max)
     b_s, b_t = a_s + k * m_s, a_t + k * m_t
-    redistribute = (product < 0) & (change.abs() < local.desired_change.abs())
+    redistribute = (product < 0) & (change.abs() <= local.desired_change.abs())
     after = a_s * a_t + change
     ratio = (a_s + local.k_min * m_s) / (a_t + local.k_min * m_t)
     slid = torch.minimum(torch.maximum(torch.sqrt(after * ratio), after), after / box.temporal_min)

@@ -176,7 +176,10 @@ class Waterfill:
         else:
             given = min(total(ask_bound), total_free)
             freed = min(total_free, given + surplus_max - surplus)
-        return fill(ask, ask_bound, given) - fill(free, free_bound, freed)
+        # A side that gets all it wants gets exactly that: what an element may do beside hangs on it, and must not hang
+        # on how a sum was rounded.
+        gains = ask if given == total_ask else fill(ask, ask_bound, given)
+        return gains - (free if freed == total_free else fill(free, free_bound, freed))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,55 @@
+"""Launches that cost little: recorded once, their arguments set anew each time.
+
+``wp.launch`` checks and packs all its arguments, which takes as long as some of these kernels run.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+from torch import Tensor
+
+from tsar.config import TsarConfig
+
+
+def address(tensor: Tensor) -> int:
+    """Where a tensor's elements lie, one after the other, on the CPU.
+
+    Raises:
+        ValueError: if they lie otherwise.
+    """
+    if not tensor.is_contiguous() or tensor.is_cuda:
+        raise ValueError(f"expected a contiguous tensor on the CPU, got strides {tensor.stride()} on {tensor.device}")
+    return tensor.data_ptr()
+
+
+def require_same(config: TsarConfig, own: TsarConfig) -> None:
+    """Refuses a run that compiled stages were not made for.
+
+    Raises:
+        ValueError: if the configurations differ.
+    """
+    if config is not own and config != own:
+        raise ValueError("compiled stages: expected the configuration that they were made for, got another")
+
+
+class Command:
+    """A kernel to be launched on the CPU over and over; not to be shared between threads.
+
+    Its first arguments stay as they are, the others are plain numbers: values, or addresses of tensors, which the
+    caller keeps alive and contiguous during the call.
+    """
+
+    def __init__(self, kernel: Any, *fixed: Any) -> None:
+        """Records a launch of ``kernel`` over one thread whose first arguments are ``fixed``."""
+        varying = len(kernel.adj.args) - len(fixed)
+        self._launch = wp.launch(kernel, 1, inputs=[*fixed, *[0] * varying], device="cpu", record_cmd=True)
+        # Plain C numbers, which may be set in place; the first parameter is the size of the launch.
+        self._varying = self._launch.params[1 + len(fixed) :]
+
+    def __call__(self, *arguments: float) -> None:
+        """Launches with these last arguments."""
+        for parameter, value in zip(self._varying, arguments, strict=True):
+            parameter.value = value
+        self._launch.launch()

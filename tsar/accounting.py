@@ -1,0 +1,43 @@
+"""What a cycle's record says of the whole field: the density that is handed out, and how the ages on show differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.config import TsarConfig
+from tsar.morton import raster_to_morton, total
+from tsar.types import Densities
+
+FAST_REFRESH = 0.5
+"""Elements refreshed at least this often per cycle count as moving when the spread of ages is measured."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """Sums over the field after a cycle.
+
+    Attributes:
+        combined: Σ θ_s θ_t, samples per cycle.
+        age_spread_s: newest minus oldest sample shown among the elements that are refreshed fast, seconds; 0 if there
+            are none.
+    """
+
+    combined: float
+    age_spread_s: float
+
+
+def account(densities: Densities, newest_s: Float[Tensor, "side side"], config: TsarConfig) -> Account:
+    """Takes stock of the densities and of the newest samples on show, raster order."""
+    return Account(total(densities.combined()), _age_spread(newest_s, densities, config))
+
+
+def _age_spread(newest_s: Float[Tensor, "side side"], densities: Densities, config: TsarConfig) -> float:
+    side, repeat = config.sdf_side, config.sdf_side // newest_s.shape[0]
+    field = newest_s.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1).reshape(-1)
+    fast = densities.temporal[raster_to_morton(side)] >= FAST_REFRESH
+    shown = field[fast & torch.isfinite(field)]
+    return float(shown.max() - shown.min()) if shown.numel() else 0.0

@@ -1,0 +1,54 @@
+"""The stages as the pipeline sees them: a record of functions, handed in as the renderer is.
+
+The functions of this package are the reference: any tensor, any device, one operation a line. A compiled set computes
+the same within rounding; where it does not cover a configuration it holds the function of the reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from tsar.accounting import Account, account
+from tsar.cache import FrameletCache, insert
+from tsar.config import TsarConfig
+from tsar.error import Estimate, estimate
+from tsar.reconstruction import Reconstruction, reconstruct
+from tsar.response import respond
+from tsar.selection import make_batch, select
+from tsar.tiling import build
+from tsar.types import Densities, Errors, FrameletBatch, Tiling
+
+Field = Float[Tensor, " e"]
+
+
+@dataclass(frozen=True)
+class Stages:
+    """One function a stage; arguments and results are those of the reference, which is the default.
+
+    Attributes:
+        select: which tiles are due, and what is left of their credit.
+        make_batch: the request to the renderer.
+        estimate: errors, repaired colours, wavelet state.
+        insert: the batch into the cache, in place.
+        respond: new densities.
+        build: new tiling.
+        reconstruct: image; flags dead framelets in the cache, in place.
+        account: sums for the record of the cycle.
+    """
+
+    select: Callable[[Tiling, Field, Field, TsarConfig], tuple[Int64[Tensor, " b"], Field]] = select
+    make_batch: Callable[[Tiling, Int64[Tensor, " b"], float, int, TsarConfig], FrameletBatch] = make_batch
+    estimate: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig], Estimate] = estimate
+    insert: Callable[[FrameletCache, FrameletBatch, Tensor, Tensor], object] = insert
+    respond: Callable[[Densities, Errors, TsarConfig], Densities] = respond
+    build: Callable[[Field, TsarConfig], Tiling] = build
+    reconstruct: Callable[[FrameletCache, TsarConfig, float], Reconstruction] = reconstruct
+    account: Callable[[Densities, Tensor, TsarConfig], Account] = account
+
+
+REFERENCE = Stages()
+"""Tensor operations throughout."""
