@@ -95,8 +95,10 @@ struct RayHit {
 
 // Asks the caches for what is walked into later.
 inline void prefetch(const Tree& tree, int child) {
-    const char* at = child >= 0 ? (const char*)(tree.nodes + child) : (const char*)(tree.blocks + (~child >> 3));
-    for (int line = 0; line < 3; ++line) __builtin_prefetch(at + 64 * line);
+    const bool inner = child >= 0;
+    const char* at = inner ? (const char*)(tree.nodes + child) : (const char*)(tree.blocks + (~child >> 3));
+    const int lines = inner ? 4 : (~child & 7) < BLOCK_WIDTH ? 3 : 6;
+    for (int line = 0; line < lines; ++line) __builtin_prefetch(at + 64 * line);
 }
 
 // One ray against a leaf, four triangles at a time. Keeps the nearest hit, of equally near ones the face with the lower

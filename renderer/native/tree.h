@@ -9,6 +9,7 @@ namespace packets {
 
 constexpr int WIDTH = 8;        // children of a node, and triangles of a leaf at most
 constexpr int BLOCK_WIDTH = 4;  // triangles of a block
+constexpr int LEAF = 8;         // triangles of a leaf at most
 constexpr int EMPTY_CHILD = -2147483647 - 1;
 
 // Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (`~(first block * 8 + triangles - 1)`) or
@@ -106,10 +107,10 @@ class TreeBuilder {
         Range runs[WIDTH];
         int run_count = 1;
         runs[0] = range;
-        run_count = open_runs(runs, run_count, WIDTH);
+        run_count = open_runs(runs, run_count, LEAF);
         run_count = open_runs(runs, run_count, SMALL);
         int first_node = used_nodes;
-        for (int i = 0; i < run_count; ++i) used_nodes += runs[i].count() > WIDTH;
+        for (int i = 0; i < run_count; ++i) used_nodes += runs[i].count() > LEAF;
         for (int i = 0, next = first_node; i < WIDTH; ++i) {
             Node& node = nodes[index];
             bool used = i < run_count;
@@ -117,10 +118,10 @@ class TreeBuilder {
                 node.lower[axis][i] = used ? runs[i].box.lower[axis] : FAR;
                 node.upper[axis][i] = used ? runs[i].box.upper[axis] : -FAR;
             }
-            node.child[i] = !used ? EMPTY_CHILD : runs[i].count() > WIDTH ? next++ : leaf(runs[i]);
+            node.child[i] = !used ? EMPTY_CHILD : runs[i].count() > LEAF ? next++ : leaf(runs[i]);
         }
         for (int i = 0, next = first_node; i < run_count; ++i)
-            if (runs[i].count() > WIDTH) fill(next++, runs[i]);
+            if (runs[i].count() > LEAF) fill(next++, runs[i]);
     }
 
     // Splits the run with the greatest surface of those longer than `longest` until there are eight; how many there are.
