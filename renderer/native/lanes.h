@@ -62,6 +62,11 @@ inline float least(f16 a) {
     return d.x < d.y ? d.x : d.y;
 }
 inline float greatest(f16 a) { return -least(-a); }
+inline float added(f16 a) {
+    f8 b = a.lo + a.hi;
+    f4 c = b.lo + b.hi;
+    return (c.x + c.y) + (c.z + c.w);
+}
 
 // base[index] in every lane; every index must be one that may be read.
 inline f16 gather(const float* base, i16 index) {

@@ -17,8 +17,6 @@ constexpr float ROUNDING_UP = 1.0000005f;
 constexpr float PADDING = 4.0e-7f;
 // Packets whose directions differ by more than this along an axis are walked ray by ray.
 constexpr float SPREAD_MAX = 0.25f;
-// Where no more lanes than this pass a box, they go on alone.
-constexpr int FEW = 2;
 
 template <class F> inline F reciprocal(F x) { return 1.0f / (vabs(x) > TINY ? x : (F)TINY); }
 inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TINY); }
@@ -125,13 +123,13 @@ inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, 
     return found;
 }
 
-// One ray from a node, or a leaf, on. `any` ends at the first hit; `hit.t` holds how far to look.
-template <bool any> inline bool walk(const Tree& tree, int current, const Single& ray, RayHit& hit) {
+// One ray from the root. `any` ends at the first hit; `hit.t` holds how far to look.
+template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit) {
     struct Entry {
         float near;
         int child;
     } stack[STACK];
-    int size = 0;
+    int size = 0, current = 0;
     bool found = false;
     const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
     const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
@@ -289,17 +287,33 @@ inline unsigned meet_leaf(const Block* leaf, int triangles, const Packet& rays, 
     return changed;
 }
 
-// Some lanes one by one, from a node or leaf on. Returns those with a new hit; `any` idles them.
+// Few lanes of a packet against a leaf, each with four triangles at once. Returns those with a new hit; `any` idles them.
 template <bool any>
-inline unsigned walk_alone(const Tree& tree, int child, const Vec16& from, const Vec16& along, unsigned lanes,
-                           PacketHit& hit) {
+inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
+    unsigned changed = 0;
+    const Vec16 from = {rays.origin[rays.kx], rays.origin[rays.ky], rays.origin[rays.kz]};
+    for (; lanes; lanes &= lanes - 1) {
+        const int lane = first_bit(lanes);
+        RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
+        const Vec<f4> origin = {(f4)from.x[lane], (f4)from.y[lane], (f4)from.z[lane]};
+        const Vec<f4> shear = {(f4)rays.shear.x[lane], (f4)rays.shear.y[lane], (f4)rays.shear.z[lane]};
+        if (!meet_leaf(leaf, triangles, origin, shear, rays.kx, rays.ky, rays.kz, one)) continue;
+        changed |= 1u << lane;
+        hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
+    }
+    return changed;
+}
+
+// Lanes one by one, from the root. Returns those that found a hit; `any` idles them.
+template <bool any>
+inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
     unsigned changed = 0;
     for (; lanes; lanes &= lanes - 1) {
         const int lane = first_bit(lanes);
         const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
         const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
         RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
-        if (!walk<any>(tree, child, Single(origin, direction), one)) continue;
+        if (!walk<any>(tree, Single(origin, direction), one)) continue;
         changed |= 1u << lane;
         hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
     }
@@ -325,10 +339,12 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
         const unsigned active = entry.parent ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
         if (!active) continue;
         unsigned changed;
-        if (__builtin_popcount(active) <= FEW) {
-            changed = walk_alone<any>(tree, entry.child, rays.origin, rays.direction, active, hit);
-        } else if (entry.child < 0) {
-            changed = meet_leaf<any>(tree.blocks + (~entry.child >> 3), (~entry.child & 7) + 1, rays, hit);
+        if (entry.child < 0) {
+            const Block* leaf = tree.blocks + (~entry.child >> 3);
+            const int triangles = (~entry.child & 7) + 1;
+            const bool alone = __builtin_popcount(active) * ((triangles + BLOCK_WIDTH - 1) / BLOCK_WIDTH) < triangles;
+            changed = alone ? meet_leaf_alone<any>(leaf, triangles, rays, active, hit)
+                            : meet_leaf<any>(leaf, triangles, rays, hit);
         } else {
             const Node& node = tree.nodes[entry.child];
             const int base = size;
@@ -355,7 +371,7 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
 template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, const Vec16& along, PacketHit& hit) {
     Packet rays(from, along);
     if (rays.together) return walk<any>(tree, rays, hit);
-    return walk_alone<any>(tree, 0, from, along, bits(hit.t >= 0.0f), hit);
+    return walk_alone<any>(tree, from, along, bits(hit.t >= 0.0f), hit);
 }
 
 }  // namespace packets

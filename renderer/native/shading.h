@@ -306,6 +306,27 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
     return total;
 }
 
+// Mean of `samples` squared samples of a pixel, whole packets of them, by rows.
+template <class Scene, class View>
+inline void render_pixel(const Stage<Scene, View>& stage, int column, int row, int samples, float across, float down,
+                         float* color) {
+    const int per_pixel = samples * samples;
+    i16 lane_number;
+    for (int lane = 0; lane < LANES; ++lane) lane_number[lane] = lane;
+    Vec16 total = {(f16)0.0f, (f16)0.0f, (f16)0.0f};
+    for (int first = 0; first < per_pixel; first += LANES) {
+        const f16 sample = to_float(lane_number + first), y = vfloor((sample + 0.5f) / (float)samples);
+        const f16 x = sample - y * (float)samples;
+        Vec16 origin, direction;
+        camera_rays(stage, ((float)(column * samples) + x + 0.5f) / across, ((float)(row * samples) + y + 0.5f) / down,
+                    origin, direction);
+        i16 shadow_rays, bounces;
+        total = total + radiance(stage, origin, direction, ALL, shadow_rays, bounces);
+    }
+    const float share = 1.0f / (float)per_pixel;
+    color[0] = added(total.x) * share, color[1] = added(total.y) * share, color[2] = added(total.z) * share;
+}
+
 // Renders a block of 4 x 4 pixels, `samples` squared samples each; blocks go along the Morton curve within 16 x 16
 // pixels, those by rows. Consecutive samples share a pixel as far as they can.
 template <class Scene, class View, class Pixel>
@@ -319,6 +340,16 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     for (int lane = 0; lane < LANES; ++lane) stage.time_s[lane] = time_s;
     const int per_pixel = samples * samples;
     const float across = (float)(width * samples), down = (float)(height * samples);
+    if (per_pixel % LANES == 0) {
+        for (int at = 0; at < LANES; ++at) {
+            const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+            float color[3];
+            if (column >= width || row >= height) continue;
+            render_pixel(stage, column, row, samples, across, down, color);
+            image[row * width + column] = Pixel(color[0], color[1], color[2]);
+        }
+        return;
+    }
     float sums[LANES][3] = {};
     int at = 0, within_x = 0, within_y = 0;  // pixel of the block, and sample of the pixel
     for (int packet = 0; packet < per_pixel; ++packet) {
@@ -341,8 +372,8 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
         i16 shadow_rays, bounces;
         const Vec16 color = radiance(stage, origin, direction, busy, shadow_rays, bounces);
         for (int lane = 0; lane < LANES; ++lane) {
-            float* sum = sums[pixel[lane]];
-            sum[0] += color.x[lane], sum[1] += color.y[lane], sum[2] += color.z[lane];
+            float* to = sums[pixel[lane]];
+            to[0] += color.x[lane], to[1] += color.y[lane], to[2] += color.z[lane];
         }
     }
     const float share = 1.0f / (float)per_pixel;
