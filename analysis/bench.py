@@ -137,18 +137,23 @@ def counted(show: Callable[[int], None]) -> Callable[..., None]:
     return lambda *_: show(next(done))
 
 
+_REST_S = 0.03
+
+
 def take_turns(
     cases: Mapping[str, Callable[[], object]], repetitions: int, on_round: Callable[[int], None] = lambda done: None
 ) -> dict[str, list[float]]:
     """Wall seconds of every case, ``repetitions`` times each, after one run that is not counted.
 
-    Cases take turns, forwards and backwards, so that neither drift nor an order of precedence favours one.
+    Cases take turns, forwards and backwards, so that neither drift nor an order of precedence favours one, and rest
+    before each turn: threads of the one before may spin for milliseconds, waiting for more to do.
     """
     for run in cases.values():
         run()
     seconds: dict[str, list[float]] = {name: [] for name in cases}
     for number in range(repetitions):
         for name in list(cases) if number % 2 == 0 else reversed(list(cases)):
+            time.sleep(_REST_S)
             start = time.perf_counter()
             cases[name]()
             seconds[name].append(time.perf_counter() - start)

@@ -68,9 +68,9 @@ def render_pixels(
 def pose_tracks(
     scene: SceneData,
     view: ViewData,
-    time_s: wp.float64,
     translation: wp.array(dtype=wp.vec3),
     rotation: wp.array(dtype=wp.quat),
+    time_s: wp.float64,
 ):
     """Poses of all tracks at one time, to the bit those that samples find for themselves."""
     track = wp.tid()

@@ -35,21 +35,26 @@ def require_same(config: TsarConfig, own: TsarConfig) -> None:
 
 
 class Command:
-    """A kernel to be launched on the CPU over and over; not to be shared between threads.
+    """A kernel to be launched on the CPU over and over; its arguments are not to be set by two threads at once.
 
     Its first arguments stay as they are, the others are plain numbers: values, or addresses of tensors, which the
-    caller keeps alive and contiguous during the call.
+    caller keeps alive and contiguous during the launch.
     """
 
-    def __init__(self, kernel: Any, *fixed: Any) -> None:
-        """Records a launch of ``kernel`` over one thread whose first arguments are ``fixed``."""
+    def __init__(self, kernel: Any, *fixed: Any, size: int = 1) -> None:
+        """Records a launch of ``kernel`` over ``size`` threads whose first arguments are ``fixed``."""
         varying = len(kernel.adj.args) - len(fixed)
-        self._launch = wp.launch(kernel, 1, inputs=[*fixed, *[0] * varying], device="cpu", record_cmd=True)
+        self._launch = wp.launch(kernel, size, inputs=[*fixed, *[0] * varying], device="cpu", record_cmd=True)
         # Plain C numbers, which may be set in place; the first parameter is the size of the launch.
         self._varying = self._launch.params[1 + len(fixed) :]
+        self.launch = self._launch.launch
+
+    def set(self, *arguments: float) -> None:
+        """Sets the last arguments."""
+        for parameter, value in zip(self._varying, arguments, strict=True):
+            parameter.value = value
 
     def __call__(self, *arguments: float) -> None:
         """Launches with these last arguments."""
-        for parameter, value in zip(self._varying, arguments, strict=True):
-            parameter.value = value
-        self._launch.launch()
+        self.set(*arguments)
+        self.launch()

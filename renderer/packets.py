@@ -21,6 +21,9 @@ NODE_FLOATS, BLOCK_FLOATS = 64, 40
 """Sizes of a tree's records in units of four bytes, as in ``native/tree.h``."""
 
 
+Address = wp.uint64
+
+
 @wp.struct
 class Queries:
     """Rays through one mesh, and where their hits go: ``face`` is -1 for a miss, or a flag where any hit will do."""
@@ -65,15 +68,21 @@ def native_build_tree(
 def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
 
 
-@wp.func_native("packets::shade_samples(scene, view, taken.data, position, time_s, color, rays);")
+@wp.func_native(
+    """
+    packets::shade_samples(scene, view, (int*)taken, count, (const float*)position, (const double*)time_s,
+                           (float*)color, (long long*)rays);
+    """
+)
 def native_shade_samples(
     scene: SceneData,
     view: ViewData,
-    taken: wp.array(dtype=wp.int32),
-    position: wp.array(dtype=wp.vec2),
-    time_s: wp.array(dtype=wp.float64),
-    color: wp.array(dtype=wp.vec3),
-    rays: wp.array(dtype=wp.int64),
+    taken: Address,
+    count: wp.int32,
+    position: Address,
+    time_s: Address,
+    color: Address,
+    rays: Address,
 ): ...
 
 
@@ -112,18 +121,19 @@ def trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32):
 def shade_samples(
     scene: SceneData,
     view: ViewData,
-    taken: wp.array(dtype=wp.int32),
-    position: wp.array(dtype=wp.vec2),
-    time_s: wp.array(dtype=wp.float64),
-    color: wp.array(dtype=wp.vec3),
-    rays: wp.array(dtype=wp.int64),
+    taken: Address,
+    count: wp.int32,
+    position: Address,
+    time_s: Address,
+    color: Address,
+    rays: Address,
 ):
     """As the kernel of the same name in ``kernels.py``, for all samples that no other launch has taken.
 
     Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero. ``rays``
-    receives the totals.
+    receives the totals. Arrays come as addresses, for a launch that is recorded once.
     """
-    native_shade_samples(scene, view, taken, position, time_s, color, rays)
+    native_shade_samples(scene, view, taken, count, position, time_s, color, rays)
 
 
 @wp.kernel(enable_backward=False)

@@ -14,6 +14,7 @@ from torch import Tensor
 from renderer import device as devices
 from renderer import kernels
 from renderer import packets as packet_kernels
+from renderer.batches import PacketBatches
 from renderer.buffers import build_buffers
 from renderer.checks import check_affine
 from renderer.structs import ViewData
@@ -78,6 +79,10 @@ class Renderer:
         self._buffers = build_buffers(scene, self.device, self._kernels is packet_kernels)
         self._buffers.data.throughput_cutoff = float(throughput_cutoff)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 and self.device == "cpu" else None
+        self._batches = None
+        if self._kernels is packet_kernels:
+            still, moving = (self._view(1.0, self.footprint_resolution_px) for _ in range(2))
+            self._batches = PacketBatches(self._buffers, still, moving, self.threads, self._pool)
 
     def trace(self, batch: FrameletBatch) -> SampleBatch:
         """Shades the samples of a batch on a square image.
@@ -97,9 +102,7 @@ class Renderer:
                 f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and "
                 f"{tuple(batch.time_s.shape)}"
             )
-        color, counters = self._shade(
-            batch.position.reshape(-1, 2), batch.time_s.reshape(-1), 1.0, self.footprint_resolution_px
-        )
+        color, counters = self._shade(batch.position.reshape(-1, 2), batch.time_s.reshape(-1))
         return SampleBatch(color.reshape(*shape[:2], 3), counters)
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
@@ -122,7 +125,8 @@ class Renderer:
         _check_size(width_px, height_px, samples_per_axis)
         target = torch.device(self.device)
         image = torch.empty(height_px, width_px, 3, device=target)
-        view = self._view(float(time_s), width_px / height_px, min(width_px, height_px) * samples_per_axis)
+        view = self._view(width_px / height_px, min(width_px, height_px) * samples_per_axis)
+        self._pose(view, float(time_s))
         shared = samples_per_axis, wp.float64(time_s), wp.from_torch(image, dtype=wp.vec3)
         pixels = -(-width_px // _BLOCK_PX) * -(-height_px // _BLOCK_PX) * _BLOCK_PX**2
         self._launch(self._kernels.render_pixels, view, shared, pixels)
@@ -133,29 +137,30 @@ class Renderer:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _shade(
-        self, position: Tensor, time_s: Tensor, aspect: float, footprint_px: float
-    ) -> tuple[Tensor, dict[str, int]]:
-        """Colours ``(k, 3)`` and ray counts of flat lists of samples; ``aspect`` is width over height."""
+    def _shade(self, position: Tensor, time_s: Tensor) -> tuple[Tensor, dict[str, int]]:
+        """Colours ``(k, 3)`` and ray counts of flat lists of samples."""
         count, home = position.shape[0], position.device
         if count == 0:
             return torch.zeros(0, 3, device=home), {"primary_rays": 0, "shadow_rays": 0, "reflection_rays": 0}
         target = torch.device(self.device)
         position = position.to(target, torch.float32).contiguous()
-        time_s = time_s.to(target, torch.float64).contiguous()
         earliest, latest = _bounds(time_s)
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
+        single_time_s = earliest if earliest == latest else None
+        if self._batches is not None:
+            color, shadow, reflection = self._batches.shade(position, time_s, single_time_s)
+            return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
         color = torch.empty(count, 3, device=target)
-        # packets add up their rays, single samples cannot: host threads would disturb each other
-        as_totals = self._kernels is packet_kernels
-        rays = torch.zeros(1 if as_totals else count, 2, dtype=torch.int64 if as_totals else torch.int32, device=target)
-        view = self._view(earliest if earliest == latest else None, aspect, footprint_px)
+        rays = torch.empty(count, 2, dtype=torch.int32, device=target)
+        view = self._view(1.0, self.footprint_resolution_px)
+        if single_time_s is not None:
+            self._pose(view, single_time_s)
         shared = (
             wp.from_torch(position, dtype=wp.vec2),
-            wp.from_torch(time_s, dtype=wp.float64),
+            wp.from_torch(time_s.to(target, torch.float64).contiguous(), dtype=wp.float64),
             wp.from_torch(color, dtype=wp.vec3),
-            wp.from_torch(rays.reshape(-1), dtype=wp.int64) if as_totals else wp.from_torch(rays, dtype=wp.vec2i),
+            wp.from_torch(rays, dtype=wp.vec2i),
         )
         self._launch(self._kernels.shade_samples, view, shared, count)
         shadow, reflection = _totals(rays)
@@ -189,8 +194,8 @@ class Renderer:
         for _ in (map if self._pool is None else self._pool.map)(lambda i: run(i, min(_RANGE, count - i)), firsts):
             pass
 
-    def _view(self, time_s: float | None, aspect: float, footprint_px: float) -> ViewData:
-        """Camera record; with a time, poses of all tracks at it."""
+    def _view(self, aspect: float, footprint_px: float) -> ViewData:
+        """Camera record for samples of many times; ``aspect`` is width over height."""
         tangent = math.tan(math.radians(self._camera.fov_deg) / 2.0)
         to_world = np.asarray(self._camera.to_world, np.float64)
         view = ViewData()
@@ -199,14 +204,16 @@ class Renderer:
         view.camera_track = self._buffers.tracks.add(self._camera.track)
         view.tan_x, view.tan_y = tangent * max(aspect, 1.0), tangent * max(1.0 / aspect, 1.0)
         view.spread = 2.0 * tangent / footprint_px
-        if time_s is not None:
-            count = len(self._buffers.tracks.tracks)
-            poses = wp.empty(count, wp.vec3, self.device), wp.empty(count, wp.quat, self.device)
-            inputs = [self._buffers.data, view, wp.float64(time_s), *poses]
-            wp.launch(kernels.pose_tracks, dim=count, inputs=inputs, device=self.device)
-            view.pose_translation, view.pose_rotation = poses
-            view.single_time = 1
         return view
+
+    def _pose(self, view: ViewData, time_s: float) -> None:
+        """Adds the poses of all tracks at the one time of all samples."""
+        count = len(self._buffers.tracks.tracks)
+        poses = wp.empty(count, wp.vec3, self.device), wp.empty(count, wp.quat, self.device)
+        inputs = [self._buffers.data, view, *poses, wp.float64(time_s)]
+        wp.launch(kernels.pose_tracks, dim=count, inputs=inputs, device=self.device)
+        view.pose_translation, view.pose_rotation = poses
+        view.single_time = 1
 
 
 def _check_size(width_px: int, height_px: int, samples_per_axis: int) -> None:

@@ -12,7 +12,6 @@ from renderer import device as devices
 from renderer import packets
 from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
 
-
 _LINE_FLOATS = 16
 
 

@@ -384,25 +384,26 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     }
 }
 
-// Shades samples `first` to `first + 15`, as far as there are `count` of them.
-// Adds the shadow rays and reflections it took to `rays`.
-template <class Scene, class View, class Position, class Color>
-inline void shade_packet(const Scene& scene, const View& view, int first, int count, const Position* position,
-                         const double* time_s, Color* color, long long* rays) {
+// Shades samples `first` to `first + 15`, as far as there are `count` of them. Adds the shadow rays and reflections it
+// took to `rays`. Times are read only where samples differ in them.
+template <class Scene, class View>
+inline void shade_packet(const Scene& scene, const View& view, int first, int count, const float* position,
+                         const double* time_s, float* color, long long* rays) {
     Stage<Scene, View> stage = {scene, view, {}};
     const int used = count - first < LANES ? count - first : LANES;
     f16 x, y;
     for (int lane = 0; lane < LANES; ++lane) {
         const int sample = first + (lane < used ? lane : used - 1);
-        x[lane] = position[sample][0], y[lane] = position[sample][1];
-        stage.time_s[lane] = time_s[sample];
+        x[lane] = position[2 * sample], y[lane] = position[2 * sample + 1];
+        if (!view.single_time) stage.time_s[lane] = time_s[sample];
     }
     Vec16 origin, direction;
     camera_rays(stage, x, y, origin, direction);
     i16 shadow_rays, bounces;
     const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces);
     for (int lane = 0; lane < used; ++lane) {
-        color[first + lane] = Color(result.x[lane], result.y[lane], result.z[lane]);
+        float* to = color + 3 * (first + lane);
+        to[0] = result.x[lane], to[1] = result.y[lane], to[2] = result.z[lane];
         rays[0] += shadow_rays[lane], rays[1] += bounces[lane];
     }
 }
@@ -413,15 +414,14 @@ template <class Work> inline void share(int* taken, int count, int at_once, Work
         for (int item = first; item < first + at_once && item < count; ++item) work(item);
 }
 
-template <class Scene, class View, class Positions, class Times, class Colors, class Counts>
-inline void shade_samples(const Scene& scene, const View& view, int* taken, const Positions& position,
-                          const Times& time_s, const Colors& color, const Counts& rays) {
-    const int count = position.shape[0];
+template <class Scene, class View>
+inline void shade_samples(const Scene& scene, const View& view, int* taken, int count, const float* position,
+                          const double* time_s, float* color, long long* rays) {
     long long mine[2] = {};
     share(taken, (count + LANES - 1) / LANES, 16, [&](int packet) {
-        shade_packet(scene, view, packet * LANES, count, position.data, time_s.data, color.data, mine);
+        shade_packet(scene, view, packet * LANES, count, position, time_s, color, mine);
     });
-    for (int kind = 0; kind < 2; ++kind) __atomic_fetch_add((long long*)rays.data + kind, mine[kind], __ATOMIC_RELAXED);
+    for (int kind = 0; kind < 2; ++kind) __atomic_fetch_add(rays + kind, mine[kind], __ATOMIC_RELAXED);
 }
 
 template <class Scene, class View, class Image>

@@ -17,7 +17,8 @@ from tests.renderer.builders import WHITE, batch, driving_scene, grid, turning_t
 def test_poses_are_scipys(time_s: float) -> None:
     tracks = [turning_track(5, keys=1), turning_track(4)]
     renderer = Renderer(Scene(PerspectiveCamera(), tuple(Instance(Sphere(), Matte(WHITE), track=t) for t in tracks)))
-    view = renderer._view(time_s, 1.0, 64.0)
+    view = renderer._view(1.0, 64.0)
+    renderer._pose(view, time_s)
     for number, track in enumerate(tracks, start=1):
         matrix = track_matrix(track, time_s)
         np.testing.assert_allclose(view.pose_translation.numpy()[number], matrix[:3, 3], atol=1e-6)

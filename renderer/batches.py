@@ -1,0 +1,69 @@
+"""Batches of samples through packets, at little cost beside the tracing itself."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Executor
+
+import numpy as np
+import torch
+import warp as wp
+from torch import Tensor
+
+from renderer import kernels, packets
+from renderer.buffers import SceneBuffers
+from renderer.launching import Command, address
+from renderer.structs import ViewData
+
+
+class PacketBatches:
+    """Shades lists of samples for one camera and one footprint, on the CPU. Calls from several threads take turns."""
+
+    def __init__(
+        self, buffers: SceneBuffers, still: ViewData, moving: ViewData, threads: int, pool: Executor | None
+    ) -> None:
+        """Records the launches.
+
+        Args:
+            buffers: the scene.
+            still, moving: two records of the camera, for samples of one time and of many; ``still`` is changed here.
+            threads: host threads that share a batch, the caller's among them.
+            pool: where the others run.
+        """
+        count = len(buffers.tracks.tracks)
+        still.pose_translation = wp.empty(count, wp.vec3, "cpu")
+        still.pose_rotation = wp.empty(count, wp.quat, "cpu")
+        still.single_time = 1
+        poses = still.pose_translation, still.pose_rotation
+        self._pose = Command(kernels.pose_tracks, buffers.data, moving, *poses, size=count)
+        self._still, self._moving = (Command(packets.shade_samples, buffers.data, view) for view in (still, moving))
+        self._keep = buffers, still, moving  # launches know their arrays by address only
+        self._threads, self._pool, self._lock = threads, pool, threading.Lock()
+        self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
+
+    def shade(self, position: Tensor, time_s: Tensor, single_time_s: float | None) -> tuple[Tensor, int, int]:
+        """Colours ``(k, 3)`` float32, and how many shadow rays and reflections they took.
+
+        Args:
+            position: ``(k, 2)`` float32 on the image plane.
+            time_s: ``(k,)`` animation times.
+            single_time_s: the time of all samples, where they have but one.
+        """
+        color = torch.empty(len(position), 3)
+        with self._lock:
+            self._taken[:], self._rays[:] = 0, 0
+            command, times = self._moving, 0
+            if single_time_s is None:
+                time_s = time_s.to(torch.float64).contiguous()
+                times = address(time_s)
+            else:
+                command = self._still
+                self._pose(single_time_s)
+            arrays = address(position), times, address(color), self._rays.ctypes.data
+            command.set(self._taken.ctypes.data, len(position), *arrays)
+            others = [self._pool.submit(command.launch) for _ in range(self._threads - 1)] if self._pool else []
+            command.launch()
+            for other in others:
+                other.result()
+            shadow, reflection = self._rays.tolist()
+        return color, shadow, reflection
