@@ -126,7 +126,7 @@ _NOT_TRACING = ("film.py", "sequence.py", "queries.py", "control*.py", "display*
 
 
 def renderer_hash(root: Path, device: str) -> str:
-    """Hash of what of the renderer decides a picture: its source without file formats and stages, Warp, the kind of device."""
+    """Hash of what decides a picture: the renderer without file formats and stages, Warp, the kind of device."""
     version = importlib.metadata.version("warp-lang")
     return "-".join((source_hash(root / "renderer", skip=_NOT_TRACING)[:16], version, device.partition(":")[0]))
 
