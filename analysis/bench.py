@@ -137,23 +137,33 @@ def counted(show: Callable[[int], None]) -> Callable[..., None]:
     return lambda *_: show(next(done))
 
 
-_REST_S = 0.03
-
-
 def take_turns(
-    cases: Mapping[str, Callable[[], object]], repetitions: int, on_round: Callable[[int], None] = lambda done: None
+    cases: Mapping[str, Callable[[], object]],
+    repetitions: int,
+    on_round: Callable[[int], None] = lambda done: None,
+    rest_s: float = 0.0,
+    lead_in: bool = False,
 ) -> dict[str, list[float]]:
     """Wall seconds of every case, ``repetitions`` times each, after one run that is not counted.
 
-    Cases take turns, forwards and backwards, so that neither drift nor an order of precedence favours one, and rest
-    before each turn: threads of the one before may spin for milliseconds, waiting for more to do.
+    Cases take turns, forwards and backwards, so that neither drift nor an order of precedence favours one.
+
+    Args:
+        cases: what is measured, by name.
+        repetitions: turns of each.
+        on_round: told how many rounds are done.
+        rest_s: pause before each turn. Threads of the case before may spin for milliseconds, waiting for more to do.
+        lead_in: each turn runs twice and the second run counts. A core that another case left idle takes tens of
+            milliseconds to come back, and neither a renderer nor a pipeline pauses for that long.
     """
     for run in cases.values():
         run()
     seconds: dict[str, list[float]] = {name: [] for name in cases}
     for number in range(repetitions):
         for name in list(cases) if number % 2 == 0 else reversed(list(cases)):
-            time.sleep(_REST_S)
+            time.sleep(rest_s)
+            if lead_in:
+                cases[name]()
             start = time.perf_counter()
             cases[name]()
             seconds[name].append(time.perf_counter() - start)

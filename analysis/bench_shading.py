@@ -27,6 +27,8 @@ DRIVING_S = 0.8
 
 _NO_TARGETS: Mapping[str, float | None] = dict.fromkeys(peer.VARIANTS)
 
+_REST_S = 0.03  # Mitsuba's threads spin on after a rendering
+
 
 @dataclass(frozen=True)
 class Still:
@@ -81,7 +83,7 @@ def compare(still: Still, renderer: Renderer, options: BenchOptions, tick: Calla
     }
     cases: dict[str, Callable[[], object]] = {"ours": lambda: renderer.render_frame(still.time_s, side, side, axis)}
     cases |= {variant: picture.repeated(axis**2) for variant, picture in pictures.items()}
-    seconds = take_turns(cases, options.repetitions, tick)
+    seconds = take_turns(cases, options.repetitions, tick, rest_s=_REST_S)
     mine = renderer.render_frame(still.time_s, side, side, axis).numpy()
     for variant, reason in reasons.items():
         note = reason

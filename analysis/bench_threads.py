@@ -43,7 +43,7 @@ def cores(options: BenchOptions, bars: Bars) -> Iterator[Row]:
         batches = morton_batches(options, scene.duration_s)
         renderers = {threads: renderer_of(scene, options, threads) for threads in (1, 2)}
         cases = {str(threads): _tracing(renderer.trace, batches) for threads, renderer in renderers.items()}
-        seconds = take_turns(cases, options.repetitions, tick)
+        seconds = take_turns(cases, options.repetitions, tick, lead_in=True)
         for renderer in renderers.values():
             renderer.close()
         row = Row("cores", f"{name}, 2 threads", "M samples/s", 0.0, "1 thread")
@@ -61,7 +61,7 @@ def order(options: BenchOptions, bars: Bars) -> Iterator[Row]:
             "Morton": _tracing(renderer.trace, batches),
             "rows": _tracing(renderer.trace, [in_rows(batch) for batch in batches]),
         }
-        seconds = take_turns(cases, options.repetitions, tick)
+        seconds = take_turns(cases, options.repetitions, tick, lead_in=True)
         renderer.close()
         row = Row("order", f"{name}, Morton order", "M samples/s", 0.0, "row order")
         yield rate_row(row, _samples(batches), seconds["Morton"], seconds["rows"])

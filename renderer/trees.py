@@ -12,7 +12,9 @@ from renderer import device as devices
 from renderer import packets
 from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
 
-_LINE_FLOATS = 16
+_LINE_FLOATS = 16  # of a cache line
+_COORDINATE_MAX = 1.0e18
+_FACES_MAX = (1 << 25) - 1  # their nodes fill what Warp can address in one array
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,8 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
         The tree; the same mesh gives the same bits.
 
     Raises:
-        ValueError: if a mesh has no faces, an index is out of range, or a vertex is not finite.
+        ValueError: if a mesh has no faces or too many, an index is out of range, or a vertex that is used is not finite
+            or so great that areas overflow.
     """
     points = np.ascontiguousarray(vertices, np.float32)
     corners = np.ascontiguousarray(faces, np.int32)
@@ -47,15 +50,19 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
         raise ValueError(f"mesh: expected vertices (v, 3) and faces (f, 3), got {points.shape} and {corners.shape}")
     if corners.min() < 0 or corners.max() >= len(points):
         raise ValueError(f"faces: expected indices below {len(points)}, got {corners.min()} to {corners.max()}")
-    if not np.isfinite(points).all():
-        raise ValueError("vertices: expected finite numbers")
+    if not (np.abs(points[corners]) < _COORDINATE_MAX).all():
+        raise ValueError(f"vertices: expected finite numbers below {_COORDINATE_MAX:g}")
     count = len(corners)
-    # One node more than there can be: an inner node has at least two children. Pages that stay empty cost nothing.
-    nodes, blocks = np.empty(count * NODE_FLOATS, np.float32), np.empty(count * BLOCK_FLOATS, np.float32)
+    if count > _FACES_MAX:
+        raise ValueError(f"faces: expected at most {_FACES_MAX:,}, got {count:,}")
+    # As many nodes as faces suffice: below the root every node has at least two children. Pages that stay empty cost
+    # nothing, and what no node uses is zero.
+    nodes, blocks = np.zeros(count * NODE_FLOATS, np.float32), np.zeros(count * BLOCK_FLOATS, np.float32)
     boxes, order, used = np.empty(6 * count, np.float32), np.empty(count, np.int32), np.zeros(2, np.int32)
+    scratch = boxes, order, nodes, blocks, used
     devices.load_kernels(packets, "cpu")
-    arrays = [wp.array(points, dtype=wp.vec3, copy=False), wp.array(corners, dtype=wp.vec3i, copy=False)]
-    arrays += [_shared(values) for values in (boxes, order, nodes, blocks, used)]
+    arrays = [_shared(points, wp.vec3), _shared(corners, wp.vec3i)]
+    arrays += [_shared(values, wp.float32 if values.dtype == np.float32 else wp.int32) for values in scratch]
     wp.launch(packets.build_tree, dim=1, inputs=arrays, device="cpu")
     return Tree(
         nodes.reshape(-1, NODE_FLOATS)[: used[0]].copy(),
@@ -71,5 +78,5 @@ def aligned(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return room[first : first + values.size]
 
 
-def _shared(values: NDArray) -> wp.array:
-    return wp.array(values, dtype=wp.float32 if values.dtype == np.float32 else wp.int32, device="cpu", copy=False)
+def _shared(values: NDArray, dtype: type) -> wp.array:
+    return wp.array(values, dtype=dtype, device="cpu", copy=False)

@@ -1,4 +1,5 @@
-// Elementary functions of sixteen floats, exact to a few units in the last place.
+// Elementary functions of sixteen floats, exact to a few units in the last place; for vpow these count in the
+// logarithm of the result.
 #pragma once
 #include "lanes.h"
 
@@ -6,7 +7,7 @@ namespace packets {
 
 constexpr float PI = 3.14159265358979f;
 
-// Twice the area tangent's series on [sqrt(1/2), sqrt(2)], plus the exponent. For positive, normal numbers.
+// Twice the series of the inverse hyperbolic tangent on [sqrt(1/2), sqrt(2)], plus the exponent. For positive, normal numbers.
 inline f16 vlog2(f16 x) {
     const i16 raw = __builtin_bit_cast(i16, x);
     const i16 exponent = (raw - 0x3f3504f3) >> 23;  // 0x3f3504f3 is sqrt(1/2)

@@ -1,7 +1,8 @@
 // Rays against one mesh: sixteen rays that keep together walk the tree as one packet, others walk it alone.
 //
 // Whether a ray meets a triangle, and where, is computed by the same operations either way, and of equally near faces
-// the one with the lower number counts. So a ray's hit does not depend on its company, nor on the order of traversal.
+// the one with the lower number counts. So a ray's hit does not depend on its company, nor on the order of traversal,
+// save where it runs so exactly within a triangle's plane that the distance of that triangle is nothing but rounding.
 #pragma once
 #include "lanes.h"
 #include "tree.h"
@@ -58,7 +59,7 @@ inline int fastest_axis(float x, float y, float z) {
     return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
 }
 
-// One ray, or the part of a packet that is the same for one lane.
+// One ray, ready to be walked.
 struct Single {
     float origin[3], inverse[3];
     float near_origin[3], far_origin[3];  // moved by the padding, outwards
@@ -94,8 +95,8 @@ struct RayHit {
 // Asks the caches for what is walked into later.
 inline void prefetch(const Tree& tree, int child) {
     const bool inner = child >= 0;
-    const char* at = inner ? (const char*)(tree.nodes + child) : (const char*)(tree.blocks + (~child >> 3));
-    const int lines = inner ? 4 : (~child & 7) < BLOCK_WIDTH ? 3 : 6;
+    const char* at = inner ? (const char*)(tree.nodes + child) : (const char*)(tree.blocks + leaf_block(child));
+    const int lines = inner ? 4 : leaf_triangles(child) <= BLOCK_WIDTH ? 3 : 6;
     for (int line = 0; line < lines; ++line) __builtin_prefetch(at + 64 * line);
 }
 
@@ -166,8 +167,8 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
                 continue;
             }
         } else {
-            const Block* leaf = tree.blocks + (~current >> 3);
-            found |= meet_leaf(leaf, (~current & 7) + 1, from, shear, ray.kx, ray.ky, ray.kz, hit);
+            const Block* leaf = tree.blocks + leaf_block(current);
+            found |= meet_leaf(leaf, leaf_triangles(current), from, shear, ray.kx, ray.ky, ray.kz, hit);
             if (any && found) return true;
         }
         do {
@@ -178,9 +179,10 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
     }
 }
 
-// Sixteen rays. A lane with a negative `t` in its hit is idle; it should hold the ray of a busy one.
+// Sixteen rays. A lane with a negative `t` in its hit is idle; unless it holds the ray of a busy one it may keep the
+// packet from being walked as one.
 struct Packet {
-    Vec16 origin, direction, inverse;
+    Vec16 origin, inverse;
     Vec16 low_origin, high_origin;  // moved by the padding, for lower and upper sides of boxes
     Vec16 shear;
     int kx, ky, kz;
@@ -189,18 +191,20 @@ struct Packet {
     bool together;  // worth walking as one
     bool same_signs;
 
-    Packet(const Vec16& from, const Vec16& along) : origin(from), direction(along) {
+    Packet(const Vec16& from, const Vec16& along) : origin(from) {
         f16 x = vabs(along.x), y = vabs(along.y), z = vabs(along.z);
         unsigned by_x = bits((x >= y) & (x >= z)), by_y = bits(y >= z) & ~by_x;
         kz = by_x & 1u ? 0 : by_y & 1u ? 1 : 2, kx = (kz + 1) % 3, ky = (kz + 2) % 3;
         unsigned agree = kz == 0 ? by_x : kz == 1 ? by_y : ALL & ~(by_x | by_y);
-        float longest = greatest(along[kz] < 0.0f ? -along[kz] : along[kz]);
+        float longest = greatest(vabs(along[kz]));
         float spread = 0.0f;
         for (int axis = 0; axis < 3; ++axis) {
             float width = greatest(along[axis]) - least(along[axis]);
             spread = width > spread ? width : spread;
         }
-        together = agree == ALL && spread <= SPREAD_MAX * longest;
+        // What is not finite would spoil the bounds of the others.
+        const f16 sum = from.x + from.y + from.z + along.x + along.y + along.z;
+        together = agree == ALL && bits(sum - sum == 0.0f) == ALL && spread <= SPREAD_MAX * longest;
         if (!together) return;
         inverse = {reciprocal(along.x), reciprocal(along.y), reciprocal(along.z)};
         f16 fast = 1.0f / along[kz];
@@ -260,10 +264,11 @@ inline unsigned children_met(const Node& node, const Packet& rays, const PacketH
     return met;
 }
 
-// The packet against a leaf, triangle by triangle. Returns the lanes with a new hit; `any` idles them.
+// Lanes of a packet against a leaf, triangle by triangle. Returns the lanes with a new hit; `any` idles them.
 template <bool any>
-inline unsigned meet_leaf(const Block* leaf, int triangles, const Packet& rays, PacketHit& hit) {
+inline unsigned meet_leaf(const Block* leaf, int triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
     unsigned changed = 0;
+    const i16 passing = lanes_of(lanes);  // others must not hit what they would not have met alone
     for (int number = 0; number < triangles; ++number) {
         const Block& block = leaf[number / BLOCK_WIDTH];
         const int lane = number % BLOCK_WIDTH;
@@ -277,7 +282,7 @@ inline unsigned meet_leaf(const Block* leaf, int triangles, const Packet& rays, 
         i16 inside = meets_triangle(corner[0], corner[1], corner[2], rays.shear, t, u, v);
         if (!bits(inside)) continue;
         const int face = block.face[lane];
-        inside = inside & ((t < hit.t) | ((t == hit.t) & (face < hit.face)));
+        inside = inside & passing & ((t < hit.t) | ((t == hit.t) & (face < hit.face)));
         changed |= bits(inside);
         hit.t = inside ? any ? (f16)-1.0f : t : hit.t;
         if (any) continue;
@@ -340,11 +345,11 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
         if (!active) continue;
         unsigned changed;
         if (entry.child < 0) {
-            const Block* leaf = tree.blocks + (~entry.child >> 3);
-            const int triangles = (~entry.child & 7) + 1;
+            const Block* leaf = tree.blocks + leaf_block(entry.child);
+            const int triangles = leaf_triangles(entry.child);
             const bool alone = __builtin_popcount(active) * ((triangles + BLOCK_WIDTH - 1) / BLOCK_WIDTH) < triangles;
             changed = alone ? meet_leaf_alone<any>(leaf, triangles, rays, active, hit)
-                            : meet_leaf<any>(leaf, triangles, rays, hit);
+                            : meet_leaf<any>(leaf, triangles, rays, active, hit);
         } else {
             const Node& node = tree.nodes[entry.child];
             const int base = size;

@@ -73,8 +73,9 @@ template <class Scene, class View> struct Stage {
     }
 
   private:
-    // One lane, as camera.py interpolates.
+    // One lane, to the bit as camera.py interpolates.
     void pose_at(int track, int lane, Pose& pose) const {
+#pragma clang fp contract(off)
         const auto& record = scene.tracks.data[track];
         const int last = record.key_count - 1;
         double at = (time_s[lane] - record.start_s) / record.interval_s;

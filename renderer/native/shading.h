@@ -1,4 +1,4 @@
-// Sixteen samples of one framelet from the camera to their colours: the lanes of `camera.py`, `surface.py`, `lights.py`
+// Sixteen samples from the camera to their colours: the lanes of `camera.py`, `surface.py`, `lights.py`
 // and `shading.py`, which say why each step is as it is, and which every other device runs.
 #pragma once
 #include "functions.h"
@@ -214,7 +214,7 @@ inline Vec16 direct_light(const Stage<Scene, View>& stage, const Surface& surfac
     for (int light = 0; light < scene.light_count; ++light) {
         const auto& record = scene.lights.data[light];
         Vec16 towards = spread(record.place), irradiance = spread(record.color);
-        Hit shadow;
+        Hit shadow = {};
         shadow.at.t = FAR;
         if (record.kind == LIGHT_POINT) {
             towards = towards - start;
@@ -346,7 +346,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
             float color[3];
             if (column >= width || row >= height) continue;
             render_pixel(stage, column, row, samples, across, down, color);
-            image[row * width + column] = Pixel(color[0], color[1], color[2]);
+            image[(long long)row * width + column] = Pixel(color[0], color[1], color[2]);
         }
         return;
     }
@@ -380,7 +380,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     for (at = 0; at < LANES; ++at) {
         const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
         if (column < width && row < height)
-            image[row * width + column] = Pixel(sums[at][0] * share, sums[at][1] * share, sums[at][2] * share);
+            image[(long long)row * width + column] = Pixel(sums[at][0] * share, sums[at][1] * share, sums[at][2] * share);
     }
 }
 
@@ -393,7 +393,7 @@ inline void shade_packet(const Scene& scene, const View& view, int first, int co
     const int used = count - first < LANES ? count - first : LANES;
     f16 x, y;
     for (int lane = 0; lane < LANES; ++lane) {
-        const int sample = first + (lane < used ? lane : used - 1);
+        const long long sample = first + (lane < used ? lane : used - 1);
         x[lane] = position[2 * sample], y[lane] = position[2 * sample + 1];
         if (!view.single_time) stage.time_s[lane] = time_s[sample];
     }
@@ -402,7 +402,7 @@ inline void shade_packet(const Scene& scene, const View& view, int first, int co
     i16 shadow_rays, bounces;
     const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces);
     for (int lane = 0; lane < used; ++lane) {
-        float* to = color + 3 * (first + lane);
+        float* to = color + 3ll * (first + lane);
         to[0] = result.x[lane], to[1] = result.y[lane], to[2] = result.z[lane];
         rays[0] += shadow_rays[lane], rays[1] += bounces[lane];
     }

@@ -7,12 +7,18 @@
 
 namespace packets {
 
-constexpr int WIDTH = 8;        // children of a node, and triangles of a leaf at most
+constexpr int WIDTH = 8;        // children of a node
 constexpr int BLOCK_WIDTH = 4;  // triangles of a block
 constexpr int LEAF = 8;         // triangles of a leaf at most
 constexpr int EMPTY_CHILD = -2147483647 - 1;
+constexpr float NOTHING = __builtin_inff();  // an empty box reaches from here to its negative: no ray meets it
 
-// Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (`~(first block * 8 + triangles - 1)`) or
+// A leaf as a child of a node: its first block and how many triangles it has, one to eight.
+inline int leaf_child(int block, int triangles) { return ~(block * 8 + triangles - 1); }
+inline int leaf_block(int child) { return ~child >> 3; }
+inline int leaf_triangles(int child) { return (~child & 7) + 1; }
+
+// Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (< 0, see above) or
 // EMPTY_CHILD, whose box is inside out.
 struct Node {
     float lower[3][WIDTH];
@@ -31,7 +37,7 @@ struct Block {
 struct Bounds {
     float lower[3], upper[3];
     void clear() {
-        for (int axis = 0; axis < 3; ++axis) lower[axis] = FAR, upper[axis] = -FAR;
+        for (int axis = 0; axis < 3; ++axis) lower[axis] = NOTHING, upper[axis] = -NOTHING;
     }
     void add(const float* low, const float* high) {
         for (int axis = 0; axis < 3; ++axis) {
@@ -115,8 +121,8 @@ class TreeBuilder {
             Node& node = nodes[index];
             bool used = i < run_count;
             for (int axis = 0; axis < 3; ++axis) {
-                node.lower[axis][i] = used ? runs[i].box.lower[axis] : FAR;
-                node.upper[axis][i] = used ? runs[i].box.upper[axis] : -FAR;
+                node.lower[axis][i] = used ? runs[i].box.lower[axis] : NOTHING;
+                node.upper[axis][i] = used ? runs[i].box.upper[axis] : -NOTHING;
             }
             node.child[i] = !used ? EMPTY_CHILD : runs[i].count() > LEAF ? next++ : leaf(runs[i]);
         }
@@ -153,7 +159,7 @@ class TreeBuilder {
                             triangle < 0 ? 0.0f : vertices[3 * faces[3 * triangle + corner] + axis];
             }
         }
-        return ~(first_block * WIDTH + run.count() - 1);
+        return leaf_child(first_block, run.count());
     }
 
     struct Cut {

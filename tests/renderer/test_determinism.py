@@ -43,10 +43,11 @@ def test_wide_and_tall_frames_hold_the_square_one_in_their_middle(driving) -> No
         assert ((part - square).abs().amax(-1) > 1e-3).float().mean() < 0.01
 
 
-def test_supersampling_is_the_mean_of_a_finer_frame(driving) -> None:
-    fine = driving.render_frame(0.3, 51, 33)
-    coarse = driving.render_frame(0.3, 17, 11, samples_per_axis=3)
-    expected = fine.reshape(11, 3, 17, 3, 3).mean(dim=(1, 3))
+@pytest.mark.parametrize("samples", [3, 4, 8])
+def test_supersampling_is_the_mean_of_a_finer_frame(driving, samples: int) -> None:
+    fine = driving.render_frame(0.3, 17 * samples, 11 * samples)
+    coarse = driving.render_frame(0.3, 17, 11, samples_per_axis=samples)
+    expected = fine.reshape(11, samples, 17, samples, 3).mean(dim=(1, 3))
     assert ((coarse - expected).abs().amax(-1) > 1e-3).float().mean() < 0.02
 
 
@@ -57,6 +58,12 @@ def test_ranges_do_not_change_a_bit(monkeypatch) -> None:
     assert torch.equal(renderer.render_frame(0.3, 70, 50, 2), whole)
     one = Renderer(driving_scene(), threads=1, packets=False)
     assert torch.equal(one.render_frame(0.3, 70, 50, 2), whole)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 4])
+def test_threads_do_not_change_a_bit_of_a_frame(samples: int) -> None:
+    one, three = (Renderer(driving_scene(), threads=threads).render_frame(0.3, 70, 50, samples) for threads in (1, 3))
+    assert torch.equal(one, three)
 
 
 def test_an_empty_batch_is_answered() -> None:

@@ -16,6 +16,7 @@ from scenes.canonical import (
     Cube,
     DirectionalLight,
     Disk,
+    Emissive,
     EnvironmentLight,
     ImageTexture,
     Instance,
@@ -42,7 +43,7 @@ from tests.renderer.builders import (
 
 
 def every_feature() -> Scene:
-    """All shapes, textures, wraps, filters, lights and materials, still and moving, in one picture."""
+    """All shapes, kinds of textures, wraps, filters, lights and materials, still and moving, in one picture."""
     rng = np.random.default_rng(2)
     picture = rng.random((16, 8, 3), dtype=np.float32)
     red, blue = ConstantTexture((0.7, 0.1, 0.1)), ConstantTexture((0.1, 0.2, 0.7))
@@ -61,6 +62,7 @@ def every_feature() -> Scene:
         (Cube(), turned, Phong(blue, (0.2, 0.2, 0.2), 8.0), turning_track(1)),
         (ball, place((0.9, -0.5, 1.0), scale=(0.4, 0.5, 0.4)), gloss, turning_track(2)),
         (ball, place((-0.4, -0.5, 1.2), scale=(0.4, 0.4, 0.4)), Mirror(textures[0]), None),
+        (Disk(0.3), place((0.2, 1.2, 0.0)), Emissive((0.5, 0.9, 0.2)), None),
     ]
     sky = rng.random((8, 16, 3), dtype=np.float32)
     lights = (PointLight((2.0, 3.0, 3.0), (20.0, 18.0, 15.0)), DirectionalLight((-0.5, -1.0, -0.4), (1.0, 1.0, 0.9)))
@@ -106,11 +108,15 @@ def test_driving_pictures_are_those_of_single_samples(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_sample_does_not_depend_on_its_company(name: str) -> None:
+@pytest.mark.parametrize("mixed_times", [False, True])
+def test_a_sample_does_not_depend_on_its_company(name: str, mixed_times: bool) -> None:
     renderer = Renderer(SCENES[name]())
     position = grid(48)
+    times = np.random.default_rng(1).uniform(0.0, 0.8, len(position)) if mixed_times else np.full(len(position), 0.3)
     order = np.random.default_rng(0).permutation(len(position))
-    together, apart = (renderer.trace(batch(where, 0.3)).color.reshape(-1, 3) for where in (position, position[order]))
+    together, apart = (
+        renderer.trace(batch(position[rows], times[rows])).color.reshape(-1, 3) for rows in (slice(None), order)
+    )
     assert torch.equal(together[torch.from_numpy(order)], apart)
 
 

@@ -62,7 +62,6 @@ def test_blocked_says_whether_there_is_a_hit_before_the_end(kind: str) -> None:
     hits = queries.closest(origin, direction)
     met = hits.face >= 0
     assert np.array_equal(queries.blocked(origin, direction), met)
-    assert not queries.blocked(origin, direction, np.where(met, hits.t * 0.999, 0.5)).any() or kind == "random"
     assert queries.blocked(origin[met], direction[met], hits.t[met] * 1.001).all()
     assert not queries.blocked(origin[met], direction[met], hits.t[met] * 0.999).any()
     assert not (queries.closest(origin, direction, 1e-6).face >= 0).any()
@@ -78,6 +77,26 @@ def test_a_ray_does_not_depend_on_its_company() -> None:
     for name in ("face", "t", "u", "v"):
         assert np.array_equal(getattr(together, name)[order], getattr(apart, name)), name
         assert np.array_equal(getattr(together, name), getattr(threads, name)), name
+    reach = np.random.default_rng(2).uniform(0.0, 4.0, len(origin)).astype(np.float32)
+    blocked = queries.blocked(origin, direction, reach)
+    assert 0.1 < blocked.mean() < 0.9
+    assert np.array_equal(blocked[order], queries.blocked(origin[order], direction[order], reach[order]))
+
+
+@pytest.mark.parametrize("spoilt", ["origin", "direction", "reach"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_no_number_spoils_no_other_ray(spoilt: str, value: float) -> None:
+    vertices, faces = bumpy(3)
+    queries = RayQueries(vertices, faces)
+    origin, direction = camera_rays(16)
+    reach = np.full(len(origin), 1e30, np.float32)
+    good = queries.closest(origin, direction, reach)
+    {"origin": origin, "direction": direction, "reach": reach}[spoilt][5::16] = value
+    bad = queries.closest(origin, direction, reach)
+    others = np.arange(len(origin)) % 16 != 5
+    assert np.array_equal(bad.face[others], good.face[others]) and np.array_equal(bad.t[others], good.t[others])
+    if value != np.inf or spoilt != "reach":
+        assert (bad.face[~others] == -1).all()
 
 
 @pytest.mark.parametrize("distance", [3.0, 1e2, 1e4])
@@ -105,6 +124,9 @@ def test_equal_distances_go_to_the_lower_number_in_trees_of_any_shape() -> None:
         direction[::3] = (0.01, 0.0, -2.0)
         hits = queries.closest(origin, direction)
         assert (hits.face == 0).all() and np.allclose(hits.t, 0.5)
+        origin[1::2, 2], direction[1::2, 2] = -1.0, 2.0  # from both sides: these are walked one by one
+        alone = queries.closest(origin, direction)
+        assert (alone.face == 0).all() and np.allclose(alone.t, 0.5) and queries.blocked(origin, direction).all()
 
 
 def test_slivers_and_points_are_harmless() -> None:
@@ -139,7 +161,7 @@ def test_odd_queries_are_refused() -> None:
             RayQueries(vertices, odd)
     with pytest.raises(ValueError, match="expected indices below 42, got 0 to 42"):
         RayQueries(vertices, [[0, 1, 42]])
-    with pytest.raises(ValueError, match="finite"):
+    with pytest.raises(ValueError, match="finite numbers below"):
         RayQueries(np.full((3, 3), np.nan), [[0, 1, 2]])
     with pytest.raises(ValueError, match="threads: expected at least 1, got 0"):
         RayQueries(vertices, faces, threads=0)
