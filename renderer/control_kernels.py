@@ -8,7 +8,7 @@ from __future__ import annotations
 import warp as wp
 
 from renderer.control_estimate import ErrorPlan, estimate_framelet, fetch_ahead
-from renderer.control_ranking import Address, count_above, kth_greatest, rank_keys
+from renderer.control_ranking import count_above, kth_greatest, rank_keys
 from renderer.control_response import (
     ResponsePlan,
     constrain_active,
@@ -27,6 +27,7 @@ from renderer.control_selection import (
     store_framelet,
 )
 from renderer.control_tiling import count_exceeding, emit_tiles, mark_splits, sum_account, sum_nodes
+from renderer.launching import Address
 
 
 @wp.struct

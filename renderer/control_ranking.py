@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import warp as wp
 
-Address = wp.uint64
-"""Of the first element of a contiguous tensor."""
+from renderer.launching import Address
 
 
 @wp.func_native("""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.control_ranking import Address
+from renderer.launching import Address
 
 
 @wp.struct

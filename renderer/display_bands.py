@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.control_ranking import Address
 from renderer.display_age import DisplayPlan
+from renderer.launching import Address
 
 PLANES = 5
 

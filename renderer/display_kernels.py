@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.control_ranking import Address
 from renderer.display_age import DisplayPlan, list_candidates, map_newest, smooth_rows
 from renderer.display_bands import begin_band, blend_rows, bury, corner, expand_rows, finish_band, passes
+from renderer.launching import Address
 
 
 @wp.struct

@@ -8,9 +8,13 @@ from __future__ import annotations
 from typing import Any
 
 import warp as wp
+from numpy.typing import NDArray
 from torch import Tensor
 
 from tsar.config import TsarConfig
+
+Address = wp.uint64
+"""In a kernel: of the first element of a contiguous tensor on the CPU."""
 
 
 def address(tensor: Tensor) -> int:
@@ -22,6 +26,11 @@ def address(tensor: Tensor) -> int:
     if not tensor.is_contiguous() or tensor.is_cuda:
         raise ValueError(f"expected a contiguous tensor on the CPU, got strides {tensor.stride()} on {tensor.device}")
     return tensor.data_ptr()
+
+
+def shared(values: NDArray, dtype: type) -> wp.array:
+    """A contiguous NumPy array as a Warp one on the CPU, in the same memory."""
+    return wp.array(values, dtype=dtype, device="cpu", copy=False)
 
 
 def require_same(config: TsarConfig, own: TsarConfig) -> None:

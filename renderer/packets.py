@@ -12,6 +12,7 @@ from pathlib import Path
 
 import warp as wp
 
+from renderer.launching import Address
 from renderer.structs import SceneData, ViewData
 
 LANES = wp.constant(16)
@@ -19,9 +20,6 @@ LANES = wp.constant(16)
 
 NODE_FLOATS, BLOCK_FLOATS = 64, 40
 """Sizes of a tree's records in units of four bytes, as in ``native/tree.h``."""
-
-
-Address = wp.uint64
 
 
 @wp.struct

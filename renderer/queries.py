@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from renderer import packets
+from renderer.launching import shared
 from renderer.trees import aligned, build_tree
 
 _RANGE_RAYS = 1 << 14
@@ -53,7 +54,7 @@ class RayQueries:
         if threads < 1:
             raise ValueError(f"threads: expected at least 1, got {threads}")
         tree = build_tree(vertices, faces)
-        self._nodes, self._blocks = (_shared(aligned(part), wp.float32) for part in (tree.nodes, tree.blocks))
+        self._nodes, self._blocks = (shared(aligned(part), wp.float32) for part in (tree.nodes, tree.blocks))
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def closest(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None = None) -> RayHits:
@@ -83,9 +84,9 @@ class RayQueries:
         hits = RayHits(np.empty(count, np.int32), *(np.empty(count if nearest else 0, np.float32) for _ in range(3)))
         rays = packets.Queries()
         rays.nodes, rays.blocks = self._nodes, self._blocks
-        rays.origin, rays.direction = _shared(starts, wp.vec3), _shared(ways, wp.vec3)
-        rays.reach, rays.face = _shared(reach, wp.float32), _shared(hits.face, wp.int32)
-        rays.t, rays.u, rays.v = (_shared(part, wp.float32) for part in (hits.t, hits.u, hits.v))
+        rays.origin, rays.direction = shared(starts, wp.vec3), shared(ways, wp.vec3)
+        rays.reach, rays.face = shared(reach, wp.float32), shared(hits.face, wp.int32)
+        rays.t, rays.u, rays.v = (shared(part, wp.float32) for part in (hits.t, hits.u, hits.v))
 
         def run(first: int) -> None:
             dim = -(-min(_RANGE_RAYS, count - first) // packets.LANES)
@@ -94,7 +95,3 @@ class RayQueries:
         for _ in (map if self._pool is None else self._pool.map)(run, range(0, count, _RANGE_RAYS)):
             pass
         return hits
-
-
-def _shared(values: NDArray, dtype: type) -> wp.array:
-    return wp.array(values, dtype=dtype, device="cpu", copy=False)

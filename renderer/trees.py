@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from renderer import device as devices
 from renderer import packets
+from renderer.launching import shared
 from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
 
 _LINE_FLOATS = 16  # of a cache line
@@ -61,8 +62,8 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
     boxes, order, used = np.empty(6 * count, np.float32), np.empty(count, np.int32), np.zeros(2, np.int32)
     scratch = boxes, order, nodes, blocks, used
     devices.load_kernels(packets, "cpu")
-    arrays = [_shared(points, wp.vec3), _shared(corners, wp.vec3i)]
-    arrays += [_shared(values, wp.float32 if values.dtype == np.float32 else wp.int32) for values in scratch]
+    arrays = [shared(points, wp.vec3), shared(corners, wp.vec3i)]
+    arrays += [shared(values, wp.float32 if values.dtype == np.float32 else wp.int32) for values in scratch]
     wp.launch(packets.build_tree, dim=1, inputs=arrays, device="cpu")
     return Tree(
         nodes.reshape(-1, NODE_FLOATS)[: used[0]].copy(),
@@ -76,7 +77,3 @@ def aligned(values: NDArray[np.float32]) -> NDArray[np.float32]:
     first = -room.ctypes.data // 4 % _LINE_FLOATS
     room[first : first + values.size] = values.reshape(-1)
     return room[first : first + values.size]
-
-
-def _shared(values: NDArray, dtype: type) -> wp.array:
-    return wp.array(values, dtype=dtype, device="cpu", copy=False)

@@ -1,0 +1,148 @@
+// Samples from the camera to their colours, sixteen at a time: the lanes of `camera.py` and `kernels.py`.
+#pragma once
+#include "shading.h"
+
+namespace packets {
+
+template <class Scene, class View>
+inline void camera_rays(const Stage<Scene, View>& stage, f16 x, f16 y, Vec16& origin, Vec16& direction) {
+    const View& view = stage.view;
+    const Vec16 local = {(2.0f * x - 1.0f) * view.tan_x, (1.0f - 2.0f * y) * view.tan_y, (f16)-1.0f};
+    origin = spread(view.from_camera_offset);
+    direction = transformed(view.from_camera, local);
+    if (view.camera_track) {
+        const Pose pose = stage.pose(view.camera_track);
+        origin = pose.to_world(origin) + pose.translation;
+        direction = pose.to_world(direction);
+    }
+    direction = unit(direction);
+}
+
+// Mean of `samples` squared samples of a pixel, whole packets of them, by rows.
+template <class Scene, class View>
+inline void render_pixel(const Stage<Scene, View>& stage, int column, int row, int samples, float across, float down,
+                         float* color) {
+    const int per_pixel = samples * samples;
+    i16 lane_number;
+    for (int lane = 0; lane < LANES; ++lane) lane_number[lane] = lane;
+    Vec16 total = {(f16)0.0f, (f16)0.0f, (f16)0.0f};
+    for (int first = 0; first < per_pixel; first += LANES) {
+        const f16 sample = to_float(lane_number + first), y = vfloor((sample + 0.5f) / (float)samples);
+        const f16 x = sample - y * (float)samples;
+        Vec16 origin, direction;
+        camera_rays(stage, ((float)(column * samples) + x + 0.5f) / across, ((float)(row * samples) + y + 0.5f) / down,
+                    origin, direction);
+        i16 shadow_rays, bounces;
+        total = total + radiance(stage, origin, direction, ALL, shadow_rays, bounces);
+    }
+    const float share = 1.0f / (float)per_pixel;
+    color[0] = added(total.x) * share, color[1] = added(total.y) * share, color[2] = added(total.z) * share;
+}
+
+// Renders a block of 4 x 4 pixels, `samples` squared samples each; blocks go along the Morton curve within 16 x 16
+// pixels, those by rows. Consecutive samples share a pixel as far as they can.
+template <class Scene, class View, class Pixel>
+inline void render_block(const Scene& scene, const View& view, int block, int width, int height, int samples,
+                         double time_s, Pixel* image) {
+    const int columns = (width + 15) / 16, place = block / 16, inner = block % 16;
+    const int left = place % columns * 16 + (inner & 1) * 4 + (inner >> 2 & 1) * 8;
+    const int top = place / columns * 16 + (inner >> 1 & 1) * 4 + (inner >> 3) * 8;
+    if (left >= width || top >= height) return;
+    Stage<Scene, View> stage = {scene, view, {}};
+    for (int lane = 0; lane < LANES; ++lane) stage.time_s[lane] = time_s;
+    const int per_pixel = samples * samples;
+    const float across = (float)(width * samples), down = (float)(height * samples);
+    if (per_pixel % LANES == 0) {
+        for (int at = 0; at < LANES; ++at) {
+            const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+            float color[3];
+            if (column >= width || row >= height) continue;
+            render_pixel(stage, column, row, samples, across, down, color);
+            image[(long long)row * width + column] = Pixel(color[0], color[1], color[2]);
+        }
+        return;
+    }
+    float sums[LANES][3] = {};
+    int at = 0, within_x = 0, within_y = 0;  // pixel of the block, and sample of the pixel
+    for (int packet = 0; packet < per_pixel; ++packet) {
+        int pixel[LANES];
+        f16 x, y;
+        unsigned busy = 0;
+        for (int lane = 0; lane < LANES; ++lane) {
+            const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+            pixel[lane] = at;
+            busy |= (unsigned)(column < width && row < height) << lane;
+            x[lane] = (float)(column * samples + within_x), y[lane] = (float)(row * samples + within_y);
+            if (++within_x < samples) continue;
+            within_x = 0;
+            if (++within_y < samples) continue;
+            within_y = 0, ++at;
+        }
+        if (!busy) continue;
+        Vec16 origin, direction;
+        camera_rays(stage, (x + 0.5f) / across, (y + 0.5f) / down, origin, direction);
+        i16 shadow_rays, bounces;
+        const Vec16 color = radiance(stage, origin, direction, busy, shadow_rays, bounces);
+        for (int lane = 0; lane < LANES; ++lane) {
+            float* to = sums[pixel[lane]];
+            to[0] += color.x[lane], to[1] += color.y[lane], to[2] += color.z[lane];
+        }
+    }
+    const float share = 1.0f / (float)per_pixel;
+    for (at = 0; at < LANES; ++at) {
+        const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+        if (column < width && row < height)
+            image[(long long)row * width + column] = Pixel(sums[at][0] * share, sums[at][1] * share, sums[at][2] * share);
+    }
+}
+
+// Shades samples `first` to `first + 15`, as far as there are `count` of them. Adds the shadow rays and reflections it
+// took to `rays`. Times are read only where samples differ in them.
+template <class Scene, class View>
+inline void shade_packet(const Scene& scene, const View& view, int first, int count, const float* position,
+                         const double* time_s, float* color, long long* rays) {
+    Stage<Scene, View> stage = {scene, view, {}};
+    const int used = count - first < LANES ? count - first : LANES;
+    f16 x, y;
+    for (int lane = 0; lane < LANES; ++lane) {
+        const long long sample = first + (lane < used ? lane : used - 1);
+        x[lane] = position[2 * sample], y[lane] = position[2 * sample + 1];
+        if (!view.single_time) stage.time_s[lane] = time_s[sample];
+    }
+    Vec16 origin, direction;
+    camera_rays(stage, x, y, origin, direction);
+    i16 shadow_rays, bounces;
+    const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces);
+    for (int lane = 0; lane < used; ++lane) {
+        float* to = color + 3ll * (first + lane);
+        to[0] = result.x[lane], to[1] = result.y[lane], to[2] = result.z[lane];
+        rays[0] += shadow_rays[lane], rays[1] += bounces[lane];
+    }
+}
+
+// Calls `work(item)` for items below `count` that no other caller has taken; `taken` counts them for all callers.
+template <class Work> inline void share(int* taken, int count, int at_once, Work work) {
+    for (int first; (first = __atomic_fetch_add(taken, at_once, __ATOMIC_RELAXED)) < count;)
+        for (int item = first; item < first + at_once && item < count; ++item) work(item);
+}
+
+template <class Scene, class View>
+inline void shade_samples(const Scene& scene, const View& view, int* taken, int count, const float* position,
+                          const double* time_s, float* color, long long* rays) {
+    long long mine[2] = {};
+    share(taken, (count + LANES - 1) / LANES, 16, [&](int packet) {
+        shade_packet(scene, view, packet * LANES, count, position, time_s, color, mine);
+    });
+    for (int kind = 0; kind < 2; ++kind) __atomic_fetch_add(rays + kind, mine[kind], __ATOMIC_RELAXED);
+}
+
+template <class Scene, class View, class Image>
+inline void render_pixels(const Scene& scene, const View& view, int* taken, int samples, double time_s,
+                          const Image& image) {
+    const int width = image.shape[1], height = image.shape[0];
+    share(taken, (width + 15) / 16 * ((height + 15) / 16) * 16, 16, [&](int block) {
+        render_block(scene, view, block, width, height, samples, time_s, image.data);
+    });
+}
+
+}  // namespace packets
