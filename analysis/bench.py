@@ -153,8 +153,8 @@ def take_turns(
         repetitions: turns of each.
         on_round: told how many rounds are done.
         rest_s: pause before each turn. Threads of the case before may spin for milliseconds, waiting for more to do.
-        lead_in: each turn runs twice and the second run counts. A core that another case left idle takes tens of
-            milliseconds to come back, and neither a renderer nor a pipeline pauses for that long.
+        lead_in: each turn runs twice and the second run counts: a core that another case left idle is slow to come
+            back, and a renderer in use does not leave it idle.
     """
     for run in cases.values():
         run()

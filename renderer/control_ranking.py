@@ -4,7 +4,7 @@ Each ranks by a float64 and takes the ``k`` first. A float64 becomes an unsigned
 the ``k``-th is found bit by bit from the top: 64 passes that count, each a handful of vector instructions for the some
 hundred values there are. All above it are taken, and of those equal to it as many as are missing, in a stated order.
 
-Addresses are passed as numbers: a launch then costs a microsecond, not ten, for no array has to be described.
+Addresses are passed as numbers: a launch then costs less, for no array has to be described.
 """
 
 from __future__ import annotations
