@@ -19,6 +19,7 @@ from renderer.structs import (
     SHAPE_DISK,
     SHAPE_MESH,
     SHAPE_RECTANGLE,
+    SHAPE_RELIEF,
     SHAPE_SPHERE,
     GroupRecord,
     InstanceRecord,
@@ -27,6 +28,7 @@ from renderer.structs import (
     MaterialRecord,
     MeshRecord,
     NodeRecord,
+    ReliefRecord,
     SceneData,
     TextureRecord,
     TrackRecord,
@@ -37,6 +39,7 @@ from scenes.canonical import (
     DirectionalLight,
     Disk,
     EnvironmentLight,
+    HeightField,
     Instance,
     Matrix,
     Mesh,
@@ -88,6 +91,7 @@ class _Builder:
         self.tracks = TrackTable(device)
         self.meshes = MeshTable(device, packets)
         self.instance_rows: list[tuple[dict, np.ndarray, np.ndarray]] = []
+        self.reliefs: list[dict] = []
 
     def assembly(self, assembly: Assembly) -> None:
         """Adds meshes that became one."""
@@ -99,9 +103,17 @@ class _Builder:
     def instance(self, instance: Instance) -> None:
         """Adds an instance."""
         name, shape = instance.name, instance.shape
-        if instance.emission is not None:
-            raise SceneError(f"Instance {name!r}: area lights (Instance.emission) are not supported yet")
         row = {"track": self.tracks.add(instance.track), "material": self.materials.add(instance.material, name)}
+        if instance.emission is not None:
+            check_light(instance.emission, f"Instance {name!r}: emission")
+            if not isinstance(shape, Rectangle | Sphere):
+                raise SceneError(
+                    f"Instance {name!r}: emission: expected a Rectangle or Sphere, got {type(shape).__name__}"
+                )
+            row["emission"] = instance.emission
+        if isinstance(instance.material, HeightField):
+            self._relief(row, instance, instance.material)
+            return
         if isinstance(shape, Mesh):
             self._place({"shape": SHAPE_MESH, **row}, self.meshes.add(shape), instance.to_world, name)
             return
@@ -116,6 +128,22 @@ class _Builder:
         corner = np.array([1.0, 1.0, 0.0 if isinstance(shape, Disk | Rectangle) else 1.0])
         unit = UnitMesh(-1, np.zeros(3), scale, -corner, corner)
         self._place({"shape": _UNIT_SHAPES[type(shape)], **row}, unit, instance.to_world, name)
+
+    def _relief(self, row: dict, instance: Instance, material: HeightField) -> None:
+        """Adds a rectangle that is carved."""
+        name = instance.name
+        if not isinstance(instance.shape, Rectangle):
+            raise SceneError(
+                f"Instance {name!r}: HeightField: expected a Rectangle, got {type(instance.shape).__name__}"
+            )
+        if instance.emission is not None:
+            raise SceneError(f"Instance {name!r}: expected no emission of a HeightField, got {instance.emission}")
+        planes = material.height if material.height.ndim == 3 else material.height[..., None]
+        level, _ = self.materials.add_image(np.repeat(planes[..., :1], 3, axis=2), mipmap=False)
+        row |= {"shape": SHAPE_RELIEF, "relief": len(self.reliefs)}
+        self.reliefs.append({"level": level, "depth": material.depth, "steps": material.steps})
+        lower, upper = np.array([-1.0, -1.0, -material.depth]), np.array([1.0, 1.0, 0.0])
+        self._place(row, UnitMesh(-1, np.zeros(3), 1.0, lower, upper), instance.to_world, name)
 
     def _place(self, row: dict, unit: UnitMesh, to_world: Matrix, name: str) -> None:
         """Adds a unit shape: its transforms in float64 before rounding, and its bounds in track space."""
@@ -233,6 +261,7 @@ class _Builder:
         data.textures = _upload(self.materials.textures, TextureRecord, device)
         data.levels = _upload(self.materials.levels, LevelRecord, device)
         data.texels = self.materials.upload_texels(device)
+        data.reliefs = _upload(self.reliefs, ReliefRecord, device)
         data.light_count = len(light_rows)
         data.lights = _upload(light_rows, LightRecord, device)
         data.tracks = _upload(self.tracks.rows, TrackRecord, device)
@@ -240,6 +269,9 @@ class _Builder:
         data.ambient = wp.vec3(*map(float, scene.ambient))
         depth = int(scene.integrator.depth)
         data.depth = min(depth, DEPTH_MAX) if depth >= 0 else DEPTH_MAX
+        data.light_cells = scene.integrator.light_cells
+        data.reflection_rays = scene.integrator.reflection_rays
+        data.refraction_rays = scene.integrator.refraction_rays
         return SceneBuffers(data, self.tracks, self.meshes.keep, self.meshes.triangle_count)
 
 

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.structs import SceneData, ViewData
+from renderer.features import Feature
+from renderer.randomness import PURPOSE_LENS, draw_2d
+from renderer.structs import CAMERA_PANORAMA, CAMERA_PARALLEL, Draw, SceneData, ViewData
+
+_LENS = wp.constant(int(Feature.LENS))
+_PARALLEL = wp.constant(int(Feature.PARALLEL))
+_PANORAMA = wp.constant(int(Feature.PANORAMA))
+_MOTION = wp.constant(int(Feature.MOTION))
+_KIND_PARALLEL = wp.constant(CAMERA_PARALLEL)
+_KIND_PANORAMA = wp.constant(CAMERA_PANORAMA)
+_PURPOSE_LENS = wp.constant(PURPOSE_LENS)
 
 
 @wp.func
@@ -54,16 +64,31 @@ def track_rotation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp
 
 
 @wp.func
-def camera_ray(scene: SceneData, view: ViewData, position: wp.vec2, time_s: wp.float64):
-    """Origin and unit direction, in world space, of the ray through an image position in [0, 1)² from the top left."""
-    local = wp.vec3(
-        (2.0 * position[0] - 1.0) * view.tan_x,
-        (1.0 - 2.0 * position[1]) * view.tan_y,
-        -1.0,
-    )
-    origin = view.from_camera_offset
-    direction = view.from_camera * local
-    if view.camera_track != 0:
+def camera_ray(features: wp.int32, scene: SceneData, view: ViewData, draw: Draw, position: wp.vec2, time_s: wp.float64):
+    """Origin and unit direction, in world space, of a ray through an image position in [0, 1)² from the top left.
+
+    With a lens the ray starts at a point of it and meets that of the pinhole in the plane in focus.
+    """
+    x = (2.0 * position[0] - 1.0) * view.tan_x
+    y = (1.0 - 2.0 * position[1]) * view.tan_y
+    start = wp.vec3(0.0, 0.0, 0.0)
+    towards = wp.vec3(x, y, -1.0)
+    if (features & _LENS) != 0 and view.lens_radius > 0.0:
+        sample = draw_2d(draw, _PURPOSE_LENS)
+        radius = view.lens_radius * wp.sqrt(sample[0])
+        turn = 2.0 * wp.pi * sample[1]
+        start = wp.vec3(radius * wp.cos(turn), radius * wp.sin(turn), 0.0)
+        towards = view.focal_distance * towards - start
+    if (features & _PARALLEL) != 0 and view.kind == _KIND_PARALLEL:
+        start = wp.vec3(x, y, 0.0)
+        towards = wp.vec3(0.0, 0.0, -1.0)
+    if (features & _PANORAMA) != 0 and view.kind == _KIND_PANORAMA:
+        turn = 2.0 * wp.pi * (position[0] - 0.5)
+        polar = wp.pi * position[1]
+        towards = wp.vec3(wp.sin(turn) * wp.sin(polar), wp.cos(polar), -wp.cos(turn) * wp.sin(polar))
+    origin = view.from_camera * start + view.from_camera_offset
+    direction = view.from_camera * towards
+    if (features & _MOTION) != 0 and view.camera_track != 0:
         rotation = track_rotation(scene, view, view.camera_track, time_s)
         origin = wp.quat_rotate(rotation, origin) + track_translation(scene, view, view.camera_track, time_s)
         direction = wp.quat_rotate(rotation, direction)

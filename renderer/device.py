@@ -73,8 +73,12 @@ def pick(device: str) -> str:
     return device
 
 
+Kernels = ModuleType | wp.Module
+"""What holds kernels: a Python module, or one that Warp made for a set of features."""
+
+
 def load_kernels(
-    modules: ModuleType | Sequence[ModuleType], device: str, report: Callable[[str], None] | None = None
+    modules: Kernels | Sequence[Kernels], device: str, report: Callable[[str], None] | None = None
 ) -> None:
     """Loads modules of kernels before their first launch, and says how far it is when that takes a while.
 
@@ -83,22 +87,26 @@ def load_kernels(
     by side: Warp locks what they share while it writes their source, and not while it compiles that.
 
     Args:
-        modules: Python modules that define kernels.
+        modules: what defines kernels.
         device: from :func:`pick`.
         report: called with a line of text at times while kernels are compiled; by default a status on a terminal, or
             lines on standard error.
     """
     with _lock:
-        asked = [modules] if isinstance(modules, ModuleType) else modules
-        missing = [module for module in asked if (module.__name__, device) not in _loaded]
+        asked = [modules] if isinstance(modules, Kernels) else modules
+        missing = [module for module in asked if (_name(module), device) not in _loaded]
         if not missing:
             return
         with ThreadPoolExecutor(min(len(missing), core_count())) as pool:
-            loads = {pool.submit(wp.load_module, module, device=device): module.__name__ for module in missing}
+            loads = {pool.submit(wp.load_module, module, device=device): _name(module) for module in missing}
             _watch(loads, device, report)
         for load, name in loads.items():
             load.result()
             _loaded.add((name, device))
+
+
+def _name(module: Kernels) -> str:
+    return module.__name__ if isinstance(module, ModuleType) else module.name
 
 
 def _watch(loads: Mapping[Future, str], device: str, report: Callable[[str], None] | None) -> None:

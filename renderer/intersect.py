@@ -5,10 +5,14 @@ from __future__ import annotations
 import warp as wp
 
 from renderer.camera import track_rotation, track_translation
+from renderer.features import Feature
+from renderer.heightfield import relief_distance
 from renderer.structs import (
+    SHAPE_CUBE,
     SHAPE_DISK,
     SHAPE_MESH,
     SHAPE_RECTANGLE,
+    SHAPE_RELIEF,
     SHAPE_SPHERE,
     Hit,
     InstanceRecord,
@@ -20,6 +24,14 @@ _MESH = wp.constant(SHAPE_MESH)
 _SPHERE = wp.constant(SHAPE_SPHERE)
 _DISK = wp.constant(SHAPE_DISK)
 _RECTANGLE = wp.constant(SHAPE_RECTANGLE)
+_CUBE = wp.constant(SHAPE_CUBE)
+_RELIEF = wp.constant(SHAPE_RELIEF)
+_HAS_MESH = wp.constant(int(Feature.MESH))
+_HAS_SPHERE = wp.constant(int(Feature.SPHERE))
+_HAS_FLAT = wp.constant(int(Feature.FLAT))
+_HAS_CUBE = wp.constant(int(Feature.CUBE))
+_HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
+_HAS_MOTION = wp.constant(int(Feature.MOTION))
 
 _TINY = wp.constant(1.0e-20)
 
@@ -125,7 +137,12 @@ def misses_sphere(from_center: wp.vec3, direction: wp.vec3, radius: wp.float32, 
 
 @wp.func
 def meet_instance(
-    scene: SceneData, record: InstanceRecord, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+    features: wp.int32,
+    scene: SceneData,
+    record: InstanceRecord,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
 ) -> Hit:
     """Nearest hit of a ray in track space with one instance, before ``t_max``; ``instance`` is 0 for a hit."""
     hit = Hit()
@@ -136,18 +153,20 @@ def meet_instance(
     towards = towards / stretch
     reach = t_max * stretch
     t = wp.float32(-1.0)
-    if record.shape == _MESH:
+    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
         query = wp.mesh_query_ray(scene.meshes[record.mesh].id, start, towards, reach)
         if query.result:
             t = query.t
             hit.u = query.u
             hit.v = query.v
             hit.face = query.face
-    elif record.shape == _SPHERE:
+    elif (features & _HAS_SPHERE) != 0 and record.shape == _SPHERE:
         t = sphere_distance(start, towards)
-    elif record.shape == _DISK or record.shape == _RECTANGLE:
+    elif (features & _HAS_FLAT) != 0 and (record.shape == _DISK or record.shape == _RECTANGLE):
         t = plane_distance(start, towards, record.shape == _DISK)
-    else:
+    elif (features & _HAS_RELIEF) != 0 and record.shape == _RELIEF:
+        t = relief_distance(scene, record, start, towards, reach)
+    elif (features & _HAS_CUBE) != 0 and record.shape == _CUBE:
         distance, face = cube_distance(start, towards)
         t = distance
         hit.face = face
@@ -159,21 +178,32 @@ def meet_instance(
 
 @wp.func
 def instance_blocks(
-    scene: SceneData, record: InstanceRecord, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+    features: wp.int32,
+    scene: SceneData,
+    record: InstanceRecord,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
 ) -> wp.bool:
     """Whether an instance lies along a ray in track space before ``t_max``; any hit will do."""
-    if record.shape == _MESH:
+    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
         start = record.to_local * origin + record.to_local_offset
         towards = record.to_local * direction
         stretch = wp.length(towards)
         return wp.mesh_query_ray_anyhit(scene.meshes[record.mesh].id, start, towards / stretch, t_max * stretch)
-    hit = meet_instance(scene, record, origin, direction, t_max)
+    hit = meet_instance(features, scene, record, origin, direction, t_max)
     return hit.instance == 0
 
 
 @wp.func
 def closest_hit(
-    scene: SceneData, view: ViewData, time_s: wp.float64, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
 ) -> Hit:
     """Nearest hit of a world ray of unit direction with any instance."""
     best = Hit()
@@ -184,7 +214,7 @@ def closest_hit(
         start = wp.vec3(origin[0], origin[1], origin[2])
         towards = wp.vec3(direction[0], direction[1], direction[2])
         missed = wp.bool(False)
-        if group.track != 0:
+        if (features & _HAS_MOTION) != 0 and group.track != 0:
             start = origin - track_translation(scene, view, group.track, time_s)
             missed = misses_sphere(start, direction, group.radius, best.t)
             if not missed:
@@ -200,7 +230,7 @@ def closest_hit(
                 if not meets_box(start, inverse, node.lower, node.upper, best.t):
                     index = node.skip
                 elif node.instance >= 0:
-                    hit = meet_instance(scene, scene.instances[node.instance], start, towards, best.t)
+                    hit = meet_instance(features, scene, scene.instances[node.instance], start, towards, best.t)
                     if hit.instance == 0:
                         best = hit
                         best.instance = node.instance
@@ -209,7 +239,13 @@ def closest_hit(
 
 @wp.func
 def occluded(
-    scene: SceneData, view: ViewData, time_s: wp.float64, origin: wp.vec3, direction: wp.vec3, t_max: wp.float32
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
 ) -> wp.bool:
     """Whether anything lies along a world ray before ``t_max``."""
     for g in range(scene.group_count):
@@ -217,7 +253,7 @@ def occluded(
         start = wp.vec3(origin[0], origin[1], origin[2])
         towards = wp.vec3(direction[0], direction[1], direction[2])
         missed = wp.bool(False)
-        if group.track != 0:
+        if (features & _HAS_MOTION) != 0 and group.track != 0:
             start = origin - track_translation(scene, view, group.track, time_s)
             missed = misses_sphere(start, direction, group.radius, t_max)
             if not missed:
@@ -233,6 +269,6 @@ def occluded(
                 if not meets_box(start, inverse, node.lower, node.upper, t_max):
                     index = node.skip
                 elif node.instance >= 0:
-                    if instance_blocks(scene, scene.instances[node.instance], start, towards, t_max):
+                    if instance_blocks(features, scene, scene.instances[node.instance], start, towards, t_max):
                         return True
     return False

@@ -1,30 +1,103 @@
-"""Kernel entry points: index, load, call, store."""
+"""Kernel entry points: index, load, call, store.
+
+Those that shade are compiled for the features of a scene (:func:`specialised`).
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
 
 import warp as wp
 
 from renderer.camera import camera_ray, track_rotation, track_translation
+from renderer.features import Feature
+from renderer.randomness import group_draw
 from renderer.shading import radiance
-from renderer.structs import SceneData, ViewData
+from renderer.structs import Ray, SceneData, ViewData
 
 
-@wp.kernel(enable_backward=False)
-def shade_samples(
-    scene: SceneData,
-    view: ViewData,
-    first: wp.int32,
-    position: wp.array(dtype=wp.vec2),
-    time_s: wp.array(dtype=wp.float64),
-    color: wp.array(dtype=wp.vec3),
-    rays: wp.array(dtype=wp.vec2i),
-):
-    """Shades the samples from ``first`` on; ``rays`` receives shadow and reflection rays of each."""
-    i = first + wp.tid()
-    origin, direction = camera_ray(scene, view, position[i], time_s[i])
-    result, shadow_rays, reflection_rays = radiance(scene, view, time_s[i], origin, direction)
-    color[i] = result
-    rays[i] = wp.vec2i(shadow_rays, reflection_rays)
+@dataclass(frozen=True)
+class ShadingKernels:
+    """Kernels for one set of features.
+
+    Attributes:
+        shade_samples: shades a list of samples in groups.
+        render_pixels: shades the samples of a regular grid in every pixel, and takes their means.
+        module: what holds both, for loading.
+    """
+
+    shade_samples: wp.Kernel
+    render_pixels: wp.Kernel
+    module: wp.Module
+
+
+def compiled_count() -> int:
+    """How many sets of features this process has kernels for."""
+    return specialised.cache_info().currsize
+
+
+@cache
+def specialised(features: Feature) -> ShadingKernels:
+    """Kernels that can do what is in ``features`` and hold no code for the rest; the same object for the same set."""
+    mask = int(features)
+    name = f"renderer.shading_{mask:08x}"
+
+    @wp.kernel(enable_backward=False, module=name)
+    def shade_samples(
+        scene: SceneData,
+        view: ViewData,
+        stack: wp.array2d(dtype=Ray),
+        first: wp.int32,
+        group_size: wp.int32,
+        position: wp.array(dtype=wp.vec2),
+        time_s: wp.array(dtype=wp.float64),
+        color: wp.array(dtype=wp.vec3),
+        rays: wp.array(dtype=wp.vec3i),
+    ):
+        """Shades the samples from ``first`` on; ``rays`` receives the shadow, reflected and refracted rays of each."""
+        i = first + wp.tid()
+        leader = (i / group_size) * group_size
+        draw = group_draw(scene.seed, position[leader], time_s[leader], i - leader, group_size)
+        origin, direction = camera_ray(wp.static(mask), scene, view, draw, position[i], time_s[i])
+        result, counts = radiance(
+            wp.static(mask), scene, view, time_s[i], draw, origin, direction, stack, wp.tid()
+        )  # fmt: skip
+        color[i] = result
+        rays[i] = counts
+
+    @wp.kernel(enable_backward=False, module=name)
+    def render_pixels(
+        scene: SceneData,
+        view: ViewData,
+        stack: wp.array2d(dtype=Ray),
+        first: wp.int32,
+        samples: wp.int32,
+        time_s: wp.float64,
+        image: wp.array2d(dtype=wp.vec3),
+    ):
+        """Renders pixels, each the mean of a regular grid of ``samples`` squared samples, ``first`` counted like
+        threads: along the Morton curve within blocks of 16 x 16 pixels, those by rows."""
+        pixel = first + wp.tid()
+        height = image.shape[0]
+        width = image.shape[1]
+        columns = (width + 15) / 16
+        column = ((pixel / 256) % columns) * 16 + every_second_bit(pixel % 256)
+        row = ((pixel / 256) / columns) * 16 + every_second_bit((pixel % 256) >> 1)
+        if column < width and row < height:
+            total = wp.vec3(0.0, 0.0, 0.0)
+            leader = grid_position(column, row, 0, samples, width, height)
+            for sample in range(samples * samples):
+                position = grid_position(column, row, sample, samples, width, height)
+                draw = group_draw(scene.seed, leader, time_s, sample, samples * samples)
+                origin, direction = camera_ray(wp.static(mask), scene, view, draw, position, time_s)
+                result, _counts = radiance(
+                    wp.static(mask), scene, view, time_s, draw, origin, direction, stack, wp.tid()
+                )  # fmt: skip
+                total = total + result
+            image[row, column] = total * (1.0 / wp.float32(samples * samples))
+
+    return ShadingKernels(shade_samples, render_pixels, shade_samples.module)
 
 
 @wp.func
@@ -33,35 +106,16 @@ def every_second_bit(code: wp.int32) -> wp.int32:
     return (code & 1) | ((code >> 1) & 2) | ((code >> 2) & 4) | ((code >> 3) & 8)
 
 
-@wp.kernel(enable_backward=False)
-def render_pixels(
-    scene: SceneData,
-    view: ViewData,
-    first: wp.int32,
-    samples: wp.int32,
-    time_s: wp.float64,
-    image: wp.array2d(dtype=wp.vec3),
-):
-    """Renders pixels, each the mean of a regular grid of ``samples`` squared samples, ``first`` counted like threads:
-    along the Morton curve within blocks of 16 x 16 pixels, those by rows."""
-    pixel = first + wp.tid()
-    height = image.shape[0]
-    width = image.shape[1]
-    columns = (width + 15) / 16
-    column = ((pixel / 256) % columns) * 16 + every_second_bit(pixel % 256)
-    row = ((pixel / 256) / columns) * 16 + every_second_bit((pixel % 256) >> 1)
-    if column < width and row < height:
-        total = wp.vec3(0.0, 0.0, 0.0)
-        for y in range(samples):
-            for x in range(samples):
-                position = wp.vec2(
-                    (wp.float32(column * samples + x) + 0.5) / wp.float32(width * samples),
-                    (wp.float32(row * samples + y) + 0.5) / wp.float32(height * samples),
-                )
-                origin, direction = camera_ray(scene, view, position, time_s)
-                result, _shadow_rays, _reflection_rays = radiance(scene, view, time_s, origin, direction)
-                total = total + result
-        image[row, column] = total * (1.0 / wp.float32(samples * samples))
+@wp.func
+def grid_position(
+    column: wp.int32, row: wp.int32, sample: wp.int32, samples: wp.int32, width: wp.int32, height: wp.int32
+) -> wp.vec2:
+    """Where a sample of a pixel's regular grid lies on the image."""
+    x = column * samples + sample % samples
+    y = row * samples + sample / samples
+    return wp.vec2(
+        (wp.float32(x) + 0.5) / wp.float32(width * samples), (wp.float32(y) + 0.5) / wp.float32(height * samples)
+    )
 
 
 @wp.kernel(enable_backward=False)

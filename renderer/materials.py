@@ -22,6 +22,8 @@ from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
     Emissive,
+    Glass,
+    HeightField,
     ImageTexture,
     Material,
     Matte,
@@ -145,6 +147,10 @@ class MaterialTable:
         row: dict = {
             "diffuse": -1,
             "mirror": -1,
+            "transmission": -1,
+            "ior": 1.0,
+            "thin": 0,
+            "cos_spread": 1.0,
             "specular": _BLACK,
             "exponent": 1.0,
             "ambient": 0.0,
@@ -159,6 +165,7 @@ class MaterialTable:
             for name in ("specular", "exponent", "ambient", "fresnel_min", "fresnel_max", "fresnel_exponent"):
                 row[name] = getattr(material, name)
             row["mirror_tint"] = material.mirror_tint
+            row["cos_spread"] = _cos_half(material.mirror_spread_deg)
         elif isinstance(material, Matte):
             if material.sigma_deg != 0.0:
                 raise SceneError(f"{where}: Matte.sigma_deg {material.sigma_deg} is not supported yet, expected 0")
@@ -166,10 +173,24 @@ class MaterialTable:
         elif isinstance(material, Mirror):
             row["mirror"] = self.add_texture(material.reflectance, where)
             row["fresnel_min"] = row["fresnel_max"] = 1.0
+            row["cos_spread"] = _cos_half(material.spread_deg)
+        elif isinstance(material, Glass):
+            if tuple(material.roughness) != (0.0, 0.0):
+                raise SceneError(f"{where}: Glass.roughness {material.roughness} is not supported yet, use spread_deg")
+            row["mirror"] = self.add_texture(material.reflectance, where)
+            row["transmission"] = self.add_texture(material.transmittance, where)
+            row["ior"], row["thin"] = material.ior, int(material.thin)
+            row["cos_spread"] = _cos_half(material.spread_deg)
+        elif isinstance(material, HeightField):
+            return self._material_row(material.base, where)
         elif isinstance(material, Emissive):
             row["emission"] = material.radiance
         else:
             raise SceneError(f"{where}: material {type(material).__name__} is not supported yet")
-        for name in row.keys() - {"diffuse", "mirror"}:
+        for name in row.keys() - {"diffuse", "mirror", "transmission"}:
             check_light(row[name], f"{where}: {type(material).__name__}.{name}")
         return row
+
+
+def _cos_half(angle_deg: float) -> float:
+    return float(np.cos(np.radians(angle_deg) / 2.0))

@@ -99,7 +99,10 @@ def _joined(parts: list[Instance]) -> Mesh:
     vertices, normals = zip(*(_placed(part) for part in parts), strict=True)
     first = np.cumsum([0, *(len(part) for part in vertices[:-1])])
     meshes = [part.shape for part in parts if isinstance(part.shape, Mesh)]
-    faces = [mesh.faces.astype(np.int64) + start for mesh, start in zip(meshes, first, strict=True)]
+    # a mirrored part turns its faces round, so that their outside stays outside
+    mirrored = [np.linalg.det(part.to_world[:3, :3]) < 0.0 for part in parts]
+    wound = [mesh.faces[:, ::-1] if flip else mesh.faces for mesh, flip in zip(meshes, mirrored, strict=True)]
+    faces = [rows.astype(np.int64) + start for rows, start in zip(wound, first, strict=True)]
     uvs = [np.zeros((len(mesh.vertices), 2), np.float32) if mesh.uvs is None else mesh.uvs for mesh in meshes]
     joined = np.concatenate(vertices)
     return Mesh(joined, np.concatenate(faces).astype(np.int32), np.concatenate(normals), np.concatenate(uvs), "merged")

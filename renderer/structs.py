@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import warp as wp
 
-SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK, SHAPE_RECTANGLE, SHAPE_CUBE = range(5)
+SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK, SHAPE_RECTANGLE, SHAPE_CUBE, SHAPE_RELIEF = range(6)
 TEXTURE_CONSTANT, TEXTURE_IMAGE, TEXTURE_CHECKERBOARD = range(3)
+CAMERA_PERSPECTIVE, CAMERA_PARALLEL, CAMERA_PANORAMA = range(3)
 WRAP_REPEAT, WRAP_CLAMP, WRAP_BLACK = range(3)
 FILTER_NEAREST, FILTER_BILINEAR, FILTER_MIPMAP = range(3)
-LIGHT_POINT, LIGHT_DIRECTIONAL = range(2)
+LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SUN_DISC, LIGHT_SPOT, LIGHT_QUAD, LIGHT_SPHERE, LIGHT_ENVIRONMENT = range(7)
 
 
 @wp.struct
@@ -42,6 +43,8 @@ class InstanceRecord:
     from_local: wp.mat33
     from_local_offset: wp.vec3
     extent: wp.float32  # greatest distance the unit shape is stretched to, scene units
+    emission: wp.vec3  # radiance that leaves the outside
+    relief: wp.int32  # of a height field
 
 
 @wp.struct
@@ -62,11 +65,24 @@ class MeshRecord:
 
 
 @wp.struct
+class ReliefRecord:
+    """A height field below the square [-1, 1]² at z = 0; its samples lie in the pool of texels."""
+
+    level: wp.int32
+    depth: wp.float32
+    steps: wp.int32
+
+
+@wp.struct
 class MaterialRecord:
     """Every supported material in one form; a negative texture means none."""
 
     diffuse: wp.int32
     mirror: wp.int32
+    transmission: wp.int32  # of glass
+    ior: wp.float32
+    thin: wp.int32
+    cos_spread: wp.float32  # of the half angle that reflected and refracted rays are spread by
     specular: wp.vec3
     exponent: wp.float32
     ambient: wp.float32
@@ -105,11 +121,21 @@ class LevelRecord:
 
 @wp.struct
 class LightRecord:
-    """``place`` is the position of a point light, or the unit direction towards a directional light."""
+    """A light.
+
+    ``place`` is a position (point, spot; centre of a sphere or rectangle, in the space of ``track``), or the unit
+    direction towards a directional light. ``color`` is an intensity, an irradiance or a radiance, as the light has it.
+    """
 
     kind: wp.int32
     place: wp.vec3
     color: wp.vec3
+    track: wp.int32  # of a rectangle or sphere
+    across: wp.vec3  # half edges of a rectangle; of a spot, across is the direction it shines in
+    along: wp.vec3
+    radius: wp.float32  # of a sphere
+    cos_inner: wp.float32  # of the half angle of a sun's disc, or where a spot begins to fall off
+    cos_outer: wp.float32  # where a spot ends
 
 
 @wp.struct
@@ -152,6 +178,7 @@ class SceneData:
     textures: wp.array(dtype=TextureRecord)
     levels: wp.array(dtype=LevelRecord)
     texels: wp.array(dtype=wp.vec3)
+    reliefs: wp.array(dtype=ReliefRecord)
     light_count: wp.int32
     lights: wp.array(dtype=LightRecord)
     tracks: wp.array(dtype=TrackRecord)
@@ -162,20 +189,31 @@ class SceneData:
     environment_level: wp.int32  # negative for black
     environment_to_map: wp.mat33
     environment_scale: wp.float32
+    # chances of the environment's rows, and of texels within rows, summed up: rows + 1, and columns + 1 a row
+    environment_rows: wp.array(dtype=wp.float32)
+    environment_columns: wp.array2d(dtype=wp.float32)
     depth: wp.int32
     throughput_cutoff: wp.float32
+    light_cells: wp.int32
+    reflection_rays: wp.int32
+    refraction_rays: wp.int32
+    seed: wp.uint32
 
 
 @wp.struct
 class ViewData:
     """The camera, and what is known about the time of a whole launch."""
 
+    kind: wp.int32
     from_camera: wp.mat33
     from_camera_offset: wp.vec3
     camera_track: wp.int32
-    tan_x: wp.float32  # tangents of the half angles of the image
+    tan_x: wp.float32  # tangents of the half angles of the image; its half size where rays are parallel
     tan_y: wp.float32
-    spread: wp.float32  # width of a pixel's cone per unit of distance
+    width: wp.float32  # of a pixel's cone at the camera, and per unit of distance
+    spread: wp.float32
+    lens_radius: wp.float32
+    focal_distance: wp.float32
     single_time: wp.int32  # 1 where ``pose_*`` hold every track's pose for all samples of the launch
     pose_translation: wp.array(dtype=wp.vec3)
     pose_rotation: wp.array(dtype=wp.quat)
@@ -196,6 +234,19 @@ class Hit:
 
 
 @wp.struct
+class LocalSurface:
+    """A hit in the unit space of its shape; the area of a patch ``tangent_u x tangent_v`` covers ``uv_area`` of uv."""
+
+    position: wp.vec3
+    geometric_normal: wp.vec3
+    normal: wp.vec3
+    uv: wp.vec2
+    tangent_u: wp.vec3
+    tangent_v: wp.vec3
+    uv_area: wp.float32
+
+
+@wp.struct
 class Surface:
     """What shading needs of a hit, in world space; normals are on the viewer's side."""
 
@@ -206,3 +257,26 @@ class Surface:
     uv_density: wp.float32  # uv units per scene unit, geometric mean of both axes
     offset: wp.float32  # how far a ray must start off the surface to clear rounding, scene units
     material: wp.int32
+    emission: wp.vec3
+    inside: wp.bool  # whether the viewer is on the side that the normal of the shape points away from
+
+
+@wp.struct
+class Draw:
+    """Which sample's random numbers: a group's key, and the place of the sample in it."""
+
+    key: wp.uint32
+    index: wp.int32
+    count: wp.int32
+
+
+@wp.struct
+class Ray:
+    """A ray under way; ``weight`` is what its radiance counts for, ``travelled`` the way behind it."""
+
+    start: wp.vec3
+    towards: wp.vec3
+    weight: wp.vec3
+    travelled: wp.float32
+    bounces: wp.int32
+    draw: Draw

@@ -5,13 +5,17 @@ from __future__ import annotations
 import warp as wp
 
 from renderer.camera import track_rotation, track_translation
+from renderer.features import Feature
+from renderer.heightfield import relief_surface
 from renderer.structs import (
     SHAPE_DISK,
     SHAPE_MESH,
     SHAPE_RECTANGLE,
+    SHAPE_RELIEF,
     SHAPE_SPHERE,
     Hit,
     InstanceRecord,
+    LocalSurface,
     SceneData,
     Surface,
     ViewData,
@@ -21,22 +25,15 @@ _MESH = wp.constant(SHAPE_MESH)
 _SPHERE = wp.constant(SHAPE_SPHERE)
 _DISK = wp.constant(SHAPE_DISK)
 _RECTANGLE = wp.constant(SHAPE_RECTANGLE)
+_RELIEF = wp.constant(SHAPE_RELIEF)
+_HAS_MESH = wp.constant(int(Feature.MESH))
+_HAS_SPHERE = wp.constant(int(Feature.SPHERE))
+_HAS_FLAT = wp.constant(int(Feature.FLAT))
+_HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
+_HAS_MOTION = wp.constant(int(Feature.MOTION))
 
 # Eight units in the last place of float32: a hit is carried through two transforms of some roundings each.
 _OFFSET = wp.constant(1.0e-6)
-
-
-@wp.struct
-class LocalSurface:
-    """A hit in the unit space of its shape; the area of a patch ``tangent_u x tangent_v`` covers ``uv_area`` of uv."""
-
-    position: wp.vec3
-    geometric_normal: wp.vec3
-    normal: wp.vec3
-    uv: wp.vec2
-    tangent_u: wp.vec3
-    tangent_v: wp.vec3
-    uv_area: wp.float32
 
 
 @wp.func
@@ -115,13 +112,17 @@ def flat_surface(point: wp.vec3, axis: wp.int32, side: wp.float32) -> LocalSurfa
 
 
 @wp.func
-def local_surface(scene: SceneData, record: InstanceRecord, hit: Hit, point: wp.vec3) -> LocalSurface:
+def local_surface(
+    features: wp.int32, scene: SceneData, record: InstanceRecord, hit: Hit, point: wp.vec3
+) -> LocalSurface:
     """The hit in the unit space of its shape; ``point`` is the hit along the ray, snapped onto the shape here."""
-    if record.shape == _MESH:
+    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
         return mesh_surface(scene, record, hit)
-    if record.shape == _SPHERE:
+    if (features & _HAS_SPHERE) != 0 and record.shape == _SPHERE:
         return sphere_surface(point)
-    if record.shape == _DISK or record.shape == _RECTANGLE:
+    if (features & _HAS_RELIEF) != 0 and record.shape == _RELIEF:
+        return relief_surface(scene, record, hit, point)
+    if (features & _HAS_FLAT) != 0 and (record.shape == _DISK or record.shape == _RECTANGLE):
         return flat_surface(wp.vec3(point[0], point[1], 0.0), 2, 1.0)
     axis = hit.face % 3
     side = wp.where(hit.face < 3, 1.0, -1.0)
@@ -146,31 +147,38 @@ def greatest(v: wp.vec3) -> wp.float32:
 
 @wp.func
 def surface_at(
-    scene: SceneData, view: ViewData, time_s: wp.float64, hit: Hit, origin: wp.vec3, direction: wp.vec3
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    hit: Hit,
+    origin: wp.vec3,
+    direction: wp.vec3,
 ) -> Surface:
     """World-space surface at the hit of a world ray."""
     record = scene.instances[hit.instance]
     translation = wp.vec3(0.0, 0.0, 0.0)
     rotation = wp.quat(0.0, 0.0, 0.0, 1.0)
     point = origin + hit.t * direction
-    if record.track != 0:
+    if (features & _HAS_MOTION) != 0 and record.track != 0:
         translation = track_translation(scene, view, record.track, time_s)
         rotation = track_rotation(scene, view, record.track, time_s)
         point = wp.quat_rotate_inv(rotation, point - translation)
-    local = local_surface(scene, record, hit, record.to_local * point + record.to_local_offset)
+    local = local_surface(features, scene, record, hit, record.to_local * point + record.to_local_offset)
     to_local_transposed = wp.transpose(record.to_local)
     geometric = to_local_transposed * local.geometric_normal
     shading = to_local_transposed * local.normal
     patch = wp.length(wp.cross(record.from_local * local.tangent_u, record.from_local * local.tangent_v))
     position = record.from_local * local.position + record.from_local_offset
     magnitude = record.extent
-    if record.track != 0:
+    if (features & _HAS_MOTION) != 0 and record.track != 0:
         magnitude = magnitude + greatest(position) + greatest(translation)
         position = wp.quat_rotate(rotation, position) + translation
         geometric = wp.quat_rotate(rotation, geometric)
         shading = wp.quat_rotate(rotation, shading)
     surface = Surface()
     surface.position = position
+    surface.inside = wp.dot(geometric, direction) > 0.0
     surface.geometric_normal = facing(wp.normalize(geometric), direction)
     shading = wp.normalize(shading)
     if wp.dot(shading, surface.geometric_normal) < 0.0:
@@ -183,6 +191,7 @@ def surface_at(
     surface.uv = local.uv
     surface.uv_density = wp.sqrt(local.uv_area / wp.max(patch, 1.0e-30))
     surface.offset = (magnitude + greatest(position)) * _OFFSET
+    surface.emission = record.emission
     surface.material = record.material
     if record.material < 0:
         surface.material = scene.face_materials[scene.meshes[record.mesh].first_material + hit.face]

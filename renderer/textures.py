@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from renderer.features import Feature
 from renderer.structs import (
     FILTER_MIPMAP,
     FILTER_NEAREST,
@@ -22,6 +23,8 @@ _REPEAT = wp.constant(WRAP_REPEAT)
 _BLACK = wp.constant(WRAP_BLACK)
 _NEAREST = wp.constant(FILTER_NEAREST)
 _MIPMAP = wp.constant(FILTER_MIPMAP)
+_HAS_IMAGE = wp.constant(int(Feature.IMAGE))
+_HAS_CHECKERBOARD = wp.constant(int(Feature.CHECKERBOARD))
 
 
 @wp.func
@@ -118,17 +121,19 @@ def image_lookup(scene: SceneData, record: TextureRecord, uv: wp.vec2, footprint
 
 
 @wp.func
-def texture_color(scene: SceneData, texture: wp.int32, uv: wp.vec2, footprint_uv: wp.float32) -> wp.vec3:
+def texture_color(
+    features: wp.int32, scene: SceneData, texture: wp.int32, uv: wp.vec2, footprint_uv: wp.float32
+) -> wp.vec3:
     """Colour of a texture; descends through checkerboards to the constant or image below."""
     record = scene.textures[texture]
     tint = record.value
-    while record.kind == _CHECKERBOARD:
+    while (features & _HAS_CHECKERBOARD) != 0 and record.kind == _CHECKERBOARD:
         square = wp.floor(uv[0] * record.uv_scale[0]) + wp.floor(uv[1] * record.uv_scale[1])
         if square - 2.0 * wp.floor(square * 0.5) == 0.0:
             record = scene.textures[record.even]
         else:
             record = scene.textures[record.odd]
         tint = wp.cw_mul(tint, record.value)
-    if record.kind == _CONSTANT:
-        return tint
-    return wp.cw_mul(tint, image_lookup(scene, record, uv, footprint_uv))
+    if (features & _HAS_IMAGE) != 0 and record.kind != _CONSTANT:
+        tint = wp.cw_mul(tint, image_lookup(scene, record, uv, footprint_uv))
+    return tint

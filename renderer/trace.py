@@ -16,12 +16,16 @@ from renderer import kernels
 from renderer import packets as packet_kernels
 from renderer.batches import PacketBatches
 from renderer.buffers import build_buffers
-from renderer.checks import check_affine
-from renderer.structs import ViewData
-from scenes.canonical import PerspectiveCamera, Scene, SceneError
+from renderer.features import ALL, PACKETS, Feature, required
+from renderer.shading import stack_size
+from renderer.structs import Ray, ViewData
+from renderer.viewing import camera_view, check_camera
+from scenes.canonical import Scene
 from tsar.types import FrameletBatch, SampleBatch
 
 _RANGE = 1024  # samples or pixels per launch without packets: few enough that threads end together
+_RANGE_CUDA = 1 << 18  # few enough that the rays waiting to be followed fit into memory
+_SECONDARY = "shadow_rays", "reflection_rays", "refraction_rays"
 _BLOCK_PX = 16  # as the kernels' order of pixels
 _BYTES_PER_PIXEL = 12
 _SAMPLES_PER_PIXEL_AXIS_MAX = 1024
@@ -35,6 +39,8 @@ class Renderer:
         device: where kernels run, ``cpu`` or ``cuda:0``.
         threads: host threads that launch kernels (``cpu`` only).
         footprint_resolution_px: pixels along the shorter image axis that :meth:`trace` filters textures for.
+        features: what kernels are compiled for.
+        packets: whether sixteen samples at a time are traced.
     """
 
     def __init__(
@@ -45,6 +51,8 @@ class Renderer:
         footprint_resolution_px: float = 512.0,
         throughput_cutoff: float = 2.0e-3,
         packets: bool = True,
+        specialise: bool = True,
+        seed: int = 0,
     ) -> None:
         """Builds acceleration structures and loads kernels.
 
@@ -55,8 +63,11 @@ class Renderer:
             footprint_resolution_px: see the class. It is fixed for all batches, so that a coarse tile is as sharp as a
                 fine one, and a framed renderer as sharp as an adaptive one.
             throughput_cutoff: a chain of mirrors ends where it would contribute less than this share.
-            packets: trace sixteen samples at a time (``cpu`` only); without, one by one as other devices do. Pictures
-                differ by rounding.
+            packets: trace sixteen samples at a time where they can do all that the scene requires (``cpu`` only);
+                without, one by one as other devices do. Pictures differ by rounding.
+            specialise: compile kernels for what the scene requires; without, for everything there is. Pictures are the
+                same.
+            seed: of the random numbers behind lens, extended lights and glossy rays, 0 to 2^32 - 1.
 
         Raises:
             SceneError: if the scene holds what the renderer does not support.
@@ -68,27 +79,38 @@ class Renderer:
             raise ValueError(f"footprint_resolution_px: expected a positive number, got {footprint_resolution_px}")
         if not 0.0 <= throughput_cutoff < math.inf:
             raise ValueError(f"throughput_cutoff: expected a share of at least 0, got {throughput_cutoff}")
+        if not 0 <= seed < 1 << 32:
+            raise ValueError(f"seed: expected 0 to 2^32 - 1, got {seed}")
         self.device = devices.pick(device)
         self.threads = threads or devices.core_count()
         self.footprint_resolution_px = float(footprint_resolution_px)
-        self._camera = _check_camera(scene)
+        self._camera = check_camera(scene)
         self._scene = scene
-        self._kernels = packet_kernels if packets and self.device == "cpu" else kernels
-        # before the buffers are built, which takes kernels too: all are compiled side by side
-        devices.load_kernels([kernels, self._kernels], self.device)
-        self._buffers = build_buffers(scene, self.device, self._kernels is packet_kernels)
-        self._buffers.data.throughput_cutoff = float(throughput_cutoff)
+        needed = required(scene)
+        self.packets = packets and self.device == "cpu" and needed | PACKETS == PACKETS
+        self.features = PACKETS if self.packets else needed if specialise else ALL
+        self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
+        # before the buffers are built, which takes those of packets too: they are compiled side by side
+        devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)
+        self._buffers = build_buffers(scene, self.device, self.packets)
+        if not self.packets:  # these are compiled for the scene: it is known now that it can be rendered
+            devices.load_kernels(self._kernels.module, self.device)
+        data = self._buffers.data
+        data.throughput_cutoff, data.seed = float(throughput_cutoff), wp.uint32(seed)
+        self._stack_size = stack_size(self.features, data.depth, data.reflection_rays, data.refraction_rays)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 and self.device == "cpu" else None
-        self._batches = None
-        if self._kernels is packet_kernels:
-            still, moving = (self._view(1.0, self.footprint_resolution_px) for _ in range(2))
-            self._batches = PacketBatches(self._buffers, still, moving, self.threads, self._pool)
+        self._batches: dict[tuple[float, float], PacketBatches] = {}
+        if self.packets:
+            self._packet_batches(1.0, self.footprint_resolution_px)
 
-    def trace(self, batch: FrameletBatch) -> SampleBatch:
-        """Shades the samples of a batch on a square image.
+    def trace(self, batch: FrameletBatch, aspect: float = 1.0, footprint_px: float | None = None) -> SampleBatch:
+        """Shades the samples of a batch; those of one row are a group, over which secondary rays are spread.
 
         Args:
             batch: positions ``(n, samples, 2)`` and times ``(n, samples)``.
+            aspect: width over height of the image.
+            footprint_px: pixels along its shorter axis that textures are filtered for, by default
+                ``footprint_resolution_px``.
 
         Returns:
             Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, and ray counts.
@@ -102,7 +124,12 @@ class Renderer:
                 f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and "
                 f"{tuple(batch.time_s.shape)}"
             )
-        color, counters = self._shade(batch.position.reshape(-1, 2), batch.time_s.reshape(-1))
+        if not 0.0 < aspect < math.inf:
+            raise ValueError(f"aspect: expected a positive number, got {aspect}")
+        footprint_px = footprint_px or self.footprint_resolution_px
+        color, counters = self._shade(
+            batch.position.reshape(-1, 2), batch.time_s.reshape(-1), shape[1], aspect, footprint_px
+        )
         return SampleBatch(color.reshape(*shape[:2], 3), counters)
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
@@ -137,34 +164,48 @@ class Renderer:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _shade(self, position: Tensor, time_s: Tensor) -> tuple[Tensor, dict[str, int]]:
-        """Colours ``(k, 3)`` and ray counts of flat lists of samples."""
+    def _shade(
+        self, position: Tensor, time_s: Tensor, group_size: int, aspect: float, footprint_px: float
+    ) -> tuple[Tensor, dict[str, int]]:
+        """Colours ``(k, 3)`` and ray counts of flat lists of samples, in groups of ``group_size``."""
         count, home = position.shape[0], position.device
         if count == 0:
-            return torch.zeros(0, 3, device=home), {"primary_rays": 0, "shadow_rays": 0, "reflection_rays": 0}
+            return torch.zeros(0, 3, device=home), dict.fromkeys(("primary_rays", *_SECONDARY[:2]), 0)
         target = torch.device(self.device)
         position = position.to(target, torch.float32).contiguous()
         earliest, latest = _bounds(time_s)
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
         single_time_s = earliest if earliest == latest else None
-        if self._batches is not None:
-            color, shadow, reflection = self._batches.shade(position, time_s, single_time_s)
-            return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
-        color = torch.empty(count, 3, device=target)
-        rays = torch.empty(count, 2, dtype=torch.int32, device=target)
-        view = self._view(1.0, self.footprint_resolution_px)
-        if single_time_s is not None:
-            self._pose(view, single_time_s)
-        shared = (
-            wp.from_torch(position, dtype=wp.vec2),
-            wp.from_torch(time_s.to(target, torch.float64).contiguous(), dtype=wp.float64),
-            wp.from_torch(color, dtype=wp.vec3),
-            wp.from_torch(rays, dtype=wp.vec2i),
-        )
-        self._launch(self._kernels.shade_samples, view, shared, count)
-        shadow, reflection = _totals(rays)
-        return color.to(home), {"primary_rays": count, "shadow_rays": shadow, "reflection_rays": reflection}
+        if self.packets:
+            batches = self._packet_batches(aspect, footprint_px)
+            color, shadow, reflection = batches.shade(position, time_s, single_time_s)
+            totals = [shadow, reflection, 0]
+        else:
+            color = torch.empty(count, 3, device=target)
+            rays = torch.empty(count, 3, dtype=torch.int32, device=target)
+            view = self._view(aspect, footprint_px)
+            if single_time_s is not None:
+                self._pose(view, single_time_s)
+            shared = (
+                group_size,
+                wp.from_torch(position, dtype=wp.vec2),
+                wp.from_torch(time_s.to(target, torch.float64).contiguous(), dtype=wp.float64),
+                wp.from_torch(color, dtype=wp.vec3),
+                wp.from_torch(rays, dtype=wp.vec3i),
+            )
+            self._launch(self._kernels.shade_samples, view, shared, count)
+            totals = _totals(rays)
+        kinds = _SECONDARY if Feature.GLASS in self.features else _SECONDARY[:2]
+        return color.to(home), {"primary_rays": count, **dict(zip(kinds, totals, strict=False))}
+
+    def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:
+        """Recorded launches for pictures of one shape."""
+        key = aspect, footprint_px
+        if key not in self._batches:
+            still, moving = (self._view(*key) for _ in range(2))
+            self._batches[key] = PacketBatches(self._buffers, still, moving, self.threads, self._pool)
+        return self._batches[key]
 
     def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int) -> None:
         """Runs a kernel over ``count`` elements: one launch on a GPU, one a host thread on the CPU.
@@ -172,7 +213,7 @@ class Renderer:
         Launches on the CPU release the interpreter lock. Those of packets take what is left to do from one counter;
         single samples are dealt out in ranges.
         """
-        if self._kernels is packet_kernels:
+        if self.packets:
             taken = wp.zeros(1, dtype=wp.int32, device="cpu")
             inputs = [self._buffers.data, view, taken, *shared]
             command = wp.launch(kernel, dim=1, inputs=inputs, device="cpu", record_cmd=True)
@@ -183,11 +224,13 @@ class Renderer:
             return
 
         def run(first: int, dim: int) -> None:
-            wp.launch(kernel, dim=dim, inputs=[self._buffers.data, view, first, *shared], device=self.device)
+            stack = wp.empty((dim if self._stack_size > 1 else 1, self._stack_size), Ray, self.device)
+            wp.launch(kernel, dim=dim, inputs=[self._buffers.data, view, stack, first, *shared], device=self.device)
 
         if self.device != "cpu":
             torch.cuda.synchronize()  # Warp launches on a stream of its own
-            run(0, count)
+            for first in range(0, count, _RANGE_CUDA):
+                run(first, min(_RANGE_CUDA, count - first))
             wp.synchronize_device(self.device)
             return
         firsts = range(0, count, _RANGE)
@@ -195,16 +238,7 @@ class Renderer:
             pass
 
     def _view(self, aspect: float, footprint_px: float) -> ViewData:
-        """Camera record for samples of many times; ``aspect`` is width over height."""
-        tangent = math.tan(math.radians(self._camera.fov_deg) / 2.0)
-        to_world = np.asarray(self._camera.to_world, np.float64)
-        view = ViewData()
-        view.from_camera = wp.mat33(*to_world[:3, :3].astype(np.float32).reshape(-1).tolist())
-        view.from_camera_offset = wp.vec3(*to_world[:3, 3].tolist())
-        view.camera_track = self._buffers.tracks.add(self._camera.track)
-        view.tan_x, view.tan_y = tangent * max(aspect, 1.0), tangent * max(1.0 / aspect, 1.0)
-        view.spread = 2.0 * tangent / footprint_px
-        return view
+        return camera_view(self._camera, self._buffers.tracks, aspect, footprint_px)
 
     def _pose(self, view: ViewData, time_s: float) -> None:
         """Adds the poses of all tracks at the one time of all samples."""
@@ -255,15 +289,3 @@ def _free_memory_bytes() -> int:
     except OSError:
         pass
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-
-
-def _check_camera(scene: Scene) -> PerspectiveCamera:
-    camera = scene.camera
-    if not isinstance(camera, PerspectiveCamera):
-        raise SceneError(f"camera {type(camera).__name__} is not supported yet, expected PerspectiveCamera")
-    if camera.lens_radius > 0.0:
-        raise SceneError(f"PerspectiveCamera.lens_radius {camera.lens_radius} is not supported yet, expected 0")
-    if tuple(camera.shutter_s) != (0.0, 0.0):
-        raise SceneError(f"PerspectiveCamera.shutter_s {camera.shutter_s} is not supported yet, expected (0, 0)")
-    check_affine(camera.to_world, "PerspectiveCamera.to_world")
-    return camera

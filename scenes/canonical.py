@@ -136,6 +136,12 @@ class MixTexture:
 Texture = ConstantTexture | ImageTexture | CheckerboardTexture | ScaleTexture | MixTexture
 
 
+def _check_spread(name: str, spread_deg: float) -> None:
+    """Raises SceneError unless a cone of rays fits above a surface."""
+    if not 0.0 <= spread_deg <= 180.0:
+        raise SceneError(f"{name}: expected an angle in [0, 180], got {spread_deg}")
+
+
 # --- materials -------------------------------------------------------------------------------------------------------
 
 
@@ -156,6 +162,7 @@ class Phong:
         fresnel_min, fresnel_max: mirror reflectance at normal and at grazing incidence, in [0, 1].
         fresnel_exponent: 5 is Schlick's.
         mirror_tint: colour of the mirrored part (metals).
+        mirror_spread_deg: full angle of the cone that mirrored rays fill evenly, zero for a sharp mirror image.
     """
 
     diffuse: Texture
@@ -166,8 +173,10 @@ class Phong:
     fresnel_max: float = 0.0
     fresnel_exponent: float = 5.0
     mirror_tint: Rgb = (1.0, 1.0, 1.0)
+    mirror_spread_deg: float = 0.0
 
     def __post_init__(self) -> None:
+        _check_spread("Phong.mirror_spread_deg", self.mirror_spread_deg)
         if self.exponent < 1.0:
             raise SceneError(f"Phong.exponent: expected at least 1, got {self.exponent}")
         if not 0.0 <= self.fresnel_min <= self.fresnel_max <= 1.0:
@@ -186,20 +195,38 @@ class Matte:
 
 @dataclass(frozen=True)
 class Mirror:
-    """Perfect specular reflection."""
+    """Specular reflection: perfect, or glossy over an even cone of full angle ``spread_deg`` about the mirrored ray."""
 
     reflectance: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    spread_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_spread("Mirror.spread_deg", self.spread_deg)
 
 
 @dataclass(frozen=True)
 class Glass:
-    """Dielectric; ``roughness`` is the microfacet alpha per tangent axis, zero for smooth."""
+    """Dielectric.
+
+    Attributes:
+        reflectance, transmittance: multiply what Fresnel's equations send each way.
+        ior: index of refraction of the inside over the outside, positive.
+        roughness: microfacet alpha per tangent axis, zero for smooth.
+        thin: a pane without thickness: light passes unbent, and reflections between its faces are summed.
+        spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill evenly.
+    """
 
     reflectance: Texture = ConstantTexture((1.0, 1.0, 1.0))
     transmittance: Texture = ConstantTexture((1.0, 1.0, 1.0))
     ior: float = 1.5
     roughness: tuple[float, float] = (0.0, 0.0)
     thin: bool = False
+    spread_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_spread("Glass.spread_deg", self.spread_deg)
+        if not 0.0 < self.ior < float("inf"):
+            raise SceneError(f"Glass.ior: expected a positive number, got {self.ior}")
 
 
 @dataclass(frozen=True)
@@ -262,6 +289,37 @@ class MixMaterial:
     amount: Texture
 
 
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """Relief on a :class:`Rectangle`, carved into it.
+
+    Height 1 lies in the plane of the rectangle, height 0 lies ``depth`` below it (against its normal). Rays that leave
+    the relief through its sides pass on, so its silhouette is that of the relief.
+
+    Attributes:
+        base: what the relief is made of.
+        height: ``(h, w)`` or ``(h, w, 3)`` float32 in [0, 1], of which the first channel counts; stretched over the
+            rectangle, bilinear, row 0 at the top (``v = 1``).
+        depth: in object space, positive.
+        steps: even steps that a ray takes through the whole relief, at least 2, before the secant search.
+    """
+
+    base: Material
+    height: NDArray[np.float32]
+    depth: float
+    steps: int = 64
+
+    def __post_init__(self) -> None:
+        if self.height.ndim not in (2, 3) or min(self.height.shape) < 1:
+            raise SceneError(f"HeightField.height: expected (h, w) or (h, w, 3), got {self.height.shape}")
+        if not (np.isfinite(self.height).all() and self.height.min() >= 0.0 and self.height.max() <= 1.0):
+            raise SceneError("HeightField.height: expected finite values in [0, 1]")
+        if not 0.0 < self.depth < float("inf"):
+            raise SceneError(f"HeightField.depth: expected a positive number, got {self.depth}")
+        if self.steps < 2:
+            raise SceneError(f"HeightField.steps: expected at least 2, got {self.steps}")
+
+
 @dataclass(frozen=True)
 class Emissive:
     """A surface that only emits, two-sided, constant radiance."""
@@ -269,7 +327,20 @@ class Emissive:
     radiance: Rgb
 
 
-Material = Phong | Matte | Mirror | Glass | Metal | Glossy | Plastic | Translucent | Uber | MixMaterial | Emissive
+Material = (
+    Phong
+    | Matte
+    | Mirror
+    | Glass
+    | Metal
+    | Glossy
+    | Plastic
+    | Translucent
+    | Uber
+    | MixMaterial
+    | HeightField
+    | Emissive
+)
 
 
 # --- shapes and instances --------------------------------------------------------------------------------------------
@@ -347,7 +418,8 @@ class Instance:
         to_world: ``(4, 4)`` float64, non-singular.
         track: rigid animation, or None for a static instance.
         name: for messages and reports.
-        emission: radiance of an area light, linear RGB, or None.
+        emission: radiance of an area light, linear RGB, or None. It leaves the side that the normal points to, of a
+            :class:`Rectangle` or :class:`Sphere`.
     """
 
     shape: Shape
@@ -404,6 +476,8 @@ class SpotLight:
 class EnvironmentLight:
     """Radiance from infinity: an image, or a constant where the image is one texel.
 
+    Among a scene's lights it lights surfaces and is seen; as a scene's background it is seen only.
+
     Attributes:
         image: ``(height, width, 3)`` float32 linear RGB, latitude–longitude.
         to_world: rotation of the map, ``(4, 4)``.
@@ -440,6 +514,8 @@ class PerspectiveCamera:
         to_world: ``(4, 4)`` camera-to-world; a negative determinant (a mirrored picture) is kept, not repaired.
         fov_deg: full angle of the *shorter* image axis, in (0, 180).
         track: rigid animation applied outside ``to_world``.
+        lens_radius: of the aperture, scene units.
+        focal_distance: from the lens to the plane in focus, along the viewing direction, positive.
         shutter_s: ``(open, close)`` offsets from the frame's time.
     """
 
@@ -455,6 +531,11 @@ class PerspectiveCamera:
             raise SceneError(f"PerspectiveCamera.fov_deg: expected in (0, 180), got {self.fov_deg}")
         if self.lens_radius < 0.0:
             raise SceneError(f"PerspectiveCamera.lens_radius: expected non-negative, got {self.lens_radius}")
+        if not 0.0 < self.focal_distance < float("inf"):
+            raise SceneError(f"PerspectiveCamera.focal_distance: expected a positive number, got {self.focal_distance}")
+        opening, closing = self.shutter_s
+        if not -float("inf") < opening <= closing < float("inf"):
+            raise SceneError(f"PerspectiveCamera.shutter_s: expected open <= close, got {self.shutter_s}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -507,10 +588,30 @@ class Sampler:
 
 @dataclass(frozen=True)
 class Integrator:
-    """Light transport asked for; ``depth`` is the greatest number of bounces, -1 for no limit."""
+    """Light transport asked for.
+
+    Attributes:
+        depth: greatest number of bounces, -1 for no limit.
+        shadow_rays: towards each light that has an extent, ``one`` per shaded point, samples sharing the light out
+            among them, or ``all``: one to a random point of each of its cells.
+        light_cells: cells along each of the two axes of such a light, for ``all``.
+        reflection_rays, refraction_rays: spread about the perfect direction at the first glossy surface a camera ray
+            meets; deeper ones send one.
+
+    Source: Olszewski, "Distribution Ray Tracing" (sections on soft shadows and on diffuse reflection).
+    """
 
     kind: Literal["whitted", "direct", "path", "bidirectional", "photonmap", "metropolis"] = "whitted"
     depth: int = 4
+    shadow_rays: Literal["one", "all"] = "one"
+    light_cells: int = 4
+    reflection_rays: int = 1
+    refraction_rays: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("light_cells", "reflection_rays", "refraction_rays"):
+            if not 1 <= getattr(self, name) <= 256:
+                raise SceneError(f"Integrator.{name}: expected 1 to 256, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, eq=False)

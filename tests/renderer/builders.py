@@ -123,10 +123,8 @@ def driving_scene() -> Scene:
             Instance(mesh, paint, place((1.0, 0.9, 0.3), scale=(0.5, 0.8, -0.6)), turning_track(), name="moving"),
             Instance(Sphere(0.3), Phong(WHITE, ambient=0.5), place((0.0, 0.3, 1.5)), name="ball"),
         ),
-        lights=(
-            DirectionalLight((-1.0, -2.0, -1.0), (2.0, 1.9, 1.7)),
-            EnvironmentLight(np.ascontiguousarray(np.broadcast_to(sky, (16, 32, 3)))),
-        ),
+        lights=(DirectionalLight((-1.0, -2.0, -1.0), (2.0, 1.9, 1.7)),),
+        background=EnvironmentLight(np.ascontiguousarray(np.broadcast_to(sky, (16, 32, 3)))),
         integrator=Integrator(depth=3),
         ambient=(0.3, 0.3, 0.35),
         duration_s=1.0,
@@ -217,7 +215,8 @@ def vehicle_scene() -> Scene:
     return Scene(
         PerspectiveCamera(look_at((4.2, 1.7, 6.0), (0.0, 1.0, 0.0)), 45.0),
         (ground, *houses, *parts, *wheels),
-        (DirectionalLight((-1.0, -2.0, -1.0), (2.0, 1.9, 1.7)), EnvironmentLight(sky)),
+        (DirectionalLight((-1.0, -2.0, -1.0), (2.0, 1.9, 1.7)),),
+        background=EnvironmentLight(sky),
         integrator=Integrator(depth=3),
         ambient=(0.3, 0.3, 0.35),
         duration_s=1.0,

@@ -85,9 +85,6 @@ def test_a_mesh_shared_too_often_is_not_copied(monkeypatch) -> None:
 
 
 def test_faults_name_the_part() -> None:
-    area_light = dataclasses.replace(_pair()[0], emission=(1.0, 1.0, 1.0), name="lamp")
-    with pytest.raises(SceneError, match="'lamp'.*area lights"):
-        Renderer(_scene([*_pair(), area_light]))
     bad = dataclasses.replace(_pair()[0], material=Phong(ConstantTexture((np.nan, 0, 0))), name="odd")
     with pytest.raises(SceneError, match="'odd'.*finite"):
         Renderer(_scene([*_pair(), bad]))

@@ -72,7 +72,8 @@ def every_feature() -> Scene:
             Instance(shape, material, to_world, track, name=f"{number}")
             for number, (shape, to_world, material, track) in enumerate(shapes)
         ),
-        lights=(*lights, EnvironmentLight(sky)),
+        lights=lights,
+        background=EnvironmentLight(sky),
         ambient=(0.2, 0.3, 0.4),
         integrator=Integrator(depth=3),
     )
