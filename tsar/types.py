@@ -40,7 +40,7 @@ class FrameletBatch:
             within a framelet. Multiples of ``1 / 65536``, so exact in float32.
         time_s: animation time of each sample, seconds.
         cycle: pipeline cycle that asked for it.
-        seed: with the tile, cycle and sample number, the key of every random number the renderer may draw.
+        seed: of the run that asked for it. What a renderer draws itself it derives from positions and times.
     """
 
     level: Int64[Tensor, " n"]
