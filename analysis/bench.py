@@ -22,7 +22,7 @@ from tsar.config import require
 if TYPE_CHECKING:
     from analysis.progress import Bars
 
-GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "overhead", "growth", "start")
+GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "features", "overhead", "growth", "start")
 """Groups of rows, in the order of the table."""
 
 ON_CPU_ONLY = ("coherent", "incoherent", "cores", "start")
@@ -42,7 +42,7 @@ class BenchOptions:
     """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
-    cores, order, overhead, growth, start."""
+    cores, order, features, overhead, growth, start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of ours are compared; runs nothing."""
     device: Literal["cpu", "cuda:0"] = "cpu"

@@ -9,6 +9,7 @@ from typing import Any
 
 from analysis import progress
 from analysis.bench import ON_CPU_ONLY, SPREAD, BenchOptions, Group, Row
+from analysis.bench_features import features
 from analysis.bench_growth import growth
 from analysis.bench_machine import machine, versions
 from analysis.bench_overhead import overhead
@@ -29,6 +30,7 @@ MEASURED_BY: Mapping[str, Group] = {
     "shaded": shaded,
     "cores": cores,
     "order": order,
+    "features": features,
     "overhead": overhead,
     "growth": growth,
     "start": start_rows,

@@ -11,7 +11,7 @@ from functools import cache
 import warp as wp
 
 from renderer.camera import camera_ray, track_rotation, track_translation
-from renderer.features import Feature
+from renderer.features import ALL, Feature
 from renderer.randomness import group_draw
 from renderer.shading import radiance
 from renderer.structs import Ray, SceneData, ViewData
@@ -32,9 +32,24 @@ class ShadingKernels:
     module: wp.Module
 
 
+SETS_MAX = 24
+"""Sets of features that one process compiles kernels for; scenes beyond them get kernels for everything there is."""
+
+
 def compiled_count() -> int:
     """How many sets of features this process has kernels for."""
     return specialised.cache_info().currsize
+
+
+def nearest(features: Feature) -> Feature:
+    """The set that kernels for ``features`` are compiled for: they themselves, or everything once there are enough."""
+    if features in _asked or len(_asked) < SETS_MAX:
+        _asked.add(features)
+        return features
+    return ALL
+
+
+_asked: set[Feature] = set()
 
 
 @cache

@@ -88,7 +88,7 @@ class Renderer:
         self._scene = scene
         needed = required(scene)
         self.packets = packets and self.device == "cpu" and needed | PACKETS == PACKETS
-        self.features = PACKETS if self.packets else needed if specialise else ALL
+        self.features = PACKETS if self.packets else kernels.nearest(needed) if specialise else ALL
         self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
         # before the buffers are built, which takes those of packets too: they are compiled side by side
         devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)

@@ -1,0 +1,105 @@
+"""Frames as batches of framelets: every pixel's samples are one group, and tiles of pixels go through the one kernel.
+
+A tile's pixels come out the same to the bit whichever tiles are rendered together, and on whichever machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+from numpy.typing import NDArray
+from torch import Tensor
+
+from renderer.sampling import SamplePlan
+from renderer.trace import Renderer
+from tsar.morton import deinterleave
+from tsar.types import FrameletBatch
+
+TILE_PX = 16
+"""Side of a tile. Tiles are always traced whole, also where they hang over the picture: which samples share a packet
+must not depend on the picture's size."""
+
+_SAMPLES_AT_ONCE = 1 << 18
+
+
+def tile_count(width_px: int, height_px: int) -> int:
+    """Tiles that cover a picture; they are numbered row by row."""
+    return -(-width_px // TILE_PX) * -(-height_px // TILE_PX)
+
+
+def tile_pixels(
+    tiles: Sequence[int] | NDArray[np.int64], width_px: int
+) -> tuple[Int[NDArray[np.int64], "tiles 256"], Int[NDArray[np.int64], "tiles 256"]]:
+    """Columns and rows of the pixels of tiles, each tile along the Morton curve."""
+    across = -(-width_px // TILE_PX)
+    index = np.asarray(tiles, np.int64)[:, None]
+    x, y = (np.asarray(part) for part in deinterleave(torch.arange(TILE_PX**2)))
+    return index % across * TILE_PX + x, index // across * TILE_PX + y
+
+
+def render_tiles(
+    renderer: Renderer,
+    plan: SamplePlan,
+    tiles: Sequence[int],
+    size_px: tuple[int, int],
+    frame_time_s: float,
+    shutter_s: tuple[float, float] = (0.0, 0.0),
+    frame: int = 0,
+) -> tuple[Float[Tensor, "tiles 256 3"], dict[str, int]]:
+    """Means of the samples of every pixel of some tiles, and the rays they took.
+
+    Args:
+        renderer: the scene.
+        plan: where in the pixel and when in the shutter's time samples lie.
+        tiles: their numbers, see :func:`tile_count`.
+        size_px: width and height of the whole picture.
+        frame_time_s: time of the frame, seconds.
+        shutter_s: opening and closing time, from the frame's.
+        frame: number of the frame in its sequence.
+
+    Returns:
+        Linear radiance, pixels along the Morton curve; those outside the picture are traced as well. Counts by kind.
+    """
+    columns, rows = tile_pixels(tiles, size_px[0])
+    position, time_s = plan.samples(columns.ravel(), rows.ravel(), *size_px, frame_time_s, shutter_s, frame)
+    number = torch.zeros(len(position), dtype=torch.int64)
+    batch = FrameletBatch(number, number, torch.as_tensor(position), torch.as_tensor(time_s), frame, plan.seed)
+    footprint_px = min(size_px) * math.sqrt(position.shape[1])
+    answer = renderer.trace(batch, size_px[0] / size_px[1], footprint_px)
+    # in the order of the samples, whatever the number of pixels
+    means = answer.color.cpu().numpy().sum(axis=1, dtype=np.float64) / position.shape[1]
+    return torch.as_tensor(means.reshape(len(tiles), TILE_PX**2, 3).astype(np.float32)), answer.counters
+
+
+def place_tiles(image: Float[Tensor, "h w 3"], tiles: Sequence[int], colors: Float[Tensor, "tiles 256 3"]) -> None:
+    """Puts tiles into a picture; what hangs over is dropped."""
+    height, width = image.shape[:2]
+    columns, rows = (torch.as_tensor(part) for part in tile_pixels(tiles, width))
+    inside = (columns < width) & (rows < height)
+    image[rows[inside], columns[inside]] = colors[inside]
+
+
+def render_image(
+    renderer: Renderer,
+    plan: SamplePlan,
+    width_px: int,
+    height_px: int,
+    frame_time_s: float,
+    shutter_s: tuple[float, float] = (0.0, 0.0),
+    frame: int = 0,
+    done: Callable[[int], None] = lambda tiles: None,
+) -> Float[Tensor, "h w 3"]:
+    """A whole frame, linear radiance; see :func:`render_tiles`. ``done`` is told how many tiles are."""
+    image = torch.zeros(height_px, width_px, 3)
+    count = tile_count(width_px, height_px)
+    at_once = max(1, _SAMPLES_AT_ONCE // (TILE_PX**2 * plan.samples_per_pixel))
+    for first in range(0, count, at_once):
+        tiles = range(first, min(first + at_once, count))
+        colors, _ = render_tiles(renderer, plan, tiles, (width_px, height_px), frame_time_s, shutter_s, frame)
+        place_tiles(image, tiles, colors)
+        done(tiles.stop)
+    return image
