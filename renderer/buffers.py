@@ -9,12 +9,11 @@ import warp as wp
 
 from renderer.checks import check_affine, check_finite, check_light
 from renderer.hierarchy import box_tree
+from renderer.light_table import LightTable
 from renderer.materials import MaterialTable
 from renderer.merging import Assembly, assemble
 from renderer.meshes import MeshTable, UnitMesh, check_mesh
 from renderer.structs import (
-    LIGHT_DIRECTIONAL,
-    LIGHT_POINT,
     SHAPE_CUBE,
     SHAPE_DISK,
     SHAPE_MESH,
@@ -36,14 +35,11 @@ from renderer.structs import (
 from renderer.tracks import TrackTable
 from scenes.canonical import (
     Cube,
-    DirectionalLight,
     Disk,
-    EnvironmentLight,
     HeightField,
     Instance,
     Matrix,
     Mesh,
-    PointLight,
     Rectangle,
     Scene,
     SceneError,
@@ -87,7 +83,8 @@ class _Builder:
 
     def __init__(self, scene: Scene, device: str, packets: bool) -> None:
         self.scene, self.device = scene, device
-        self.materials = MaterialTable()
+        self.materials = MaterialTable(device)
+        self.lights = LightTable()
         self.tracks = TrackTable(device)
         self.meshes = MeshTable(device, packets)
         self.instance_rows: list[tuple[dict, np.ndarray, np.ndarray]] = []
@@ -105,11 +102,7 @@ class _Builder:
         name, shape = instance.name, instance.shape
         row = {"track": self.tracks.add(instance.track), "material": self.materials.add(instance.material, name)}
         if instance.emission is not None:
-            check_light(instance.emission, f"Instance {name!r}: emission")
-            if not isinstance(shape, Rectangle | Sphere):
-                raise SceneError(
-                    f"Instance {name!r}: emission: expected a Rectangle or Sphere, got {type(shape).__name__}"
-                )
+            self.lights.add_emitter(instance, row["track"])
             row["emission"] = instance.emission
         if isinstance(instance.material, HeightField):
             self._relief(row, instance, instance.material)
@@ -190,48 +183,6 @@ class _Builder:
             groups.append({"track": track, "first": first, "end": len(nodes), "radius": radius})
         return groups, nodes
 
-    def lights(self) -> tuple[list[dict], EnvironmentLight | None]:
-        """Rows of the lights that cast shadows, and the environment."""
-        rows: list[dict] = []
-        environments = []
-        for light in self.scene.lights:
-            if isinstance(light, PointLight):
-                check_finite(light.position, "PointLight.position")
-                check_light(light.intensity, "PointLight.intensity")
-                rows.append({"kind": LIGHT_POINT, "place": light.position, "color": light.intensity})
-            elif isinstance(light, DirectionalLight):
-                length = float(np.linalg.norm(light.direction))
-                if not 0.0 < length < np.inf:
-                    raise SceneError(f"DirectionalLight.direction: expected a direction, got {light.direction}")
-                if light.angle_deg != 0.0:
-                    raise SceneError(f"DirectionalLight.angle_deg {light.angle_deg} is not supported yet, expected 0")
-                check_light(light.irradiance, "DirectionalLight.irradiance")
-                towards = -np.asarray(light.direction) / length
-                rows.append({"kind": LIGHT_DIRECTIONAL, "place": towards, "color": light.irradiance})
-            elif isinstance(light, EnvironmentLight):
-                environments.append(light)
-            else:
-                raise SceneError(f"light {type(light).__name__} is not supported yet")
-        if len(environments) > 1:
-            raise SceneError(f"expected at most one EnvironmentLight, got {len(environments)}")
-        return rows, self.scene.background or (environments[0] if environments else None)
-
-    def environment(self, light: EnvironmentLight | None, data: SceneData) -> None:
-        """What rays that leave the scene see."""
-        data.environment_level = -1
-        if light is None:
-            return
-        name, shape = f"EnvironmentLight {light.source!r}", light.image.shape
-        if len(shape) != 3 or shape[2] != 3 or min(shape) < 1:
-            raise SceneError(f"{name}: expected an image (h, w, 3), got {shape}")
-        check_light(light.image, name)
-        check_light(light.scale, f"{name}: scale")
-        check_affine(light.to_world, f"{name}: to_world")
-        data.environment_level = self.materials.add_image(light.image, mipmap=False)[0]
-        rotation = np.asarray(light.to_world, np.float64)[:3, :3]
-        data.environment_to_map = wp.mat33(*np.linalg.inv(rotation).astype(np.float32).reshape(-1).tolist())
-        data.environment_scale = float(light.scale)
-
     def build(self) -> SceneBuffers:
         """Fills and uploads everything."""
         scene, device = self.scene, self.device
@@ -246,8 +197,9 @@ class _Builder:
             self.instance(instance)
         for assembly in assemblies:
             self.assembly(assembly)
-        light_rows, environment = self.lights()
-        self.environment(environment, data)
+        for light in scene.lights:
+            self.lights.add(light)
+        self.lights.place_environment(data, self.materials, scene.background)
         check_light(scene.ambient, "Scene.ambient")
         groups, nodes = self.groups()
         data.group_count = len(groups)
@@ -260,16 +212,16 @@ class _Builder:
         data.materials = _upload(self.materials.rows, MaterialRecord, device)
         data.textures = _upload(self.materials.textures, TextureRecord, device)
         data.levels = _upload(self.materials.levels, LevelRecord, device)
-        data.texels = self.materials.upload_texels(device)
+        data.texels = self.materials.upload_texels()
         data.reliefs = _upload(self.reliefs, ReliefRecord, device)
-        data.light_count = len(light_rows)
-        data.lights = _upload(light_rows, LightRecord, device)
+        data.light_count = len(self.lights.rows)
+        data.lights = _upload(self.lights.rows, LightRecord, device)
         data.tracks = _upload(self.tracks.rows, TrackRecord, device)
         data.key_translation, data.key_rotation, data.key_angle = self.tracks.keys()
         data.ambient = wp.vec3(*map(float, scene.ambient))
         depth = int(scene.integrator.depth)
         data.depth = min(depth, DEPTH_MAX) if depth >= 0 else DEPTH_MAX
-        data.light_cells = scene.integrator.light_cells
+        data.light_cells = scene.integrator.light_cells if scene.integrator.shadow_rays == "all" else 1
         data.reflection_rays = scene.integrator.reflection_rays
         data.refraction_rays = scene.integrator.refraction_rays
         return SceneBuffers(data, self.tracks, self.meshes.keep, self.meshes.triangle_count)

@@ -59,7 +59,8 @@ def mip_levels(image: np.ndarray) -> list[np.ndarray]:
 class MaterialTable:
     """Rows of materials, textures and mip levels, and the pool of texels."""
 
-    def __init__(self) -> None:
+    def __init__(self, device: str) -> None:
+        self.device = device
         self.rows: list[dict] = []
         self.textures: list[dict] = []
         self.levels: list[dict] = []
@@ -87,10 +88,10 @@ class MaterialTable:
             self._alive.append(image)
         return self._image_index[key]
 
-    def upload_texels(self, device: str) -> wp.array:
+    def upload_texels(self) -> wp.array:
         """All texels on a device; one black one where there are none."""
         table = np.concatenate(self.texels) if self.texels else np.zeros((1, 3), np.float32)
-        return wp.array(table, dtype=wp.vec3, device=device)
+        return wp.array(table, dtype=wp.vec3, device=self.device)
 
     def add_texture(self, texture: Texture, where: str) -> int:
         """Index of a texture; the same object is stored once."""

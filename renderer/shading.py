@@ -83,18 +83,19 @@ def direct_light(
         for cell in range(cells * cells):
             if cells > 1:
                 sample = cell_2d(draw, _LIGHT + light, cell, cells)
-            towards, irradiance, reach = arriving_light(features, scene, view, time_s, record, sample, start)
+            arriving = arriving_light(features, scene, view, time_s, record, sample, start)
+            towards = arriving.direction
             cosine = wp.dot(surface.normal, towards)
             # light from behind the true surface must not leak in over a smooth normal
-            if cosine > 0.0 and wp.dot(surface.geometric_normal, towards) > 0.0 and wp.max(irradiance) > 0.0:
+            if cosine > 0.0 and wp.dot(surface.geometric_normal, towards) > 0.0 and wp.max(arriving.irradiance) > 0.0:
                 reflected = albedo * (cosine / wp.pi)
                 if (features & _HIGHLIGHT) != 0:
                     lobe = wp.max(wp.dot(mirrored, towards), 0.0)
                     gloss = wp.pow(lobe, material.exponent) * (material.exponent + 2.0) * (0.5 / wp.pi)
                     reflected = reflected + material.specular * gloss
                 rays = rays + 1
-                if not occluded(features, scene, view, time_s, start, towards, reach):
-                    total = total + wp.cw_mul(reflected, irradiance) * share
+                if not occluded(features, scene, view, time_s, start, towards, arriving.reach):
+                    total = total + wp.cw_mul(reflected, arriving.irradiance) * share
     return total, rays
 
 

@@ -186,12 +186,14 @@ class SceneData:
     key_rotation: wp.array(dtype=wp.quat)
     key_angle: wp.array(dtype=wp.float32)  # between a key's quaternion and the next one's, radians
     ambient: wp.vec3
-    environment_level: wp.int32  # negative for black
+    environment_level: wp.int32  # of what is seen at infinity; negative for black
     environment_to_map: wp.mat33
     environment_scale: wp.float32
-    # chances of the environment's rows, and of texels within rows, summed up: rows + 1, and columns + 1 a row
-    environment_rows: wp.array(dtype=wp.float32)
-    environment_columns: wp.array2d(dtype=wp.float32)
+    lighting_level: wp.int32  # of the environment that lights surfaces
+    lighting_to_map: wp.mat33
+    lighting_scale: wp.float32
+    lighting_rows: wp.array(dtype=wp.float32)  # chances of its rows, summed up: from 0 to 1
+    lighting_columns: wp.array2d(dtype=wp.float32)  # the same of the texels within each row
     depth: wp.int32
     throughput_cutoff: wp.float32
     light_cells: wp.int32

@@ -160,7 +160,7 @@ def test_no_ray_slips_through_shared_edges(scale: float, matrix: np.ndarray) -> 
         placed = _scaled(matrix, scale)
         for turn in ((0.0, 0.0, 0.0), (0.0, 1.5, 0.0), (np.pi / 2, 0.0, 0.0)):
             camera = PerspectiveCamera(place(placed[:3, 3], turn), 100.0)
-            scene = Scene(camera, (Instance(mesh, Matte(WHITE), placed),), (sky,))
+            scene = Scene(camera, (Instance(mesh, Matte(WHITE), placed),), background=sky)
             position = _edge_positions(mesh, camera, placed)
             assert len(position) > 1500
             assert (colors(scene, position) == 0.0).all()
