@@ -177,10 +177,10 @@ def environment_light() -> Scene:
 
 
 def glossy_reflection() -> Scene:
-    """The same mirror three times: perfect, and spread by 6 and by 20 degrees."""
+    """The same mirror three times: perfect, and spread by 12 and by 40 degrees."""
     balls = [
         Instance(Sphere(0.95), Mirror(ConstantTexture((0.9, 0.9, 0.9)), spread), _placed((x, 0.0, 0.95)), name=f"{x}")
-        for x, spread in ((-2.1, 0.0), (0.0, 6.0), (2.1, 20.0))
+        for x, spread in ((-2.1, 0.0), (0.0, 12.0), (2.1, 40.0))
     ]
     return _scene(*balls, lights=(_SUN,))
 
@@ -300,7 +300,7 @@ EFFECTS: dict[str, Effect] = {
         (spot_light, "spot light"),
         (sun_disc, "sun with an extent"),
         (environment_light, "light from an environment map, importance-sampled"),
-        (glossy_reflection, "glossy reflection, spread by 0, 6 and 20 degrees"),
+        (glossy_reflection, "glossy reflection, spread by 0, 12 and 40 degrees"),
         (glass, "refraction: solid, thin, block"),
         (glossy_refraction, "glossy refraction, spread by 0, 4 and 14 degrees"),
         (depth_of_field, "depth of field of a thin lens"),
