@@ -13,6 +13,8 @@ import tyro
 
 from tsar.config import require
 
+_NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
+
 
 @dataclass(frozen=True)
 class RenderOptions:
@@ -25,7 +27,18 @@ class RenderOptions:
     height_px: int = 512
     """Height, pixels."""
     samples_per_axis: int = 2
-    """Samples along a pixel's side."""
+    """Samples along a pixel's side, all at the frame's time."""
+    samples: int = 0
+    """Instead of that regular grid, this many samples of a point set per pixel, spread over the time the shutter is
+    open as well."""
+    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    """The point set; stratified takes cubes of samples only."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture, of point sets."""
+    time_filter: Literal["box", "triangle"] = "box"
+    """Reconstruction filter over the time the shutter is open, of point sets."""
+    seed: int = 0
+    """Of everything random."""
     time_s: float = 0.0
     """Animation time of the first frame, seconds."""
     frames: int = 1
@@ -40,6 +53,8 @@ class RenderOptions:
     """Where rays are traced."""
     threads: int = 0
     """Threads for tracing; 0 takes one per core."""
+    explain: bool = False
+    """Print what the scene requires of the kernels, and why, instead of rendering."""
     out: Path = Path("out/render")
     """Folder for the results; frames that an interrupted run of the same job left there are kept."""
 
@@ -49,6 +64,8 @@ class RenderOptions:
         require(0 < self.fps < math.inf, "fps", "a positive, finite number", self.fps)
         require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
         require(self.threads >= 0, "threads", "at least 0", self.threads)
+        require(0 <= self.samples <= 1 << 16, "samples", "between 0 and 65536", self.samples)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
 
     @property
     def times_s(self) -> list[float]:
@@ -63,7 +80,7 @@ class RenderOptions:
     @property
     def job(self) -> dict[str, Any]:
         """What decides the content of the stills."""
-        return {k: v for k, v in dataclasses.asdict(self).items() if k not in ("frames", "threads", "format", "out")}
+        return {name: value for name, value in dataclasses.asdict(self).items() if name not in _NOT_OF_THE_STILLS}
 
 
 def previous_job(out: Path) -> str | None:

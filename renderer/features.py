@@ -127,12 +127,6 @@ def explain(scene: Scene) -> dict[Feature, str]:
     return {feature: found[feature] for feature in Feature if feature in found}
 
 
-def explanation(scene: Scene) -> list[tuple[str, bool, str]]:
-    """Every feature in words, whether a scene requires it, and what in the scene does."""
-    found = explain(scene)
-    return [(MEANING[feature], feature in found, found.get(feature, "")) for feature in Feature]
-
-
 def required(scene: Scene) -> Feature:
     """The features of a scene, as one set."""
     features = Feature(0)

@@ -103,3 +103,19 @@ def render_image(
         place_tiles(image, tiles, colors)
         done(tiles.stop)
     return image
+
+
+def pictures(
+    renderer: Renderer, sampling: SamplePlan | int, width_px: int, height_px: int
+) -> Callable[[int, float], Float[Tensor, "h w 3"]]:
+    """Makes the frame of a number at a time, over the time that the scene's shutter is open.
+
+    Args:
+        renderer: the scene.
+        sampling: a plan; or a whole number, of the samples along a pixel's side of a regular grid at one time.
+        width_px, height_px: of every frame.
+    """
+    if not isinstance(sampling, SamplePlan):
+        return lambda number, time_s: renderer.render_frame(time_s, width_px, height_px, sampling)
+    size = width_px, height_px
+    return lambda number, time_s: render_image(renderer, sampling, *size, time_s, renderer.shutter_s, number)

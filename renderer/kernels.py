@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import warp as wp
 
 from renderer.camera import camera_ray, track_rotation, track_translation
-from renderer.features import ALL, Feature
+from renderer.features import ALL, MEANING, PACKETS, Feature, explain, required
 from renderer.randomness import group_draw
 from renderer.shading import radiance
 from renderer.structs import Ray, SceneData, ViewData
+from scenes.canonical import Scene
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class ShadingKernels:
     module: wp.Module
 
 
+_MODULE = "renderer.shading_"
+
 SETS_MAX = 24
 """Sets of features that one process compiles kernels for; scenes beyond them get kernels for everything there is."""
 
@@ -39,6 +43,23 @@ SETS_MAX = 24
 def compiled_count() -> int:
     """How many sets of features this process has kernels for."""
     return specialised.cache_info().currsize
+
+
+def kept_count() -> int:
+    """How many sets of features this machine keeps compiled kernels for, as :mod:`renderer.shading` is now or was."""
+    folders = Path(wp.config.kernel_cache_dir or "").glob(f"wp_{_MODULE}*")
+    return len({folder.name.removeprefix(f"wp_{_MODULE}")[:8] for folder in folders if folder.is_dir()})
+
+
+def explanation(scene: Scene) -> list[str]:
+    """Lines that say of every feature whether a scene requires it, and what in the scene does."""
+    found = explain(scene)
+    lines = [
+        f"{'yes' if feature in found else ' - '}  {MEANING[feature]:44} {found.get(feature, '')}" for feature in Feature
+    ]
+    alone = "one by one, by kernels of their own" if required(scene) & ~PACKETS else "in packets of sixteen"
+    kept = f"kernels for {kept_count()} sets of features are kept on this machine"
+    return [*(line.rstrip() for line in lines), f"samples are traced {alone}; {kept}"]
 
 
 def nearest(features: Feature) -> Feature:
@@ -56,7 +77,7 @@ _asked: set[Feature] = set()
 def specialised(features: Feature) -> ShadingKernels:
     """Kernels that can do what is in ``features`` and hold no code for the rest; the same object for the same set."""
     mask = int(features)
-    name = f"renderer.shading_{mask:08x}"
+    name = f"{_MODULE}{mask:08x}"
 
     @wp.kernel(enable_backward=False, module=name)
     def shade_samples(

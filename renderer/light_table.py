@@ -108,9 +108,7 @@ class LightTable:
         if self.environment is not None:
             turn = np.asarray(self.environment.to_world, np.float64)[:3, :3]
             if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-5):
-                raise SceneError(
-                    "EnvironmentLight.to_world: expected a rotation, got a matrix that stretches"
-                )
+                raise SceneError("EnvironmentLight.to_world: expected a rotation, got a matrix that stretches")
             data.lighting_level, data.lighting_to_map, data.lighting_scale = _map(self.environment, materials)
             if data.lighting_scale > 0.0 and self.environment.image.max() > 0.0:
                 rows, columns = summed_chances(self.environment.image)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import warp as wp
 
+from renderer.features import PACKETS, Feature
 from renderer.launching import Address
 from renderer.structs import SceneData, ViewData
 
@@ -35,6 +36,11 @@ class Queries:
     t: wp.array(dtype=wp.float32)
     u: wp.array(dtype=wp.float32)
     v: wp.array(dtype=wp.float32)
+
+
+def suffice_for(features: Feature) -> bool:
+    """Whether packets can do all that is in a set."""
+    return features | PACKETS == PACKETS
 
 
 _NATIVE = Path(__file__).resolve().parent / "native"

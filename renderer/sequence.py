@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from torch import Tensor
 
 from renderer.film import Mp4Writer, write_image
-from renderer.trace import Renderer
 
 
 def still_path(folder: Path, number: int, ending: str) -> Path:
@@ -18,10 +18,8 @@ def still_path(folder: Path, number: int, ending: str) -> Path:
 
 
 def render_stills(
-    renderer: Renderer,
+    picture: Callable[[int, float], Tensor],
     times_s: Sequence[float],
-    size_px: tuple[int, int],
-    samples_per_axis: int,
     folder: Path,
     ending: str,
     done: Callable[[int], None] = lambda count: None,
@@ -29,10 +27,8 @@ def render_stills(
     """Renders the stills that are not on disk yet.
 
     Args:
-        renderer: the scene.
+        picture: linear radiance ``(h, w, 3)`` of the still of a number, at a time.
         times_s: animation time of each still, seconds.
-        size_px: width and height.
-        samples_per_axis: the average of a grid of this many samples squared is one pixel.
         folder, ending: where stills go, and their format.
         done: called with the number of stills that are on disk.
 
@@ -46,7 +42,7 @@ def render_stills(
     for number, time_s in enumerate(times_s):
         path = still_path(folder, number, ending)
         if not path.exists():
-            nonfinite += write_image(path, renderer.render_frame(time_s, *size_px, samples_per_axis))
+            nonfinite += write_image(path, picture(number, time_s))
             rendered += 1
         done(number + 1)
     return rendered, nonfinite

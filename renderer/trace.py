@@ -87,7 +87,7 @@ class Renderer:
         self._camera = check_camera(scene)
         self._scene = scene
         needed = required(scene)
-        self.packets = packets and self.device == "cpu" and needed | PACKETS == PACKETS
+        self.packets = packets and self.device == "cpu" and packet_kernels.suffice_for(needed)
         self.features = PACKETS if self.packets else kernels.nearest(needed) if specialise else ALL
         self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
         # before the buffers are built, which takes those of packets too: they are compiled side by side
@@ -158,6 +158,12 @@ class Renderer:
         pixels = -(-width_px // _BLOCK_PX) * -(-height_px // _BLOCK_PX) * _BLOCK_PX**2
         self._launch(self._kernels.render_pixels, view, shared, pixels)
         return image.cpu()
+
+    @property
+    def shutter_s(self) -> tuple[float, float]:
+        """When the scene's shutter opens and closes, from a frame's time, seconds."""
+        opening, closing = getattr(self._camera, "shutter_s", (0.0, 0.0))
+        return float(opening), float(closing)
 
     def close(self) -> None:
         """Ends the worker threads; the renderer must not be used afterwards."""

@@ -83,7 +83,7 @@ def _facing_down(at: tuple[float, float, float], half_x: float, half_y: float) -
 
 def _floor(scale: float = 1.0) -> Instance:
     squares = CheckerboardTexture(
-        ConstantTexture((0.62, 0.60, 0.56)), ConstantTexture((0.30, 0.31, 0.34)), (24 * scale,) * 2
+        ConstantTexture((0.62, 0.60, 0.56)), ConstantTexture((0.30, 0.31, 0.34)), (24.0 * scale, 24.0 * scale)
     )
     return Instance(Rectangle(), Phong(squares), _placed((0, 6, 0), (12 * scale, 12 * scale, 1)), name="floor")
 

@@ -2,6 +2,8 @@
 
 Examples: python scripts/render.py fly-by --time-s 1 --out out/still
           python scripts/render.py chase --frames 60 --format mp4 --out out/chase
+          python scripts/render.py moving-object --samples 125 --point-set stratified --out out/blur
+          python scripts/render.py glass --explain
 """
 
 from __future__ import annotations
@@ -20,19 +22,29 @@ from analysis.render_options import RenderOptions, previous_job
 def main() -> None:
     """Parses, renders, prints what was written where."""
     options = parse(RenderOptions, __doc__ or "")
+    from renderer.kernels import explanation
+    from scenes import catalog
+
     with bad_input():
+        scene = catalog.load(options.scene, options.phase)
+        if options.explain:
+            print("\n".join(explanation(scene)))
+            return
         writable_folder(options.out, "out")
 
     from analysis.progress import bars
     from analysis.records import provenance
     from renderer.film import FilmError
+    from renderer.frames import pictures
+    from renderer.sampling import SamplePlan
     from renderer.sequence import render_stills, still_path, write_film
     from renderer.trace import Renderer
-    from scenes import catalog
 
     with bad_input():
-        scene = catalog.load(options.scene, options.phase)
-        renderer = Renderer(scene, options.device, options.threads or None)
+        renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
+        kinds = options.point_set, options.seed, options.space_filter
+        plan = SamplePlan(options.samples, *kinds, time_filter=options.time_filter) if options.samples else None
+        picture = pictures(renderer, plan or options.samples_per_axis, options.width_px, options.height_px)
     source = provenance(Path(__file__).parent.parent, options.job, scene=scene.name, device=options.device)
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
         if previous_job(options.out) != source["config_hash"]:
@@ -40,15 +52,8 @@ def main() -> None:
                 old.unlink()
         write_json(options.out / "job.json", {"config_hash": source["config_hash"]})
         stills = [still_path(options.out, number, options.still_ending) for number in range(options.frames)]
-        rendered, nonfinite = render_stills(
-            renderer,
-            options.times_s,
-            (options.width_px, options.height_px),
-            options.samples_per_axis,
-            options.out,
-            options.still_ending,
-            shown.task("frames", options.frames),
-        )
+        done = shown.task("frames", options.frames)
+        rendered, nonfinite = render_stills(picture, options.times_s, options.out, options.still_ending, done)
         if options.format == "mp4":
             write_film(stills, options.out / "film.mp4", options.fps)
         found = {"frames": options.frames, "rendered_now": rendered, "nonfinite": nonfinite}

@@ -22,6 +22,7 @@ FORBIDDEN = {
 # these wire packages together: what they may import beside the above
 WIRING = {
     "analysis/bench_cycles.py": ("renderer", "tsar"),
+    "analysis/bench_features.py": ("renderer", "scenes"),
     "analysis/bench_mitsuba.py": ("scenes",),
     "analysis/bench_mitsuba_scene.py": ("scenes",),
     "analysis/bench_overhead.py": ("tsar",),
@@ -34,6 +35,7 @@ WIRING = {
     "analysis/estimate_check.py": ("tsar",),
     "analysis/evaluation.py": ("renderer", "scenes", "tsar"),
     "analysis/experiment.py": ("renderer", "scenes", "tsar"),
+    "analysis/gallery.py": ("renderer", "scenes"),
     "analysis/ideal_density.py": ("tsar",),
     "analysis/spectrum.py": ("renderer", "scenes", "tsar"),
     "analysis/spectrum_study.py": ("scenes",),

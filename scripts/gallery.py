@@ -1,0 +1,41 @@
+"""Render one picture for each effect of the ray tracer, and a sheet of them all.
+
+Examples: python scripts/gallery.py --out out/gallery
+          python scripts/gallery.py glass depth-of-field --samples 256 --out out/two
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.files import writable_folder, write_json
+
+
+def main() -> None:
+    """Parses, renders, prints what each picture took."""
+    from analysis.gallery import GalleryOptions, render_gallery, sample_plan
+
+    options = parse(GalleryOptions, __doc__ or "")
+    with bad_input():
+        plan = sample_plan(options)
+        writable_folder(options.out, "out")
+    from analysis.progress import bars
+    from analysis.records import provenance
+    from renderer.film import FilmError
+
+    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
+        found = render_gallery(options, plan, shown.task)
+        source = provenance(Path(__file__).parent.parent, found["config"], seed=options.seed, device=options.device)
+        write_json(options.out / "summary.json", {**found, "provenance": source})
+    for name, each in found["effects"].items():
+        kernels = "packets" if each["packets"] else f"{len(each['features'])} features"
+        print(f"{name:20} {each['wall_s']:6.2f} s  {each['samples_per_s'] / 1e6:5.2f} M samples/s  {kernels}")
+    print(f"pictures, gallery.jpg and summary.json in {options.out}")
+
+
+if __name__ == "__main__":
+    run_cli(main)
