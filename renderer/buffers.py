@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from renderer.accelerators import STRUCTURES, Structure
 from renderer.checks import check_affine, check_finite, check_light
 from renderer.hierarchy import box_tree
 from renderer.light_table import LightTable
@@ -81,12 +82,12 @@ def _upload(rows: list[dict], record: type, device: str) -> wp.array:
 class _Builder:
     """Collects the tables of a scene, then uploads them."""
 
-    def __init__(self, scene: Scene, device: str, packets: bool) -> None:
+    def __init__(self, scene: Scene, device: str, structure: Structure | None) -> None:
         self.scene, self.device = scene, device
         self.materials = MaterialTable(device)
         self.lights = LightTable()
         self.tracks = TrackTable(device)
-        self.meshes = MeshTable(device, packets)
+        self.meshes = MeshTable(device, structure)
         self.instance_rows: list[tuple[dict, np.ndarray, np.ndarray]] = []
         self.reliefs: list[dict] = []
 
@@ -207,6 +208,7 @@ class _Builder:
         data.nodes = _upload(nodes, NodeRecord, device)
         data.instances = _upload([row for row, _, _ in self.instance_rows], InstanceRecord, device)
         data.meshes = _upload(self.meshes.rows, MeshRecord, device)
+        data.structure = STRUCTURES.index(self.meshes.structure) if self.meshes.structure is not None else -1
         for name, pool in self.meshes.pools.items():
             setattr(data, name, pool.upload(device))
         data.materials = _upload(self.materials.rows, MaterialRecord, device)
@@ -227,15 +229,15 @@ class _Builder:
         return SceneBuffers(data, self.tracks, self.meshes.keep, self.meshes.triangle_count)
 
 
-def build_buffers(scene: Scene, device: str, packets: bool) -> SceneBuffers:
+def build_buffers(scene: Scene, device: str, structure: Structure | None) -> SceneBuffers:
     """Uploads a scene.
 
     Args:
         scene: canonical scene.
         device: from :func:`renderer.device.pick`.
-        packets: whether meshes get the trees of ``packets.py``, instead of Warp's.
+        structure: over the triangles of meshes, for the CPU's kernels; None for Warp's own trees.
 
     Raises:
         SceneError: for anything the renderer does not support, or values that cannot be rendered.
     """
-    return _Builder(scene, device, packets).build()
+    return _Builder(scene, device, structure).build()

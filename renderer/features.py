@@ -64,6 +64,7 @@ class Feature(IntFlag):
     SPHERE_LIGHT = auto()
     ENVIRONMENT = auto()
     ALL_CELLS = auto()
+    WARP_TREES = auto()
 
 
 ALL = Feature((1 << len(Feature)) - 1)
@@ -110,6 +111,7 @@ MEANING = {
     Feature.SPHERE_LIGHT: "spheres that give light",
     Feature.ENVIRONMENT: "light from the environment map",
     Feature.ALL_CELLS: "a shadow ray to every cell of a light",
+    Feature.WARP_TREES: "Warp's own trees over meshes, as on a GPU",
 }
 
 _EXTENDED = Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT

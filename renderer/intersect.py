@@ -32,8 +32,43 @@ _HAS_FLAT = wp.constant(int(Feature.FLAT))
 _HAS_CUBE = wp.constant(int(Feature.CUBE))
 _HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
 _HAS_MOTION = wp.constant(int(Feature.MOTION))
+_HAS_WARP_TREES = wp.constant(int(Feature.WARP_TREES))
 
 _TINY = wp.constant(1.0e-20)
+
+
+# On a GPU no mesh comes without a tree of Warp's, so that this is never called there.
+_NATIVE = """
+#if defined(__CUDACC__) || defined(__CUDA_ARCH__) || defined(__CUDACC_RTC__)
+    return wp::vec4(-1.0f, 0.0f, 0.0f, 0.0f);
+#else
+    packets::RayHit hit;
+    const bool found = packets::single_ray<{any}>(scene, mesh, start, towards, reach, (long long*)work.data, hit);
+    return wp::vec4(found ? hit.t : -1.0f, hit.u, hit.v, __builtin_bit_cast(float, hit.face));
+#endif
+"""
+
+
+@wp.func_native(_NATIVE.replace("{any}", "false"))
+def nearest_in_mesh(
+    scene: SceneData,
+    mesh: wp.int32,
+    start: wp.vec3,
+    towards: wp.vec3,
+    reach: wp.float32,
+    work: wp.array(dtype=wp.int64),
+) -> wp.vec4: ...
+
+
+@wp.func_native(_NATIVE.replace("{any}", "true"))
+def any_in_mesh(
+    scene: SceneData,
+    mesh: wp.int32,
+    start: wp.vec3,
+    towards: wp.vec3,
+    reach: wp.float32,
+    work: wp.array(dtype=wp.int64),
+) -> wp.vec4: ...
 
 
 @wp.func
@@ -139,6 +174,7 @@ def misses_sphere(from_center: wp.vec3, direction: wp.vec3, radius: wp.float32, 
 def meet_instance(
     features: wp.int32,
     scene: SceneData,
+    view: ViewData,
     record: InstanceRecord,
     origin: wp.vec3,
     direction: wp.vec3,
@@ -154,12 +190,19 @@ def meet_instance(
     reach = t_max * stretch
     t = wp.float32(-1.0)
     if (features & _HAS_MESH) != 0 and record.shape == _MESH:
-        query = wp.mesh_query_ray(scene.meshes[record.mesh].id, start, towards, reach)
-        if query.result:
-            t = query.t
-            hit.u = query.u
-            hit.v = query.v
-            hit.face = query.face
+        if (features & _HAS_WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
+            query = wp.mesh_query_ray(scene.meshes[record.mesh].id, start, towards, reach)
+            if query.result:
+                t = query.t
+                hit.u = query.u
+                hit.v = query.v
+                hit.face = query.face
+        else:
+            found = nearest_in_mesh(scene, record.mesh, start, towards, reach, view.work)
+            t = found[0]
+            hit.u = found[1]
+            hit.v = found[2]
+            hit.face = wp.cast(found[3], wp.int32)
     elif (features & _HAS_SPHERE) != 0 and record.shape == _SPHERE:
         t = sphere_distance(start, towards)
     elif (features & _HAS_FLAT) != 0 and (record.shape == _DISK or record.shape == _RECTANGLE):
@@ -180,6 +223,7 @@ def meet_instance(
 def instance_blocks(
     features: wp.int32,
     scene: SceneData,
+    view: ViewData,
     record: InstanceRecord,
     origin: wp.vec3,
     direction: wp.vec3,
@@ -190,8 +234,12 @@ def instance_blocks(
         start = record.to_local * origin + record.to_local_offset
         towards = record.to_local * direction
         stretch = wp.length(towards)
-        return wp.mesh_query_ray_anyhit(scene.meshes[record.mesh].id, start, towards / stretch, t_max * stretch)
-    hit = meet_instance(features, scene, record, origin, direction, t_max)
+        reach = t_max * stretch
+        if (features & _HAS_WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
+            return wp.mesh_query_ray_anyhit(scene.meshes[record.mesh].id, start, towards / stretch, reach)
+        found = any_in_mesh(scene, record.mesh, start, towards / stretch, reach, view.work)
+        return found[0] >= 0.0
+    hit = meet_instance(features, scene, view, record, origin, direction, t_max)
     return hit.instance == 0
 
 
@@ -230,7 +278,7 @@ def closest_hit(
                 if not meets_box(start, inverse, node.lower, node.upper, best.t):
                     index = node.skip
                 elif node.instance >= 0:
-                    hit = meet_instance(features, scene, scene.instances[node.instance], start, towards, best.t)
+                    hit = meet_instance(features, scene, view, scene.instances[node.instance], start, towards, best.t)
                     if hit.instance == 0:
                         best = hit
                         best.instance = node.instance
@@ -269,6 +317,6 @@ def occluded(
                 if not meets_box(start, inverse, node.lower, node.upper, t_max):
                     index = node.skip
                 elif node.instance >= 0:
-                    if instance_blocks(features, scene, scene.instances[node.instance], start, towards, t_max):
+                    if instance_blocks(features, scene, view, scene.instances[node.instance], start, towards, t_max):
                         return True
     return False

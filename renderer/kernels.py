@@ -13,6 +13,7 @@ import warp as wp
 
 from renderer.camera import camera_ray, track_rotation, track_translation
 from renderer.features import ALL, MEANING, PACKETS, Feature, explain, required
+from renderer.packets import MODULE_OPTIONS
 from renderer.randomness import group_draw
 from renderer.shading import radiance
 from renderer.structs import Ray, SceneData, ViewData
@@ -78,6 +79,7 @@ def specialised(features: Feature) -> ShadingKernels:
     """Kernels that can do what is in ``features`` and hold no code for the rest; the same object for the same set."""
     mask = int(features)
     name = f"{_MODULE}{mask:08x}"
+    wp.get_module(name).options.update(MODULE_OPTIONS)
 
     @wp.kernel(enable_backward=False, module=name)
     def shade_samples(

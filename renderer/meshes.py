@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from renderer.accelerators import KD_FLOATS, Structure, build_structure
 from renderer.packets import BLOCK_FLOATS, NODE_FLOATS
-from renderer.trees import aligned, build_tree
+from renderer.trees import aligned
 from scenes.canonical import Mesh, SceneError
 
 _BOX_PADDING = 2.0e-5
@@ -60,14 +61,16 @@ class _Pool:
 class MeshTable:
     """The unique meshes of a scene."""
 
-    def __init__(self, device: str, packets: bool) -> None:
-        self.device, self.packets = device, packets
+    def __init__(self, device: str, structure: Structure | None) -> None:
+        """Starts empty; ``structure`` is over triangles on the CPU, None for Warp's own trees."""
+        self.device, self.structure = device, structure
         self.rows: list[dict] = []
         self.triangle_count = 0
         self.keep: list[object] = []  # kernels know a Warp mesh by number only; ids of meshes must not be used again
         self.pools = {
             "tree_nodes": _Pool(NODE_FLOATS, np.float32, wp.float32),
             "tree_blocks": _Pool(BLOCK_FLOATS, np.float32, wp.float32),
+            "kd_nodes": _Pool(KD_FLOATS, np.float32, wp.float32),
             "vertices": _Pool(3, np.float32, wp.vec3),
             "faces": _Pool(3, np.int32, wp.vec3i),
             "normals": _Pool(3, np.float32, wp.vec3),
@@ -91,12 +94,10 @@ class MeshTable:
             pools = self.pools
             self.keep.append(mesh)
             tree: dict[str, object]
-            if self.packets:
-                built = build_tree(vertices, mesh.faces)
-                tree = {
-                    "first_node": pools["tree_nodes"].append(built.nodes),
-                    "first_block": pools["tree_blocks"].append(built.blocks),
-                }
+            if self.structure is not None:
+                nodes, blocks = build_structure(self.structure, vertices, mesh.faces)
+                pool = pools["kd_nodes" if self.structure == "kdtree" else "tree_nodes"]
+                tree = {"first_node": pool.append(nodes), "first_block": pools["tree_blocks"].append(blocks)}
             else:
                 bvh = padded_mesh(vertices[mesh.faces], self.device)
                 self.keep.append(bvh)
@@ -106,6 +107,7 @@ class MeshTable:
                 {
                     **tree,
                     "first_face": pools["faces"].append(mesh.faces),
+                    "face_count": len(mesh.faces),
                     "first_vertex": pools["vertices"].append(vertices),
                     "first_normal": pools["normals"].append(mesh.normals),
                     "first_uv": pools["uvs"].append(mesh.uvs),

@@ -53,7 +53,8 @@ BUILD_OPTIONS = wp.ModuleBuildOptions(
 )
 """What a module of kernels needs to call what is in ``native/``."""
 
-wp.set_module_options({"enable_backward": False, "extra_build_options": BUILD_OPTIONS})
+MODULE_OPTIONS = {"enable_backward": False, "extra_build_options": BUILD_OPTIONS}
+wp.set_module_options(MODULE_OPTIONS)
 
 
 @wp.func_native("packets::build_tree(vertices, faces, boxes, order, nodes, blocks, counts);")
@@ -65,6 +66,12 @@ def native_build_tree(
     nodes: wp.array(dtype=wp.float32),
     blocks: wp.array(dtype=wp.float32),
     counts: wp.array(dtype=wp.int32),
+): ...
+
+
+@wp.func_native("packets::trace_single(scene, rays, ray, nearest != 0, (long long*)work.data);")
+def native_trace_single(
+    scene: SceneData, rays: Queries, ray: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)
 ): ...
 
 
@@ -113,6 +120,12 @@ def build_tree(
 ):
     """Fills ``nodes`` and ``blocks`` and how many of each there are; ``boxes`` and ``order`` are scratch."""
     native_build_tree(vertices, faces, boxes, order, nodes, blocks, counts)
+
+
+@wp.kernel(enable_backward=False)
+def trace_singles(scene: SceneData, rays: Queries, first: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)):
+    """Traces a ray a thread through the scene's first mesh, from ray ``first`` on, and adds up what that takes."""
+    native_trace_single(scene, rays, first + wp.tid(), nearest, work)
 
 
 @wp.kernel(enable_backward=False)

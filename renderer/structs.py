@@ -51,13 +51,15 @@ class InstanceRecord:
 class MeshRecord:
     """A mesh: its tree, and where its arrays lie in the pools. A negative first index means it has none.
 
-    The CPU's packets walk the tree that starts at ``first_node``; elsewhere Warp's own is known by ``id``.
+    The CPU's kernels walk the structure that starts at ``first_node`` and ``first_block``; elsewhere Warp's own tree is
+    known by ``id``.
     """
 
     id: wp.uint64
     first_node: wp.int32
     first_block: wp.int32
     first_face: wp.int32
+    face_count: wp.int32
     first_vertex: wp.int32
     first_normal: wp.int32
     first_uv: wp.int32
@@ -169,6 +171,8 @@ class SceneData:
     meshes: wp.array(dtype=MeshRecord)
     tree_nodes: wp.array(dtype=wp.float32)  # records of native/tree.h
     tree_blocks: wp.array(dtype=wp.float32)
+    kd_nodes: wp.array(dtype=wp.float32)  # records of native/structures.h
+    structure: wp.int32  # over the triangles of meshes, see accelerators.py
     vertices: wp.array(dtype=wp.vec3)
     faces: wp.array(dtype=wp.vec3i)
     normals: wp.array(dtype=wp.vec3)
@@ -219,6 +223,7 @@ class ViewData:
     single_time: wp.int32  # 1 where ``pose_*`` hold every track's pose for all samples of the launch
     pose_translation: wp.array(dtype=wp.vec3)
     pose_rotation: wp.array(dtype=wp.quat)
+    work: wp.array(dtype=wp.int64)  # sums node visits and triangle tests; empty where they are not asked for
 
 
 @wp.struct

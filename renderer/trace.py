@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
+from typing import Literal
 
 import numpy as np
 import torch
@@ -14,9 +15,11 @@ from torch import Tensor
 from renderer import device as devices
 from renderer import kernels
 from renderer import packets as packet_kernels
+from renderer.accelerators import STRUCTURES, Structure
 from renderer.batches import PacketBatches
 from renderer.buffers import build_buffers
 from renderer.features import ALL, PACKETS, Feature, required
+from renderer.launching import shared
 from renderer.shading import stack_size
 from renderer.structs import Ray, ViewData
 from renderer.viewing import camera_view, check_camera
@@ -53,6 +56,8 @@ class Renderer:
         packets: bool = True,
         specialise: bool = True,
         seed: int = 0,
+        structure: Structure | Literal["warp"] = "bvh",
+        count_work: bool = False,
     ) -> None:
         """Builds acceleration structures and loads kernels.
 
@@ -67,6 +72,11 @@ class Renderer:
                 without, one by one as other devices do. Pictures differ by rounding.
             specialise: compile kernels for what the scene requires; without, for everything there is. Pictures are the
                 same.
+            structure: over the triangles of meshes: the tree of boxes, a kd-tree, ``brute`` for none, or ``warp`` for
+                Warp's own tree, which a GPU always has. Only the first is walked by packets. The first three give the
+                same pictures to the bit, ``warp`` up to rounding.
+            count_work: count the nodes visited and triangles tested, as ``node_visits`` and ``triangle_tests``; for
+                single samples, on the CPU, of the first three.
             seed: of the random numbers behind lens, extended lights and glossy rays, 0 to 2^32 - 1.
 
         Raises:
@@ -87,16 +97,25 @@ class Renderer:
         self._camera = check_camera(scene)
         self._scene = scene
         needed = required(scene)
-        self.packets = packets and self.device == "cpu" and packet_kernels.suffice_for(needed)
+        if structure not in (*STRUCTURES, "warp"):
+            raise ValueError(f"structure: expected one of {', '.join(STRUCTURES)}, warp, got {structure!r}")
+        own = None if structure == "warp" or self.device != "cpu" else structure
+        if count_work and own is None:
+            raise ValueError(f"count_work: expected a structure of the CPU's, got {structure!r} on {self.device}")
+        together = packets and self.device == "cpu" and structure == "bvh" and not count_work
+        self.packets = together and packet_kernels.suffice_for(needed)
+        if own is None:
+            needed |= Feature.WARP_TREES
         self.features = PACKETS if self.packets else kernels.nearest(needed) if specialise else ALL
         self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
         # before the buffers are built, which takes those of packets too: they are compiled side by side
         devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)
-        self._buffers = build_buffers(scene, self.device, self.packets)
+        self._buffers = build_buffers(scene, self.device, own)
         if not self.packets:  # these are compiled for the scene: it is known now that it can be rendered
             devices.load_kernels(self._kernels.module, self.device)
         data = self._buffers.data
         data.throughput_cutoff, data.seed = float(throughput_cutoff), wp.uint32(seed)
+        self._work = np.zeros(2, np.int64) if count_work else None
         self._stack_size = stack_size(self.features, data.depth, data.reflection_rays, data.refraction_rays)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 and self.device == "cpu" else None
         self._batches: dict[tuple[float, float], PacketBatches] = {}
@@ -203,7 +222,11 @@ class Renderer:
             self._launch(self._kernels.shade_samples, view, shared, count)
             totals = _totals(rays)
         kinds = _SECONDARY if Feature.GLASS in self.features else _SECONDARY[:2]
-        return color.to(home), {"primary_rays": count, **dict(zip(kinds, totals, strict=False))}
+        counters = {"primary_rays": count, **dict(zip(kinds, totals, strict=False))}
+        if self._work is not None:
+            counters |= dict(zip(("node_visits", "triangle_tests"), self._work.tolist(), strict=True))
+            self._work[:] = 0
+        return color.to(home), counters
 
     def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:
         """Recorded launches for pictures of one shape."""
@@ -244,7 +267,10 @@ class Renderer:
             pass
 
     def _view(self, aspect: float, footprint_px: float) -> ViewData:
-        return camera_view(self._camera, self._buffers.tracks, aspect, footprint_px)
+        view = camera_view(self._camera, self._buffers.tracks, aspect, footprint_px)
+        if self._work is not None:
+            view.work = shared(self._work, wp.int64)
+        return view
 
     def _pose(self, view: ViewData, time_s: float) -> None:
         """Adds the poses of all tracks at the one time of all samples."""

@@ -1,6 +1,6 @@
 // Rays from a list through one mesh.
 #pragma once
-#include "rays.h"
+#include "structures.h"
 
 namespace packets {
 
@@ -27,6 +27,18 @@ template <bool any, class Queries> inline void trace_packet(const Queries& list,
         list.face.data[i] = any ? (int)met : met ? hit.face[lane] : -1;
         if (!any) list.t.data[i] = hit.t[lane], list.u.data[i] = hit.u[lane], list.v.data[i] = hit.v[lane];
     }
+}
+
+// Traces one ray of a list through the first mesh of a scene, alone; adds what it took to `work`.
+template <class Scene, class Queries>
+inline void trace_single(const Scene& scene, const Queries& list, int i, bool nearest, long long* work) {
+    RayHit hit;
+    const float reach = list.reach.data[i];
+    const auto &origin = list.origin.data[i], &direction = list.direction.data[i];
+    const bool found = nearest ? single_ray<false>(scene, 0, origin, direction, reach, work, hit)
+                               : single_ray<true>(scene, 0, origin, direction, reach, work, hit);
+    list.face.data[i] = nearest ? found ? hit.face : -1 : (int)found;
+    if (nearest) list.t.data[i] = hit.t, list.u.data[i] = hit.u, list.v.data[i] = hit.v;
 }
 
 template <class Queries> inline void trace_queries(const Queries& list, int first, bool nearest) {

@@ -124,8 +124,14 @@ inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, 
     return found;
 }
 
+// Takes no notice of what a walk does; see structures.h for one that does.
+struct Uncounted {
+    void visit() {}
+    void test(int) {}
+};
+
 // One ray from the root. `any` ends at the first hit; `hit.t` holds how far to look.
-template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit) {
+template <bool any, class Count> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit, Count& count) {
     struct Entry {
         float near;
         int child;
@@ -137,6 +143,7 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
     while (true) {
         if (current >= 0) {
             const Node& node = tree.nodes[current];
+            count.visit();
             f8 near = 0.0f, far = hit.t;
             for (int axis = 0; axis < 3; ++axis) {
                 const f8 close = load<f8>(node.lower[0] + ray.near_side[axis]);
@@ -168,6 +175,7 @@ template <bool any> inline bool walk(const Tree& tree, const Single& ray, RayHit
             }
         } else {
             const Block* leaf = tree.blocks + leaf_block(current);
+            count.test(leaf_triangles(current));
             found |= meet_leaf(leaf, leaf_triangles(current), from, shear, ray.kx, ray.ky, ray.kz, hit);
             if (any && found) return true;
         }
@@ -318,7 +326,8 @@ inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& alo
         const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
         const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
         RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
-        if (!walk<any>(tree, Single(origin, direction), one)) continue;
+        Uncounted none;
+        if (!walk<any>(tree, Single(origin, direction), one, none)) continue;
         changed |= 1u << lane;
         hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
     }

@@ -1,0 +1,121 @@
+// One ray through a mesh by the structure of one's choice, and what it took: for rays that do not keep together, and to
+// compare structures. All hold blocks of the same triangles and test them by the same operations, so all find the same.
+//
+// A visit is a node whose boxes or plane the ray is tested against; a test is a triangle of a block. With eight boxes a
+// node and four triangles a block, a visit and a test cost less here than one by one.
+#pragma once
+#include "rays.h"
+
+namespace packets {
+
+constexpr int STRUCTURE_BVH = 0, STRUCTURE_KDTREE = 1;
+constexpr int KD_STACK = 64;  // deeper than any such tree
+
+struct Counted {
+    long long visits = 0, tests = 0;
+    void visit() { ++visits; }
+    void test(int triangles) { tests += triangles; }
+};
+
+// Of a kd-tree: a plane and where the two sides begin, or a leaf's blocks.
+struct KdNode {
+    float split;
+    int axis;    // 0, 1, 2, or 3 for a leaf
+    int first;   // the lower side, the upper one follows; the first block of a leaf
+    int count;   // triangles of a leaf
+};
+
+struct KdTree {
+    const KdNode* nodes;
+    const Block* blocks;
+};
+
+// Walks the sides of each plane in the order in which the ray meets them. A plane's own thickness is that of the
+// padding: what lies within it is looked for on both sides, as boxes of a BVH overlap by as much.
+template <bool any, class Count>
+inline bool walk(const KdTree& tree, const Single& ray, RayHit& hit, Count& count) {
+    struct Entry {
+        int node;
+        float near, far;
+    } stack[KD_STACK];
+    const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
+    const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
+    Entry at = {0, 0.0f, hit.t};
+    int size = 0;
+    bool found = false;
+    while (true) {
+        const KdNode& node = tree.nodes[at.node];
+        count.visit();
+        if (node.axis < 3) {
+            const int axis = node.axis;
+            // Where the ray enters and leaves the thickness of the plane. A ray along the plane may have either sign.
+            const float a = (node.split - ray.near_origin[axis]) * ray.inverse[axis];
+            const float b = (node.split - ray.far_origin[axis]) * ray.inverse[axis];
+            const float enter = a < b ? a : b, leave = a < b ? b : a;
+            const bool upwards = ray.inverse[axis] > 0.0f;
+            const int near_side = upwards ? node.first : node.first + 1, far_side = upwards ? node.first + 1 : node.first;
+            if (at.near * (1.0f / ROUNDING_UP) > leave) {
+                at.node = far_side;
+            } else if (enter > at.far * ROUNDING_UP) {
+                at.node = near_side;
+            } else {
+                stack[size++] = {far_side, enter > at.near ? enter : at.near, at.far};
+                at.node = near_side, at.far = leave < at.far ? leave : at.far;
+            }
+            continue;
+        }
+        if (node.count) {
+            count.test(node.count);
+            found |= meet_leaf(tree.blocks + node.first, node.count, from, shear, ray.kx, ray.ky, ray.kz, hit);
+            if (any && found) return true;
+        }
+        do {
+            if (!size) return found;
+            at = stack[--size];
+        } while (at.near > hit.t * ROUNDING_UP);
+    }
+}
+
+// Every triangle.
+template <class Count> inline bool meet_all(const Block* blocks, int triangles, const Single& ray, RayHit& hit, Count& count) {
+    const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
+    const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
+    count.test(triangles);
+    return meet_leaf(blocks, triangles, from, shear, ray.kx, ray.ky, ray.kz, hit);
+}
+
+template <bool any, class Scene, class Record, class Count>
+inline bool meet_mesh(const Scene& scene, const Record& mesh, const Single& ray, RayHit& hit, Count& count) {
+    const Block* blocks = (const Block*)scene.tree_blocks.data + mesh.first_block;
+    if (scene.structure == STRUCTURE_BVH) {
+        const Tree tree = {(const Node*)scene.tree_nodes.data + mesh.first_node, blocks};
+        return walk<any>(tree, ray, hit, count);
+    }
+    if (scene.structure == STRUCTURE_KDTREE) {
+        const KdTree tree = {(const KdNode*)scene.kd_nodes.data + mesh.first_node, blocks};
+        return walk<any>(tree, ray, hit, count);
+    }
+    return meet_all(blocks, mesh.face_count, ray, hit, count);
+}
+
+// A ray before `reach` through a mesh in its unit space. Fills distance, weights of the first two corners and face; the
+// face is -1 for a miss. `totals` receives visits and tests, unless it is null.
+template <bool any, class Scene, class V>
+inline bool single_ray(const Scene& scene, int mesh, const V& start, const V& towards, float reach, long long* totals,
+                       RayHit& hit) {
+    const float from[3] = {start[0], start[1], start[2]}, along[3] = {towards[0], towards[1], towards[2]};
+    const Single ray(from, along);
+    const auto& record = scene.meshes.data[mesh];
+    hit = {reach, 0.0f, 0.0f, -1};
+    if (!totals) {
+        Uncounted none;
+        return meet_mesh<any>(scene, record, ray, hit, none);
+    }
+    Counted counted;
+    const bool found = meet_mesh<any>(scene, record, ray, hit, counted);
+    __atomic_fetch_add(totals, counted.visits, __ATOMIC_RELAXED);
+    __atomic_fetch_add(totals + 1, counted.tests, __ATOMIC_RELAXED);
+    return found;
+}
+
+}  // namespace packets
