@@ -1,7 +1,9 @@
 """Structures over a mesh's triangles that can stand in for its tree of boxes: a kd-tree, or none at all.
 
 They exist to be compared: every structure holds the same triangles and is walked by kernels that test them alike
-(``native/structures.h``), so every one gives the same pictures.
+(``native/structures.h``), so every one gives the same pictures. (A triangle no
+larger than float32 can tell its corners apart may be met or missed by chance, and a structure keeps rays from it that
+pass far away.)
 """
 
 from __future__ import annotations

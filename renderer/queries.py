@@ -14,7 +14,8 @@ from renderer.launching import shared
 from renderer.trees import aligned, build_tree
 
 _RANGE_RAYS = 1 << 14
-_FAR = 1.0e30
+FAR = 1.0e30
+"""How far a ray reaches that has no end of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,7 @@ class RayQueries:
         if starts.ndim != 2 or starts.shape[1] != 3 or ways.shape != starts.shape:
             raise ValueError(f"rays: expected origins and directions (n, 3), got {starts.shape} and {ways.shape}")
         count = len(starts)
-        reach = np.full(count, _FAR, np.float32)
+        reach = np.full(count, FAR, np.float32)
         if t_max is not None:
             reach = np.minimum(reach, np.broadcast_to(np.asarray(t_max, np.float32), count))
         hits = RayHits(np.empty(count, np.int32), *(np.empty(count if nearest else 0, np.float32) for _ in range(3)))
