@@ -6,6 +6,7 @@ A tile's pixels come out the same to the bit whichever tiles are rendered togeth
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -92,15 +93,20 @@ def render_image(
     shutter_s: tuple[float, float] = (0.0, 0.0),
     frame: int = 0,
     done: Callable[[int], None] = lambda tiles: None,
+    counters: Counter[str] | None = None,
 ) -> Float[Tensor, "h w 3"]:
-    """A whole frame, linear radiance; see :func:`render_tiles`. ``done`` is told how many tiles are."""
+    """A whole frame, linear radiance; see :func:`render_tiles`. ``done`` is told how many tiles are,
+    and ``counters`` receives the rays they took.
+    """
     image = torch.zeros(height_px, width_px, 3)
     count = tile_count(width_px, height_px)
     at_once = max(1, _SAMPLES_AT_ONCE // (TILE_PX**2 * plan.samples_per_pixel))
     for first in range(0, count, at_once):
         tiles = range(first, min(first + at_once, count))
-        colors, _ = render_tiles(renderer, plan, tiles, (width_px, height_px), frame_time_s, shutter_s, frame)
+        colors, rays = render_tiles(renderer, plan, tiles, (width_px, height_px), frame_time_s, shutter_s, frame)
         place_tiles(image, tiles, colors)
+        if counters is not None:
+            counters.update(rays)
         done(tiles.stop)
     return image
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenes import effects
+from scenes import effects, report
 from scenes.canonical import Scene, SceneError
 from scenes.driving import ANIMATIONS
 from scenes.driving import load as load_driving
@@ -13,7 +13,7 @@ NAMES: tuple[str, ...] = tuple(ANIMATIONS)
 
 def all_names() -> tuple[str, ...]:
     """Names of all built-in scenes."""
-    return (*NAMES, *effects.EFFECTS)
+    return (*NAMES, *effects.EFFECTS, *report.IMAGES)
 
 
 def load(name: str, phase: float = 0.0) -> Scene:
@@ -35,4 +35,4 @@ def load(name: str, phase: float = 0.0) -> Scene:
         return load_driving(found, phase)
     if phase != 0.0:
         raise SceneError(f"phase: expected 0 for the scene {found}, which has no phases, got {phase}")
-    return effects.load(found)
+    return report.load(found) if found in report.IMAGES else effects.load(found)

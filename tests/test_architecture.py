@@ -21,6 +21,7 @@ FORBIDDEN = {
 
 # these wire packages together: what they may import beside the above
 WIRING = {
+    "analysis/accelerators.py": ("renderer", "scenes"),
     "analysis/bench_cycles.py": ("renderer", "tsar"),
     "analysis/bench_features.py": ("renderer", "scenes"),
     "analysis/bench_mitsuba.py": ("scenes",),

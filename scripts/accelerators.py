@@ -1,0 +1,58 @@
+"""Compare brute force, kd-tree and tree of boxes by what a ray takes, or render the ray-tracer report's two images.
+
+Examples: python scripts/accelerators.py --out out/accelerators
+          python scripts/accelerators.py --image report-one report-two --out out/report
+          python scripts/accelerators.py --image report-one --scale 0.2 --out out/report-small
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.files import atomic, writable_folder, write_json
+
+
+def main() -> None:
+    """Parses, measures or renders, prints a table or what each image took."""
+    from analysis.accelerators import AcceleratorOptions, lines, render_report_image, table
+
+    options = parse(AcceleratorOptions, __doc__ or "")
+    with bad_input():
+        writable_folder(options.out, "out")
+    from analysis.plots import save
+    from analysis.plots_accelerators import tests_figure
+    from analysis.progress import bars
+    from analysis.records import provenance
+    from analysis.tables import frame_table
+    from renderer.film import FilmError, write_image
+
+    config = dataclasses.asdict(options)
+    found: dict = {"config": config, "provenance": provenance(Path(__file__).parent.parent, config, seed=options.seed)}
+    with full_disk(options.out, FilmError), bars() as shown:
+        if options.image:
+            images = {name: render_report_image(name, options, shown.task) for name in dict.fromkeys(options.image)}
+            for name, (image, _) in images.items():
+                for ending in (".png", ".exr"):
+                    write_image(options.out / f"{name}{ending}", image)
+            found["images"] = {name: facts for name, (_, facts) in images.items()}
+        else:
+            rows = table(options, shown.task)
+            with atomic(options.out / "table.csv") as path:
+                rows.to_csv(path, index=False)
+            save(tests_figure(rows), options.out / "tests.png")
+            found["rows"] = rows.to_dict("records")
+        write_json(options.out / "summary.json", found)
+    if options.image:
+        print("\n".join(lines(list(found["images"].items()))))
+    else:
+        frame_table(rows)
+    print(f"written to {options.out}")
+
+
+if __name__ == "__main__":
+    run_cli(main)
