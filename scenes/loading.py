@@ -19,7 +19,8 @@ ASSETS = Path(__file__).parent / "assets"
 Picture = NDArray[np.float32]
 
 
-def _one_line(error: BaseException) -> str:
+def one_line(error: BaseException) -> str:
+    """The message of an error without line breaks; its kind where it has none."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
@@ -56,7 +57,7 @@ def read_image(path: Path) -> Picture:
     try:
         pixels = _read_exr(path) if path.suffix.lower() == ".exr" else _read_srgb(path)
     except Exception as error:  # decoders raise what they like on broken files
-        raise SceneError(f"texture {path}: cannot be read: {_one_line(error)}") from error
+        raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
         raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
     pixels.flags.writeable = False
@@ -65,7 +66,11 @@ def read_image(path: Path) -> Picture:
 
 def _read_srgb(path: Path) -> Picture:
     with Image.open(path) as image:
-        encoded = np.array(image.convert("RGB"))
+        return decode_srgb(np.array(image.convert("RGB")))
+
+
+def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Linear values of 8-bit sRGB ones."""
     # by a table: the power of a whole picture has other bits for another number of threads
     steps = torch.arange(256, dtype=torch.float32).expand(3, 1, 256) / 255.0
     return kornia.color.rgb_to_linear_rgb(steps)[0, 0].numpy()[encoded]
@@ -113,7 +118,7 @@ def read_mesh(path: Path) -> Mesh:
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
         faces = np.asarray(mesh.faces, np.int32)
     except Exception as error:  # parsers raise what they like on broken files
-        raise SceneError(f"mesh {path}: cannot be read: {_one_line(error)}") from error
+        raise SceneError(f"mesh {path}: cannot be read: {one_line(error)}") from error
     if len(faces) == 0:
         raise SceneError(f"mesh {path}: expected triangles, found none")
     uvs = getattr(mesh.visual, "uv", None)
