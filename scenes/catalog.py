@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from scenes import effects, report
 from scenes.canonical import Scene, SceneError
 from scenes.driving import ANIMATIONS
 from scenes.driving import load as load_driving
+from scenes.formats.blocks import load_blocks
+from scenes.loading import asset
 
 NAMES: tuple[str, ...] = tuple(ANIMATIONS)
 """Names of the driving scenes, the inputs of experiments; they also go by their number."""
 
+BLUR_SCENES = {"planescene": "plane/planescene.txt", "spheresscene": "spheres/spheresscene.txt"}
+"""The two scenes of the motion-blur perception study, and their files among the assets."""
+
 
 def all_names() -> tuple[str, ...]:
     """Names of all built-in scenes."""
-    return (*NAMES, *effects.EFFECTS, *report.IMAGES)
+    return (*NAMES, *BLUR_SCENES, *effects.EFFECTS, *report.IMAGES)
+
+
+def blur_scene_file(name: str) -> Path:
+    """The block file of a scene of the study."""
+    return asset(BLUR_SCENES[name])
 
 
 def load(name: str, phase: float = 0.0) -> Scene:
@@ -35,4 +47,6 @@ def load(name: str, phase: float = 0.0) -> Scene:
         return load_driving(found, phase)
     if phase != 0.0:
         raise SceneError(f"phase: expected 0 for the scene {found}, which has no phases, got {phase}")
+    if found in BLUR_SCENES:
+        return load_blocks(blur_scene_file(found))[0]
     return report.load(found) if found in report.IMAGES else effects.load(found)
