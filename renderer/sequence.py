@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ def still_path(folder: Path, number: int, ending: str) -> Path:
 
 def render_stills(
     picture: Callable[[int, float], Tensor],
-    times_s: Sequence[float],
+    times_s: Mapping[int, float],
     folder: Path,
     ending: str,
     done: Callable[[int], None] = lambda count: None,
@@ -28,7 +28,7 @@ def render_stills(
 
     Args:
         picture: linear radiance ``(h, w, 3)`` of the still of a number, at a time.
-        times_s: animation time of each still, seconds.
+        times_s: animation time of each still by its number, seconds.
         folder, ending: where stills go, and their format.
         done: called with the number of stills that are on disk.
 
@@ -39,12 +39,12 @@ def render_stills(
         FilmError: a still cannot be written.
     """
     rendered, nonfinite = 0, 0
-    for number, time_s in enumerate(times_s):
+    for count, (number, time_s) in enumerate(times_s.items()):
         path = still_path(folder, number, ending)
         if not path.exists():
             nonfinite += write_image(path, picture(number, time_s))
             rendered += 1
-        done(number + 1)
+        done(count + 1)
     return rendered, nonfinite
 
 

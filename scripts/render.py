@@ -53,7 +53,9 @@ def main() -> None:
         write_json(options.out / "job.json", {"config_hash": source["config_hash"]})
         stills = [still_path(options.out, number, options.still_ending) for number in range(options.frames)]
         done = shown.task("frames", options.frames)
-        rendered, nonfinite = render_stills(picture, options.times_s, options.out, options.still_ending, done)
+        rendered, nonfinite = render_stills(
+            picture, dict(enumerate(options.times_s)), options.out, options.still_ending, done
+        )
         if options.format == "mp4":
             write_film(stills, options.out / "film.mp4", options.fps)
         found = {"frames": options.frames, "rendered_now": rendered, "nonfinite": nonfinite}

@@ -38,6 +38,7 @@ WIRING = {
     "analysis/experiment.py": ("renderer", "scenes", "tsar"),
     "analysis/gallery.py": ("renderer", "scenes"),
     "analysis/ideal_density.py": ("tsar",),
+    "analysis/jobs.py": ("renderer", "scenes"),
     "analysis/spectrum.py": ("renderer", "scenes", "tsar"),
     "analysis/spectrum_study.py": ("scenes",),
 }

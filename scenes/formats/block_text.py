@@ -169,21 +169,19 @@ def _surprise(error: lark.exceptions.UnexpectedInput) -> str:
     if token is not None and token.type == "$END":
         return "expected 'end' of the last block, found the end of the file"
     got = repr(str(token if token is not None else getattr(error, "char", "")))
-    if token is not None and token.type == "END":
-        return "expected a block, got 'end'"
     return f"expected an attribute or 'end' on a line of its own, got {got}"
 
 
 def _block(tree: lark.Tree, name: str) -> Block:
-    kind, *attributes = [
-        child for child in tree.children if not (isinstance(child, lark.Token) and child.type == "END")
-    ]
-    where = f"{name}:{kind.line}"  # type: ignore[union-attr]
+    first = tree.children[0]
+    assert isinstance(first, lark.Token)
+    kind, where = str(first), f"{name}:{first.line}"
+    attributes = [child for child in tree.children if isinstance(child, lark.Tree)]
     if kind not in ALLOWED:
         raise SceneError(f"{where}: expected one of {', '.join(ALLOWED)}, got {kind!r}")
     values: dict[str, Any] = {}
     for attribute in attributes:
-        key, *words = [str(word) for word in attribute.children]  # type: ignore[union-attr]
+        key, *words = [str(word) for word in attribute.children]
         line = f"{name}:{attribute.children[0].line}"  # type: ignore[union-attr]
         if key not in ALLOWED[kind]:
             raise SceneError(f"{line}: {kind}: expected one of {', '.join(ALLOWED[kind])}, got {key!r}")

@@ -1,0 +1,146 @@
+"""Batch jobs: a block file's sequence, rendered in every combination of sampling that a job file names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from analysis.files import write_json
+from analysis.render_options import previous_job
+from scenes import catalog
+from scenes.canonical import Scene, SceneError
+from scenes.formats.block_settings import Settings
+from scenes.formats.blocks import load_blocks
+from scenes.formats.jobs import Combination, Job, read_job
+from tsar.config import require
+
+
+@dataclass(frozen=True)
+class JobOptions:
+    """Every combination of sampling levels, point sets and time filters of a job file."""
+
+    job: Annotated[Path, tyro.conf.Positional]
+    """Job file: seven lines, as in figure 12 of the motion-blur perception thesis."""
+    scene: str = ""
+    """A block file, or the built-in planescene or spheresscene; by default the one the job's name names."""
+    width_px: int = 0
+    """Width and height of a frame, pixels; 0 takes the file's."""
+    first_frame: int = 0
+    """First frame of the sequence to render."""
+    frames: int = 0
+    """How many; 0 takes all that follow."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture; the thesis has a Gaussian."""
+    sigma_px: float = 0.5
+    """Of the Gaussian, pixels."""
+    box_share: float = 0.5
+    """The middle part of the shutter's time that the box filter spans; the thesis has 0.5."""
+    format: Literal["png", "exr"] = "png"
+    """Of the frames."""
+    seed: int = 0
+    """Of point sets and shifts."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/job")
+    """Folder for a folder of frames per combination, and summary.json; frames that an interrupted run of the same job
+    left there are kept."""
+
+    def __post_init__(self) -> None:
+        require(0 <= self.width_px <= 32768, "width_px", "between 0 and 32768", self.width_px)
+        require(self.first_frame >= 0, "first_frame", "at least 0", self.first_frame)
+        require(self.frames >= 0, "frames", "at least 0", self.frames)
+        require(0.0 < self.sigma_px <= 16.0, "sigma_px", "between 0 and 16", self.sigma_px)
+        require(0.0 < self.box_share <= 1.0, "box_share", "between 0 and 1", self.box_share)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        require(self.threads >= 0, "threads", "at least 0", self.threads)
+
+
+@dataclass(frozen=True)
+class Work:
+    """A job, ready to run: what to render and how."""
+
+    job: Job
+    scene: Scene
+    settings: Settings
+    size_px: tuple[int, int]
+    frames: range
+
+
+def prepare(options: JobOptions) -> Work:
+    """Reads the job and its scene.
+
+    Raises:
+        SceneError: something in them cannot be used.
+    """
+    job = read_job(options.job)
+    name = options.scene or job.name.lower().replace("_", "").replace(" ", "")
+    if not options.scene and name not in catalog.BLUR_SCENES:
+        raise SceneError(f"scene: expected a block file or one of {', '.join(catalog.BLUR_SCENES)}, got none")
+    file = catalog.blur_scene_file(name) if name in catalog.BLUR_SCENES else Path(name)
+    scene, settings = load_blocks(file)
+    size = (settings.width_px, settings.height_px)
+    if options.width_px:
+        size = (options.width_px, max(1, round(options.width_px * settings.height_px / settings.width_px)))
+    end = options.first_frame + options.frames if options.frames else settings.frame_count
+    if not options.first_frame < end <= settings.frame_count:
+        count = settings.frame_count
+        raise SceneError(f"frames: expected some of the sequence's {count}, got {options.first_frame} to {end - 1}")
+    return Work(job, scene, settings, size, range(options.first_frame, end))
+
+
+def run_job(
+    work: Work, options: JobOptions, config_hash: str, task: Callable[[str, int], Callable[[int], None]]
+) -> list[dict[str, Any]]:
+    """Renders what is not on disk yet; a row per combination.
+
+    Args:
+        work: from :func:`prepare`.
+        options: of the job.
+        config_hash: tells whether frames on disk are of the same job.
+        task: shows how far it is.
+    """
+    from renderer.trace import Renderer
+
+    renderer = Renderer(work.scene, threads=options.threads or None, seed=options.seed)
+    rows = []
+    for combination in work.job.combinations:
+        done = task(combination.name, len(work.frames))
+        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, config_hash, done)})
+    renderer.close()
+    return rows
+
+
+def _run(
+    renderer: Any,
+    combination: Combination,
+    work: Work,
+    options: JobOptions,
+    config_hash: str,
+    done: Callable[[int], None],
+) -> dict[str, Any]:
+    from renderer.frames import pictures
+    from renderer.sampling import SamplePlan
+    from renderer.sequence import render_stills
+
+    plan = SamplePlan(
+        combination.samples,
+        combination.point_set,  # type: ignore[arg-type]
+        options.seed,
+        options.space_filter,
+        options.sigma_px,
+        combination.time_filter,  # type: ignore[arg-type]
+        options.box_share,
+    )
+    folder = options.out / combination.name
+    if previous_job(folder) != config_hash:
+        for old in folder.glob("frame*.*"):
+            old.unlink()
+    write_json(folder / "job.json", {"config_hash": config_hash})
+    times_s = {number: work.settings.frame_start_s(number) for number in work.frames}
+    picture = pictures(renderer, plan, *work.size_px)
+    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", done)
+    return {"frames": len(work.frames), "rendered_now": rendered, "nonfinite": nonfinite}

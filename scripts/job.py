@@ -1,0 +1,50 @@
+"""Render a sequence in every combination of sampling levels, point sets and time filters of a job file.
+
+Examples: python scripts/job.py scenes/assets/plane/plane_job.txt --out out/plane
+          python scripts/job.py scenes/assets/spheres/spheres_job.txt --width-px 192 --frames 2 --out out/few
+          python scripts/job.py my_job.txt --scene my_scene.txt --out out/mine
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.files import writable_folder, write_json
+
+
+def main() -> None:
+    """Parses, renders what is missing, prints how much that was."""
+    from analysis.jobs import JobOptions, prepare, run_job
+
+    options = parse(JobOptions, __doc__ or "")
+    with bad_input():
+        work = prepare(options)
+        writable_folder(options.out, "out")
+    from analysis.progress import bars
+    from analysis.records import provenance
+    from analysis.reference import content_hash
+    from renderer.film import FilmError
+
+    config = dataclasses.asdict(options)
+    kept = {name: config[name] for name in ("space_filter", "sigma_px", "box_share", "format", "seed")}
+    source = provenance(Path(__file__).parent.parent, config, scene=work.settings.name, seed=options.seed)
+    stills = provenance(Path(__file__).parent.parent, {**kept, "size": work.size_px, "scene": content_hash(work.scene)})
+    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
+        rows = run_job(work, options, stills["config_hash"], shown.task)
+        found = {"job": dataclasses.asdict(work.job), "settings": dataclasses.asdict(work.settings), "rows": rows}
+        write_json(options.out / "summary.json", {**found, "config": config, "provenance": source})
+    rendered, bad = (sum(row[name] for row in rows) for name in ("rendered_now", "nonfinite"))
+    frames = len(rows) * len(work.frames)
+    print(
+        f"{work.job.name}: {len(rows)} combinations, {frames} frames ({rendered} rendered now, {bad} values not finite)"
+    )
+    print(f"written to {options.out}")
+
+
+if __name__ == "__main__":
+    run_cli(main)
