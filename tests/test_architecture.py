@@ -40,6 +40,7 @@ WIRING = {
     "analysis/ideal_density.py": ("tsar",),
     "analysis/jobs.py": ("renderer", "scenes"),
     "analysis/spectrum.py": ("renderer", "scenes", "tsar"),
+    "analysis/tiles.py": ("renderer", "scenes"),
     "analysis/spectrum_study.py": ("scenes",),
 }
 

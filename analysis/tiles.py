@@ -1,0 +1,215 @@
+"""A picture in tiles over processes or machines: the same bits as from one, whoever renders which tile, and when."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from analysis.farm import FarmOptions
+from analysis.files import atomic, write_json
+from analysis.render_options import previous_job
+from tsar.config import require
+
+if TYPE_CHECKING:
+    from distributed import Client
+    from torch import Tensor
+
+    from renderer.trace import Renderer
+
+_RETRIES = 5
+
+
+@dataclass(frozen=True)
+class TileOptions:
+    """One picture of a scene, in tiles over processes or machines."""
+
+    scene: Annotated[str, tyro.conf.Positional]
+    """Built-in scene by name."""
+    width_px: int = 0
+    """Width, pixels; 0 takes that of the scene's film."""
+    height_px: int = 0
+    """Height, pixels; 0 takes that of the scene's film."""
+    samples: int = 32
+    """Samples per pixel; a cube for the point set stratified."""
+    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    """Where in the pixel and when in the shutter's time they lie."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture."""
+    time_s: float = 0.0
+    """Animation time at which the frame begins, seconds."""
+    seed: int = 0
+    """Of everything random."""
+    chunk_tiles: int = 16
+    """Tiles of 16 x 16 pixels that a worker is handed at once."""
+    farm: FarmOptions = dataclasses.field(default_factory=FarmOptions)
+    """Where tiles are rendered."""
+    study: tuple[int, ...] = ()
+    """Numbers of local workers to time instead, each the same picture; such as 1 2 4."""
+    repetitions: int = 3
+    """Turns of each number in a study; medians count."""
+    out: Path = Path("out/tiles")
+    """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
+
+    def __post_init__(self) -> None:
+        for name in ("width_px", "height_px"):
+            require(0 <= getattr(self, name) <= 32768, name, "between 0 and 32768", getattr(self, name))
+        require(1 <= self.samples <= 1 << 16, "samples", "between 1 and 65536", self.samples)
+        require(1 <= self.chunk_tiles <= 1 << 16, "chunk_tiles", "between 1 and 65536", self.chunk_tiles)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
+        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
+        for count in self.study:
+            require(1 <= count <= 64, "study", "between 1 and 64", count)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What to render, in full: small enough to send with every chunk."""
+
+    scene: str
+    size_px: tuple[int, int]
+    samples: int
+    point_set: str
+    space_filter: str
+    time_s: float
+    seed: int
+    threads: int
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What decides the bits: all but the threads."""
+        return {name: value for name, value in dataclasses.asdict(self).items() if name != "threads"}
+
+
+def picture_of(options: TileOptions, threads: int) -> Picture:
+    """The picture asked for.
+
+    Raises:
+        ValueError: there is no such scene, or the point set cannot have so many points.
+    """
+    from renderer.sampling import point_set
+    from scenes import catalog
+
+    film = catalog.load(options.scene).film
+    point_set(options.point_set, options.samples)
+    size = options.width_px or film.width_px, options.height_px or film.height_px
+    kinds = options.samples, options.point_set, options.space_filter
+    return Picture(options.scene, size, *kinds, options.time_s, options.seed, threads)
+
+
+def chunks_of(picture: Picture, chunk_tiles: int) -> list[range]:
+    """The tiles of a picture in runs."""
+    from renderer.frames import tile_count
+
+    count = tile_count(*picture.size_px)
+    return [range(first, min(first + chunk_tiles, count)) for first in range(0, count, chunk_tiles)]
+
+
+@lru_cache(maxsize=1)
+def _renderer(scene: str, seed: int, threads: int) -> Renderer:
+    """A process builds a scene once, however many chunks of it it is handed."""
+    from renderer.trace import Renderer
+    from scenes import catalog
+
+    return Renderer(catalog.load(scene), threads=threads, seed=seed)
+
+
+def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:
+    """Pixels ``(tiles, 256, 3)`` of some tiles, the rays they took, and seconds without building the scene."""
+    from renderer.frames import render_tiles
+    from renderer.sampling import SamplePlan
+
+    renderer = _renderer(picture.scene, picture.seed, picture.threads)
+    plan = SamplePlan(picture.samples, picture.point_set, picture.seed, picture.space_filter)  # type: ignore[arg-type]
+    start = time.perf_counter()
+    colors, rays = render_tiles(renderer, plan, tiles, picture.size_px, picture.time_s, renderer.shutter_s)
+    return colors.numpy(), rays, time.perf_counter() - start
+
+
+def rendered(
+    client: Client, picture: Picture, chunks: Sequence[range], workers: Sequence[str] | None = None
+) -> Iterator[tuple[int, tuple[NDArray[np.float32], dict[str, int], float]]]:
+    """Renders chunks on a cluster, in any order; those of a worker that dies are done again by others.
+
+    Args:
+        client: of the cluster.
+        picture: what to render.
+        chunks: runs of tiles.
+        workers: addresses of the only workers to use.
+
+    Yields:
+        The number of a chunk and what :func:`render_chunk` returned.
+    """
+    from distributed import as_completed
+
+    futures = {
+        client.submit(render_chunk, picture, chunk, pure=False, retries=_RETRIES, workers=workers): number
+        for number, chunk in enumerate(chunks)
+    }
+    for future, result in as_completed(list(futures), with_results=True, raise_errors=True):
+        yield futures[future], result
+        future.release()
+
+
+def assembled(picture: Picture, chunks: Sequence[range], pixels: Sequence[NDArray[np.float32]]) -> Tensor:
+    """The picture, linear radiance ``(h, w, 3)``."""
+    import torch
+
+    from renderer.frames import place_tiles
+
+    width, height = picture.size_px
+    image = torch.zeros(height, width, 3)
+    for chunk, part in zip(chunks, pixels, strict=True):
+        place_tiles(image, chunk, torch.as_tensor(part))
+    return image
+
+
+def render_resumed(
+    client: Client, picture: Picture, options: TileOptions, config_hash: str, done: Callable[[int], None]
+) -> tuple[Tensor, dict[str, Any]]:
+    """Renders what an interrupted run of the same picture has not left on disk, and puts the picture together.
+
+    Args:
+        client: of the cluster.
+        picture: what to render.
+        options: of the command.
+        config_hash: tells whether chunks on disk are of the same picture.
+        done: told how many chunks are on disk.
+
+    Returns:
+        The picture, and how it came about.
+    """
+    folder, chunks = options.out / "chunks", chunks_of(picture, options.chunk_tiles)
+    if previous_job(folder) != config_hash:
+        for old in folder.glob("chunk*.npz"):
+            old.unlink()
+    write_json(folder / "job.json", {"config_hash": config_hash})
+    files = [folder / f"chunk{number:06d}.npz" for number in range(len(chunks))]
+    missing = [number for number, file in enumerate(files) if not file.exists()]
+    count = len(chunks) - len(missing)
+    done(count)
+    start = time.perf_counter()
+    for place, (pixels, rays, seconds) in rendered(client, picture, [chunks[number] for number in missing]):
+        with atomic(files[missing[place]]) as temporary:
+            np.savez(temporary, pixels=pixels, seconds=seconds, kinds=list(rays), rays=list(rays.values()))
+        count += 1
+        done(count)
+    wall_s, rays, seconds, parts = time.perf_counter() - start, Counter[str](), 0.0, []
+    for file in files:
+        with np.load(file) as stored:
+            parts.append(stored["pixels"])
+            rays.update(dict(zip(stored["kinds"].tolist(), stored["rays"].tolist(), strict=True)))
+            seconds += float(stored["seconds"])
+    facts = {"chunks": len(chunks), "chunks_rendered_now": len(missing), "wall_s": wall_s, "worker_s": seconds}
+    return assembled(picture, chunks, parts), {**facts, "rays": dict(rays)}

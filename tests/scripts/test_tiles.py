@@ -1,0 +1,37 @@
+"""The command that renders tiles."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from renderer.film import read_exr
+from tests.scripts.commands import assert_refused, call_script, nothing_in
+
+
+def test_a_picture_and_its_summary(tmp_path: Path, monkeypatch, capsys) -> None:
+    out = tmp_path / "out"
+    arguments = ("plain", "--width-px", "40", "--height-px", "30", "--samples", "4", "--farm.workers", "1")
+    assert call_script("tiles.py", monkeypatch, *arguments, "--out", str(out)) == 0
+    assert read_exr(out / "plain.exr").shape == (30, 40, 3) and (out / "plain.png").exists()
+    found = json.loads((out / "summary.json").read_text())
+    assert found["chunks"] == found["chunks_rendered_now"] == 1 and found["nonfinite"] == 0
+    assert found["rays"]["primary_rays"] == 6 * 256 * 4
+    assert "1 chunks (1 now)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("fog",), ("scene", "one of", "fog")),
+        (("plain", "--samples", "9", "--point-set", "stratified"), ("expected a cube of samples", "9")),
+        (("plain", "--farm.scheduler", "nowhere"), ("scheduler", "nowhere")),
+        (("plain", "--study", "0"), ("study", "0")),
+    ],
+)
+def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
+    status = call_script("tiles.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
+    assert_refused(status, capsys, parts)
+    assert nothing_in(tmp_path / "out")
