@@ -54,7 +54,7 @@ def main() -> None:
         frame_table(pd.DataFrame(found["rows"]))
         predicted, reported = found["predicted"], found["predicted"]["reported"]
         beside = f" (report: {reported:.1f})" if reported else ""
-        print(f"same bits from all: {found['same_bits']}; by the model {predicted['workers']} workers, each with a core, "
+        print(f"same bits from all: {found['same_bits']}; by the model {predicted['workers']} workers with a core each "
               f"are {predicted['speedup']:.1f} times as fast as one{beside}")  # fmt: skip
     else:
         print(f"{found['chunks']} chunks ({found['chunks_rendered_now']} now) in {found['wall_s']:.1f} s, "

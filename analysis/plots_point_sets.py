@@ -1,0 +1,71 @@
+"""Figures of point sets, after figures 4, 5, 7 and 9 of the motion-blur perception thesis; computes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "0.45")
+
+
+def projections_figure(sets: Mapping[str, NDArray[np.float64]]) -> Figure:
+    """Points on the pixel, the time of each left out (figure 4)."""
+    figure = Figure(figsize=(2.1 * len(sets), 2.4), layout="constrained")
+    for axis, (name, points) in zip(np.atleast_1d(figure.subplots(1, len(sets))), sets.items(), strict=True):
+        axis.plot(points[:, 0], points[:, 1], "k.", ms=3)
+        axis.set(xlim=(0, 1), ylim=(0, 1), aspect="equal", title=name, xticks=(0, 0.5, 1), yticks=(0, 0.5, 1))
+    return figure
+
+
+def frames_figure(frames: Mapping[tuple[str, int], NDArray[np.uint8]]) -> Figure:
+    """Motion blur by set and number of samples (figure 5)."""
+    sets, levels = list(dict.fromkeys(key[0] for key in frames)), list(dict.fromkeys(key[1] for key in frames))
+    figure = Figure(figsize=(2.6 * len(sets), 2.6 * len(levels)), layout="constrained")
+    axes = figure.subplots(len(levels), len(sets), squeeze=False)
+    for row, level in enumerate(levels):
+        for column, name in enumerate(sets):
+            axes[row, column].imshow(frames[name, level], interpolation="nearest")
+            axes[row, column].set(xticks=(), yticks=())
+            if row == 0:
+                axes[row, column].set_title(name)
+        axes[row, 0].set_ylabel(f"{level} samples a pixel")
+    return figure
+
+
+def warp_figure(points: NDArray[np.float64], warped: NDArray[np.float64]) -> Figure:
+    """A set before and after the Gaussian warp, pixels from the centre (figure 7)."""
+    figure = Figure(figsize=(7.0, 3.5), layout="constrained")
+    for axis, places, title in zip(
+        figure.subplots(1, 2), (points - 0.5, warped), ("unmodified", "Gaussian-warped"), strict=True
+    ):
+        axis.plot(places[:, 0], places[:, 1], "k.", ms=4)
+        axis.set(xlim=(-2, 2), ylim=(-2, 2), aspect="equal", title=title, xlabel="pixels", ylabel="pixels")
+    return figure
+
+
+def time_figure(rows: Mapping[str, NDArray[np.float64]]) -> Figure:
+    """Even times and what the time filters make of them (figure 9)."""
+    figure = Figure(figsize=(7.0, 2.0), layout="constrained")
+    axis = figure.subplots()
+    for number, (name, times) in enumerate(rows.items()):
+        axis.plot(times, np.full(len(times), -number), "k|", ms=14)
+        axis.text(-0.02, -number, name, ha="right", va="center")
+    axis.set(xlim=(-0.02, 1.02), ylim=(0.6 - len(rows), 0.6), yticks=(), xlabel="time, share of the shutter's")
+    return figure
+
+
+def convergence_figure(errors: pd.DataFrame, sets: Sequence[str], kinds: Sequence[str]) -> Figure:
+    """Mean squared error against the number of points, a panel an integrand."""
+    figure = Figure(figsize=(4.0 * len(kinds), 3.6), layout="constrained")
+    for axis, kind in zip(np.atleast_1d(figure.subplots(1, len(kinds))), kinds, strict=True):
+        for name, ink in zip(sets, _INK, strict=False):
+            part = errors[(errors["set"] == name) & (errors["integrand"] == kind) & (errors["points"] > 1)]
+            axis.loglog(part["points"], np.maximum(part["mse"], 1e-12), marker="o", ms=3, color=ink, label=name)
+        axis.set(title=kind, xlabel="samples", ylabel="mean squared error")
+        axis.grid(True, alpha=0.3)
+    figure.axes[0].legend(fontsize=7)
+    return figure

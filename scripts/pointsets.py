@@ -1,0 +1,68 @@
+"""Measure point sets and draw figures 4, 5, 7 and 9 of the motion-blur perception thesis from them.
+
+Example: python scripts/pointsets.py --out out/pointsets
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.files import atomic, writable_folder, write_json
+
+
+def main() -> None:
+    """Parses, measures, draws, prints tables."""
+    from analysis.point_sets import INTEGRANDS, SETS, PointSetOptions, blurred_frames, mean_errors, measure, slopes
+
+    options = parse(PointSetOptions, __doc__ or "")
+    with bad_input():
+        writable_folder(options.out, "out")
+    import numpy as np
+
+    from analysis import plots_point_sets as plots
+    from analysis.plots import save
+    from analysis.progress import bars
+    from analysis.records import provenance
+    from analysis.tables import frame_table
+    from renderer.film import encode_srgb
+    from renderer.sampling import box_warp, gaussian_warp, point_set, triangle_warp
+
+    config, count = dataclasses.asdict(options), itertools.count(1)
+    with full_disk(options.out), bars() as shown:
+        done = shown.task("sets", len(SETS) * len(set(options.levels)))
+        even, errors = measure(options, lambda: done(next(count)))
+        fitted = slopes(errors)
+        for name, rows in (("evenness", even), ("errors", errors), ("slopes", fitted)):
+            with atomic(options.out / f"{name}.csv") as path:
+                rows.to_csv(path, index=False)
+        sets = {name: point_set(name, 125, options.seed) for name in SETS}  # type: ignore[arg-type]
+        save(plots.projections_figure(sets), options.out / "projections.png")
+        warped = np.stack(gaussian_warp(sets["hammersley"][:, 0], sets["hammersley"][:, 1], 0.5), axis=1)
+        save(plots.warp_figure(sets["hammersley"][:, :2], warped), options.out / "gaussian.png")
+        t = (np.arange(40) + 0.5) / 40
+        times = {"even": t, "truncated box": box_warp(t, 0.5), "triangle": triangle_warp(t)}
+        save(plots.time_figure(times), options.out / "times.png")
+        save(plots.convergence_figure(errors, SETS, INTEGRANDS), options.out / "convergence.png")
+        if options.frame_px:
+            frames = blurred_frames(options, SETS[:3], (8, 64, 216))
+            pictures = {key: encode_srgb(image) for key, image in frames.items()}
+            save(plots.frames_figure(pictures), options.out / "blur.png")
+        tables = {name: rows.to_dict("records") for name, rows in (("evenness", even), ("errors", errors))}
+        source = provenance(Path(__file__).parent.parent, config, seed=options.seed)
+        found = {**tables, "slopes": fitted.to_dict("records"), "config": config, "provenance": source}
+        write_json(options.out / "summary.json", found)
+    middle = sorted(set(options.levels))[len(set(options.levels)) // 2]
+    frame_table(even.query("points == @middle"), f"evenness of {middle} points")
+    frame_table(mean_errors(errors, middle), f"mean squared error of {middle} points")
+    frame_table(fitted, "slopes of the MSE")
+    print(f"written to {options.out}")
+
+
+if __name__ == "__main__":
+    run_cli(main)

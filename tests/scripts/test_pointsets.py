@@ -1,0 +1,36 @@
+"""The command that measures point sets."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.scripts.commands import assert_refused, call_script, nothing_in
+
+
+def test_tables_and_figures(tmp_path: Path, monkeypatch, capsys) -> None:
+    out = tmp_path / "out"
+    arguments = ("--levels", "1", "8", "27", "--cases", "64", "--sets-of-each", "1", "--frame-px", "16")
+    assert call_script("pointsets.py", monkeypatch, *arguments, "--out", str(out)) == 0
+    for name in ("projections", "gaussian", "times", "convergence", "blur"):
+        assert (out / f"{name}.png").stat().st_size > 5_000, name
+    assert len(pd.read_csv(out / "evenness.csv")) == 18 and len(pd.read_csv(out / "errors.csv")) == 54
+    assert len(json.loads((out / "summary.json").read_text())["slopes"]) == 6
+    assert "slopes" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--levels", "8", "27", "60"), ("levels", "cubes", "60")),
+        (("--levels", "8", "27"), ("levels", "at least three")),
+        (("--cases", "0"), ("cases", "0")),
+    ],
+)
+def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
+    status = call_script("pointsets.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
+    assert_refused(status, capsys, parts)
+    assert nothing_in(tmp_path / "out")
