@@ -1,10 +1,16 @@
-"""Values of a scene that no kernel can make sense of, refused in one line."""
+"""Values of a scene or a picture that no kernel can make sense of, refused in one line."""
 
 from __future__ import annotations
+
+import os
 
 import numpy as np
 
 from scenes.canonical import SceneError
+
+_BYTES_PER_PIXEL = 12
+_SAMPLES_PER_PIXEL_AXIS_MAX = 1024
+_SAMPLES_PER_AXIS_MAX = 1 << 22  # float32 tells two of so many apart
 
 
 def check_finite(values: object, what: str) -> None:
@@ -39,3 +45,31 @@ def _short(values: object) -> str:
     if array.size > 4:
         return f"{array.size} values from {array.min()} to {array.max()}"
     return str(array.tolist())
+
+
+def check_frame_size(width_px: int, height_px: int, samples_per_axis: int) -> None:
+    """Raises ValueError where a picture has too many samples along an axis or does not fit into memory."""
+    if samples_per_axis > _SAMPLES_PER_PIXEL_AXIS_MAX:
+        raise ValueError(f"samples_per_axis: expected at most {_SAMPLES_PER_PIXEL_AXIS_MAX}, got {samples_per_axis}")
+    if max(width_px, height_px) * samples_per_axis > _SAMPLES_PER_AXIS_MAX:
+        raise ValueError(
+            f"render_frame: expected at most {_SAMPLES_PER_AXIS_MAX:,} samples along an axis, got "
+            f"{max(width_px, height_px)} pixels of {samples_per_axis}"
+        )
+    need, have = width_px * height_px * _BYTES_PER_PIXEL, _free_memory_bytes()
+    if need > have:
+        raise ValueError(
+            f"render_frame: {width_px} x {height_px} pixels need about {need / 2**30:.1f} GiB of memory, "
+            f"{have / 2**30:.1f} GiB are free"
+        )
+
+
+def _free_memory_bytes() -> int:
+    try:
+        with open("/proc/meminfo") as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

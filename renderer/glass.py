@@ -1,8 +1,20 @@
-"""Dielectrics: Snell's law and Fresnel's equations."""
+"""Dielectrics: Snell's law and Fresnel's equations, and what a surface of glass sends on."""
 
 from __future__ import annotations
 
 import warp as wp
+
+from renderer.structs import MaterialRecord, SceneData, Surface
+from renderer.textures import texture_color
+
+
+@wp.struct
+class Sent:
+    """What leaves a surface along the two perfect directions: what each ray is weighed with."""
+
+    reflection: wp.vec3
+    refraction: wp.vec3
+    through: wp.vec3  # direction of the refracted ray
 
 
 @wp.func
@@ -28,3 +40,33 @@ def refracted(direction: wp.vec3, normal: wp.vec3, cosine: wp.float32, ratio: wp
     squared = ratio * ratio * wp.max(1.0 - cosine * cosine, 0.0)
     beyond = wp.sqrt(wp.max(1.0 - squared, 0.0))
     return wp.normalize(ratio * direction + (ratio * cosine - beyond) * normal)
+
+
+@wp.func
+def sent_by_glass(
+    features: wp.int32,
+    scene: SceneData,
+    surface: Surface,
+    material: MaterialRecord,
+    cosine: wp.float32,
+    footprint: wp.float32,
+    direction: wp.vec3,
+) -> Sent:
+    """The shares of Fresnel's equations; ``thin`` panes sum the reflections between their faces."""
+    sent = Sent()
+    ratio = 1.0 / material.ior
+    if surface.inside and material.thin == 0:
+        ratio = material.ior
+    reflectance = dielectric_reflectance(cosine, ratio)
+    sent.through = direction
+    scale = wp.float32(1.0)
+    if material.thin != 0:
+        reflectance = 2.0 * reflectance / (1.0 + reflectance)
+    elif reflectance < 1.0:
+        sent.through = refracted(direction, surface.normal, cosine, ratio)
+        # radiance is squeezed into, or let out of, the smaller solid angle inside (Veach 1997, eq. 5.2)
+        scale = ratio * ratio
+    sent.reflection = texture_color(features, scene, material.mirror, surface.uv, footprint) * reflectance
+    passed = (1.0 - reflectance) * scale
+    sent.refraction = texture_color(features, scene, material.transmission, surface.uv, footprint) * passed
+    return sent

@@ -7,6 +7,7 @@ import warp as wp
 from renderer.camera import track_rotation, track_translation
 from renderer.features import Feature
 from renderer.heightfield import relief_distance
+from renderer.shapes import cube_distance, meets_box, misses_sphere, plane_distance, reciprocal, sphere_distance
 from renderer.structs import (
     SHAPE_CUBE,
     SHAPE_DISK,
@@ -33,8 +34,6 @@ _HAS_CUBE = wp.constant(int(Feature.CUBE))
 _HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
 _HAS_MOTION = wp.constant(int(Feature.MOTION))
 _HAS_WARP_TREES = wp.constant(int(Feature.WARP_TREES))
-
-_TINY = wp.constant(1.0e-20)
 
 
 # On a GPU no mesh comes without a tree of Warp's, so that this is never called there.
@@ -69,105 +68,6 @@ def any_in_mesh(
     reach: wp.float32,
     work: wp.array(dtype=wp.int64),
 ) -> wp.vec4: ...
-
-
-@wp.func
-def reciprocal(direction: wp.vec3) -> wp.vec3:
-    """Component-wise 1 / x, large but finite for zero so that slab tests meet no NaN."""
-    x = wp.where(wp.abs(direction[0]) > _TINY, direction[0], _TINY)
-    y = wp.where(wp.abs(direction[1]) > _TINY, direction[1], _TINY)
-    z = wp.where(wp.abs(direction[2]) > _TINY, direction[2], _TINY)
-    return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
-
-
-@wp.func
-def meets_box(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3, t_max: wp.float32) -> wp.bool:
-    """Whether a ray passes through an axis-aligned box before ``t_max``."""
-    a = wp.cw_mul(lower - origin, inverse)
-    b = wp.cw_mul(upper - origin, inverse)
-    near = wp.max(wp.max(wp.min(a[0], b[0]), wp.min(a[1], b[1])), wp.max(wp.min(a[2], b[2]), 0.0))
-    far = wp.min(wp.min(wp.max(a[0], b[0]), wp.max(a[1], b[1])), wp.min(wp.max(a[2], b[2]), t_max))
-    return near <= far
-
-
-@wp.func
-def sphere_distance(origin: wp.vec3, direction: wp.vec3) -> wp.float32:
-    """Distance to the unit sphere along a unit direction, negative for none.
-
-    Source: Haines, Günther and Akenine-Möller 2019, "Precision Improvements for Ray/Sphere Intersection".
-    """
-    b = wp.dot(origin, direction)
-    nearest = origin - b * direction
-    discriminant = 1.0 - wp.dot(nearest, nearest)
-    if discriminant < 0.0:
-        return -1.0
-    c = wp.dot(origin, origin) - 1.0
-    root = wp.sqrt(discriminant)
-    if b > 0.0:
-        far = -b - root  # both roots share this denominator; here the ray moves away from the centre
-        t = c / far
-        if t >= 0.0:
-            return t
-        return -1.0
-    far = -b + root
-    t = c / far
-    if t >= 0.0:
-        return t
-    return far
-
-
-@wp.func
-def plane_distance(origin: wp.vec3, direction: wp.vec3, disk: wp.bool) -> wp.float32:
-    """Distance to the unit disk or to the square [-1, 1]² at z = 0, negative for none."""
-    if direction[2] == 0.0:
-        return -1.0
-    t = -origin[2] / direction[2]
-    x = origin[0] + t * direction[0]
-    y = origin[1] + t * direction[1]
-    if disk:
-        if x * x + y * y > 1.0:
-            return -1.0
-    elif wp.abs(x) > 1.0 or wp.abs(y) > 1.0:
-        return -1.0
-    return t
-
-
-@wp.func
-def cube_distance(origin: wp.vec3, direction: wp.vec3):
-    """Distance to the cube [-1, 1]³ (negative for none) and its face: axis, plus 3 for the negative side."""
-    inverse = reciprocal(direction)
-    near = wp.float32(-1.0e30)
-    far = wp.float32(1.0e30)
-    near_face = wp.int32(0)
-    far_face = wp.int32(0)
-    for axis in range(3):
-        a = (-1.0 - origin[axis]) * inverse[axis]
-        b = (1.0 - origin[axis]) * inverse[axis]
-        enter = wp.min(a, b)
-        leave = wp.max(a, b)
-        if enter > near:
-            near = enter
-            near_face = axis + wp.where(inverse[axis] > 0.0, 3, 0)
-        if leave < far:
-            far = leave
-            far_face = axis + wp.where(inverse[axis] > 0.0, 0, 3)
-    if near > far or far < 0.0:
-        return -1.0, 0
-    if near >= 0.0:
-        return near, near_face
-    return far, far_face
-
-
-@wp.func
-def misses_sphere(from_center: wp.vec3, direction: wp.vec3, radius: wp.float32, t_max: wp.float32) -> wp.bool:
-    """Whether a ray that starts at ``from_center`` surely stays outside a sphere up to ``t_max``."""
-    b = wp.dot(from_center, direction)
-    squared = wp.dot(from_center, from_center)
-    if squared <= radius * radius:
-        return False
-    nearest = from_center - b * direction
-    # the slack covers what rounding takes from a far start
-    return b > 0.0 or -b - radius > t_max or wp.dot(nearest, nearest) > radius * radius + 4.0e-6 * squared
 
 
 @wp.func

@@ -10,7 +10,7 @@ from __future__ import annotations
 import warp as wp
 
 from renderer.features import Feature
-from renderer.glass import dielectric_reflectance, refracted
+from renderer.glass import Sent, sent_by_glass
 from renderer.intersect import closest_hit, occluded
 from renderer.lights import arriving_light, environment_radiance, has_extent
 from renderer.randomness import (
@@ -37,15 +37,6 @@ _GLASS = wp.constant(int(Feature.GLASS))
 _MANY_RAYS = wp.constant(int(Feature.MANY_RAYS))
 _EXTENDED = wp.constant(int(Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT))
 _ALL_CELLS = wp.constant(int(Feature.ALL_CELLS))
-
-
-@wp.struct
-class Sent:
-    """What leaves a surface along the two perfect directions: what each ray is weighed with."""
-
-    reflection: wp.vec3
-    refraction: wp.vec3
-    through: wp.vec3  # direction of the refracted ray
 
 
 @wp.func
@@ -120,36 +111,6 @@ def fresnel(material: MaterialRecord, cosine: wp.float32) -> wp.float32:
     """Mirror reflectance ``min + (max - min) (1 - cos)^exponent``."""
     grazing = wp.pow(wp.clamp(1.0 - cosine, 0.0, 1.0), material.fresnel_exponent)
     return material.fresnel_min + (material.fresnel_max - material.fresnel_min) * grazing
-
-
-@wp.func
-def sent_by_glass(
-    features: wp.int32,
-    scene: SceneData,
-    surface: Surface,
-    material: MaterialRecord,
-    cosine: wp.float32,
-    footprint: wp.float32,
-    direction: wp.vec3,
-) -> Sent:
-    """The shares of Fresnel's equations; ``thin`` panes sum the reflections between their faces."""
-    sent = Sent()
-    ratio = 1.0 / material.ior
-    if surface.inside and material.thin == 0:
-        ratio = material.ior
-    reflectance = dielectric_reflectance(cosine, ratio)
-    sent.through = direction
-    scale = wp.float32(1.0)
-    if material.thin != 0:
-        reflectance = 2.0 * reflectance / (1.0 + reflectance)
-    elif reflectance < 1.0:
-        sent.through = refracted(direction, surface.normal, cosine, ratio)
-        # radiance is squeezed into, or let out of, the smaller solid angle inside (Veach 1997, eq. 5.2)
-        scale = ratio * ratio
-    sent.reflection = texture_color(features, scene, material.mirror, surface.uv, footprint) * reflectance
-    passed = (1.0 - reflectance) * scale
-    sent.refraction = texture_color(features, scene, material.transmission, surface.uv, footprint) * passed
-    return sent
 
 
 @wp.func

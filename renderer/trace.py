@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
@@ -18,6 +17,7 @@ from renderer import packets as packet_kernels
 from renderer.accelerators import STRUCTURES, Structure
 from renderer.batches import PacketBatches
 from renderer.buffers import build_buffers
+from renderer.checks import check_frame_size
 from renderer.features import ALL, PACKETS, Feature, required
 from renderer.launching import shared
 from renderer.shading import stack_size
@@ -30,9 +30,6 @@ _RANGE = 1024  # samples or pixels per launch without packets: few enough that t
 _RANGE_CUDA = 1 << 18  # few enough that the rays waiting to be followed fit into memory
 _SECONDARY = "shadow_rays", "reflection_rays", "refraction_rays"
 _BLOCK_PX = 16  # as the kernels' order of pixels
-_BYTES_PER_PIXEL = 12
-_SAMPLES_PER_PIXEL_AXIS_MAX = 1024
-_SAMPLES_PER_AXIS_MAX = 1 << 22  # float32 tells two of so many apart
 
 
 class Renderer:
@@ -168,7 +165,7 @@ class Renderer:
         for name, value in (("width_px", width_px), ("height_px", height_px), ("samples_per_axis", samples_per_axis)):
             if int(value) != value or value < 1:
                 raise ValueError(f"{name}: expected a whole number of at least 1, got {value}")
-        _check_size(width_px, height_px, samples_per_axis)
+        check_frame_size(width_px, height_px, samples_per_axis)
         target = torch.device(self.device)
         image = torch.empty(height_px, width_px, 3, device=target)
         view = self._view(width_px / height_px, min(width_px, height_px) * samples_per_axis)
@@ -282,22 +279,6 @@ class Renderer:
         view.single_time = 1
 
 
-def _check_size(width_px: int, height_px: int, samples_per_axis: int) -> None:
-    if samples_per_axis > _SAMPLES_PER_PIXEL_AXIS_MAX:
-        raise ValueError(f"samples_per_axis: expected at most {_SAMPLES_PER_PIXEL_AXIS_MAX}, got {samples_per_axis}")
-    if max(width_px, height_px) * samples_per_axis > _SAMPLES_PER_AXIS_MAX:
-        raise ValueError(
-            f"render_frame: expected at most {_SAMPLES_PER_AXIS_MAX:,} samples along an axis, got "
-            f"{max(width_px, height_px)} pixels of {samples_per_axis}"
-        )
-    need, have = width_px * height_px * _BYTES_PER_PIXEL, _free_memory_bytes()
-    if need > have:
-        raise ValueError(
-            f"render_frame: {width_px} x {height_px} pixels need about {need / 2**30:.1f} GiB of memory, "
-            f"{have / 2**30:.1f} GiB are free"
-        )
-
-
 # On the host by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours.
 
 
@@ -310,14 +291,3 @@ def _totals(rays: Tensor) -> list[int]:
     if rays.device.type == "cpu":
         return rays.numpy().sum(axis=0, dtype=np.int64).tolist()
     return rays.sum(dim=0, dtype=torch.int64).tolist()
-
-
-def _free_memory_bytes() -> int:
-    try:
-        with open("/proc/meminfo") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-    except OSError:
-        pass
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

@@ -14,28 +14,21 @@ from PIL import Image
 from scenes import world
 from scenes.animation import camera_to_world
 from scenes.canonical import (
-    Camera,
-    CheckerboardTexture,
     ConstantTexture,
     Cube,
     DirectionalLight,
     EnvironmentCamera,
-    EnvironmentLight,
     Glass,
     HeightField,
     ImageTexture,
     Instance,
     Integrator,
-    Light,
-    Material,
-    Matrix,
     Mirror,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
     PointLight,
     Rectangle,
-    Rgb,
     RigidTrack,
     Scene,
     SceneError,
@@ -43,14 +36,12 @@ from scenes.canonical import (
     SpotLight,
 )
 from scenes.loading import asset, read_image
+from scenes.stage import AMBIENT, BLUE, EYE, GREY, RED, SUN, TARGET, floor, haze, lamp, paint, pair, placed, staged
 
 SHUTTER_S = 0.5
 """For how long the shutter of the blurred scenes is open, from time 0."""
 
 _SPEED = 3.0  # of what moves, scene units a second
-_EYE, _TARGET = (0.0, -9.0, 3.4), (0.0, 0.0, 1.0)
-_GREY, _RED, _BLUE = (0.55, 0.55, 0.55), (0.75, 0.12, 0.1), (0.12, 0.25, 0.7)
-_AMBIENT = (0.10, 0.11, 0.13)
 
 
 @dataclass(frozen=True)
@@ -66,74 +57,22 @@ class Effect:
     scene: Callable[[], Scene]
 
 
-def _paint(color: Rgb, **more: float | Rgb) -> Phong:
-    return Phong(ConstantTexture(color), **more)  # type: ignore[arg-type]
-
-
-def _placed(at: tuple[float, float, float], size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Matrix:
-    matrix = np.diag([*size, 1.0])
-    matrix[:3, 3] = at
-    return matrix
-
-
-def _facing_down(at: tuple[float, float, float], half_x: float, half_y: float) -> Matrix:
-    """A rectangle whose outside looks at the floor."""
-    return _placed(at, (half_x, -half_y, -1.0))
-
-
-def _floor(scale: float = 1.0) -> Instance:
-    squares = CheckerboardTexture(
-        ConstantTexture((0.62, 0.60, 0.56)), ConstantTexture((0.30, 0.31, 0.34)), (24.0 * scale, 24.0 * scale)
-    )
-    return Instance(Rectangle(), Phong(squares), _placed((0, 6, 0), (12 * scale, 12 * scale, 1)), name="floor")
-
-
-def _scene(*instances: Instance, lights: tuple[Light, ...] = (), camera: Camera | None = None, **more) -> Scene:
-    camera = camera or PerspectiveCamera(camera_to_world(np.array(_EYE), np.array(_TARGET)), 38.0)
-    return Scene(camera, (_floor(), *instances), lights, ambient=_AMBIENT, background=_haze(), **more)
-
-
-def _haze() -> EnvironmentLight:
-    """A plain gradient behind everything: dark below, bright at the horizon, blue above."""
-    heights = np.linspace(1.0, -1.0, 64)[:, None, None]
-    above = np.array([0.75, 0.82, 0.9]) + np.clip(heights, 0.0, 1.0) * np.array([-0.55, -0.42, -0.15])
-    return EnvironmentLight(np.where(heights > 0.0, above, 0.25).astype(np.float32), world.sky().to_world)
-
-
-def _lamp(at: tuple[float, float, float], half: float, radiance: float) -> Instance:
-    emission = (radiance, 0.95 * radiance, 0.85 * radiance)
-    return Instance(Rectangle(), _paint(_GREY), _facing_down(at, half, half), name="lamp", emission=emission)
-
-
-_SUN = DirectionalLight((0.5, 0.6, -1.0), (2.4, 2.3, 2.0))
-
-
-def _pair(left: Material, right: Material) -> tuple[Instance, ...]:
-    """A ball and a box side by side."""
-    turned = _placed((1.5, 0.5, 0.9), (0.9, 0.9, 0.9))
-    turned[:2, :2] = 0.9 * np.array([[0.87, -0.5], [0.5, 0.87]])
-    return (
-        Instance(Sphere(1.0), left, _placed((-1.5, 0.0, 1.0)), name="ball"),
-        Instance(Cube(), right, turned, name="box"),
-    )
-
-
 def plain() -> Scene:
     """Hard shadows of a point light; a chequered floor up to the horizon, for anti-aliasing."""
-    balls = _pair(_paint(_RED, specular=(0.3, 0.3, 0.3), exponent=60.0), _paint(_BLUE))
+    balls = pair(paint(RED, specular=(0.3, 0.3, 0.3), exponent=60.0), paint(BLUE))
     lamp = PointLight((-3.0, -4.0, 6.0), (110.0, 105.0, 95.0))
     return Scene(
-        PerspectiveCamera(camera_to_world(np.array(_EYE), np.array(_TARGET)), 38.0),
-        (_floor(8.0), *balls),
+        PerspectiveCamera(camera_to_world(np.array(EYE), np.array(TARGET)), 38.0),
+        (floor(8.0), *balls),
         (lamp,),
-        ambient=_AMBIENT,
-        background=_haze(),
+        ambient=AMBIENT,
+        background=haze(),
     )
 
 
 def quad_light() -> Scene:
     """A square lamp: shadows soften with the distance from what casts them."""
-    return _scene(*_pair(_paint(_RED), _paint(_BLUE)), _lamp((-2.5, -1.0, 5.5), 1.2, 16.0))
+    return staged(*pair(paint(RED), paint(BLUE)), lamp((-2.5, -1.0, 5.5), 1.2, 16.0))
 
 
 def quad_light_cells() -> Scene:
@@ -151,50 +90,50 @@ def quad_light_cells() -> Scene:
 
 def sphere_light() -> Scene:
     """A glowing ball between two others."""
-    glow = Instance(Sphere(0.45), _paint(_GREY), _placed((0.0, -1.6, 0.45)), name="lamp", emission=(14.0, 12.0, 8.0))
-    return _scene(*_pair(_paint(_RED), _paint(_BLUE)), glow)
+    glow = Instance(Sphere(0.45), paint(GREY), placed((0.0, -1.6, 0.45)), name="lamp", emission=(14.0, 12.0, 8.0))
+    return staged(*pair(paint(RED), paint(BLUE)), glow)
 
 
 def spot_light() -> Scene:
     """A spot light with a soft edge."""
     spot = SpotLight((-3.0, -5.0, 7.0), (0.0, 0.0, 0.6), (260.0, 245.0, 210.0), 9.0, 15.0)
-    return _scene(*_pair(_paint(_RED), _paint(_BLUE)), lights=(spot,))
+    return staged(*pair(paint(RED), paint(BLUE)), lights=(spot,))
 
 
 def sun_disc() -> Scene:
     """The sun ten times as wide as it is: half-shadows grow along a shadow."""
     sun = DirectionalLight((0.8, 0.7, -0.6), (3.0, 2.8, 2.4), angle_deg=5.3)
-    return _scene(*_pair(_paint(_RED), _paint(_BLUE)), lights=(sun,))
+    return staged(*pair(paint(RED), paint(BLUE)), lights=(sun,))
 
 
 def environment_light() -> Scene:
     """Light from the whole of a sky picture."""
     sky = world.sky()
-    balls = _pair(_paint((0.8, 0.8, 0.8), ambient=0.0), Mirror())
-    floor = Instance(Rectangle(), _paint(_GREY, ambient=0.0), _placed((0, 6, 0), (12, 12, 1)), name="floor")
-    camera = PerspectiveCamera(camera_to_world(np.array(_EYE), np.array(_TARGET)), 38.0)
+    balls = pair(paint((0.8, 0.8, 0.8), ambient=0.0), Mirror())
+    floor = Instance(Rectangle(), paint(GREY, ambient=0.0), placed((0, 6, 0), (12, 12, 1)), name="floor")
+    camera = PerspectiveCamera(camera_to_world(np.array(EYE), np.array(TARGET)), 38.0)
     return Scene(camera, (floor, *balls), (sky,))
 
 
 def glossy_reflection() -> Scene:
     """The same mirror three times: perfect, and spread by 12 and by 40 degrees."""
     balls = [
-        Instance(Sphere(0.95), Mirror(ConstantTexture((0.9, 0.9, 0.9)), spread), _placed((x, 0.0, 0.95)), name=f"{x}")
+        Instance(Sphere(0.95), Mirror(ConstantTexture((0.9, 0.9, 0.9)), spread), placed((x, 0.0, 0.95)), name=f"{x}")
         for x, spread in ((-2.1, 0.0), (0.0, 12.0), (2.1, 40.0))
     ]
-    return _scene(*balls, lights=(_SUN,))
+    return staged(*balls, lights=(SUN,))
 
 
 def glass() -> Scene:
     """A solid ball of glass, a bubble's thin shell of it, and a box."""
     solid, shell = Glass(), Glass(thin=True)
-    box = _placed((2.3, 0.6, 0.95), (0.7, 0.7, 0.9))  # just above the floor, so that the two do not coincide
-    return _scene(
-        Instance(Sphere(1.0), solid, _placed((-0.2, 0.0, 1.0)), name="ball"),
-        Instance(Sphere(0.9), shell, _placed((-2.4, 0.6, 0.9)), name="bubble"),
+    box = placed((2.3, 0.6, 0.95), (0.7, 0.7, 0.9))  # just above the floor, so that the two do not coincide
+    return staged(
+        Instance(Sphere(1.0), solid, placed((-0.2, 0.0, 1.0)), name="ball"),
+        Instance(Sphere(0.9), shell, placed((-2.4, 0.6, 0.9)), name="bubble"),
         Instance(Cube(), solid, box, name="block"),
-        Instance(Cube(), _paint(_RED), _placed((0.6, 3.2, 0.8), (0.8, 0.8, 0.8)), name="behind"),
-        lights=(_SUN,),
+        Instance(Cube(), paint(RED), placed((0.6, 3.2, 0.8), (0.8, 0.8, 0.8)), name="behind"),
+        lights=(SUN,),
         integrator=Integrator(depth=8),
     )
 
@@ -203,33 +142,33 @@ def glossy_refraction() -> Scene:
     """Panes of frosted glass before the same boxes: clear, spread by 4 and by 14 degrees."""
     panes = [
         Instance(
-            Cube(), Glass(thin=True, spread_deg=spread), _placed((x, -1.5, 1.2), (0.95, 0.02, 1.2)), name=f"pane {x}"
+            Cube(), Glass(thin=True, spread_deg=spread), placed((x, -1.5, 1.2), (0.95, 0.02, 1.2)), name=f"pane {x}"
         )
         for x, spread in ((-2.1, 0.0), (0.0, 4.0), (2.1, 14.0))
     ]
     boxes = [
-        Instance(Cube(), _paint(color), _placed((x, 1.2, 0.6), (0.35, 0.35, 0.6)), name=f"box {x}")
-        for x, color in ((-2.6, _RED), (-1.6, _BLUE), (-0.5, _RED), (0.5, _BLUE), (1.6, _RED), (2.6, _BLUE))
+        Instance(Cube(), paint(color), placed((x, 1.2, 0.6), (0.35, 0.35, 0.6)), name=f"box {x}")
+        for x, color in ((-2.6, RED), (-1.6, BLUE), (-0.5, RED), (0.5, BLUE), (1.6, RED), (2.6, BLUE))
     ]
     integrator = Integrator(depth=6, reflection_rays=2, refraction_rays=4)
-    return _scene(*panes, *boxes, lights=(_SUN,), integrator=integrator)
+    return staged(*panes, *boxes, lights=(SUN,), integrator=integrator)
 
 
 def depth_of_field() -> Scene:
     """A row of balls, the third in focus."""
     balls = [
-        Instance(Sphere(0.55), _paint(color, specular=(0.3, 0.3, 0.3)), _placed((x, y, 0.55)), name=f"{y}")
+        Instance(Sphere(0.55), paint(color, specular=(0.3, 0.3, 0.3)), placed((x, y, 0.55)), name=f"{y}")
         for (x, y), color in zip(
             ((-2.0, -4.0), (-1.1, -2.0), (0.0, 0.5), (1.6, 4.0), (4.0, 9.0)),
-            (_BLUE, _RED, (0.8, 0.65, 0.1), _RED, _BLUE),
+            (BLUE, RED, (0.8, 0.65, 0.1), RED, BLUE),
             strict=True,
         )
     ]
-    distance = float(np.linalg.norm(np.subtract((0.0, 0.5, 0.55), _EYE)))
+    distance = float(np.linalg.norm(np.subtract((0.0, 0.5, 0.55), EYE)))
     camera = PerspectiveCamera(
-        camera_to_world(np.array(_EYE), np.array((0.0, 0.5, 0.55))), 38.0, lens_radius=0.28, focal_distance=distance
+        camera_to_world(np.array(EYE), np.array((0.0, 0.5, 0.55))), 38.0, lens_radius=0.28, focal_distance=distance
     )
-    return _scene(*balls, lights=(_SUN,), camera=camera)
+    return staged(*balls, lights=(SUN,), camera=camera)
 
 
 def _sliding(velocity: tuple[float, float, float]) -> RigidTrack:
@@ -240,11 +179,11 @@ def _sliding(velocity: tuple[float, float, float]) -> RigidTrack:
 
 def moving_object() -> Scene:
     """A ball that flies to the right past one at rest, and its shadow with it."""
-    camera = PerspectiveCamera(camera_to_world(np.array(_EYE), np.array(_TARGET)), 38.0, shutter_s=(0.0, SHUTTER_S))
-    return _scene(
-        Instance(Sphere(0.8), _paint(_RED), _placed((-1.8, -1.0, 0.8)), _sliding((_SPEED, 0.0, 0.0)), name="moving"),
-        Instance(Sphere(0.8), _paint(_BLUE), _placed((1.8, 1.0, 0.8)), name="still"),
-        lights=(_SUN,),
+    camera = PerspectiveCamera(camera_to_world(np.array(EYE), np.array(TARGET)), 38.0, shutter_s=(0.0, SHUTTER_S))
+    return staged(
+        Instance(Sphere(0.8), paint(RED), placed((-1.8, -1.0, 0.8)), _sliding((_SPEED, 0.0, 0.0)), name="moving"),
+        Instance(Sphere(0.8), paint(BLUE), placed((1.8, 1.0, 0.8)), name="still"),
+        lights=(SUN,),
         camera=camera,
     )
 
@@ -252,34 +191,32 @@ def moving_object() -> Scene:
 def moving_camera() -> Scene:
     """The camera slides to the right: what is near blurs most."""
     camera = PerspectiveCamera(
-        camera_to_world(np.array(_EYE), np.array(_TARGET)),
+        camera_to_world(np.array(EYE), np.array(TARGET)),
         38.0,
         track=_sliding((1.2, 0.0, 0.0)),
         shutter_s=(0.0, SHUTTER_S),
     )
-    return _scene(*_pair(_paint(_RED), _paint(_BLUE)), lights=(_SUN,), camera=camera)
+    return staged(*pair(paint(RED), paint(BLUE)), lights=(SUN,), camera=camera)
 
 
 def height_field() -> Scene:
     """Paving carved into a rectangle, low sun: stones hide and shade their joints, also at the border."""
     height = np.asarray(Image.open(asset("pavement_height_512.png")).convert("L"), np.float32) / 255.0
     stone = Phong(ImageTexture(read_image(asset("pavement_albedo_512.png"))))
-    relief = Instance(
-        Rectangle(), HeightField(stone, height, 0.16, 128), _placed((0, 0, 1), (2.2, 2.2, 1)), name="slab"
-    )
+    relief = Instance(Rectangle(), HeightField(stone, height, 0.16, 128), placed((0, 0, 1), (2.2, 2.2, 1)), name="slab")
     camera = PerspectiveCamera(camera_to_world(np.array((1.5, -5.5, 2.6)), np.array((0.0, 0.0, 0.9))), 42.0)
     low = DirectionalLight((1.0, 0.35, -0.42), (3.2, 2.9, 2.4))
-    return _scene(relief, lights=(low,), camera=camera)
+    return staged(relief, lights=(low,), camera=camera)
 
 
 def parallel_projection() -> Scene:
     """No perspective: equal boxes are equally large at any distance."""
     boxes = [
-        Instance(Cube(), _paint(color), _placed((x, 3.0 * x, 0.5), (0.5, 0.5, 0.5)), name=f"{x}")
-        for x, color in ((-2.0, _RED), (0.0, _BLUE), (2.0, _RED))
+        Instance(Cube(), paint(color), placed((x, 3.0 * x, 0.5), (0.5, 0.5, 0.5)), name=f"{x}")
+        for x, color in ((-2.0, RED), (0.0, BLUE), (2.0, RED))
     ]
     camera = OrthographicCamera(camera_to_world(np.array((0.0, -9.0, 7.0)), np.array((0.0, 1.0, 0.5))), 4.2)
-    return _scene(*boxes, lights=(_SUN,), camera=camera)
+    return staged(*boxes, lights=(SUN,), camera=camera)
 
 
 def whole_sphere() -> Scene:
@@ -287,7 +224,7 @@ def whole_sphere() -> Scene:
     matrix = np.eye(4)
     matrix[:3, :3] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # +y of the camera is up
     matrix[:3, 3] = (0.0, -3.0, 1.5)
-    return _scene(*_pair(_paint(_RED), Mirror()), lights=(_SUN,), camera=EnvironmentCamera(matrix))
+    return staged(*pair(paint(RED), Mirror()), lights=(SUN,), camera=EnvironmentCamera(matrix))
 
 
 EFFECTS: dict[str, Effect] = {
