@@ -5,20 +5,18 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.bench import take_turns
+from analysis.tracer_options import AcceleratorOptions
 from scenes import report
 from scenes.canonical import Mesh
-from tsar.config import require
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -32,36 +30,6 @@ REPORTED = {
 STRUCTURES = ("brute", "kdtree", "bvh")
 _BRUTE_TESTS = 4e8  # of a turn; rays without any structure are as few as that takes
 _SIDE_PX = 256
-
-
-@dataclass(frozen=True)
-class AcceleratorOptions:
-    """Ray-triangle tests per ray of brute force, kd-tree and tree of boxes, and the two images of the report."""
-
-    out: Path = Path("out/accelerators")
-    """Folder for table.csv, tests.png, the images and summary.json."""
-    triangles: tuple[int, ...] = (100, 1_000, 10_080, 100_000, 1_000_000)
-    """Triangles of the meshes, about."""
-    repetitions: int = 5
-    """Turns of each structure; medians count."""
-    image: tuple[Literal["report-one", "report-two"], ...] = ()
-    """Images of the report to render, instead of the table."""
-    scale: float = 1.0
-    """Of the images' sides; 1 is the report's size."""
-    structure: Literal["kdtree", "bvh"] = "kdtree"
-    """Over the triangles of the images."""
-    seed: int = 0
-    """Of rays and samples."""
-    threads: int = 0
-    """Threads for tracing images; 0 takes one per core."""
-
-    def __post_init__(self) -> None:
-        for count in self.triangles:
-            require(16 <= count <= 4_000_000, "triangles", "between 16 and 4,000,000", count)
-        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
-        require(0.01 <= self.scale <= 4.0, "scale", "between 0.01 and 4", self.scale)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
 
 
 def knot_of(triangles: int) -> Mesh:

@@ -5,15 +5,14 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
 
 from analysis.files import atomic
+from analysis.tracer_options import GalleryOptions
 from scenes import effects
 from tsar.config import require
 
@@ -21,45 +20,6 @@ if TYPE_CHECKING:
     from renderer.sampling import SamplePlan
 
 COLUMNS = 4
-
-
-@dataclass(frozen=True)
-class GalleryOptions:
-    """One picture for each effect of the ray tracer."""
-
-    effects: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
-    """Effects by name; all where none is named."""
-    width_px: int = 480
-    """Width, pixels."""
-    height_px: int = 360
-    """Height, pixels."""
-    samples: int = 64
-    """Samples per pixel; a cube for the point set stratified."""
-    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
-    """Where in the pixel and when in the shutter's time they lie."""
-    space_filter: Literal["box", "gaussian"] = "gaussian"
-    """Reconstruction filter over the picture."""
-    seed: int = 0
-    """Of everything random."""
-    device: Literal["cpu", "cuda:0"] = "cpu"
-    """Where rays are traced."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
-    out: Path = Path("out/gallery")
-    """Folder for NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
-
-    def __post_init__(self) -> None:
-        for name, most in (("width_px", 32768), ("height_px", 32768), ("samples", 1 << 16)):
-            require(1 <= getattr(self, name) <= most, name, f"between 1 and {most}", getattr(self, name))
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
-        for name in self.effects:
-            require(name in effects.EFFECTS, "effects", f"one of {', '.join(effects.EFFECTS)}", name)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Effects to show."""
-        return tuple(dict.fromkeys(self.effects)) or tuple(effects.EFFECTS)
 
 
 def render_effect(
@@ -120,12 +80,24 @@ def write_sheet(path: Path, pictures: Sequence[NDArray[np.uint8]], captions: Seq
     plt.close(figure)
 
 
+def names(options: GalleryOptions) -> tuple[str, ...]:
+    """Effects to show.
+
+    Raises:
+        ValueError: one is not known.
+    """
+    for name in options.effects:
+        require(name in effects.EFFECTS, "effects", f"one of {', '.join(effects.EFFECTS)}", name)
+    return tuple(dict.fromkeys(options.effects)) or tuple(effects.EFFECTS)
+
+
 def sample_plan(options: GalleryOptions) -> SamplePlan:
     """How pixels are sampled.
 
     Raises:
-        ValueError: for a number of samples that the point set cannot have.
+        ValueError: for a number of samples that the point set cannot have, or an effect that is not known.
     """
+    names(options)
     from renderer.sampling import SamplePlan
 
     return SamplePlan(options.samples, options.point_set, options.seed, options.space_filter)
@@ -138,9 +110,9 @@ def render_gallery(
     from renderer.frames import tile_count
 
     found, pictures = {}, []
-    for name in options.names:
+    for name in names(options):
         done = task(name, tile_count(options.width_px, options.height_px))
         picture, found[name] = render_effect(name, plan, options, done)
         pictures.append(picture)
-    write_sheet(options.out / "gallery.jpg", pictures, [effects.EFFECTS[name].what for name in options.names])
+    write_sheet(options.out / "gallery.jpg", pictures, [effects.EFFECTS[name].what for name in names(options)])
     return {"effects": found, "config": dataclasses.asdict(options)}

@@ -5,58 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import tyro
+from typing import Any
 
 from analysis.files import write_json
 from analysis.render_options import previous_job
+from analysis.tracer_options import JobOptions
 from scenes import catalog
 from scenes.canonical import Scene, SceneError
 from scenes.formats.block_settings import Settings
 from scenes.formats.blocks import load_blocks
 from scenes.formats.jobs import Combination, Job, read_job
-from tsar.config import require
-
-
-@dataclass(frozen=True)
-class JobOptions:
-    """Every combination of sampling levels, point sets and time filters of a job file."""
-
-    job: Annotated[Path, tyro.conf.Positional]
-    """Job file: seven lines, as in figure 12 of the motion-blur perception thesis."""
-    scene: str = ""
-    """A block file, or the built-in planescene or spheresscene; by default the one the job's name names."""
-    width_px: int = 0
-    """Width and height of a frame, pixels; 0 takes the file's."""
-    first_frame: int = 0
-    """First frame of the sequence to render."""
-    frames: int = 0
-    """How many; 0 takes all that follow."""
-    space_filter: Literal["box", "gaussian"] = "gaussian"
-    """Reconstruction filter over the picture; the thesis has a Gaussian."""
-    sigma_px: float = 0.5
-    """Of the Gaussian, pixels."""
-    box_share: float = 0.5
-    """The middle part of the shutter's time that the box filter spans; the thesis has 0.5."""
-    format: Literal["png", "exr"] = "png"
-    """Of the frames."""
-    seed: int = 0
-    """Of point sets and shifts."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
-    out: Path = Path("out/job")
-    """Folder for a folder of frames per combination, and summary.json; frames that an interrupted run of the same job
-    left there are kept."""
-
-    def __post_init__(self) -> None:
-        require(0 <= self.width_px <= 32768, "width_px", "between 0 and 32768", self.width_px)
-        require(self.first_frame >= 0, "first_frame", "at least 0", self.first_frame)
-        require(self.frames >= 0, "frames", "at least 0", self.frames)
-        require(0.0 < self.sigma_px <= 16.0, "sigma_px", "between 0 and 16", self.sigma_px)
-        require(0.0 < self.box_share <= 1.0, "box_share", "between 0 and 1", self.box_share)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
 
 
 @dataclass(frozen=True)

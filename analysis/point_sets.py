@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,45 +14,14 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from tsar.config import require
+from analysis.tracer_options import PointSetOptions
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
-"""Samples per pixel of the motion-blur perception study."""
-
 SETS = ("hammersley", "stratified", "poisson", "halton", "sobol", "random")
 INTEGRANDS = ("static edge", "moving edge", "smooth")
 Points = Float[NDArray[np.float64], "n 3"]
-
-
-@dataclass(frozen=True)
-class PointSetOptions:
-    """Measures point sets: discrepancy, distances, projections, strata, convergence on edges and smooth functions."""
-
-    out: Path = Path("out/pointsets")
-    """Folder for tables, figures and summary.json."""
-    levels: tuple[int, ...] = LEVELS
-    """Numbers of points, cubes."""
-    cases: int = 2048
-    """Integrands of each kind that an error is the mean over."""
-    sets_of_each: int = 4
-    """Point sets of each kind, from as many seeds."""
-    frame_px: int = 160
-    """Side of the pictures of motion blur, pixels; 0 leaves them out."""
-    seed: int = 0
-    """Of everything random."""
-
-    def __post_init__(self) -> None:
-        for level in self.levels:
-            ok = 1 <= level <= 4096 and round(level ** (1 / 3)) ** 3 == level
-            require(ok, "levels", "cubes between 1 and 4096", level)
-        require(len(set(self.levels)) >= 3, "levels", "at least three, for a slope", self.levels)
-        require(1 <= self.cases <= 1 << 20, "cases", "between 1 and 1048576", self.cases)
-        require(1 <= self.sets_of_each <= 256, "sets_of_each", "between 1 and 256", self.sets_of_each)
-        require(0 <= self.frame_px <= 2048, "frame_px", "between 0 and 2048", self.frame_px)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
 
 
 def evenness(points: Points) -> dict[str, float]:

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
 
-from analysis.farm import FarmOptions
 from analysis.files import atomic, write_json
 from analysis.render_options import previous_job
-from tsar.config import require
+from analysis.tracer_options import TileOptions
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -28,49 +24,6 @@ if TYPE_CHECKING:
     from renderer.trace import Renderer
 
 _RETRIES = 5
-
-
-@dataclass(frozen=True)
-class TileOptions:
-    """One picture of a scene, in tiles over processes or machines."""
-
-    scene: Annotated[str, tyro.conf.Positional]
-    """Built-in scene by name."""
-    width_px: int = 0
-    """Width, pixels; 0 takes that of the scene's film."""
-    height_px: int = 0
-    """Height, pixels; 0 takes that of the scene's film."""
-    samples: int = 32
-    """Samples per pixel; a cube for the point set stratified."""
-    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
-    """Where in the pixel and when in the shutter's time they lie."""
-    space_filter: Literal["box", "gaussian"] = "gaussian"
-    """Reconstruction filter over the picture."""
-    time_s: float = 0.0
-    """Animation time at which the frame begins, seconds."""
-    seed: int = 0
-    """Of everything random."""
-    chunk_tiles: int = 16
-    """Tiles of 16 x 16 pixels that a worker is handed at once."""
-    farm: FarmOptions = dataclasses.field(default_factory=FarmOptions)
-    """Where tiles are rendered."""
-    study: tuple[int, ...] = ()
-    """Numbers of local workers to time instead, each the same picture; such as 1 2 4."""
-    repetitions: int = 3
-    """Turns of each number in a study; medians count."""
-    out: Path = Path("out/tiles")
-    """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
-
-    def __post_init__(self) -> None:
-        for name in ("width_px", "height_px"):
-            require(0 <= getattr(self, name) <= 32768, name, "between 0 and 32768", getattr(self, name))
-        require(1 <= self.samples <= 1 << 16, "samples", "between 1 and 65536", self.samples)
-        require(1 <= self.chunk_tiles <= 1 << 16, "chunk_tiles", "between 1 and 65536", self.chunk_tiles)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
-        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
-        for count in self.study:
-            require(1 <= count <= 64, "study", "between 1 and 64", count)
 
 
 @dataclass(frozen=True)

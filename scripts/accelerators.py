@@ -15,13 +15,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import atomic, writable_folder, write_json
+from analysis.tracer_options import AcceleratorOptions
 
 
 def main() -> None:
     """Parses, measures or renders, prints a table or what each image took."""
-    from analysis.accelerators import AcceleratorOptions, lines, render_report_image, table
 
     options = parse(AcceleratorOptions, __doc__ or "")
+    from analysis.accelerators import lines, render_report_image, table
+
     with bad_input():
         writable_folder(options.out, "out")
     from analysis.plots import save

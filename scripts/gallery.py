@@ -13,13 +13,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import writable_folder, write_json
+from analysis.tracer_options import GalleryOptions
 
 
 def main() -> None:
     """Parses, renders, prints what each picture took."""
-    from analysis.gallery import GalleryOptions, render_gallery, sample_plan
 
     options = parse(GalleryOptions, __doc__ or "")
+    from analysis.gallery import render_gallery, sample_plan
+
     with bad_input():
         plan = sample_plan(options)
         writable_folder(options.out, "out")

@@ -15,13 +15,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import writable_folder, write_json
+from analysis.tracer_options import JobOptions
 
 
 def main() -> None:
     """Parses, renders what is missing, prints how much that was."""
-    from analysis.jobs import JobOptions, prepare, run_job
 
     options = parse(JobOptions, __doc__ or "")
+    from analysis.jobs import prepare, run_job
+
     with bad_input():
         work = prepare(options)
         writable_folder(options.out, "out")

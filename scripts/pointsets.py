@@ -14,13 +14,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import atomic, writable_folder, write_json
+from analysis.tracer_options import PointSetOptions
 
 
 def main() -> None:
     """Parses, measures, draws, prints tables."""
-    from analysis.point_sets import INTEGRANDS, SETS, PointSetOptions, blurred_frames, mean_errors, measure, slopes
 
     options = parse(PointSetOptions, __doc__ or "")
+    from analysis.point_sets import INTEGRANDS, SETS, blurred_frames, mean_errors, measure, slopes
+
     with bad_input():
         writable_folder(options.out, "out")
     import numpy as np

@@ -17,13 +17,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.farm import FarmOptions, connected
 from analysis.files import writable_folder, write_json
+from analysis.tracer_options import TileOptions
 
 
 def main() -> None:
     """Parses, renders or measures, prints what it took."""
-    from analysis.tiles import TileOptions, chunks_of, picture_of, render_resumed
 
     options = parse(TileOptions, __doc__ or "")
+    from analysis.tiles import chunks_of, picture_of, render_resumed
+
     farm = FarmOptions(workers=max(options.study)) if options.study else options.farm
     with bad_input():
         picture = picture_of(options, 1 if options.study else farm.threads)

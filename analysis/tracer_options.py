@@ -1,0 +1,189 @@
+"""Options of the commands about the ray tracer; imports little, so that ``--help`` is quick."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from analysis.farm import FarmOptions
+from tsar.config import require
+
+LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
+"""Samples per pixel of the motion-blur perception study."""
+
+
+@dataclass(frozen=True)
+class GalleryOptions:
+    """One picture for each effect of the ray tracer."""
+
+    effects: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Effects by name; all where none is named."""
+    width_px: int = 480
+    """Width, pixels."""
+    height_px: int = 360
+    """Height, pixels."""
+    samples: int = 64
+    """Samples per pixel; a cube for the point set stratified."""
+    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    """Where in the pixel and when in the shutter's time they lie."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture."""
+    seed: int = 0
+    """Of everything random."""
+    device: Literal["cpu", "cuda:0"] = "cpu"
+    """Where rays are traced."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/gallery")
+    """Folder for NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
+
+    def __post_init__(self) -> None:
+        for name, most in (("width_px", 32768), ("height_px", 32768), ("samples", 1 << 16)):
+            require(1 <= getattr(self, name) <= most, name, f"between 1 and {most}", getattr(self, name))
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        require(self.threads >= 0, "threads", "at least 0", self.threads)
+
+
+@dataclass(frozen=True)
+class AcceleratorOptions:
+    """Ray-triangle tests per ray of brute force, kd-tree and tree of boxes, and the two images of the report."""
+
+    out: Path = Path("out/accelerators")
+    """Folder for table.csv, tests.png, the images and summary.json."""
+    triangles: tuple[int, ...] = (100, 1_000, 10_080, 100_000, 1_000_000)
+    """Triangles of the meshes, about."""
+    repetitions: int = 5
+    """Turns of each structure; medians count."""
+    image: tuple[Literal["report-one", "report-two"], ...] = ()
+    """Images of the report to render, instead of the table."""
+    scale: float = 1.0
+    """Of the images' sides; 1 is the report's size."""
+    structure: Literal["kdtree", "bvh"] = "kdtree"
+    """Over the triangles of the images."""
+    seed: int = 0
+    """Of rays and samples."""
+    threads: int = 0
+    """Threads for tracing images; 0 takes one per core."""
+
+    def __post_init__(self) -> None:
+        for count in self.triangles:
+            require(16 <= count <= 4_000_000, "triangles", "between 16 and 4,000,000", count)
+        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
+        require(0.01 <= self.scale <= 4.0, "scale", "between 0.01 and 4", self.scale)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        require(self.threads >= 0, "threads", "at least 0", self.threads)
+
+
+@dataclass(frozen=True)
+class PointSetOptions:
+    """Measures point sets: discrepancy, distances, projections, strata, convergence on edges and smooth functions."""
+
+    out: Path = Path("out/pointsets")
+    """Folder for tables, figures and summary.json."""
+    levels: tuple[int, ...] = LEVELS
+    """Numbers of points, cubes."""
+    cases: int = 2048
+    """Integrands of each kind that an error is the mean over."""
+    sets_of_each: int = 4
+    """Point sets of each kind, from as many seeds."""
+    frame_px: int = 160
+    """Side of the pictures of motion blur, pixels; 0 leaves them out."""
+    seed: int = 0
+    """Of everything random."""
+
+    def __post_init__(self) -> None:
+        for level in self.levels:
+            ok = 1 <= level <= 4096 and round(level ** (1 / 3)) ** 3 == level
+            require(ok, "levels", "cubes between 1 and 4096", level)
+        require(len(set(self.levels)) >= 3, "levels", "at least three, for a slope", self.levels)
+        require(1 <= self.cases <= 1 << 20, "cases", "between 1 and 1048576", self.cases)
+        require(1 <= self.sets_of_each <= 256, "sets_of_each", "between 1 and 256", self.sets_of_each)
+        require(0 <= self.frame_px <= 2048, "frame_px", "between 0 and 2048", self.frame_px)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+
+
+@dataclass(frozen=True)
+class TileOptions:
+    """One picture of a scene, in tiles over processes or machines."""
+
+    scene: Annotated[str, tyro.conf.Positional]
+    """Built-in scene by name."""
+    width_px: int = 0
+    """Width, pixels; 0 takes that of the scene's film."""
+    height_px: int = 0
+    """Height, pixels; 0 takes that of the scene's film."""
+    samples: int = 32
+    """Samples per pixel; a cube for the point set stratified."""
+    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    """Where in the pixel and when in the shutter's time they lie."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture."""
+    time_s: float = 0.0
+    """Animation time at which the frame begins, seconds."""
+    seed: int = 0
+    """Of everything random."""
+    chunk_tiles: int = 16
+    """Tiles of 16 x 16 pixels that a worker is handed at once."""
+    farm: FarmOptions = field(default_factory=FarmOptions)
+    """Where tiles are rendered."""
+    study: tuple[int, ...] = ()
+    """Numbers of local workers to time instead, each the same picture; such as 1 2 4."""
+    repetitions: int = 3
+    """Turns of each number in a study; medians count."""
+    out: Path = Path("out/tiles")
+    """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
+
+    def __post_init__(self) -> None:
+        for name in ("width_px", "height_px"):
+            require(0 <= getattr(self, name) <= 32768, name, "between 0 and 32768", getattr(self, name))
+        require(1 <= self.samples <= 1 << 16, "samples", "between 1 and 65536", self.samples)
+        require(1 <= self.chunk_tiles <= 1 << 16, "chunk_tiles", "between 1 and 65536", self.chunk_tiles)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
+        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
+        for count in self.study:
+            require(1 <= count <= 64, "study", "between 1 and 64", count)
+
+
+@dataclass(frozen=True)
+class JobOptions:
+    """Every combination of sampling levels, point sets and time filters of a job file."""
+
+    job: Annotated[Path, tyro.conf.Positional]
+    """Job file: seven lines, as in figure 12 of the motion-blur perception thesis."""
+    scene: str = ""
+    """A block file, or the built-in planescene or spheresscene; by default the one the job's name names."""
+    width_px: int = 0
+    """Width and height of a frame, pixels; 0 takes the file's."""
+    first_frame: int = 0
+    """First frame of the sequence to render."""
+    frames: int = 0
+    """How many; 0 takes all that follow."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture; the thesis has a Gaussian."""
+    sigma_px: float = 0.5
+    """Of the Gaussian, pixels."""
+    box_share: float = 0.5
+    """The middle part of the shutter's time that the box filter spans; the thesis has 0.5."""
+    format: Literal["png", "exr"] = "png"
+    """Of the frames."""
+    seed: int = 0
+    """Of point sets and shifts."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/job")
+    """Folder for a folder of frames per combination, and summary.json; frames that an interrupted run of the same job
+    left there are kept."""
+
+    def __post_init__(self) -> None:
+        require(0 <= self.width_px <= 32768, "width_px", "between 0 and 32768", self.width_px)
+        require(self.first_frame >= 0, "first_frame", "at least 0", self.first_frame)
+        require(self.frames >= 0, "frames", "at least 0", self.frames)
+        require(0.0 < self.sigma_px <= 16.0, "sigma_px", "between 0 and 16", self.sigma_px)
+        require(0.0 < self.box_share <= 1.0, "box_share", "between 0 and 1", self.box_share)
+        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        require(self.threads >= 0, "threads", "at least 0", self.threads)
