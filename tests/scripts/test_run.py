@@ -296,3 +296,11 @@ def test_help_names_the_options(tmp_path: Path) -> None:
     for name in ("--seconds", "--ledger", "--capacity", "--batch-size", "--resolution-px", "--solver", "--out"):
         assert name in done.stdout
     assert "Framelets rendered per cycle." in done.stdout and nothing_in(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["planescene", "spheresscene", "quad-light"])
+def test_other_built_in_scenes_run_too(name: str, tmp_path: Path, monkeypatch, capsys) -> None:
+    """Block scenes of the motion-blur study, and one with lamps, whose samples draw random numbers."""
+    where = ("--no-film", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    assert call_script("run.py", monkeypatch, name, *SIZE, *SPAN, *where) == 0, capsys.readouterr().err
+    assert "hold in every cycle" in capsys.readouterr().out

@@ -1,0 +1,1 @@
+"""The motion-blur perception study: stimuli, observers, trials, psychometric functions."""

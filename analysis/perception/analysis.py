@@ -1,0 +1,150 @@
+"""From trials to just-noticeable differences, comparisons and power."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.cli import InputError
+from analysis.perception.observers import COLUMNS
+from analysis.perception.psychometrics import FitError, correct_share, fit, paired
+
+THESIS_JND = {"planescene": 40.0, "spheresscene": 100.0}
+"""Samples per pixel, read off figures 19 and 20 of the thesis."""
+
+THESIS_P = {
+    ("planescene", "spheresscene"): {27: 0.0027, 64: 0.000025, 125: 0.1296, 216: 0.0477},
+    ("hammersley", "stratified"): {27: 0.2141, 64: 0.2492, 125: 0.5190},
+    ("hammersley", "poisson"): {27: 0.8252, 64: 0.6810, 125: 0.8805},
+    ("stratified", "poisson"): {27: 0.4194, 64: 0.2967, 125: 0.6513},
+}
+"""p values of tables 1 and 2 of the thesis."""
+
+
+_GROUPS = (
+    ("scene",),
+    ("scene", "time_filter"),
+    ("point_set", "time_filter"),
+    ("scene", "point_set", "time_filter"),
+)
+
+
+def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
+    """The trials that have an answer, and of which kind their observers are.
+
+    Raises:
+        InputError: columns are missing, kinds are mixed, or there is no answer.
+    """
+    missing = [column for column in COLUMNS if column not in table.columns]
+    if missing:
+        raise InputError(f"{name}: expected a table of trials, found no column {', '.join(missing)}")
+    kinds = sorted(table["observer_kind"].dropna().unique())
+    if len(kinds) != 1:
+        raise InputError(f"{name}: expected observers of one kind, got {', '.join(map(str, kinds)) or 'none'}")
+    answered = table.dropna(subset=["correct"])
+    if answered.empty:
+        raise InputError(f"{name}: expected answered trials, got none")
+    return answered.assign(correct=answered["correct"].astype(bool)), str(kinds[0])
+
+
+def fits(trials: pd.DataFrame, bootstraps: int, seed: int) -> pd.DataFrame:
+    """Fits by scene, by scene and filter, by set and filter, and by all three; a row each."""
+    rows = []
+    for keys in _GROUPS:
+        for values in pd.DataFrame(trials, columns=list(keys)).drop_duplicates().to_dict("records"):
+            same = np.all([trials[str(key)] == value for key, value in values.items()], axis=0)
+            rows.append({**values, **fit_row(trials.loc[same], bootstraps, seed)})
+    return pd.DataFrame(rows)
+
+
+def fit_row(part: pd.DataFrame, bootstraps: int, seed: int) -> dict[str, Any]:
+    """One fit as a row; a reason instead of numbers where there is none."""
+    samples, right = np.asarray(part["samples"], np.int64), np.asarray(part["correct"], bool)
+    levels = np.unique(samples)
+    asked = [int((samples == level).sum()) for level in levels]
+    correct = [int(right[samples == level].sum()) for level in levels]
+    try:
+        found = fit(levels.tolist(), correct, asked, bootstraps, seed)
+    except FitError as error:
+        return {"status": str(error), "trials": len(part), "observers": part["observer"].nunique()}
+    low, high = found.interval or (np.nan, np.nan)
+    return {
+        "jnd": found.jnd, "low": low, "high": high, "status": found.status, "mu": found.mu, "sigma": found.sigma,
+        "lapse": found.lapse, "trials": found.trials, "observers": part["observer"].nunique(),
+    }  # fmt: skip
+
+
+def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
+    """Paired t-tests level by level: of scenes over observers and sets, of sets over observers and scenes."""
+    rows = []
+    for column, other in (("scene", "point_set"), ("point_set", "scene")):
+        shares = trials.pivot_table("correct", [column, "observer", other], "samples")
+        for first, second in itertools.combinations(sorted(set(trials[column])), 2):
+            for samples in sorted(trials["samples"].unique()):
+                both = _side_by_side(shares, first, second, samples)
+                found = paired(*both.T.tolist()) if len(both) else None
+                expected = THESIS_P.get((first, second), THESIS_P.get((second, first), {}))
+                rows.append(
+                    {
+                        "of": column, "first": first, "second": second, "samples": samples, "pairs": len(both),
+                        "t": found.t if found else np.nan, "degrees": found.degrees if found else np.nan,
+                        "p": found.p if found else np.nan,
+                        "mean_difference": found.mean_difference if found else np.nan,
+                        "thesis_p": expected.get(int(samples), np.nan),
+                    }
+                )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _side_by_side(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:
+    """Shares ``(cells, 2)`` of two conditions at one level, for the cells that have both."""
+    found = [dict(shares[samples].xs(name).dropna().items()) for name in (first, second)]
+    return np.array([(found[0][cell], found[1][cell]) for cell in found[0] if cell in found[1]]).reshape(-1, 2)
+
+
+def power(
+    levels: Sequence[int],
+    jnds: tuple[float, float],
+    sigma: float,
+    observers: Sequence[int],
+    repetitions: Sequence[int],
+    experiments: int,
+    seed: int,
+) -> pd.DataFrame:
+    """How often two conditions of given thresholds are told apart, by observers and answers per level.
+
+    Two conditions count as told apart where the 95 % intervals of their thresholds, from as many answers, do not
+    overlap. Observers are taken to be alike, so this is the best that can be hoped for.
+
+    Args:
+        levels: samples per pixel.
+        jnds: true thresholds.
+        sigma: width of both functions, octaves.
+        observers, repetitions: numbers to tabulate.
+        experiments: simulated for each cell.
+        seed: of those.
+    """
+    rows = []
+    x = np.asarray(levels, np.float64)
+    for people, answers in itertools.product(observers, repetitions):
+        rng = np.random.default_rng([seed, people, answers])
+        trials = np.full(len(x), people * answers)
+        apart, widths = 0, []
+        for number in range(experiments):
+            found = [
+                fit(levels, rng.binomial(trials, correct_share(x, np.log2(jnd), sigma, 0.0)).tolist(), trials.tolist(),
+                    100, number) for jnd in jnds
+            ]  # fmt: skip
+            (low_a, high_a), (low_b, high_b) = (one.interval or (0.0, np.inf) for one in found)
+            apart += high_a < low_b or high_b < low_a
+            widths.append(high_a / max(low_a, 1e-9))
+        rows.append(
+            {"observers": people, "answers_per_level": answers, "told_apart": apart / experiments,
+             "interval_ratio_median": float(np.median(widths))}
+        )  # fmt: skip
+    return pd.DataFrame(rows)

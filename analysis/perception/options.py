@@ -1,0 +1,104 @@
+"""Options of the perception study; imports little, so that ``--help`` is quick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from analysis.display_model import DisplayModel
+from tsar.config import require
+
+_ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"
+STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_job.txt")
+
+
+@dataclass(frozen=True)
+class StimuliOptions:
+    """Renders the stimuli of job files, and a manifest with their hashes; goes on where it was stopped."""
+
+    jobs: Annotated[tuple[Path, ...], tyro.conf.Positional] = STUDY_JOBS
+    """Job files; by default the thesis' study: two scenes, eight levels, three point sets, truncated box."""
+    width_px: int = 768
+    """Width and height of a frame, pixels."""
+    first_frame: int = 60
+    """First frame of the sequence."""
+    frames: int = 60
+    """How many frames."""
+    box_share: float = 0.5
+    """The middle part of the shutter's time that the box filter spans."""
+    seed: int = 0
+    """Of point sets and shifts."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/perception")
+    """Folder for the stimuli, manifest.json and summary.json."""
+
+    def __post_init__(self) -> None:
+        require(16 <= self.width_px <= 8192, "width_px", "between 16 and 8192", self.width_px)
+        require(self.first_frame >= 0, "first_frame", "at least 0", self.first_frame)
+        require(self.frames >= 1, "frames", "at least 1", self.frames)
+        require(len(self.jobs) >= 1, "jobs", "at least one", self.jobs)
+
+
+@dataclass(frozen=True)
+class SimulateOptions:
+    """Has simulated observers answer the stimuli of a folder; one row a trial in trials-simulated.parquet."""
+
+    stimuli: Annotated[Path, tyro.conf.Positional] = Path("out/perception")
+    """Folder of the command ``stimuli``."""
+    observers: int = 12
+    """How many observers."""
+    repetitions: int = 4
+    """Answers of each observer to each stimulus."""
+    sigma_jod: float = 1.048
+    """Noise of a single stimulus, JOD; 1.048 makes one JOD preferred in 75 % of pairs."""
+    sensitivity_spread: float = 0.25
+    """Standard deviation of the logarithm of the observers' sensitivities."""
+    lapse_mean: float = 0.02
+    """Mean share of answers that are guesses."""
+    display: DisplayModel = field(default_factory=DisplayModel)
+    """That the JOD hold for."""
+    seed: int = 0
+    """Of observers, orders and answers."""
+    out: Path = Path("out/perception-simulated")
+    """Folder for trials-simulated.parquet, jod.csv and summary.json."""
+
+    def __post_init__(self) -> None:
+        require(1 <= self.observers <= 10_000, "observers", "between 1 and 10000", self.observers)
+        require(1 <= self.repetitions <= 1000, "repetitions", "between 1 and 1000", self.repetitions)
+        require(0.0 < self.sigma_jod <= 100.0, "sigma_jod", "between 0 and 100", self.sigma_jod)
+        require(0.0 <= self.sensitivity_spread <= 3.0, "sensitivity_spread", "between 0 and 3", self.sensitivity_spread)
+        require(0.0 <= self.lapse_mean <= 0.2, "lapse_mean", "between 0 and 0.2", self.lapse_mean)
+
+
+@dataclass(frozen=True)
+class AnalyseOptions:
+    """Fits psychometric functions to trials, compares scenes and point sets, draws figures 19 to 25 of the thesis."""
+
+    trials: Annotated[Path, tyro.conf.Positional] = Path("out/perception-simulated/trials-simulated.parquet")
+    """Table of trials, of people or of simulated observers, not of both."""
+    bootstraps: int = 400
+    """Data sets drawn for each interval."""
+    seed: int = 0
+    """Of those, and of the table of power."""
+    power_repetitions: int = 200
+    """Experiments simulated for each cell of the table of power; 0 leaves it out."""
+    out: Path = Path("out/perception-analysis")
+    """Folder for fits.csv, tests.csv, power.csv, figures and summary.json."""
+
+    def __post_init__(self) -> None:
+        require(0 <= self.bootstraps <= 100_000, "bootstraps", "between 0 and 100000", self.bootstraps)
+        require(
+            0 <= self.power_repetitions <= 10_000, "power_repetitions", "between 0 and 10000", self.power_repetitions
+        )
+
+
+Step = (
+    Annotated[StimuliOptions, tyro.conf.subcommand("stimuli")]
+    | Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
+    | Annotated[AnalyseOptions, tyro.conf.subcommand("analyse")]
+)
+"""One step of the study, chosen by its name on the command line."""

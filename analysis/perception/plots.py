@@ -1,0 +1,69 @@
+"""Figures 19 to 25 of the thesis: share of right answers against samples per pixel; computes nothing but the curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.perception.psychometrics import GUESS, THRESHOLD, correct_share
+
+_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "0.45")
+
+
+def psychometric_figure(
+    trials: pd.DataFrame, column: str, fitted: Mapping[str, Mapping[str, Any]], kind: str
+) -> Figure:
+    """A curve for each value of a column.
+
+    Args:
+        trials: answered.
+        column: ``scene`` or ``point_set``.
+        fitted: rows of fits by value; those that failed have no ``mu``.
+        kind: of the observers, for the title: every figure says whom it shows.
+    """
+    figure = Figure(figsize=(5.6, 3.9), layout="constrained")
+    axis = figure.subplots()
+    for ink, (value, row) in zip(_INK * 3, fitted.items(), strict=False):
+        _curve(axis, trials.loc[trials[column] == value], row, str(value), ink)
+    axis.axhline(THRESHOLD, color="#b02a2a", ls="--", lw=0.9)
+    axis.axhline(GUESS, color="#2a8f4d", ls="--", lw=0.9)
+    levels = sorted(trials["samples"].unique())
+    axis.set(xscale="log", xlabel="samples per pixel", ylabel="share right", ylim=(0.35, 1.02))
+    axis.set_xticks(levels, [f"{int(level)}" for level in levels], minor=False)
+    axis.set_xticks([], minor=True)
+    axis.set_title(f"{kind} observers, N = {trials['observer'].nunique()}", fontsize=10)
+    axis.legend(fontsize=8)
+    return figure
+
+
+def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, ink: str) -> None:
+    """Means over observers with their standard errors, and the fitted function."""
+    shares = part.pivot_table("correct", "observer", "samples")
+    levels = np.asarray(shares.columns, np.float64)
+    by_level = [column[np.isfinite(column)] for column in shares.to_numpy(np.float64).T]
+    errors = [values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0 for values in by_level]
+    axis.errorbar(levels, [values.mean() for values in by_level], errors, fmt="o", ms=4, color=ink, capsize=2)
+    if np.isfinite(row.get("mu", np.nan)):
+        x = np.geomspace(levels[0], levels[-1], 200)
+        jnd = f"{row['jnd']:.0f}" if 0.0 < row["jnd"] < np.inf else str(row["status"])
+        axis.plot(x, correct_share(x, row["mu"], row["sigma"], row["lapse"]), color=ink, label=f"{label}, JND {jnd}")
+    else:
+        axis.plot([], [], color=ink, label=f"{label}, no fit")
+
+
+def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:
+    """Just-noticeable differences against the observer's noise."""
+    figure = Figure(figsize=(5.0, 3.6), layout="constrained")
+    axis = figure.subplots()
+    for ink, scene in zip(_INK, scenes, strict=False):
+        part = rows.loc[(rows["scene"] == scene) & (rows["status"] == "within")]
+        axis.loglog(part["sigma_jod"], part["jnd"], marker="o", ms=4, color=ink, label=scene)
+    axis.set(xlabel="noise of a stimulus, JOD", ylabel="just noticeable, samples per pixel")
+    axis.grid(True, alpha=0.3)
+    axis.legend(fontsize=8)
+    return figure

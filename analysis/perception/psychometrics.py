@@ -1,0 +1,196 @@
+"""Psychometric functions of the number of samples: fits, just-noticeable differences, intervals, t-tests, power.
+
+The share of correct answers falls with the samples per pixel ``n`` from nearly 1 to the guess rate:
+``p(n) = 1/2 + (1/2 - λ) Φ((μ - log2 n) / σ)``. The just-noticeable difference is the ``n`` at which ``p = 0.75``.
+
+Source: motion-blur perception thesis, chapter 5; Wichmann and Hill 2001, "The psychometric function".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+GUESS = 0.5
+THRESHOLD = 0.75
+LAPSE_MAX = 0.08
+"""Greatest lapse rate a fit may assume; with it, threshold is still within reach."""
+
+_OCTAVES_BEYOND = 2.0  # that a fitted μ may lie beyond the levels
+_SIGMA_LIMITS = 0.25, 6.0
+_GRID = 161, 25, 5
+
+
+class FitError(ValueError):
+    """Data that no psychometric function can be fitted to; the message says what was expected."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted function.
+
+    Attributes:
+        mu: log2 of the samples at which the lapse-free function is at the threshold.
+        sigma: width, octaves.
+        lapse: rate of answers that do not depend on the stimulus.
+        jnd: samples per pixel at the threshold; infinite where it lies above the levels, 0 where below.
+        interval: of ``jnd``, 95 %, from a bootstrap; None without one.
+        status: ``within`` the levels, ``above`` or ``below`` them.
+        log_likelihood: of the data.
+        trials: how many.
+    """
+
+    mu: float
+    sigma: float
+    lapse: float
+    jnd: float
+    interval: tuple[float, float] | None
+    status: str
+    log_likelihood: float
+    trials: int
+
+
+def correct_share(
+    samples: Float[NDArray[np.float64], "*n"], mu: float, sigma: float, lapse: float
+) -> Float[NDArray[np.float64], "*n"]:
+    """Probability of a correct answer."""
+    return GUESS + (1.0 - GUESS - lapse) * stats.norm.cdf((mu - np.log2(samples)) / sigma)
+
+
+def threshold_samples(mu: float, sigma: float, lapse: float) -> float:
+    """Samples per pixel at which a function passes the threshold."""
+    return float(2.0 ** (mu - sigma * stats.norm.ppf((THRESHOLD - GUESS) / (1.0 - GUESS - lapse))))
+
+
+def fit(
+    levels: Sequence[float],
+    correct: Sequence[int],
+    trials: Sequence[int],
+    bootstraps: int = 0,
+    seed: int = 0,
+) -> Fit:
+    """Fits by maximum likelihood; the interval is that of a parametric bootstrap.
+
+    Args:
+        levels: samples per pixel.
+        correct, trials: right answers, and answers, at each level.
+        bootstraps: how many data sets are drawn from the fit for the interval; 0 leaves it out.
+        seed: of those.
+
+    Raises:
+        FitError: fewer than two levels with answers, more right answers than answers, or a level below 1.
+    """
+    x, k, n = _checked(levels, correct, trials)
+    grid = _grid(tuple(x))
+    mu, sigma, lapse = _polished(x, k, n, *_best(grid, k[None], n[None])[0])
+    jnd, status = _placed(threshold_samples(mu, sigma, lapse), x)
+    share = np.clip(correct_share(x, mu, sigma, lapse), 1e-9, 1.0 - 1e-9)
+    log_likelihood = float((k * np.log(share) + (n - k) * np.log1p(-share)).sum())
+    interval = None
+    if bootstraps:
+        drawn = np.random.default_rng(seed).binomial(n, share, (bootstraps, len(x)))
+        found = _best(grid, drawn, np.broadcast_to(n, drawn.shape))
+        jnds = np.array([_placed(threshold_samples(*row), x)[0] for row in found])
+        low, high = np.quantile(jnds, [0.025, 0.975], method="nearest")
+        interval = float(low), float(high)
+    return Fit(mu, sigma, lapse, jnd, interval, status, log_likelihood, int(n.sum()))
+
+
+def _checked(
+    levels: Sequence[float], correct: Sequence[int], trials: Sequence[int]
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    x, k, n = np.asarray(levels, np.float64), np.asarray(correct, np.int64), np.asarray(trials, np.int64)
+    if not x.shape == k.shape == n.shape or x.ndim != 1:
+        raise FitError(f"fit: expected as many levels as counts, got {x.shape}, {k.shape} and {n.shape}")
+    if (x < 1.0).any() or not np.isfinite(x).all():
+        raise FitError(f"fit: expected levels of at least 1 sample, got {x.min()}")
+    if (k < 0).any() or (k > n).any():
+        raise FitError("fit: expected between 0 and all answers right at every level")
+    asked = n > 0
+    if len(np.unique(x[asked])) < 2:
+        raise FitError(f"fit: expected answers at two levels at least, got {len(np.unique(x[asked]))}")
+    order = np.argsort(x[asked])
+    return x[asked][order], k[asked][order], n[asked][order]
+
+
+def _placed(jnd: float, x: NDArray[np.float64]) -> tuple[float, str]:
+    """A threshold beyond the levels is not known: only that it lies there."""
+    if jnd > x[-1]:
+        return math.inf, "above"
+    return (0.0, "below") if jnd < x[0] else (jnd, "within")
+
+
+@lru_cache(maxsize=16)
+def _grid(
+    levels: tuple[float, ...],
+) -> tuple[Float[NDArray[np.float64], "g 3"], NDArray[np.float64], NDArray[np.float64]]:
+    """Parameters tried, and logarithms of the shares right and wrong at the levels ``(levels, g)``."""
+    octaves = np.log2(levels)
+    mu = np.linspace(octaves[0] - _OCTAVES_BEYOND, octaves[-1] + _OCTAVES_BEYOND, _GRID[0])
+    sigma = np.geomspace(*_SIGMA_LIMITS, _GRID[1])
+    lapse = np.linspace(0.0, LAPSE_MAX, _GRID[2])
+    rows = np.stack(np.meshgrid(mu, sigma, lapse, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = GUESS + (1.0 - GUESS - rows[:, 2]) * stats.norm.cdf((rows[:, 0] - octaves[:, None]) / rows[:, 1])
+    share = np.clip(share, 1e-9, 1.0 - 1e-9)
+    return rows, np.log(share), np.log1p(-share)
+
+
+def _best(
+    grid: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    correct: Int[NDArray[np.int64], "sets levels"],
+    trials: Int[NDArray[np.int64], "sets levels"],
+) -> Float[NDArray[np.float64], "sets 3"]:
+    """The most likely parameters of the grid for each data set."""
+    rows, log_right, log_wrong = grid
+    likelihood = correct @ log_right + (trials - correct) @ log_wrong
+    return rows[likelihood.argmax(axis=1)]
+
+
+def _polished(
+    x: NDArray[np.float64], k: NDArray[np.int64], n: NDArray[np.int64], mu: float, sigma: float, lapse: float
+) -> tuple[float, float, float]:
+    """The nearest maximum of the likelihood."""
+
+    def cost(parameters: NDArray[np.float64]) -> float:
+        share = np.clip(correct_share(x, parameters[0], math.exp(parameters[1]), parameters[2]), 1e-9, 1.0 - 1e-9)
+        return -float((k * np.log(share) + (n - k) * np.log1p(-share)).sum())
+
+    octaves = np.log2(x)
+    bounds = [
+        (octaves[0] - _OCTAVES_BEYOND, octaves[-1] + _OCTAVES_BEYOND),
+        tuple(np.log(_SIGMA_LIMITS)),
+        (0.0, LAPSE_MAX),
+    ]
+    start = np.array([mu, math.log(sigma), lapse])
+    found = optimize.minimize(cost, start, method="L-BFGS-B", bounds=bounds)
+    best = found.x if found.fun <= cost(start) else start
+    return float(best[0]), float(math.exp(best[1])), float(best[2])
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A t-test of two conditions over the same observers."""
+
+    t: float
+    p: float
+    degrees: float
+    mean_difference: float
+
+
+def paired(first: Sequence[float], second: Sequence[float]) -> Comparison | None:
+    """Student's paired test of shares right, an entry an observer; None where there are fewer than two, or all
+    differences are the same."""
+    a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
+    if a.shape != b.shape:
+        raise FitError(f"paired: expected as many of both, got {a.shape} and {b.shape}")
+    if len(a) < 2 or np.ptp(a - b) == 0.0:
+        return None
+    found = stats.ttest_rel(a, b)
+    return Comparison(float(found.statistic), float(found.pvalue), len(a) - 1.0, float((a - b).mean()))

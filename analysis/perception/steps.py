@@ -1,0 +1,130 @@
+"""The steps of the study, each from its options to files and a few lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.cli import InputError
+from analysis.files import atomic
+from analysis.perception import analysis as analyses
+from analysis.perception import plots
+from analysis.perception.observers import TASK, drawn_observers, simulated_trials
+from analysis.perception.options import AnalyseOptions, SimulateOptions, StimuliOptions
+from analysis.perception.stimuli import differences, read_manifest, render_stimuli
+
+Task = Callable[[str, int], Callable[[int], None]]
+Found = tuple[dict[str, Any], str]
+
+SIGMAS = (0.25, 0.5, 1.048, 2.0, 4.0)
+"""Noise of a stimulus, JOD, that the sweep of the observer covers."""
+
+POWER_OBSERVERS, POWER_ANSWERS = (6, 12, 24, 48), (4, 12)
+
+
+def stimuli(options: StimuliOptions, config_hash: Callable[[Any], str], task: Task) -> Found:
+    """Renders stimuli and their manifest."""
+    manifest = render_stimuli(options, config_hash, task)
+    rows = manifest["stimuli"]
+    rendered, frames = sum(row["rendered_now"] for row in rows), sum(len(row["files"]) for row in rows)
+    summary = {"stimuli": len(rows), "frames": frames, "rendered_now": rendered}
+    summary["nonfinite"] = sum(row["nonfinite"] for row in rows)
+    return summary, f"{len(rows)} stimuli, {frames} frames ({rendered} rendered now)"
+
+
+def simulate(options: SimulateOptions, task: Task) -> Found:
+    """Scores stimuli in JOD and has simulated observers answer."""
+    done, number = task("JOD", len(read_manifest(options.stimuli)["stimuli"])), count(1)
+    jod = differences(options.stimuli, options.display, lambda: done(next(number)))
+    people = drawn_observers(options.observers, options.seed, options.sensitivity_spread, options.lapse_mean)
+    trials = simulated_trials(jod, people, options.repetitions, options.seed, options.sigma_jod)
+    with atomic(options.out / "jod.csv") as path:
+        jod.to_csv(path, index=False)
+    with atomic(options.out / "trials-simulated.parquet") as path:
+        trials.to_parquet(path, index=False)
+    sweep = []
+    for sigma in SIGMAS:
+        swept = simulated_trials(jod, people, options.repetitions, options.seed, sigma)
+        for scene in dict.fromkeys(jod["scene"]):
+            row = analyses.fit_row(swept.loc[swept["scene"] == scene], 0, options.seed)
+            sweep.append({"sigma_jod": sigma, "scene": scene, **row})
+    table = pd.DataFrame(sweep)
+    with atomic(options.out / "sigma_sweep.csv") as path:
+        table.to_csv(path, index=False)
+    from analysis.plots import save
+
+    save(plots.sweep_figure(table, list(dict.fromkeys(jod["scene"]))), options.out / "sigma_sweep.png")
+    found = {
+        "task": TASK,
+        "observers": [vars(one) for one in people],
+        "display": vars(options.display),
+        "trials": len(trials),
+        "sigma_sweep": sweep,
+    }
+    return found, f"{len(trials)} trials of {len(people)} simulated observers ({TASK}), sigma {options.sigma_jod:g} JOD"
+
+
+def analyse(options: AnalyseOptions, task: Task) -> Found:
+    """Fits, tests, power and figures from a table of trials."""
+    try:
+        table = pd.read_parquet(options.trials)
+    except (OSError, ValueError) as error:
+        raise InputError(f"trials: {options.trials}: cannot be read as Parquet ({error})") from None
+    trials, kind = analyses.checked_trials(table, str(options.trials))
+    steps = task("analysis", 4)
+    fitted = analyses.fits(trials, options.bootstraps, options.seed)
+    steps(1)
+    tested = analyses.comparisons(trials)
+    steps(2)
+    _figures(options, trials, fitted, kind)
+    steps(3)
+    tables = {"fits": fitted, "tests": tested}
+    if options.power_repetitions:
+        levels = sorted(int(level) for level in trials["samples"].unique())
+        jnds = (analyses.THESIS_JND["planescene"], analyses.THESIS_JND["spheresscene"])
+        width = float(np.nanmedian(fitted["sigma"].to_numpy(np.float64))) if "sigma" in fitted else 1.5
+        tables["power"] = analyses.power(
+            levels, jnds, width, POWER_OBSERVERS, POWER_ANSWERS, options.power_repetitions, options.seed
+        )
+    steps(4)
+    for name, rows in tables.items():
+        with atomic(options.out / f"{name}.csv") as path:
+            rows.to_csv(path, index=False)
+    found = {name: rows.to_dict("records") for name, rows in tables.items()}
+    return {"observer_kind": kind, "thesis_jnd": analyses.THESIS_JND, **found}, _text(fitted, tested, kind)
+
+
+def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame, kind: str) -> None:
+    """Figures 19 and 20 by scene, 21 to 23 by set, 24 and 25 of all of both."""
+    from analysis.plots import save
+
+    filters = list(dict.fromkeys(trials["time_filter"]))
+    alone = trials.loc[trials["time_filter"] == filters[0]]
+    for column, name in (("scene", "scenes"), ("point_set", "point_sets")):
+        values = list(dict.fromkeys(alone[column]))
+        rows = {value: analyses.fit_row(alone.loc[alone[column] == value], 0, options.seed) for value in values}
+        save(plots.psychometric_figure(alone, column, rows, kind), options.out / f"{name}.png")
+        for value in values:
+            save(plots.psychometric_figure(alone, column, {value: rows[value]}, kind), options.out / f"{value}.png")
+
+
+def _text(fitted: pd.DataFrame, tested: pd.DataFrame, kind: str) -> str:
+    lines = [f"{kind} observers"]
+    for row in fitted.to_dict("records"):
+        if not (pd.isna(row["point_set"]) and pd.isna(row["time_filter"])):
+            continue
+        jnd, beside = str(row["status"]), analyses.THESIS_JND.get(row["scene"])
+        if jnd == "within":
+            jnd = f"{row['jnd']:.1f} ({row['low']:.1f} – {row['high']:.1f})"
+        end = f"; thesis about {beside:.0f}" if beside else ""
+        lines.append(f"{row['scene']}: JND {jnd} samples per pixel{end}")
+    for row in tested.to_dict("records"):
+        if not pd.isna(row["thesis_p"]):
+            what = f"{row['first']} against {row['second']} at {row['samples']:.0f}"
+            found = f"t({row['degrees']:.0f}) = {row['t']:.2f}, p = {row['p']:.4f}"
+            lines.append(f"{what}: {found}; thesis p = {row['thesis_p']:.4f}")
+    return "\n".join(lines)

@@ -1,0 +1,159 @@
+"""Stimuli of the study: sequences rendered from job files, a manifest of what they are, and how far they differ."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from PIL import Image
+
+from analysis.cli import InputError
+from analysis.display_model import DisplayModel
+from analysis.files import write_json
+from analysis.jobs import prepare, run_job
+from analysis.perception.options import StimuliOptions
+from analysis.tracer_options import JobOptions
+
+MANIFEST = "manifest.json"
+
+
+def render_stimuli(
+    options: StimuliOptions, config_hash: Callable[[Any], str], task: Callable[[str, int], Callable[[int], None]]
+) -> dict[str, Any]:
+    """Renders what is missing and writes the manifest.
+
+    Args:
+        options: jobs, size and length.
+        config_hash: of what decides the frames of a job.
+        task: shows how far it is.
+
+    Returns:
+        The manifest: a row a stimulus, with its folder, number of frames and their hash.
+    """
+    rows: list[dict[str, Any]] = []
+    for job_file in options.jobs:
+        job = JobOptions(
+            job=job_file,
+            width_px=options.width_px,
+            first_frame=options.first_frame,
+            frames=options.frames,
+            seed=options.seed,
+            box_share=options.box_share,
+            threads=options.threads,
+        )
+        work = prepare(job)
+        scene = work.settings.name
+        folder = options.out / scene
+        found = run_job(work, _placed(job, folder), config_hash(_content(job, work)), task)
+        for combination, row in zip(work.job.combinations, found, strict=True):
+            files = [folder / combination.name / f"frame{number:05d}.png" for number in work.frames]
+            rows.append(
+                {
+                    "scene": scene,
+                    "point_set": combination.point_set,
+                    "time_filter": combination.time_filter,
+                    "samples": combination.samples,
+                    "folder": f"{scene}/{combination.name}",
+                    "files": [file.name for file in files],
+                    "sha256": _hash(files),
+                    "rendered_now": row["rendered_now"],
+                    "nonfinite": row["nonfinite"],
+                }
+            )
+    manifest = {"frame_rate_hz": work.settings.frame_rate_hz, "size_px": list(work.size_px), "stimuli": rows}
+    write_json(options.out / MANIFEST, manifest)
+    return manifest
+
+
+def _placed(job: JobOptions, folder: Path) -> JobOptions:
+    import dataclasses
+
+    return dataclasses.replace(job, out=folder)
+
+
+def _content(job: JobOptions, work: Any) -> dict[str, Any]:
+    from analysis.reference import content_hash
+
+    kept = {name: getattr(job, name) for name in ("space_filter", "sigma_px", "box_share", "format", "seed")}
+    return {**kept, "size": work.size_px, "scene": content_hash(work.scene)}
+
+
+def _hash(files: Sequence[Path]) -> str:
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a folder of stimuli.
+
+    Raises:
+        InputError: there is none, or it cannot be read.
+    """
+    try:
+        return json.loads((folder / MANIFEST).read_text())
+    except (OSError, ValueError) as error:
+        raise InputError(f"stimuli: expected {folder / MANIFEST}, written by the command 'stimuli' ({error})") from None
+
+
+def frames_of(folder: Path, row: dict[str, Any]) -> NDArray[np.uint8]:
+    """Frames ``(count, h, w, 3)`` of a stimulus.
+
+    Raises:
+        InputError: one is missing or is not what the manifest says.
+    """
+    files = [folder / row["folder"] / name for name in row["files"]]
+    try:
+        if _hash(files) != row["sha256"]:
+            raise InputError(f"stimuli: {folder / row['folder']}: expected the frames of the manifest, got others")
+        return np.stack([np.asarray(Image.open(file).convert("RGB")) for file in files])
+    except OSError as error:
+        raise InputError(f"stimuli: {error.filename}: cannot be read ({error.strerror})") from None
+
+
+def differences(
+    folder: Path, display: DisplayModel, tick: Callable[[], None], total: Callable[[int], None] = lambda count: None
+) -> pd.DataFrame:
+    """How many JOD every stimulus is from the one with the most samples of its scene, set and filter.
+
+    Scores are kept in ``jod.json`` of the folder, by the hashes of both stimuli and the display.
+
+    Args:
+        folder: of the stimuli.
+        display: that the scores hold for.
+        tick: called after each.
+        total: told how many there are.
+    """
+    from analysis.perceptual import jod
+
+    manifest = read_manifest(folder)
+    kept_file = folder / "jod.json"
+    kept: dict[str, float] = json.loads(kept_file.read_text()) if kept_file.exists() else {}
+    table = pd.DataFrame(manifest["stimuli"])
+    total(len(table))
+    rows = []
+    for _, group in table.groupby(["scene", "point_set", "time_filter"], sort=False):
+        ordered = group.sort_values("samples").to_dict("records")
+        reference, reference_frames = ordered[-1], None
+        for row in ordered:
+            key = f"{row['sha256']} {reference['sha256']} {display.name} {display.rate_hz:g}"
+            if row is reference:
+                kept[key] = 0.0
+            elif key not in kept:
+                if reference_frames is None:
+                    reference_frames = frames_of(folder, reference)
+                score = jod(frames_of(folder, row), reference_frames, manifest["frame_rate_hz"], display)
+                kept[key] = 10.0 - score
+                write_json(kept_file, kept)
+            rows.append(
+                {name: row[name] for name in ("scene", "point_set", "time_filter", "samples")} | {"jod": kept[key]}
+            )
+            tick()
+    return pd.DataFrame(rows)

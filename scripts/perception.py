@@ -1,0 +1,52 @@
+"""The motion-blur perception study: render its stimuli, have observers answer, fit their psychometric functions.
+
+Examples: python scripts/perception.py stimuli --width-px 128 --frames 20 --out out/perception
+          python scripts/perception.py simulate out/perception --out out/perception-simulated
+          python scripts/perception.py analyse out/perception-simulated/trials-simulated.parquet
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.files import writable_folder, write_json
+from analysis.perception.options import SimulateOptions, Step, StimuliOptions
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def main() -> None:
+    """Parses, runs one step of the study, prints what came out."""
+    options = parse(Step, __doc__ or "")  # type: ignore[arg-type]
+    with bad_input():
+        writable_folder(options.out, "out")
+    from analysis.perception import steps
+    from analysis.progress import bars
+    from analysis.records import provenance
+    from renderer.film import FilmError
+
+    config = dataclasses.asdict(options)
+    source = provenance(ROOT, config, seed=options.seed)
+
+    def config_hash(content: Any) -> str:
+        return provenance(ROOT, content)["config_hash"]
+
+    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
+        if isinstance(options, StimuliOptions):
+            found, text = steps.stimuli(options, config_hash, shown.task)
+        elif isinstance(options, SimulateOptions):
+            found, text = steps.simulate(options, shown.task)
+        else:
+            found, text = steps.analyse(options, shown.task)
+        write_json(options.out / "summary.json", {**found, "config": config, "provenance": source})
+    print(f"{text}\nwritten to {options.out}")
+
+
+if __name__ == "__main__":
+    run_cli(main)

@@ -1,0 +1,102 @@
+"""Fits give back what they were drawn from, and say what they cannot know."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples
+
+LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
+
+
+def drawn(jnd: float, sigma: float, trials: int, seed: int, lapse: float = 0.0) -> list[int]:
+    """Right answers of an observer whose threshold is known."""
+    share = correct_share(np.array(LEVELS, np.float64), _mu(jnd, sigma, lapse), sigma, lapse)
+    return np.random.default_rng(seed).binomial(trials, share).tolist()
+
+
+def _mu(jnd: float, sigma: float, lapse: float) -> float:
+    return math.log2(jnd) - math.log2(threshold_samples(0.0, sigma, lapse))
+
+
+def test_the_threshold_is_where_three_quarters_are_right() -> None:
+    for sigma, lapse in ((0.5, 0.0), (2.0, 0.05)):
+        jnd = threshold_samples(5.0, sigma, lapse)
+        assert correct_share(np.array(jnd), 5.0, sigma, lapse) == pytest.approx(0.75)
+    assert threshold_samples(5.0, 1.0, 0.0) == pytest.approx(32.0)
+
+
+@pytest.mark.parametrize(("jnd", "sigma", "lapse"), [(40.0, 1.0, 0.0), (100.0, 2.0, 0.03)])
+def test_many_answers_give_back_the_threshold(jnd: float, sigma: float, lapse: float) -> None:
+    found = fit(LEVELS, drawn(jnd, sigma, 20_000, 1, lapse), [20_000] * 8)
+    assert found.jnd == pytest.approx(jnd, rel=0.03) and found.status == "within"
+    assert found.sigma == pytest.approx(sigma, rel=0.1) and found.lapse == pytest.approx(lapse, abs=0.01)
+
+
+def test_a_fit_is_at_least_as_likely_as_the_truth() -> None:
+    correct = drawn(60.0, 1.5, 48, 5)
+    found = fit(LEVELS, correct, [48] * 8)
+    truth = correct_share(np.array(LEVELS, np.float64), _mu(60.0, 1.5, 0.0), 1.5, 0.0)
+    k = np.array(correct)
+    assert found.log_likelihood >= (k * np.log(truth) + (48 - k) * np.log1p(-truth)).sum()
+
+
+def coverage(experiments: int, bootstraps: int) -> float:
+    inside = 0
+    for seed in range(experiments):
+        low, high = fit(LEVELS, drawn(60.0, 1.5, 144, seed), [144] * 8, bootstraps, seed).interval or (0.0, 0.0)
+        inside += low <= 60.0 <= high
+    return inside / experiments
+
+
+def test_intervals_hold_the_threshold_about_as_often_as_they_say() -> None:
+    assert 0.8 <= coverage(20, 100) <= 1.0
+
+
+@pytest.mark.slow
+def test_coverage_is_close_to_nominal() -> None:
+    assert 0.91 <= coverage(300, 400) <= 0.98
+
+
+def test_answers_that_say_nothing_of_the_threshold() -> None:
+    above, below = fit(LEVELS, [30] * 8, [30] * 8, 50), fit(LEVELS, [15] * 8, [30] * 8, 50)
+    assert (above.status, above.jnd) == ("above", math.inf) and above.interval == (math.inf, math.inf)
+    assert (below.status, below.jnd) == ("below", 0.0)
+    worse = fit(LEVELS, [0] * 8, [30] * 8)
+    assert worse.status == "below" and math.isfinite(worse.log_likelihood)
+
+
+def test_levels_without_answers_and_any_order() -> None:
+    correct = drawn(60.0, 1.5, 48, 3)
+    whole = fit(LEVELS, correct, [48] * 8)
+    more = fit([*LEVELS[::-1], 1000], [*correct[::-1], 0], [48] * 8 + [0])
+    assert more.jnd == pytest.approx(whole.jnd) and more.trials == whole.trials
+
+
+@pytest.mark.parametrize(
+    ("levels", "correct", "trials", "message"),
+    [
+        ((8,), (3,), (4,), "answers at two levels at least, got 1"),
+        ((8, 27), (3, 0), (4, 0), "answers at two levels at least, got 1"),
+        ((8, 27), (5, 2), (4, 4), "between 0 and all answers"),
+        ((0, 27), (3, 2), (4, 4), "levels of at least 1 sample"),
+        ((8, 27), (3,), (4, 4), "as many levels as counts"),
+    ],
+)
+def test_what_cannot_be_fitted(levels, correct, trials, message: str) -> None:
+    with pytest.raises(FitError, match=message):
+        fit(levels, correct, trials)
+
+
+def test_paired_tests() -> None:
+    rng = np.random.default_rng(2)
+    a = rng.random(30)
+    found = paired((a + 0.2 + 0.05 * rng.standard_normal(30)).tolist(), a.tolist())
+    assert found is not None and found.degrees == 29 and found.p < 1e-6 and found.t > 5.0
+    assert found.mean_difference == pytest.approx(0.2, abs=0.05)
+    assert paired([0.5], [0.4]) is None and paired([0.5, 0.6], [0.5, 0.6]) is None
+    with pytest.raises(FitError):
+        paired([0.5], [0.4, 0.3])
