@@ -17,6 +17,7 @@ class Bars:
 
     def task(self, label: str, total: int) -> Callable[[int], None]:
         """Adds a bar; returns a function that takes how much is done."""
+        self._progress.start()
         number = self._progress.add_task(label, total=total)
         return lambda done: self._progress.update(number, completed=done)
 
@@ -27,7 +28,7 @@ class Bars:
 
 @contextmanager
 def bars() -> Iterator[Bars]:
-    """Shows bars while the block runs."""
+    """Shows bars while the block runs, from the first one on: without any, nothing is printed."""
     columns = (
         TextColumn("{task.description:<12}"),
         BarColumn(),
@@ -36,5 +37,9 @@ def bars() -> Iterator[Bars]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    progress = Progress(*columns, console=Console(stderr=True))
+    try:
         yield Bars(progress)
+    finally:
+        if progress.live.is_started:
+            progress.stop()

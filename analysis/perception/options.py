@@ -96,9 +96,36 @@ class AnalyseOptions:
         )
 
 
+@dataclass(frozen=True)
+class ServeOptions:
+    """Shows the trials to a person on a page of this machine; goes on where it was stopped."""
+
+    observer: Annotated[str, tyro.conf.Positional]
+    """Name of the person, in the table."""
+    stimuli: Path = Path("out/perception")
+    """Folder of the command ``stimuli``."""
+    repetitions: int = 4
+    """Times that each stimulus is shown."""
+    break_every: int = 24
+    """Trials between breaks."""
+    port: int = 0
+    """Port of the page, on this machine only; 0 takes a free one."""
+    seed: int = 0
+    """Of orders and sides."""
+    out: Path = Path("out/perception-human")
+    """Folder for the session: answers.jsonl, trials-human.parquet and summary.json."""
+
+    def __post_init__(self) -> None:
+        require(bool(self.observer.strip()), "observer", "a name", self.observer)
+        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
+        require(self.break_every >= 1, "break_every", "at least 1", self.break_every)
+        require(0 <= self.port <= 65535, "port", "between 0 and 65535", self.port)
+
+
 Step = (
     Annotated[StimuliOptions, tyro.conf.subcommand("stimuli")]
     | Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
+    | Annotated[ServeOptions, tyro.conf.subcommand("serve")]
     | Annotated[AnalyseOptions, tyro.conf.subcommand("analyse")]
 )
 """One step of the study, chosen by its name on the command line."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from itertools import count
 from typing import Any
@@ -14,7 +15,9 @@ from analysis.files import atomic
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
 from analysis.perception.observers import TASK, drawn_observers, simulated_trials
-from analysis.perception.options import AnalyseOptions, SimulateOptions, StimuliOptions
+from analysis.perception.options import AnalyseOptions, ServeOptions, SimulateOptions, StimuliOptions
+from analysis.perception.protocol import Session
+from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, read_manifest, render_stimuli
 
 Task = Callable[[str, int], Callable[[int], None]]
@@ -66,6 +69,26 @@ def simulate(options: SimulateOptions, task: Task) -> Found:
         "sigma_sweep": sweep,
     }
     return found, f"{len(trials)} trials of {len(people)} simulated observers ({TASK}), sigma {options.sigma_jod:g} JOD"
+
+
+def serve(options: ServeOptions, task: Task, say: Callable[[str], None]) -> Found:
+    """Shows trials to a person until all are answered, or until this is interrupted."""
+    session = Session(options.out, options.stimuli, options.observer, options.repetitions, options.seed)
+    done = task("answers", len(session.trials))
+    done(len(session.answers))
+    try:
+        with serving(session, options.port, options.break_every) as address:
+            say(f"open {address} in a browser; Ctrl-C ends, and the same command goes on")
+            while session.current is not None:
+                time.sleep(0.2)
+                done(len(session.answers))
+            time.sleep(1.0)  # for the page to hear of its last answer
+    except KeyboardInterrupt:
+        pass  # answers are on disk
+    table = session.table()
+    late = int(np.count_nonzero(table["dropped_frames"].to_numpy() > 0))
+    found = {"observer": options.observer, "trials": len(session.trials), "answered": len(table), "with_dropped": late}
+    return found, f"{len(table)} of {len(session.trials)} trials answered, {late} with late frames"
 
 
 def analyse(options: AnalyseOptions, task: Task) -> Found:

@@ -61,7 +61,7 @@ def render_stimuli(
                     "samples": combination.samples,
                     "folder": f"{scene}/{combination.name}",
                     "files": [file.name for file in files],
-                    "sha256": _hash(files),
+                    "sha256": hash_of(files),
                     "rendered_now": row["rendered_now"],
                     "nonfinite": row["nonfinite"],
                 }
@@ -84,7 +84,8 @@ def _content(job: JobOptions, work: Any) -> dict[str, Any]:
     return {**kept, "size": work.size_px, "scene": content_hash(work.scene)}
 
 
-def _hash(files: Sequence[Path]) -> str:
+def hash_of(files: Sequence[Path]) -> str:
+    """SHA-256 of files, one behind the other."""
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
@@ -111,7 +112,7 @@ def frames_of(folder: Path, row: dict[str, Any]) -> NDArray[np.uint8]:
     """
     files = [folder / row["folder"] / name for name in row["files"]]
     try:
-        if _hash(files) != row["sha256"]:
+        if hash_of(files) != row["sha256"]:
             raise InputError(f"stimuli: {folder / row['folder']}: expected the frames of the manifest, got others")
         return np.stack([np.asarray(Image.open(file).convert("RGB")) for file in files])
     except OSError as error:

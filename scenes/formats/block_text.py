@@ -105,6 +105,7 @@ ALLOWED: Mapping[str, Mapping[str, Shape]] = {
         "numsamples": 1,
         "timefilter": str,
         "envmap": str,
+        "envmaplimit": 1,
     },
 }
 """Attributes of each kind of block."""

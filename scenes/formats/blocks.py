@@ -47,7 +47,7 @@ from scenes.canonical import (
 from scenes.formats.block_settings import Settings, read_settings
 from scenes.formats.block_text import Block, read_blocks
 from scenes.formats.block_transforms import aimed, facing, transform
-from scenes.loading import read_image
+from scenes.loading import clamp_radiance, read_image
 from scenes.models import place_model
 
 LEAD_S = 3.0
@@ -96,7 +96,10 @@ class _Loader:
         block, settings = self._single("settings"), self.settings
         background = None
         if "envmap" in block.values:
-            background = EnvironmentLight(read_image(self.folder / block.require("envmap")), source=block.get("envmap"))
+            image = read_image(self.folder / block.require("envmap"))
+            if "envmaplimit" in block.values:
+                image = clamp_radiance(image, block.get("envmaplimit"))
+            background = EnvironmentLight(image, source=block.get("envmap"))
         scene = Scene(
             self._camera(),
             tuple(instances),

@@ -1,0 +1,123 @@
+// Shows one trial after the other: two pairs of the same sequence in step, one of which differs.
+"use strict";
+
+const message = document.getElementById("message"), pairs = document.getElementById("pairs");
+const progress = document.getElementById("progress"), canvases = [...document.querySelectorAll("canvas")];
+let state = null, phase = "loading", shown = null;
+
+function say(text) {
+  message.textContent = text;
+  message.style.display = "grid";
+  pairs.style.display = "none";
+}
+
+// Frames of the stimuli of a trial, decoded; each stimulus is fetched once.
+async function frames(trial) {
+  const numbers = [...trial.left, ...trial.right], decoded = new Map();
+  for (const number of new Set(numbers)) {
+    const list = [...Array(trial.frames).keys()].map(async (frame) => {
+      const answer = await fetch(`frame/${number}/${frame}`);
+      if (!answer.ok) throw new Error(`frame ${number}/${frame} is missing`);
+      return createImageBitmap(await answer.blob());
+    });
+    decoded.set(number, await Promise.all(list));
+  }
+  return numbers.map((number) => decoded.get(number));
+}
+
+// One pixel of the picture is one of the screen, whatever the browser's zoom.
+function fit([width, height]) {
+  const ratio = window.devicePixelRatio || 1;
+  for (const canvas of canvases) {
+    canvas.width = width, canvas.height = height;
+    canvas.style.width = `${width / ratio}px`, canvas.style.height = `${height / ratio}px`;
+  }
+}
+
+// All four canvases are drawn in the same refresh. Counts refreshes, and those that came late.
+function play(sequences, rate) {
+  const contexts = canvases.map((canvas) => canvas.getContext("2d"));
+  const run = { begun: performance.now(), intervals: [], last: null, over: false };
+  function draw(now) {
+    if (run.over) return;
+    if (run.last !== null) run.intervals.push(now - run.last);
+    run.last = now;
+    const frame = Math.max(0, Math.floor((now - run.begun) * rate / 1000)) % sequences[0].length;
+    contexts.forEach((context, at) => context.drawImage(sequences[at][frame], 0, 0));
+    requestAnimationFrame(draw);
+  }
+  requestAnimationFrame(draw);
+  return run;
+}
+
+function measured(run) {
+  const sorted = [...run.intervals].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)] || 0;
+  const box = pairs.getBoundingClientRect();
+  return {
+    response_s: (performance.now() - run.begun) / 1000,
+    display_rate_hz: middle > 0 ? 1000 / middle : 0,
+    dropped_frames: run.intervals.filter((interval) => interval > 1.5 * middle).length,
+    refreshes: run.intervals.length,
+    fits_window: pairs.scrollWidth <= window.innerWidth && box.bottom <= window.innerHeight,
+    device_pixel_ratio: window.devicePixelRatio || 1,
+  };
+}
+
+async function next() {
+  progress.textContent = `${state.done} of ${state.total}`;
+  if (state.trial === null) {
+    phase = "end";
+    say("That was the last one. Thank you.");
+    return;
+  }
+  phase = "loading";
+  say("Loading …");
+  const sequences = await frames(state.trial);
+  fit(state.size_px);
+  message.style.display = "none";
+  pairs.style.display = "flex";
+  shown = play(sequences, state.frame_rate_hz);
+  phase = "trial";
+}
+
+function pause(text) {
+  phase = "pause";
+  say(`${text}\nSpace goes on.`);
+}
+
+async function answer(side) {
+  phase = "sending";
+  const facts = measured(shown);
+  shown.over = true;
+  const body = JSON.stringify({ trial: state.trial.number, answer: side, ...facts });
+  // the next trial is shown only once this one is on disk; a server that is gone is waited for
+  for (;;) {
+    try {
+      const reply = await fetch("answer", { method: "POST", body });
+      state = await (reply.ok ? reply : await fetch("state")).json();
+      break;
+    } catch {
+      say("The server does not answer. Waiting …");
+      await new Promise((resolve) => setTimeout(resolve, 300));
+    }
+  }
+  const slow = Math.abs(facts.display_rate_hz / state.frame_rate_hz - Math.round(facts.display_rate_hz / state.frame_rate_hz)) > 0.1;
+  progress.title = slow ? `display ${facts.display_rate_hz.toFixed(1)} Hz` : "";
+  if (state.rest) pause("Time for a break.");
+  else await next();
+}
+
+document.addEventListener("keydown", (event) => {
+  if (phase === "pause" && event.code === "Space") next();
+  else if (phase === "trial" && event.code === "ArrowLeft") answer("left");
+  else if (phase === "trial" && event.code === "ArrowRight") answer("right");
+  else return;
+  event.preventDefault();
+});
+
+(async () => {
+  state = await (await fetch("state")).json();
+  progress.textContent = `${state.done} of ${state.total}`;
+  pause("Two pairs of moving pictures are shown, left and right.\nIn one pair the upper and the lower picture differ.\n" +
+    "Press the arrow key of the side where they differ. Guess if you cannot tell.");
+})();

@@ -1,0 +1,114 @@
+"""A whole short session in a real browser, with a reload in the middle and a server that dies."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from analysis.perception.protocol import TABLE, Session
+from analysis.perception.server import serving
+from tests.analysis.perception.builders import write_stimuli
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f"no browser: none of {', '.join(NAMES)} is on PATH")
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        yield launched
+        launched.close()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def answered(page: Page, count: int, total: int) -> None:
+    expect(page.locator("#progress")).to_have_text(f"{count} of {total}", timeout=10_000)
+
+
+def press_when_shown(page: Page, key: str) -> None:
+    """Waits until the pairs are on the screen and moving."""
+    expect(page.locator("#pairs")).to_be_visible(timeout=10_000)
+    page.wait_for_function("phase === 'trial' && shown.intervals.length > 3")
+    page.keyboard.press(key)
+
+
+def test_a_session_from_the_first_trial_to_the_last(browser: Browser, tmp_path: Path) -> None:
+    stimuli, port, folder = write_stimuli(tmp_path / "stimuli"), free_port(), tmp_path / "session"
+    page = browser.new_page(viewport={"width": 900, "height": 700})
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    session = Session(folder, stimuli, "anna", 2, 5)
+    total = len(session.trials)
+    assert total == 6
+    given = {}
+
+    def correct_key(number: int) -> str:
+        given[number] = session.trials[number].side
+        return {"left": "ArrowLeft", "right": "ArrowRight"}[given[number]]
+
+    with serving(session, port, break_every=3) as address:
+        page.goto(address)
+        expect(page.locator("#message")).to_contain_text("Press the arrow key")
+        page.keyboard.press("ArrowLeft")  # before the start: no answer
+        answered(page, 0, total)
+        page.keyboard.press("Space")
+        press_when_shown(page, correct_key(0))
+        answered(page, 1, total)
+        sizes = page.eval_on_selector_all("canvas", "all => all.map(one => [one.width, one.height])")
+        assert sizes == [[24, 24]] * 4
+        page.reload()  # in the middle of a trial
+        expect(page.locator("#progress")).to_have_text(f"1 of {total}")
+        page.keyboard.press("Space")
+        press_when_shown(page, correct_key(1))
+        answered(page, 2, total)
+        press_when_shown(page, correct_key(2))
+        expect(page.locator("#message")).to_contain_text("Time for a break")
+        page.keyboard.press("Space")
+        expect(page.locator("#pairs")).to_be_visible(timeout=10_000)
+        page.wait_for_function("phase === 'trial' && shown.intervals.length > 3")
+    # the server is gone, and the answer is given all the same
+    page.keyboard.press(correct_key(3))
+    expect(page.locator("#message")).to_contain_text("does not answer", timeout=10_000)
+    again = Session(folder, stimuli, "anna", 2, 5)
+    assert again.current is not None and again.current.number == 3
+    with serving(again, port, break_every=100):
+        answered(page, 4, total)
+        for number in (4, 5):
+            press_when_shown(page, correct_key(number))
+            page.wait_for_function(f"state.done === {number + 1}")
+        expect(page.locator("#message")).to_contain_text("That was the last one")
+    table = pd.read_parquet(folder / TABLE)
+    assert table["trial"].tolist() == list(range(total)) and table["correct"].all()
+    assert table["answer"].tolist() == [given[number] for number in range(total)]
+    assert (table["response_s"] > 0.0).all() and (table["display_rate_hz"] > 5.0).all()
+    assert table["fits_window"].all() and (table["dropped_frames"] >= 0).all()
+    assert not errors
+    page.close()
+
+
+def test_a_window_that_is_too_small_is_noted(browser: Browser, tmp_path: Path) -> None:
+    stimuli = write_stimuli(tmp_path / "stimuli", side=160)
+    page = browser.new_page(viewport={"width": 300, "height": 300})
+    session = Session(tmp_path / "session", stimuli, "bert", 1, 0)
+    with serving(session) as address:
+        page.goto(address)
+        page.wait_for_function("phase === 'pause'")
+        page.keyboard.press("Space")
+        press_when_shown(page, "ArrowLeft")
+        page.wait_for_function("state.done === 1")
+    assert not session.table()["fits_window"].iloc[0]
+    page.close()

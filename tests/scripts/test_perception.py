@@ -1,0 +1,79 @@
+"""The study from job files to thresholds, small."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.analysis.perception.builders import write_stimuli
+from tests.scripts.commands import assert_refused, call_script, nothing_in
+
+
+def summary(folder: Path) -> dict:
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_stimuli_are_rendered_once_and_listed_with_their_hash(tmp_path: Path, monkeypatch, capsys) -> None:
+    job, out = tmp_path / "job.txt", tmp_path / "out"
+    job.write_text("Plane_scene\n2\n1 8\n1\nhammersley\n1\nbox\n")
+    arguments = ("stimuli", str(job), "--width-px", "16", "--frames", "2", "--out", str(out))
+    assert call_script("perception.py", monkeypatch, *arguments) == 0, capsys.readouterr().err
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert [row["samples"] for row in manifest["stimuli"]] == [1, 8] and manifest["size_px"] == [16, 16]
+    assert manifest["stimuli"][0]["sha256"] != manifest["stimuli"][1]["sha256"]
+    assert all((out / row["folder"] / name).exists() for row in manifest["stimuli"] for name in row["files"])
+    assert call_script("perception.py", monkeypatch, *arguments) == 0
+    assert summary(out)["rendered_now"] == 0
+    again = json.loads((out / "manifest.json").read_text())
+    assert [row["sha256"] for row in again["stimuli"]] == [row["sha256"] for row in manifest["stimuli"]]
+
+
+def test_simulated_answers_and_their_analysis(tmp_path: Path, monkeypatch, capsys) -> None:
+    stimuli = write_stimuli(tmp_path / "stimuli", side=48, frames=4, scenes=("planescene", "spheresscene"))
+    trials, found = tmp_path / "trials", tmp_path / "found"
+    simulate = ("simulate", str(stimuli), "--observers", "6", "--sigma-jod", "0.5", "--out", str(trials))
+    assert call_script("perception.py", monkeypatch, *simulate) == 0, capsys.readouterr().err
+    table = pd.read_parquet(trials / "trials-simulated.parquet")
+    assert len(table) == 6 * 6 * 4 and set(table["observer_kind"]) == {"simulated"}
+    jod = pd.read_csv(trials / "jod.csv").set_index(["scene", "samples"])["jod"]
+    assert jod["planescene", 1] > jod["planescene", 8] > jod["planescene", 64] == 0.0
+    assert "differencing" in summary(trials)["task"] and (trials / "sigma_sweep.png").exists()
+    file = str(trials / "trials-simulated.parquet")
+    analyse = ("analyse", file, "--bootstraps", "20", "--power-repetitions", "2", "--out", str(found))
+    assert call_script("perception.py", monkeypatch, *analyse) == 0, capsys.readouterr().err
+    for name in ("scenes", "point_sets", "planescene", "hammersley"):
+        assert (found / f"{name}.png").stat().st_size > 5_000
+    assert len(pd.read_csv(found / "power.csv")) == 8 and len(pd.read_csv(found / "fits.csv")) == 2 + 2 + 1 + 2
+    assert summary(found)["observer_kind"] == "simulated"
+    assert "simulated observers" in capsys.readouterr().out
+
+
+def test_a_changed_stimulus_is_noticed(tmp_path: Path, monkeypatch, capsys) -> None:
+    stimuli = write_stimuli(tmp_path / "stimuli", side=16)
+    frame = stimuli / "planescene" / "hammersley-box-0008" / "frame00000.png"
+    frame.write_bytes((stimuli / "planescene" / "hammersley-box-0001" / "frame00000.png").read_bytes())
+    status = call_script("perception.py", monkeypatch, "simulate", str(stimuli), "--out", str(tmp_path / "out"))
+    error = capsys.readouterr().err
+    assert status == 2 and "expected the frames of the manifest" in error and "Traceback" not in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("stimuli", "gone.txt"), ("gone.txt", "cannot be read")),
+        (("stimuli", "--width-px", "4"), ("width_px", "4")),
+        (("simulate", "nowhere"), ("manifest.json", "stimuli")),
+        (("analyse", "nowhere.parquet"), ("nowhere.parquet", "cannot be read as Parquet")),
+        (("serve", " "), ("observer", "a name")),
+        (("sing",), ("sing",)),
+    ],
+)
+def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    extra = ("--out", str(tmp_path / "out")) if arguments[0] != "sing" else ()
+    status = call_script("perception.py", monkeypatch, *arguments, *extra)
+    assert_refused(status, capsys, parts)
+    assert nothing_in(tmp_path / "out")
