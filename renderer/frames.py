@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import torch
@@ -65,15 +66,36 @@ def render_tiles(
     Returns:
         Linear radiance, pixels along the Morton curve; those outside the picture are traced as well. Counts by kind.
     """
+    samples = _tile_samples(plan, tiles, size_px, frame_time_s, shutter_s, frame)
+    return _traced(renderer, samples, len(tiles), size_px, frame, plan.seed)
+
+
+Samples = tuple[NDArray[np.float32], NDArray[np.float64]]
+
+
+def _tile_samples(
+    plan: SamplePlan,
+    tiles: Sequence[int],
+    size_px: tuple[int, int],
+    frame_time_s: float,
+    shutter_s: tuple[float, float],
+    frame: int,
+) -> Samples:
     columns, rows = tile_pixels(tiles, size_px[0])
-    position, time_s = plan.samples(columns.ravel(), rows.ravel(), *size_px, frame_time_s, shutter_s, frame)
+    return plan.samples(columns.ravel(), rows.ravel(), *size_px, frame_time_s, shutter_s, frame)
+
+
+def _traced(
+    renderer: Renderer, samples: Samples, tiles: int, size_px: tuple[int, int], frame: int, seed: int
+) -> tuple[Float[Tensor, "tiles 256 3"], dict[str, int]]:
+    position, time_s = samples
     number = torch.zeros(len(position), dtype=torch.int64)
-    batch = FrameletBatch(number, number, torch.as_tensor(position), torch.as_tensor(time_s), frame, plan.seed)
+    batch = FrameletBatch(number, number, torch.as_tensor(position), torch.as_tensor(time_s), frame, seed)
     footprint_px = min(size_px) * math.sqrt(position.shape[1])
     answer = renderer.trace(batch, size_px[0] / size_px[1], footprint_px)
     # in the order of the samples, whatever the number of pixels
     means = answer.color.cpu().numpy().sum(axis=1, dtype=np.float64) / position.shape[1]
-    return torch.as_tensor(means.reshape(len(tiles), TILE_PX**2, 3).astype(np.float32)), answer.counters
+    return torch.as_tensor(means.reshape(tiles, TILE_PX**2, 3).astype(np.float32)), answer.counters
 
 
 def place_tiles(image: Float[Tensor, "h w 3"], tiles: Sequence[int], colors: Float[Tensor, "tiles 256 3"]) -> None:
@@ -101,13 +123,19 @@ def render_image(
     image = torch.zeros(height_px, width_px, 3)
     count = tile_count(width_px, height_px)
     at_once = max(1, _SAMPLES_AT_ONCE // (TILE_PX**2 * plan.samples_per_pixel))
-    for first in range(0, count, at_once):
-        tiles = range(first, min(first + at_once, count))
-        colors, rays = render_tiles(renderer, plan, tiles, (width_px, height_px), frame_time_s, shutter_s, frame)
-        place_tiles(image, tiles, colors)
-        if counters is not None:
-            counters.update(rays)
-        done(tiles.stop)
+    size = width_px, height_px
+    chunks = [range(first, min(first + at_once, count)) for first in range(0, count, at_once)]
+    with ThreadPoolExecutor(1) as ahead:  # places the next samples while these are traced
+        waiting = ahead.submit(_tile_samples, plan, chunks[0], size, frame_time_s, shutter_s, frame)
+        for tiles, following in zip(chunks, [*chunks[1:], None], strict=True):
+            samples = waiting.result()
+            if following is not None:
+                waiting = ahead.submit(_tile_samples, plan, following, size, frame_time_s, shutter_s, frame)
+            colors, rays = _traced(renderer, samples, len(tiles), size, frame, plan.seed)
+            place_tiles(image, tiles, colors)
+            if counters is not None:
+                counters.update(rays)
+            done(tiles.stop)
     return image
 
 
