@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
+from analysis.cases import INPUTS
 from analysis.display_model import DisplayModel
 from tsar.config import require
 
@@ -122,10 +123,42 @@ class ServeOptions:
         require(0 <= self.port <= 65535, "port", "between 0 and 65535", self.port)
 
 
+@dataclass(frozen=True)
+class AdaptiveOptions:
+    """Puts TSAR and the framed renderer before the simulated observer, by batch size at equal cost."""
+
+    inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
+    """Inputs of the study of suitability."""
+    scale: Literal["thesis", "half", "quick"] = "quick"
+    """Size of the runs."""
+    span_s: tuple[float, float] = (0.4, 0.9)
+    """Part of each run that is scored, seconds after its start."""
+    sigma_jod: float = 1.048
+    """Noise of a single stimulus, JOD."""
+    display: DisplayModel = field(default_factory=DisplayModel)
+    """That the JOD hold for."""
+    workers: int = 0
+    """Processes; 0 takes one per core."""
+    seed: int = 0
+    """Of the runs."""
+    cache: Path = Path(".cache/reference")
+    """Folder of references, shared by all runs."""
+    out: Path = Path("out/perception-adaptive")
+    """Folder for the runs, adaptive.csv, thresholds.csv and summary.json."""
+
+    def __post_init__(self) -> None:
+        for name in self.inputs:
+            require(name in INPUTS, "inputs", f"one of {', '.join(INPUTS)}", name)
+        require(0.0 < self.sigma_jod <= 100.0, "sigma_jod", "between 0 and 100", self.sigma_jod)
+        require(0.0 <= self.span_s[0] < self.span_s[1] <= 2.0, "span_s", "from and to within the 2 s", self.span_s)
+        require(self.workers >= 0, "workers", "at least 0", self.workers)
+
+
 Step = (
     Annotated[StimuliOptions, tyro.conf.subcommand("stimuli")]
     | Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
     | Annotated[ServeOptions, tyro.conf.subcommand("serve")]
+    | Annotated[AdaptiveOptions, tyro.conf.subcommand("adaptive")]
     | Annotated[AnalyseOptions, tyro.conf.subcommand("analyse")]
 )
 """One step of the study, chosen by its name on the command line."""

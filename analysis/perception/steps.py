@@ -15,7 +15,7 @@ from analysis.files import atomic
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
 from analysis.perception.observers import TASK, drawn_observers, simulated_trials
-from analysis.perception.options import AnalyseOptions, ServeOptions, SimulateOptions, StimuliOptions
+from analysis.perception.options import AdaptiveOptions, AnalyseOptions, ServeOptions, SimulateOptions, StimuliOptions
 from analysis.perception.protocol import Session
 from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, read_manifest, render_stimuli
@@ -89,6 +89,23 @@ def serve(options: ServeOptions, task: Task, say: Callable[[str], None]) -> Foun
     late = int(np.count_nonzero(table["dropped_frames"].to_numpy() > 0))
     found = {"observer": options.observer, "trials": len(session.trials), "answered": len(table), "with_dropped": late}
     return found, f"{len(table)} of {len(session.trials)} trials answered, {late} with late frames"
+
+
+def adaptive(options: AdaptiveOptions, task: Task) -> Found:
+    """Puts TSAR and the framed renderer before the same observer."""
+    from analysis.perception.adaptive import judged, scores, thresholds
+
+    table = judged(scores(options, task("runs", 12 * len(options.inputs))), options.sigma_jod)
+    found = thresholds(table)
+    for name, rows in (("adaptive", table), ("thresholds", found)):
+        with atomic(options.out / f"{name}.csv") as path:
+            rows.to_csv(path, index=False)
+    lines = [
+        f"{row['input']}: TSAR noticed at batch {row['noticed_at']}, preferred to framed at {row['preferred_at']}, "
+        f"framed preferred at {row['framed_preferred_at']}"
+        for row in found.to_dict("records")
+    ]
+    return {"rows": table.to_dict("records"), "thresholds": found.to_dict("records")}, "\n".join(lines)
 
 
 def analyse(options: AnalyseOptions, task: Task) -> Found:

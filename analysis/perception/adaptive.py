@@ -1,0 +1,102 @@
+"""Adaptive and framed rendering before the same observer: at which batch size is a difference noticed?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.cases import ROWS, SCALES, Case, Policy, framed_config
+from analysis.cli import InputError
+from analysis.evaluation import Place, finished
+from analysis.farm import FarmOptions, run_cases
+from analysis.perception.observers import Observer, correct_probability
+from analysis.perception.options import AdaptiveOptions
+from analysis.perception.psychometrics import THRESHOLD
+from tsar.config import TsarConfig
+
+SIDE_PX = 512
+"""Output side of the rows of table 7.2 that are compared, before the scale divides it."""
+
+
+def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFrame:
+    """JOD from the reference of both renderers at equal cost, a row an input and batch size.
+
+    Results and references are kept as those of the other studies are, so that this goes on where it was stopped.
+
+    Raises:
+        InputError: a run failed.
+    """
+    scale = SCALES[options.scale]
+    rows = [number for number, (_, side) in enumerate(ROWS) if side == SIDE_PX]
+    cases: dict[tuple[str, int, str], Case] = {}
+    for name in options.inputs:
+        for row in rows:
+            config = scale.config(row, TsarConfig(seed=options.seed))
+            framed = framed_config(config.resolution_px)
+            pair: tuple[tuple[Policy, TsarConfig], ...] = (("tsar", config), ("framed", framed))
+            for policy, chosen in pair:
+                case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
+                cases[name, row, policy] = case
+    place = Place(options.out / "runs", Path(options.cache))
+    keys, failures = run_cases(list(cases.values()), place, FarmOptions(options.workers), done)
+    if failures:
+        raise InputError(f"{len(failures)} runs failed: {next(iter(failures.values()))}")
+    found = {at: finished(keys[case], place) for at, case in cases.items()}
+    table = []
+    for name in options.inputs:
+        for row in rows:
+            seen = {policy: _distance(found[name, row, policy]) for policy in ("tsar", "framed")}
+            table.append(
+                {"input": name, "batch": ROWS[row][0], **{f"jod_{policy}": jod for policy, jod in seen.items()}}
+            )
+    return pd.DataFrame(table).sort_values(["input", "batch"], ignore_index=True)
+
+
+def _distance(result: dict[str, Any] | None) -> float:
+    score = None if result is None else result.get("jod")
+    return float("nan") if score is None else 10.0 - float(score)
+
+
+def judged(table: pd.DataFrame, sigma: float) -> pd.DataFrame:
+    """What a simulated observer without lapses makes of the distances.
+
+    Adds the shares of right answers in the dual-pair task of either renderer against the reference, and of preferring
+    TSAR to the framed renderer (of two stimuli with noise ``sigma`` each, the one that looks nearer the reference).
+    """
+    from scipy import stats
+
+    plain = Observer("ideal", 1.0, 0.0)
+    tsar, framed = (table[f"jod_{name}"].to_numpy(np.float64) for name in ("tsar", "framed"))
+    return table.assign(
+        noticed_tsar=correct_probability(tsar, plain, sigma),
+        noticed_framed=correct_probability(framed, plain, sigma),
+        tsar_preferred=stats.norm.cdf((framed - tsar) / (np.sqrt(2.0) * sigma)),
+    )
+
+
+def thresholds(table: pd.DataFrame) -> pd.DataFrame:
+    """By input: the batch sizes at which TSAR differs noticeably from the reference, and is preferred, or not, to the
+    framed renderer in three of four pairs."""
+    rows = []
+    for name in dict.fromkeys(table["input"]):
+        part = table.loc[table["input"] == name]
+        batch = part["batch"].to_numpy()
+        preferred = part["tsar_preferred"].to_numpy(np.float64)
+        rows.append(
+            {
+                "input": name,
+                "noticed_at": _listed(batch[part["noticed_tsar"].to_numpy(np.float64) >= THRESHOLD]),
+                "framed_noticed": bool((part["noticed_framed"] >= THRESHOLD).any()),
+                "preferred_at": _listed(batch[preferred >= THRESHOLD]),
+                "framed_preferred_at": _listed(batch[preferred <= 1.0 - THRESHOLD]),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _listed(values: Any) -> str:
+    return ", ".join(str(int(value)) for value in values) or "none"
