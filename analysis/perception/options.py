@@ -85,7 +85,7 @@ class AnalyseOptions:
     """Data sets drawn for each interval."""
     seed: int = 0
     """Of those, and of the table of power."""
-    power_repetitions: int = 200
+    power_repetitions: int = 40
     """Experiments simulated for each cell of the table of power; 0 leaves it out."""
     out: Path = Path("out/perception-analysis")
     """Folder for fits.csv, tests.csv, power.csv, figures and summary.json."""

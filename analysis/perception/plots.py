@@ -63,6 +63,9 @@ def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:
     for ink, scene in zip(_INK, scenes, strict=False):
         part = rows.loc[(rows["scene"] == scene) & (rows["status"] == "within")]
         axis.loglog(part["sigma_jod"], part["jnd"], marker="o", ms=4, color=ink, label=scene)
+    sigmas = sorted({float(value) for value in rows["sigma_jod"]})
+    axis.set_xticks(sigmas, [f"{value:g}" for value in sigmas], minor=False)
+    axis.set_xticks([], minor=True)
     axis.set(xlabel="noise of a stimulus, JOD", ylabel="just noticeable, samples per pixel")
     axis.grid(True, alpha=0.3)
     axis.legend(fontsize=8)

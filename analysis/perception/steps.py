@@ -23,7 +23,7 @@ from analysis.perception.stimuli import differences, read_manifest, render_stimu
 Task = Callable[[str, int], Callable[[int], None]]
 Found = tuple[dict[str, Any], str]
 
-SIGMAS = (0.25, 0.5, 1.048, 2.0, 4.0)
+SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
 """Noise of a stimulus, JOD, that the sweep of the observer covers."""
 
 POWER_OBSERVERS, POWER_ANSWERS = (6, 12, 24, 48), (4, 12)
@@ -145,7 +145,7 @@ def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame
     filters = list(dict.fromkeys(trials["time_filter"]))
     alone = trials.loc[trials["time_filter"] == filters[0]]
     for column, name in (("scene", "scenes"), ("point_set", "point_sets")):
-        values = list(dict.fromkeys(alone[column]))
+        values = sorted(set(alone[column]))
         rows = {value: analyses.fit_row(alone.loc[alone[column] == value], 0, options.seed) for value in values}
         save(plots.psychometric_figure(alone, column, rows, kind), options.out / f"{name}.png")
         for value in values:
@@ -165,6 +165,6 @@ def _text(fitted: pd.DataFrame, tested: pd.DataFrame, kind: str) -> str:
     for row in tested.to_dict("records"):
         if not pd.isna(row["thesis_p"]):
             what = f"{row['first']} against {row['second']} at {row['samples']:.0f}"
-            found = f"t({row['degrees']:.0f}) = {row['t']:.2f}, p = {row['p']:.4f}"
-            lines.append(f"{what}: {found}; thesis p = {row['thesis_p']:.4f}")
+            found = f"t({row['degrees']:.0f}) = {row['t']:.2f}, p = {row['p']:.2g}"
+            lines.append(f"{what}: {found}; thesis p = {row['thesis_p']:.2g}")
     return "\n".join(lines)
