@@ -3,7 +3,11 @@
 In the unit space of the rectangle the relief is the sheet ``z = (h(x, y) - 1) depth`` over the square [-1, 1]², ``h``
 bilinear between the samples of its map. It is marched in even steps until the ray has passed through the sheet, from
 either side, and the crossing is then found by secants (Policarpo, Oliveira and Comba 2005; Tatarchuk 2006). The sheet
-has no walls: rays that leave over the border go on.
+has two sides and no walls, as a displaced mesh has none: rays that leave over the border go on.
+
+A step is at most ``2 / steps`` of the unit space wide. What a ray enters and leaves within one step may be missed: a
+ridge or groove that is narrower than ``width / steps`` samples of the map. Of several crossings within one step any may
+be taken.
 """
 
 from __future__ import annotations
@@ -26,8 +30,11 @@ def height_sample(scene: SceneData, level: LevelRecord, column: wp.int32, row: w
 
 
 @wp.func
-def height_at(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32) -> wp.float32:
-    """Height between 0 and 1 at a point of the square; row 0 of the map is at ``y = 1``."""
+def height_patch(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32) -> wp.vec3:
+    """Height between 0 and 1 at a point of the square, and its derivatives by x and y within the bilinear patch there.
+
+    Row 0 of the map is at ``y = 1``.
+    """
     across = (0.5 * x + 0.5) * wp.float32(level.width) - 0.5
     down = (0.5 - 0.5 * y) * wp.float32(level.height) - 0.5
     left = wp.floor(across)
@@ -35,10 +42,23 @@ def height_at(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32
     column = wp.int32(left)
     row = wp.int32(top)
     fx = across - left
-    upper = height_sample(scene, level, column, row) * (1.0 - fx) + height_sample(scene, level, column + 1, row) * fx
-    lower = height_sample(scene, level, column, row + 1)
-    lower = lower * (1.0 - fx) + height_sample(scene, level, column + 1, row + 1) * fx
-    return upper + (lower - upper) * (down - top)
+    fy = down - top
+    a = height_sample(scene, level, column, row)
+    b = height_sample(scene, level, column + 1, row)
+    c = height_sample(scene, level, column, row + 1)
+    d = height_sample(scene, level, column + 1, row + 1)
+    upper = a * (1.0 - fx) + b * fx
+    lower = c * (1.0 - fx) + d * fx
+    east = ((b - a) * (1.0 - fy) + (d - c) * fy) * 0.5 * wp.float32(level.width)
+    north = (upper - lower) * 0.5 * wp.float32(level.height)
+    return wp.vec3(upper + (lower - upper) * fy, east, north)
+
+
+@wp.func
+def height_at(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32) -> wp.float32:
+    """Height between 0 and 1 at a point of the square."""
+    patch = height_patch(scene, level, x, y)
+    return patch[0]
 
 
 @wp.func
@@ -94,43 +114,65 @@ def crossing(
 
 
 @wp.func
+def passage(relief: ReliefRecord, origin: wp.vec3, direction: wp.vec3, reach: wp.float32):
+    """A ray's way through the box around a relief: distance to it, where it enters, and how far it goes from there.
+
+    The last is negative for none. The entry is put on the face of the box exactly and the way measured from it:
+    otherwise a ray from afar is rounded by more than a shallow relief is deep, and passes it unseen.
+    """
+    # a little more than the sheet fills, so that its highest and lowest parts are not on the very border
+    lower = wp.vec3(-1.0, -1.0, -1.0001 * relief.depth)
+    upper = wp.vec3(1.0, 1.0, 0.0001 * relief.depth)
+    near = wp.float32(0.0)
+    far = wp.float32(reach)
+    entered = wp.int32(-1)
+    for axis in range(3):
+        if wp.abs(direction[axis]) > _TINY:
+            a = (lower[axis] - origin[axis]) / direction[axis]
+            b = (upper[axis] - origin[axis]) / direction[axis]
+            far = wp.min(far, wp.max(a, b))
+            if wp.min(a, b) > near:
+                near = wp.min(a, b)
+                entered = axis
+        elif origin[axis] < lower[axis] or origin[axis] > upper[axis]:
+            far = wp.float32(-1.0)
+    start = origin + near * direction
+    way = wp.float32(reach - near)
+    for axis in range(3):
+        start[axis] = wp.clamp(start[axis], lower[axis], upper[axis])
+        if entered == axis:
+            start[axis] = wp.where(direction[axis] > 0.0, lower[axis], upper[axis])
+        if wp.abs(direction[axis]) > _TINY:
+            leave = wp.where(direction[axis] > 0.0, upper[axis], lower[axis])
+            way = wp.min(way, (leave - start[axis]) / direction[axis])
+    if near > far:
+        way = wp.float32(-1.0)
+    return near, start, way
+
+
+@wp.func
 def relief_distance(
     scene: SceneData, record: InstanceRecord, origin: wp.vec3, direction: wp.vec3, reach: wp.float32
 ) -> wp.float32:
     """Distance along a unit direction to a relief in its unit space, negative for none before ``reach``.
 
     The whole width of the relief is crossed in its number of steps, a part of it in as many fewer, and a ray straight
-    down in a few. What is thinner than a step may be missed.
+    down in a few.
     """
     relief = scene.reliefs[record.relief]
-    near = wp.float32(0.0)
-    far = wp.float32(reach)
-    for axis in range(3):
-        low = wp.float32(-1.0)
-        high = wp.float32(1.0)
-        if axis == 2:
-            # a little more than the sheet fills, so that its highest and lowest parts are not on the very border
-            low = -1.0001 * relief.depth
-            high = 0.0001 * relief.depth
-        if wp.abs(direction[axis]) > _TINY:
-            a = (low - origin[axis]) / direction[axis]
-            b = (high - origin[axis]) / direction[axis]
-            near = wp.max(near, wp.min(a, b))
-            far = wp.min(far, wp.max(a, b))
-        elif origin[axis] < low or origin[axis] > high:
-            return -1.0
-    if near >= far:
+    near, start, way = passage(relief, origin, direction, reach)
+    if way <= 0.0:
         return -1.0
-    across = wp.length(wp.vec2(direction[0], direction[1])) * (far - near)
+    across = wp.length(wp.vec2(direction[0], direction[1])) * way
     steps = wp.max(wp.int32(wp.ceil(0.5 * across * wp.float32(relief.steps))), _FEWEST_STEPS)
-    step = (far - near) / wp.float32(steps)
-    t = wp.float32(near)
-    gap = above_sheet(scene, relief, origin, direction, t)
+    step = way / wp.float32(steps)
+    t = wp.float32(0.0)
+    gap = above_sheet(scene, relief, start, direction, t)
     for number in range(steps):
-        next_t = near + wp.float32(number + 1) * step
-        next_gap = above_sheet(scene, relief, origin, direction, next_t)
+        next_t = wp.float32(number + 1) * step
+        next_gap = above_sheet(scene, relief, start, direction, next_t)
         if (gap < 0.0) != (next_gap < 0.0):
-            return crossing(scene, relief, origin, direction, t, next_t, gap, next_gap)
+            return near + crossing(scene, relief, start, direction, t, next_t, gap, next_gap)
         t = next_t
         gap = next_gap
     return -1.0
@@ -149,11 +191,11 @@ def relief_surface(scene: SceneData, record: InstanceRecord, hit: Hit, point: wp
     tall = 1.0 / wp.float32(level.height)
     x = point[0]
     y = point[1]
-    # slopes of the patch: exact from differences within it, of a tenth of a sample
-    east = slope(scene, relief, level, x, y, 0.1 * wide, 0.0)
-    north = slope(scene, relief, level, x, y, 0.0, 0.1 * tall)
+    patch = height_patch(scene, level, x, y)
+    east = patch[1] * relief.depth
+    north = patch[2] * relief.depth
     local = LocalSurface()
-    local.position = wp.vec3(x, y, (height_at(scene, level, x, y) - 1.0) * relief.depth)
+    local.position = wp.vec3(x, y, (patch[0] - 1.0) * relief.depth)
     local.geometric_normal = wp.normalize(wp.vec3(-east, -north, 1.0))
     local.normal = wp.normalize(
         wp.vec3(

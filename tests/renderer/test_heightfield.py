@@ -159,6 +159,29 @@ def test_extremes_of_size_stay_free_of_false_shadows(depth: float, scale: float)
     assert (colors(Scene(camera, (relief,), (sun,)), grid(64)) > 0.0).mean() > 0.999
 
 
+@pytest.mark.parametrize("depth", [1e-4, 1e-2, 1.0])
+@pytest.mark.parametrize("distance", [3.0, 1e4])
+def test_a_relief_is_met_from_afar_however_shallow(depth: float, distance: float) -> None:
+    """Seen from above at a slant it covers what its rectangle covers, but for the way its depth shifts it."""
+    camera = PerspectiveCamera(
+        look_at((0.0, -0.6 * distance, 0.8 * distance), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        2.0 * np.degrees(np.arctan(1.4 / distance)),
+    )
+    shapes = (HeightField(GLOW, hills(), depth), GLOW)
+    field, flat = (colors(Scene(camera, (Instance(Rectangle(), one),)), grid(96)) > 0.0 for one in shapes)
+    assert flat.mean() > 0.2
+    assert (field != flat).mean() < 0.01 + 0.6 * depth
+
+
+def test_points_at_the_very_top_of_the_relief_are_met() -> None:
+    """Rays within the plane of the rectangle, along a ledge as high as it."""
+    height = np.zeros((8, 8), np.float32)
+    height[:, 4:] = 1.0
+    camera = OrthographicCamera(look_at((-3.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), 0.05)
+    seen = colors(Scene(camera, (Instance(Rectangle(), HeightField(GLOW, height, 0.5)),)), grid(33))
+    assert seen.reshape(33, 33)[17:].all() and not seen.reshape(33, 33)[:16].any()
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6), st.sampled_from([(1, 1), (1, 7), (9, 2)]))
 def test_nothing_is_ever_not_a_number(place_and_aim: list[float], shape: tuple[int, int]) -> None:
