@@ -86,12 +86,13 @@ def _run(
 
     plan = SamplePlan(
         combination.samples,
-        combination.point_set,  # type: ignore[arg-type]
+        combination.points,  # type: ignore[arg-type]
         options.seed,
         options.space_filter,
         options.sigma_px,
         combination.time_filter,  # type: ignore[arg-type]
         options.box_share,
+        combination.shift,  # type: ignore[arg-type]
     )
     folder = options.out / combination.name
     if previous_job(folder) != config_hash:

@@ -19,7 +19,7 @@ from analysis.tracer_options import PointSetOptions
 if TYPE_CHECKING:
     from torch import Tensor
 
-SETS = ("hammersley", "stratified", "poisson", "halton", "sobol", "random")
+SETS = ("hammersley", "stratified", "poisson", "halton", "sobol", "owen", "random")
 INTEGRANDS = ("static edge", "moving edge", "smooth")
 Points = Float[NDArray[np.float64], "n 3"]
 
@@ -33,7 +33,7 @@ def evenness(points: Points) -> dict[str, float]:
         pixel, over that of the hexagonal packing; ``cells``: share of the cells of a cubic grid of ``n`` that hold
         exactly one; ``strata``: share of ``n`` even intervals that do, mean over the axes.
     """
-    from renderer.sampling import packing_distance
+    from renderer.point_sets import packing_distance
 
     count, side = len(points), round(len(points) ** (1 / 3))
     found = {"discrepancy": _discrepancy(points)}
@@ -114,7 +114,7 @@ def squared_error(points: Points, found: Integrands, shifts: Float[NDArray[np.fl
 
 def measure(options: PointSetOptions, tick: Callable[[], None]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Tables of evenness, and of errors by integrand; a row a set and level."""
-    from renderer.sampling import point_set
+    from renderer.point_sets import point_set
 
     even, errors = [], []
     for name, level in itertools.product(SETS, sorted(set(options.levels))):

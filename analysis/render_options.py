@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from analysis.tracer_options import PointSetName
 from tsar.config import require
 
 _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
@@ -31,8 +32,10 @@ class RenderOptions:
     samples: int = 0
     """Instead of that regular grid, this many samples of a point set per pixel, spread over the time the shutter is
     open as well."""
-    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    point_set: PointSetName = "hammersley"
     """The point set; stratified takes cubes of samples only."""
+    shift: Literal["white", "blue"] = "white"
+    """How far each pixel shifts it: independently of its neighbours, or by spatiotemporal blue noise."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture, of point sets."""
     time_filter: Literal["box", "triangle"] = "box"

@@ -51,7 +51,7 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
     Raises:
         ValueError: there is no such scene, or the point set cannot have so many points.
     """
-    from renderer.sampling import point_set
+    from renderer.point_sets import point_set
     from scenes import catalog
 
     film = catalog.load(options.scene).film

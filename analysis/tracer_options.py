@@ -12,6 +12,20 @@ import tyro
 from analysis.farm import FarmOptions
 from tsar.config import require
 
+PointSetName = Literal[
+    "hammersley",
+    "stratified",
+    "poisson",
+    "halton",
+    "sobol",
+    "owen",
+    "cells-even",
+    "cells-space",
+    "cells-time",
+    "random",
+]
+"""Of ``renderer.point_sets``, which takes long to import."""
+
 LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
 """Samples per pixel of the motion-blur perception study."""
 
@@ -28,7 +42,7 @@ class GalleryOptions:
     """Height, pixels."""
     samples: int = 64
     """Samples per pixel; a cube for the point set stratified."""
-    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    point_set: PointSetName = "hammersley"
     """Where in the pixel and when in the shutter's time they lie."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
@@ -118,7 +132,7 @@ class TileOptions:
     """Height, pixels; 0 takes that of the scene's film."""
     samples: int = 32
     """Samples per pixel; a cube for the point set stratified."""
-    point_set: Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"] = "hammersley"
+    point_set: PointSetName = "hammersley"
     """Where in the pixel and when in the shutter's time they lie."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""

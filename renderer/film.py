@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -123,40 +124,36 @@ def write_image(path: Path, image: Float[Tensor, "h w 3"]) -> int:
     return writers[ending](path, image)
 
 
-class Mp4Writer:
-    """An H.264 film (MPEG-4 part 2 where there is no encoder for it), written frame by frame.
+class _FilmWriter:
+    """A film, written frame by frame.
 
-    A context manager: the file appears under its name when the block ends well. 8-bit frames of even width and height.
+    A context manager: the file appears under its name when the block ends well. 8-bit frames.
 
     Attributes:
         frames: how many were written.
     """
 
-    def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:
-        """Raises FilmError if a size is odd or the file cannot be written."""
-        if width_px % 2 or height_px % 2 or min(width_px, height_px) < 2:
-            raise FilmError(f"{path}: MP4 needs an even width and height, got {width_px} x {height_px}")
+    def __init__(self, path: Path, fps: float, width_px: int, height_px: int) -> None:
+        """Raises FilmError if the rate is none or the file cannot be written."""
         if not fps > 0:
             raise FilmError(f"{path}: expected a positive frame rate, got {fps}")
         self.path, self.frames = path, 0
-        self._size, self._fps, self._crf = (width_px, height_px), fps, crf
+        self._size, self._fps = (width_px, height_px), fps
         self._placing = _placed(path)
 
-    def __enter__(self) -> Mp4Writer:
+    def _add_stream(self, container: Any) -> Any:
+        """The stream of frames of a container, set up."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
         import av
         from av.error import FFmpegError
 
         temporary = self._placing.__enter__()
         try:
-            self._container = av.open(str(temporary), mode="w")
-            codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
-            self._stream = self._container.add_stream(codec, rate=_fraction(self._fps))
+            self._container = av.open(str(temporary), mode="w", options={"fflags": "+bitexact"})
+            self._stream = self._add_stream(self._container)
             self._stream.width, self._stream.height = self._size
-            self._stream.pix_fmt = "yuv420p"
-            if codec == "libx264":
-                self._stream.options = {"crf": str(self._crf), "preset": "veryfast"}
-            else:
-                self._stream.bit_rate = max(1_000_000, int(4 * self._size[0] * self._size[1] * self._fps / 8))
         except (FFmpegError, OSError) as error:
             self._placing.__exit__(FilmError, FilmError(), None)
             raise FilmError(f"{self.path}: cannot be written ({error})") from None
@@ -193,6 +190,43 @@ class Mp4Writer:
         except (FFmpegError, OSError) as error:
             return FilmError(f"{self.path}: cannot be written ({error})")
         return None
+
+
+class Mp4Writer(_FilmWriter):
+    """An H.264 film (MPEG-4 part 2 where there is no encoder for it), of even width and height."""
+
+    def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:
+        """Raises FilmError if a size is odd, the rate is none or the file cannot be written."""
+        if width_px % 2 or height_px % 2 or min(width_px, height_px) < 2:
+            raise FilmError(f"{path}: MP4 needs an even width and height, got {width_px} x {height_px}")
+        super().__init__(path, fps, width_px, height_px)
+        self._crf = crf
+
+    def _add_stream(self, container: Any) -> Any:
+        import av
+
+        codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
+        stream = container.add_stream(codec, rate=_fraction(self._fps))
+        stream.pix_fmt = "yuv420p"
+        if codec == "libx264":
+            stream.options = {"crf": str(self._crf), "preset": "veryfast"}
+        else:
+            stream.bit_rate = max(1_000_000, int(4 * self._size[0] * self._size[1] * self._fps / 8))
+        return stream
+
+
+class LosslessWriter(_FilmWriter):
+    """A film that keeps every 8-bit value: FFV1 in Matroska (RFC 9043, RFC 9559).
+
+    The same frames give the same bytes.
+    """
+
+    def _add_stream(self, container: Any) -> Any:
+        stream = container.add_stream("ffv1", rate=_fraction(self._fps))
+        stream.pix_fmt = "bgr0"
+        stream.codec_context.thread_count = 1
+        stream.options = {"level": "3", "slicecrc": "1", "flags": "+bitexact"}
+        return stream
 
 
 def _fraction(fps: float):

@@ -1,16 +1,15 @@
-"""Where in a pixel and when in the shutter's time samples lie: point sets, shifts and warps.
+"""Where in a pixel and when in the shutter's time samples lie: shifts and warps of point sets.
 
 A pixel's samples are a point set (u, v, t) in the unit cube, shifted round the torus by an amount of its own, then
 warped so that even points become those of the reconstruction filter (filter importance sampling): their colours count
 alike.
 
-Source: motion-blur perception thesis, chapters 2 (point sets, filters) and 3 (shift, warps; figs 14 and 16).
+Source: motion-blur perception thesis, chapters 2 (filters) and 3 (shift, warps; figs 14 and 16).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -18,122 +17,11 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
-Points = Float[NDArray[np.float64], "n 3"]
-PointSet = Literal["hammersley", "stratified", "poisson", "halton", "sobol", "random"]
-POINT_SETS: tuple[PointSet, ...] = ("hammersley", "stratified", "poisson", "halton", "sobol", "random")
-
-COUNT_MAX = 1 << 16
-"""Points of a set at most."""
-
-BELOW_ONE = float(np.nextafter(1.0, 0.0))
-
-_POISSON_MAX = 4096
-_POISSON_START = 0.75  # share of the densest packing's distance to begin with: darts alone reach about 0.7
-_POISSON_TRIES = 4096
-
-
-def point_set(name: PointSet, count: int, seed: int = 0) -> Points:
-    """Points ``(u, v, t)`` in [0, 1)³, float64.
-
-    Args:
-        name: ``hammersley`` (even in u, radical inverses to bases 2 and 3 in v and t), ``stratified`` (one random point
-            in each cell of a cubic grid), ``poisson`` (no two closer than a distance round the torus), ``halton`` and
-            ``sobol`` (both scrambled), ``random``.
-        count: how many, at most 65,536; for ``stratified`` a cube.
-        seed: of all but ``hammersley``.
-
-    Raises:
-        ValueError: for another name, or a count that the set cannot have.
-    """
-    if name not in _MAKERS:
-        raise ValueError(f"point set: expected one of {', '.join(POINT_SETS)}, got {name!r}")
-    most = _POISSON_MAX if name == "poisson" else COUNT_MAX
-    if not 1 <= count <= most:
-        raise ValueError(f"point set {name}: expected 1 to {most} points, got {count}")
-    points = np.minimum(_MAKERS[name](count, np.random.default_rng([seed, count])), BELOW_ONE)
-    points.flags.writeable = False
-    return points
-
-
-def _hammersley(count: int, _rng: np.random.Generator) -> Points:
-    inverses = qmc.Halton(2, scramble=False).random(count)
-    return np.column_stack([np.arange(count) / count, inverses])
-
-
-def _stratified(count: int, rng: np.random.Generator) -> Points:
-    side = round(count ** (1.0 / 3.0))
-    if side**3 != count:
-        below = math.floor(count ** (1.0 / 3.0) + 1e-9)
-        raise ValueError(
-            f"point set stratified: expected a cube of samples, such as {max(below, 1) ** 3} or {(below + 1) ** 3}, "
-            f"got {count}"
-        )
-    cells = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    return (cells + rng.random((count, 3))) / side
-
-
-def _poisson(count: int, rng: np.random.Generator) -> Points:
-    """Darts that keep a distance; where no more fit, the distance shrinks, so that this ends."""
-    radius = _POISSON_START * packing_distance(count)
-    points = np.empty((count, 3))
-    placed, tries = 0, 0
-    while placed < count:
-        darts = rng.random((256, 3))
-        far = toroidal_distance(darts[:, None], points[None, :placed]).min(axis=1, initial=np.inf) >= radius
-        for dart in darts[far]:
-            if placed < count and toroidal_distance(dart, points[:placed]).min(initial=np.inf) >= radius:
-                points[placed] = dart
-                placed, tries = placed + 1, 0
-        tries += len(darts)
-        if tries > _POISSON_TRIES:
-            radius, tries = 0.985 * radius, 0
-    return points
-
-
-def packing_distance(count: int) -> float:
-    """Least distance between ``count`` points of the unit torus in the densest packing of space (Gauss 1831)."""
-    return (math.sqrt(2.0) / count) ** (1.0 / 3.0)
-
-
-def toroidal_distance(
-    a: Float[NDArray[np.float64], "*n 3"], b: Float[NDArray[np.float64], "*n 3"]
-) -> Float[NDArray[np.float64], "*n"]:
-    """Distance in the unit cube whose opposite faces are one."""
-    apart = np.abs(a - b)
-    return np.linalg.norm(np.minimum(apart, 1.0 - apart), axis=-1)
-
-
-def _halton(count: int, rng: np.random.Generator) -> Points:
-    return qmc.Halton(3, scramble=True, rng=rng).random(count)
-
-
-def _sobol(count: int, rng: np.random.Generator) -> Points:
-    return qmc.Sobol(3, scramble=True, rng=rng).random_base2(max(count - 1, 0).bit_length())[:count]
-
-
-def _random(count: int, rng: np.random.Generator) -> Points:
-    return rng.random((count, 3))
-
-
-_MAKERS: dict[str, Callable[[int, np.random.Generator], Points]] = {
-    "hammersley": _hammersley,
-    "stratified": _stratified,
-    "poisson": _poisson,
-    "halton": _halton,
-    "sobol": _sobol,
-    "random": _random,
-}
+from renderer.blue_noise import FRAMES, SIDE_PX, mask
+from renderer.point_sets import GOLDEN, Points, PointSet, mixed_words, point_set
 
 # --- shifts ----------------------------------------------------------------------------------------------------------
-
-
-def _mixed(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """A bijection of 64-bit words without visible structure; constants of SplitMix64 (Steele et al. 2014)."""
-    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return words ^ (words >> np.uint64(31))
 
 
 def pixel_shift(
@@ -143,14 +31,34 @@ def pixel_shift(
 
     A function of its arguments alone: the same whatever the order of pixels, threads or machines.
     """
-    golden = np.uint64(0x9E3779B97F4A7C15)
     key = np.zeros(len(column), np.uint64)
     with np.errstate(over="ignore"):
         for part in (np.uint64(seed), np.uint64(frame), np.asarray(column, np.uint64), np.asarray(row, np.uint64)):
-            key = _mixed((key ^ part) + golden)
-        axes = np.stack([_mixed(key + golden * np.uint64(axis + 1)) for axis in range(3)], axis=1)
+            key = mixed_words((key ^ part) + GOLDEN)
+        axes = np.stack([mixed_words(key + GOLDEN * np.uint64(axis + 1)) for axis in range(3)], axis=1)
     return (axes >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
+
+_CHANNELS = ((0, 0, 0), (5, 23, 37), (11, 47, 13))  # how far apart in the mask u, v and t are read
+
+
+def blue_shift(
+    seed: int, column: Int[NDArray[np.int64], " n"], row: Int[NDArray[np.int64], " n"], frame: int = 0
+) -> Points:
+    """Shifts as those of :func:`pixel_shift`, but of spatiotemporal blue noise: errors of neighbours, and of one pixel
+    in frames that follow each other, differ, and so are less seen.
+
+    Source: Georgiev and Fajardo 2016, "Blue-noise dithered sampling"; see :mod:`renderer.blue_noise`.
+    """
+    of_seed = np.random.default_rng([seed, 0xB1E]).integers(0, (FRAMES, SIDE_PX, SIDE_PX))
+    axes = []
+    for channel in _CHANNELS:
+        later, down, across = of_seed + channel
+        axes.append(mask()[(frame + later) % FRAMES, (row + down) % SIDE_PX, (column + across) % SIDE_PX])
+    return np.stack(axes, axis=1)
+
+
+_SHIFTS = {"white": pixel_shift, "blue": blue_shift}
 
 # --- warps -----------------------------------------------------------------------------------------------------------
 
@@ -205,12 +113,16 @@ class SamplePlan:
     """Reconstruction filter over the time the shutter is open."""
     box_share: float = 1.0
     """The middle part of that time which a box spans; the thesis has 0.5."""
+    shift: Literal["white", "blue"] = "white"
+    """How far each pixel shifts the points: independently of its neighbours, or by spatiotemporal blue noise."""
     new_set_each_frame: bool = False
     """Whether every frame has a point set of its own, rather than all the same."""
 
     def __post_init__(self) -> None:
         if self.space_filter not in ("box", "gaussian") or self.time_filter not in ("box", "triangle"):
             raise ValueError(f"SamplePlan: no such filter: {self.space_filter!r}, {self.time_filter!r}")
+        if self.shift not in _SHIFTS:
+            raise ValueError(f"SamplePlan.shift: expected one of {', '.join(_SHIFTS)}, got {self.shift!r}")
         if not 0.0 < self.sigma_px < math.inf:
             raise ValueError(f"SamplePlan.sigma_px: expected a positive number, got {self.sigma_px}")
         if not 0.0 < self.box_share <= 1.0:
@@ -235,7 +147,7 @@ class SamplePlan:
         others are asked for.
         """
         points = _cached_set(self.point_set, self.samples_per_pixel, self.seed + self.new_set_each_frame * frame)
-        shifted = points[None] + pixel_shift(self.seed, columns, rows, frame)[:, None]
+        shifted = points[None] + _SHIFTS[self.shift](self.seed, columns, rows, frame)[:, None]
         shifted -= shifted >= 1.0
         u, v, t = np.moveaxis(shifted, -1, 0)
         if self.space_filter == "gaussian":

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from renderer.film import Mp4Writer, write_image
+from renderer.film import LosslessWriter, Mp4Writer, write_image
 
 
 def still_path(folder: Path, number: int, ending: str) -> Path:
@@ -46,6 +47,20 @@ def render_stills(
             rendered += 1
         done(count + 1)
     return rendered, nonfinite
+
+
+def write_lossless(frames: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> None:
+    """Joins 8-bit frames ``(h, w, 3)`` of equal size into a film that keeps every value.
+
+    Raises:
+        FilmError: the film cannot be written.
+    """
+    rest = iter(frames)
+    first = next(rest)
+    with LosslessWriter(path, fps, first.shape[1], first.shape[0]) as film:
+        film.add(first)
+        for frame in rest:
+            film.add(frame)
 
 
 def write_film(stills: Sequence[Path], path: Path, fps: float) -> None:

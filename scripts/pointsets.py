@@ -33,7 +33,8 @@ def main() -> None:
     from analysis.records import provenance
     from analysis.tables import frame_table
     from renderer.film import encode_srgb
-    from renderer.sampling import box_warp, gaussian_warp, point_set, triangle_warp
+    from renderer.point_sets import point_set
+    from renderer.sampling import box_warp, gaussian_warp, triangle_warp
 
     config, count = dataclasses.asdict(options), itertools.count(1)
     with full_disk(options.out), bars() as shown:

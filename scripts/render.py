@@ -43,7 +43,11 @@ def main() -> None:
     with bad_input():
         renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
         kinds = options.point_set, options.seed, options.space_filter
-        plan = SamplePlan(options.samples, *kinds, time_filter=options.time_filter) if options.samples else None
+        plan = (
+            SamplePlan(options.samples, *kinds, time_filter=options.time_filter, shift=options.shift)
+            if options.samples
+            else None
+        )
         picture = pictures(renderer, plan or options.samples_per_axis, options.width_px, options.height_px)
     source = provenance(Path(__file__).parent.parent, options.job, scene=scene.name, device=options.device)
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:

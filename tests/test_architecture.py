@@ -39,6 +39,7 @@ WIRING = {
     "analysis/gallery.py": ("renderer", "scenes"),
     "analysis/ideal_density.py": ("tsar",),
     "analysis/jobs.py": ("renderer", "scenes"),
+    "analysis/perception/stimuli.py": ("renderer",),
     "analysis/point_sets.py": ("renderer", "scenes"),
     "analysis/spectrum.py": ("renderer", "scenes", "tsar"),
     "analysis/tiles.py": ("renderer", "scenes"),

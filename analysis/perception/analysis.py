@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.cli import InputError
 from analysis.perception.observers import COLUMNS
+from analysis.perception.peer import peer_fit
 from analysis.perception.psychometrics import FitError, correct_share, fit, paired
 
 THESIS_JND = {"planescene": 40.0, "spheresscene": 100.0}
@@ -52,17 +53,23 @@ def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
     return answered.assign(correct=answered["correct"].astype(bool)), str(kinds[0])
 
 
-def fits(trials: pd.DataFrame, bootstraps: int, seed: int) -> pd.DataFrame:
-    """Fits by scene, by scene and filter, by set and filter, and by all three; a row each."""
+def fits(trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> pd.DataFrame:
+    """Fits by scene, by scene and filter, by set and filter, and by all three; a row each.
+
+    Args:
+        trials: answered.
+        bootstraps, seed: of the intervals.
+        peer: whether psignifit fits the same data too.
+    """
     rows = []
     for keys in _GROUPS:
         for values in pd.DataFrame(trials, columns=list(keys)).drop_duplicates().to_dict("records"):
             same = np.all([trials[str(key)] == value for key, value in values.items()], axis=0)
-            rows.append({**values, **fit_row(trials.loc[same], bootstraps, seed)})
+            rows.append({**values, **fit_row(trials.loc[same], bootstraps, seed, peer)})
     return pd.DataFrame(rows)
 
 
-def fit_row(part: pd.DataFrame, bootstraps: int, seed: int) -> dict[str, Any]:
+def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> dict[str, Any]:
     """One fit as a row; a reason instead of numbers where there is none."""
     samples, right = np.asarray(part["samples"], np.int64), np.asarray(part["correct"], bool)
     levels = np.unique(samples)
@@ -73,7 +80,12 @@ def fit_row(part: pd.DataFrame, bootstraps: int, seed: int) -> dict[str, Any]:
     except FitError as error:
         return {"status": str(error), "trials": len(part), "observers": part["observer"].nunique()}
     low, high = found.interval or (np.nan, np.nan)
+    beside = {}
+    if peer and found.status == "within":
+        other = peer_fit(levels.tolist(), correct, asked)
+        beside = {"psignifit_jnd": other.jnd, "psignifit_low": other.interval[0], "psignifit_high": other.interval[1]}
     return {
+        **beside,
         "jnd": found.jnd, "low": low, "high": high, "status": found.status, "mu": found.mu, "sigma": found.sigma,
         "lapse": found.lapse, "trials": found.trials, "observers": part["observer"].nunique(),
     }  # fmt: skip

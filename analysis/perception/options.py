@@ -28,6 +28,10 @@ class StimuliOptions:
     """First frame of the sequence."""
     frames: int = 60
     """How many frames."""
+    format: Literal["png", "exr"] = "png"
+    """Of the frames; EXR is linear radiance, and shown as the PNG that it would be."""
+    video: bool = False
+    """Also write stimulus.mkv beside the frames of each, which keeps every 8-bit value (FFV1)."""
     box_share: float = 0.5
     """The middle part of the shutter's time that the box filter spans."""
     seed: int = 0
@@ -85,6 +89,8 @@ class AnalyseOptions:
     """Data sets drawn for each interval."""
     seed: int = 0
     """Of those, and of the table of power."""
+    psignifit: bool = False
+    """Also fit with psignifit, where it is installed (an extra), and show its thresholds beside ours."""
     power_repetitions: int = 40
     """Experiments simulated for each cell of the table of power; 0 leaves it out."""
     out: Path = Path("out/perception-analysis")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.perception.protocol import Session
+from analysis.perception.stimuli import png_of
 
 _HERE = Path(__file__).parent
 _PAGE = {"/": ("trial_page.html", "text/html"), "/trial_page.js": ("trial_page.js", "text/javascript")}
@@ -66,7 +67,7 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             row = session.rows[int(parts[0])]
             file = session.stimuli / row["folder"] / row["files"][int(parts[1])]
-            self._send(file.read_bytes(), "image/png")
+            self._send(png_of(file), "image/png")
         except (ValueError, IndexError, OSError):
             self.send_error(HTTPStatus.NOT_FOUND)
 

@@ -116,7 +116,7 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
         raise InputError(f"trials: {options.trials}: cannot be read as Parquet ({error})") from None
     trials, kind = analyses.checked_trials(table, str(options.trials))
     steps = task("analysis", 4)
-    fitted = analyses.fits(trials, options.bootstraps, options.seed)
+    fitted = analyses.fits(trials, options.bootstraps, options.seed, options.psignifit)
     steps(1)
     tested = analyses.comparisons(trials)
     steps(2)
@@ -160,6 +160,9 @@ def _text(fitted: pd.DataFrame, tested: pd.DataFrame, kind: str) -> str:
         jnd, beside = str(row["status"]), analyses.THESIS_JND.get(row["scene"])
         if jnd == "within":
             jnd = f"{row['jnd']:.1f} ({row['low']:.1f} – {row['high']:.1f})"
+            if np.isfinite(row.get("psignifit_jnd", np.nan)):
+                low, high = row["psignifit_low"], row["psignifit_high"]
+                jnd += f", by psignifit {row['psignifit_jnd']:.1f} ({low:.1f} – {high:.1f})"
         end = f"; thesis about {beside:.0f}" if beside else ""
         lines.append(f"{row['scene']}: JND {jnd} samples per pixel{end}")
     for row in tested.to_dict("records"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -36,6 +37,8 @@ def render_stimuli(
     Returns:
         The manifest: a row a stimulus, with its folder, number of frames and their hash.
     """
+    from renderer.sequence import write_lossless
+
     rows: list[dict[str, Any]] = []
     for job_file in options.jobs:
         job = JobOptions(
@@ -44,6 +47,7 @@ def render_stimuli(
             first_frame=options.first_frame,
             frames=options.frames,
             seed=options.seed,
+            format=options.format,
             box_share=options.box_share,
             threads=options.threads,
         )
@@ -52,9 +56,16 @@ def render_stimuli(
         folder = options.out / scene
         found = run_job(work, _placed(job, folder), config_hash(_content(job, work)), task)
         for combination, row in zip(work.job.combinations, found, strict=True):
-            files = [folder / combination.name / f"frame{number:05d}.png" for number in work.frames]
+            files = [folder / combination.name / f"frame{number:05d}.{options.format}" for number in work.frames]
+            video = {}
+            if options.video:
+                film = files[0].with_name("stimulus.mkv")
+                if row["rendered_now"] or not film.exists():
+                    write_lossless(map(read_frame, files), film, work.settings.frame_rate_hz)
+                video = {"video": film.name, "video_sha256": hash_of([film])}
             rows.append(
                 {
+                    **video,
                     "scene": scene,
                     "point_set": combination.point_set,
                     "time_filter": combination.time_filter,
@@ -104,6 +115,31 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"stimuli: expected {folder / MANIFEST}, written by the command 'stimuli' ({error})") from None
 
 
+def read_frame(file: Path) -> NDArray[np.uint8]:
+    """A frame ``(h, w, 3)`` as it is shown; one of linear radiance is encoded.
+
+    Raises:
+        OSError: the file cannot be opened.
+        FilmError: an EXR file cannot be read.
+    """
+    if file.suffix == ".exr":
+        import torch
+
+        from renderer.film import encode_srgb, read_exr
+
+        return encode_srgb(torch.as_tensor(read_exr(file)))
+    return np.asarray(Image.open(file).convert("RGB"))
+
+
+def png_of(file: Path) -> bytes:
+    """A frame as a PNG file."""
+    if file.suffix == ".png":
+        return file.read_bytes()
+    content = io.BytesIO()
+    Image.fromarray(read_frame(file)).save(content, format="PNG")
+    return content.getvalue()
+
+
 def frames_of(folder: Path, row: dict[str, Any]) -> NDArray[np.uint8]:
     """Frames ``(count, h, w, 3)`` of a stimulus.
 
@@ -114,7 +150,7 @@ def frames_of(folder: Path, row: dict[str, Any]) -> NDArray[np.uint8]:
     try:
         if hash_of(files) != row["sha256"]:
             raise InputError(f"stimuli: {folder / row['folder']}: expected the frames of the manifest, got others")
-        return np.stack([np.asarray(Image.open(file).convert("RGB")) for file in files])
+        return np.stack([read_frame(file) for file in files])
     except OSError as error:
         raise InputError(f"stimuli: {error.filename}: cannot be read ({error.strerror})") from None
 

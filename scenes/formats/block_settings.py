@@ -20,6 +20,10 @@ POINT_SET_NAMES = {
     "poisson": "poisson",
     "halton": "halton",
     "sobol": "sobol",
+    "owen": "owen",
+    "cells-even": "cells-even",
+    "cells-space": "cells-space",
+    "cells-time": "cells-time",
     "random": "random",
 }
 """Point sets by the names that files give them."""

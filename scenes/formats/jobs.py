@@ -2,6 +2,8 @@
 
 Seven lines: a name; how many sampling levels and which; how many point sets and which; how many time filters and which.
 
+A point set's name may end in ``+blue``: pixels then shift it by spatiotemporal blue noise.
+
 Source: motion-blur perception thesis, chapter 3, fig. 12.
 """
 
@@ -14,6 +16,8 @@ from pathlib import Path
 from scenes.canonical import SceneError
 from scenes.formats.block_settings import POINT_SET_NAMES, TIME_FILTERS
 
+BLUE = "+blue"
+
 _LINES = ("a name", "how many sampling levels", "the sampling levels", "how many point sets", "the point sets",
           "how many time filters", "the time filters")  # fmt: skip
 
@@ -25,6 +29,16 @@ class Combination:
     samples: int
     point_set: str
     time_filter: str
+
+    @property
+    def points(self) -> str:
+        """The point set without its shift."""
+        return self.point_set.removesuffix(BLUE)
+
+    @property
+    def shift(self) -> str:
+        """How pixels shift it: ``white`` or ``blue``."""
+        return "blue" if self.point_set.endswith(BLUE) else "white"
 
     @property
     def name(self) -> str:
@@ -68,13 +82,11 @@ def read_job(path: Path) -> Job:
         after = f"{path}:{lines[-1][0] if lines else 1}"
         raise SceneError(f"{after}: expected seven lines ({', '.join(_LINES)}), got {len(lines)}")
     levels = [_whole(word, f"{path}:{lines[2][0]}: sampling level") for word in _counted(path, lines, 1)]
-    point_sets = [
-        _one_of(word, POINT_SET_NAMES, f"{path}:{lines[4][0]}: point set") for word in _counted(path, lines, 3)
-    ]
+    point_sets = [_point_set(word, f"{path}:{lines[4][0]}: point set") for word in _counted(path, lines, 3)]
     filters = [_one_of(word, {name: name for name in TIME_FILTERS}, f"{path}:{lines[6][0]}: time filter")
                for word in _counted(path, lines, 5)]  # fmt: skip
     job = Job(" ".join(lines[0][1]), tuple(levels), tuple(point_sets), tuple(filters))
-    if "stratified" in job.point_sets:
+    if any(combination.points == "stratified" for combination in job.combinations):
         for level in job.levels:
             if round(level ** (1 / 3)) ** 3 != level:
                 raise SceneError(f"{path}:{lines[2][0]}: sampling level: expected cubes for stratifiedmc, got {level}")
@@ -96,6 +108,11 @@ def _whole(word: str, what: str) -> int:
     if not word.isdecimal() or int(word) < 1:
         raise SceneError(f"{what}: expected a whole number of at least 1, got {word!r}")
     return int(word)
+
+
+def _point_set(word: str, what: str) -> str:
+    name = word.removesuffix(BLUE)
+    return _one_of(name, POINT_SET_NAMES, what) + word[len(name) :]
 
 
 def _one_of(word: str, known: dict[str, str], what: str) -> str:

@@ -18,7 +18,7 @@ from analysis.point_sets import (
     slopes,
     squared_error,
 )
-from renderer.sampling import point_set
+from renderer.point_sets import point_set
 
 
 def grid(side: int) -> np.ndarray:

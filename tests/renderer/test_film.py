@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from renderer.film import FilmError, Mp4Writer, encode_srgb, read_exr, write_exr, write_image, write_png, write_ppm
+from renderer.sequence import write_lossless
 
 STILL = [write_exr, write_png, write_ppm]
 ENDING = {write_exr: ".exr", write_png: ".png", write_ppm: ".ppm"}
@@ -68,6 +69,17 @@ def test_ppm_is_a_header_and_bytes(tmp_path: Path) -> None:
 def test_encoding_is_the_nearest_srgb_code(value: float) -> None:
     code = int(encode_srgb(torch.full((1, 1, 3), value))[0, 0, 1])
     assert abs(code - srgb(value)) <= 0.5 + 1e-3
+
+
+def test_a_lossless_film_keeps_every_value_and_repeats(tmp_path: Path) -> None:
+    frames = np.random.default_rng(3).integers(0, 256, (4, 11, 17, 3), dtype=np.uint8)
+    for name in ("a.mkv", "b.mkv"):
+        write_lossless(iter(frames), tmp_path / name, 29.97)
+    with av.open(str(tmp_path / "a.mkv")) as film:
+        found = np.stack([frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)])
+        assert float(film.streams.video[0].average_rate or 0.0) == pytest.approx(29.97, abs=0.01)
+    np.testing.assert_array_equal(found, frames)
+    assert (tmp_path / "a.mkv").read_bytes() == (tmp_path / "b.mkv").read_bytes()
 
 
 @pytest.mark.parametrize("write", STILL)

@@ -240,9 +240,18 @@ def test_a_job_expands_to_all_combinations(tmp_path: Path) -> None:
         assert len(read_job(catalog.asset(built_in)).combinations) == 48
 
 
+def test_point_sets_may_be_shifted_by_blue_noise(tmp_path: Path) -> None:
+    path = tmp_path / "job.txt"
+    path.write_text("Plane\n1\n8\n2\nowen owen+blue\n1\nbox\n")
+    plain, blue = read_job(path).combinations
+    assert (plain.points, plain.shift, blue.points, blue.shift) == ("owen", "white", "owen", "blue")
+    assert blue.name == "owen+blue-box-0008"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ("poisson", "poisson+red", r"job.txt:6: point set: expected one of .*got 'poisson\+red'"),
         ("8\n1 8", "7\n1 8", r"job.txt:4: the sampling levels: expected 7, got 8"),
         ("27", "26", r"job.txt:4: sampling level: expected cubes for stratifiedmc, got 26"),
         ("poisson", "poison", r"job.txt:6: point set: expected one of .*got 'poison'"),

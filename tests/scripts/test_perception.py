@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
+import av
+import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
+from analysis.perception.stimuli import frames_of, hash_of, png_of
 from tests.analysis.perception.builders import write_stimuli
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
@@ -31,6 +36,39 @@ def test_stimuli_are_rendered_once_and_listed_with_their_hash(tmp_path: Path, mo
     assert [row["sha256"] for row in again["stimuli"]] == [row["sha256"] for row in manifest["stimuli"]]
 
 
+def test_stimuli_are_kept_linear_and_as_lossless_video(tmp_path: Path, monkeypatch, capsys) -> None:
+    job, out = tmp_path / "job.txt", tmp_path / "out"
+    job.write_text("Plane_scene\n1\n8\n2\nowen+blue cells-time\n1\ntriangle\n")
+    arguments = (
+        "stimuli",
+        str(job),
+        "--width-px",
+        "16",
+        "--frames",
+        "2",
+        "--format",
+        "exr",
+        "--video",
+        "--out",
+        str(out),
+    )
+    assert call_script("perception.py", monkeypatch, *arguments) == 0, capsys.readouterr().err
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert [row["point_set"] for row in manifest["stimuli"]] == ["owen+blue", "cells-time"]
+    for row in manifest["stimuli"]:
+        frames = frames_of(out, row)
+        film = out / row["folder"] / row["video"]
+        with av.open(str(film)) as container:
+            np.testing.assert_array_equal(
+                [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)], frames
+            )
+        assert hash_of([film]) == row["video_sha256"] and (frames > 0).any()
+        shown = Image.open(io.BytesIO(png_of(out / row["folder"] / row["files"][0])))
+        np.testing.assert_array_equal(np.asarray(shown), frames[0])
+    written = film.stat().st_mtime_ns
+    assert call_script("perception.py", monkeypatch, *arguments) == 0 and film.stat().st_mtime_ns == written
+
+
 def test_simulated_answers_and_their_analysis(tmp_path: Path, monkeypatch, capsys) -> None:
     stimuli = write_stimuli(tmp_path / "stimuli", side=48, frames=4, scenes=("planescene", "spheresscene"))
     trials, found = tmp_path / "trials", tmp_path / "found"
@@ -42,7 +80,7 @@ def test_simulated_answers_and_their_analysis(tmp_path: Path, monkeypatch, capsy
     assert jod["planescene", 1] > jod["planescene", 8] > jod["planescene", 64] == 0.0
     assert "differencing" in summary(trials)["task"] and (trials / "sigma_sweep.png").exists()
     file = str(trials / "trials-simulated.parquet")
-    analyse = ("analyse", file, "--bootstraps", "20", "--power-repetitions", "2", "--out", str(found))
+    analyse = ("analyse", file, "--bootstraps", "20", "--psignifit", "--power-repetitions", "2", "--out", str(found))
     assert call_script("perception.py", monkeypatch, *analyse) == 0, capsys.readouterr().err
     for name in ("scenes", "point_sets", "planescene", "hammersley"):
         assert (found / f"{name}.png").stat().st_size > 5_000

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
 
+from analysis.cli import InputError
+from analysis.perception.peer import peer_fit
 from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples
 
 LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
@@ -100,3 +103,22 @@ def test_paired_tests() -> None:
     assert paired([0.5], [0.4]) is None and paired([0.5, 0.6], [0.5, 0.6]) is None
     with pytest.raises(FitError):
         paired([0.5], [0.4, 0.3])
+
+
+@pytest.mark.parametrize(("jnd", "sigma"), [(30.0, 1.0), (100.0, 2.0)])
+def test_psignifit_finds_the_same_threshold(jnd: float, sigma: float) -> None:
+    pytest.importorskip("psignifit")
+    correct, trials = drawn(jnd, sigma, 144, 4), [144] * 8
+    ours, theirs = fit(LEVELS, correct, trials, 200), peer_fit(LEVELS, correct, trials)
+    low, high = ours.interval or (0.0, 0.0)
+    assert theirs.jnd == pytest.approx(ours.jnd, rel=0.15)
+    assert theirs.interval[0] < ours.jnd < theirs.interval[1] and low < theirs.jnd < high
+    assert (
+        0.6 < math.log(theirs.interval[1] / theirs.interval[0]) / math.log(high / low) < 3.0
+    )  # it is unsure of lapses too
+
+
+def test_without_psignifit_there_is_one_line(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "psignifit", None)
+    with pytest.raises(InputError, match=r"expected the package, got none; pip install"):
+        peer_fit(LEVELS, [10] * 8, [20] * 8)

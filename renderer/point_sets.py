@@ -1,0 +1,188 @@
+"""Point sets (u, v, t) in the unit cube: where in a pixel, and when in the shutter's time, samples lie.
+
+Source: motion-blur perception thesis, chapter 2; Owen 1995, "Randomly permuted (t, m, s)-nets and (t, s)-sequences".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Literal, get_args
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+Points = Float[NDArray[np.float64], "n 3"]
+PointSet = Literal[
+    "hammersley",
+    "stratified",
+    "poisson",
+    "halton",
+    "sobol",
+    "owen",
+    "cells-even",
+    "cells-space",
+    "cells-time",
+    "random",
+]
+POINT_SETS: tuple[PointSet, ...] = get_args(PointSet)
+
+COUNT_MAX = 1 << 16
+"""Points of a set at most."""
+
+BELOW_ONE = float(np.nextafter(1.0, 0.0))
+
+_POISSON_MAX = 4096
+_POISSON_START = 0.75  # share of the densest packing's distance to begin with: darts alone reach about 0.7
+_POISSON_TRIES = 4096
+
+GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+
+
+def mixed_words(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """A bijection of 64-bit words without visible structure; constants of SplitMix64 (Steele et al. 2014)."""
+    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return words ^ (words >> np.uint64(31))
+
+
+def point_set(name: PointSet, count: int, seed: int = 0) -> Points:
+    """Points ``(u, v, t)`` in [0, 1)³, float64.
+
+    Args:
+        name: ``hammersley`` (even in u, radical inverses to bases 2 and 3 in v and t), ``stratified`` (one random point
+            in each cell of a cubic grid), ``poisson`` (no two closer than a distance round the torus), ``halton`` and
+            ``sobol`` (scrambled digit by digit), ``owen`` (Sobol with Owen's nested scrambling), ``cells-even``,
+            ``cells-space``, ``cells-time`` (one random point in each cell of a grid with about as many, an eighth and
+            eight times as many cells in time as along a side of the pixel), ``random``.
+        count: how many, at most 65,536; for ``stratified`` a cube.
+        seed: of all but ``hammersley``.
+
+    Raises:
+        ValueError: for another name, or a count that the set cannot have.
+    """
+    if name not in _MAKERS:
+        raise ValueError(f"point set: expected one of {', '.join(POINT_SETS)}, got {name!r}")
+    most = _POISSON_MAX if name == "poisson" else COUNT_MAX
+    if not 1 <= count <= most:
+        raise ValueError(f"point set {name}: expected 1 to {most} points, got {count}")
+    points = np.minimum(_MAKERS[name](count, np.random.default_rng([seed, count])), BELOW_ONE)
+    points.flags.writeable = False
+    return points
+
+
+def _hammersley(count: int, _rng: np.random.Generator) -> Points:
+    inverses = qmc.Halton(2, scramble=False).random(count)
+    return np.column_stack([np.arange(count) / count, inverses])
+
+
+def _stratified(count: int, rng: np.random.Generator) -> Points:
+    side = round(count ** (1.0 / 3.0))
+    if side**3 != count:
+        below = math.floor(count ** (1.0 / 3.0) + 1e-9)
+        raise ValueError(
+            f"point set stratified: expected a cube of samples, such as {max(below, 1) ** 3} or {(below + 1) ** 3}, "
+            f"got {count}"
+        )
+    cells = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    return (cells + rng.random((count, 3))) / side
+
+
+def _poisson(count: int, rng: np.random.Generator) -> Points:
+    """Darts that keep a distance; where no more fit, the distance shrinks, so that this ends."""
+    radius = _POISSON_START * packing_distance(count)
+    points = np.empty((count, 3))
+    placed, tries = 0, 0
+    while placed < count:
+        darts = rng.random((256, 3))
+        far = toroidal_distance(darts[:, None], points[None, :placed]).min(axis=1, initial=np.inf) >= radius
+        for dart in darts[far]:
+            if placed < count and toroidal_distance(dart, points[:placed]).min(initial=np.inf) >= radius:
+                points[placed] = dart
+                placed, tries = placed + 1, 0
+        tries += len(darts)
+        if tries > _POISSON_TRIES:
+            radius, tries = 0.985 * radius, 0
+    return points
+
+
+def packing_distance(count: int) -> float:
+    """Least distance between ``count`` points of the unit torus in the densest packing of space (Gauss 1831)."""
+    return (math.sqrt(2.0) / count) ** (1.0 / 3.0)
+
+
+def toroidal_distance(
+    a: Float[NDArray[np.float64], "*n 3"], b: Float[NDArray[np.float64], "*n 3"]
+) -> Float[NDArray[np.float64], "*n"]:
+    """Distance in the unit cube whose opposite faces are one."""
+    apart = np.abs(a - b)
+    return np.linalg.norm(np.minimum(apart, 1.0 - apart), axis=-1)
+
+
+def _halton(count: int, rng: np.random.Generator) -> Points:
+    return qmc.Halton(3, scramble=True, rng=rng).random(count)
+
+
+def _sobol(count: int, rng: np.random.Generator) -> Points:
+    return qmc.Sobol(3, scramble=True, rng=rng).random_base2(max(count - 1, 0).bit_length())[:count]
+
+
+def _owen(count: int, rng: np.random.Generator) -> Points:
+    """Nested uniform scrambling: a bit is flipped or not by chance, by the bits before it alone."""
+    digits = qmc.Sobol(3, scramble=False, bits=32).random_base2(max(count - 1, 0).bit_length())[:count]
+    x = (digits * 2.0**32).astype(np.uint64)
+    keys = rng.integers(0, 1 << 63, 3, dtype=np.uint64)
+    flips = np.zeros_like(x)
+    with np.errstate(over="ignore"):
+        for bit in range(31, -1, -1):
+            above = (x >> np.uint64(bit + 1)) | (np.uint64(1) << np.uint64(31 - bit))  # marked with its length
+            flips |= (mixed_words(above * GOLDEN + keys) & np.uint64(1)) << np.uint64(bit)
+    return ((x ^ flips) + rng.random(x.shape)) * 2.0**-32
+
+
+def _cells(density_ratio: float) -> Callable[[int, np.random.Generator], Points]:
+    def make(count: int, rng: np.random.Generator) -> Points:
+        sides = np.array(cell_counts(count, density_ratio))
+        cells = np.stack(np.unravel_index(np.arange(count), sides), axis=1)
+        return (cells + rng.random((count, 3))) / sides
+
+    return make
+
+
+def cell_counts(count: int, density_ratio: float) -> tuple[int, int, int]:
+    """Sides (u, v, t) of the grid of ``count`` cells whose cells in time, over those along a side of the pixel, are
+    nearest to a ratio, and whose pixel is nearest to square; the former counts twice.
+    """
+
+    def far(sides: tuple[int, int, int]) -> float:
+        across, down, times = sides
+        return 2.0 * abs(math.log(times / math.sqrt(across * down) / density_ratio)) + math.log(across / down)
+
+    divisors = [number for number in range(1, count + 1) if count % number == 0]
+    grids = [
+        (count // times // down, down, times)
+        for times in divisors
+        for down in divisors
+        if count // times % down == 0 and down * down <= count // times
+    ]
+    return min(grids, key=far)
+
+
+def _random(count: int, rng: np.random.Generator) -> Points:
+    return rng.random((count, 3))
+
+
+_MAKERS: dict[str, Callable[[int, np.random.Generator], Points]] = {
+    "hammersley": _hammersley,
+    "stratified": _stratified,
+    "poisson": _poisson,
+    "halton": _halton,
+    "sobol": _sobol,
+    "owen": _owen,
+    "cells-even": _cells(1.0),
+    "cells-space": _cells(1.0 / 8.0),
+    "cells-time": _cells(8.0),
+    "random": _random,
+}
