@@ -5,6 +5,7 @@ Examples: python scripts/perception.py stimuli --width-px 128 --frames 20 --out 
           python scripts/perception.py serve ANNA --stimuli out/perception --out out/anna
           python scripts/perception.py adaptive fly-by chase --out out/perception-adaptive
           python scripts/perception.py analyse out/perception-simulated/trials-simulated.parquet
+          python scripts/perception.py recover
 """
 
 from __future__ import annotations
@@ -18,7 +19,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import writable_folder, write_json
-from analysis.perception.options import AdaptiveOptions, ServeOptions, SimulateOptions, Step, StimuliOptions
+from analysis.perception.options import (
+    AdaptiveOptions,
+    RecoverOptions,
+    ServeOptions,
+    SimulateOptions,
+    Step,
+    StimuliOptions,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -44,6 +52,8 @@ def main() -> None:
             found, text = steps.stimuli(options, config_hash, shown.task)
         elif isinstance(options, SimulateOptions):
             found, text = steps.simulate(options, shown.task)
+        elif isinstance(options, RecoverOptions):
+            found, text = steps.recover(options, shown.task)
         elif isinstance(options, AdaptiveOptions):
             found, text = steps.adaptive(options, shown.task)
         elif isinstance(options, ServeOptions):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.cli import InputError
 from analysis.perception.observers import COLUMNS
 from analysis.perception.peer import peer_fit
-from analysis.perception.psychometrics import FitError, correct_share, fit, paired
+from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples
 
 THESIS_JND = {"planescene": 40.0, "spheresscene": 100.0}
 """Samples per pixel, read off figures 19 and 20 of the thesis."""
@@ -26,6 +26,9 @@ THESIS_P = {
 }
 """p values of tables 1 and 2 of the thesis."""
 
+
+CONDITIONS = ("scene", "point_set", "time_filter")
+"""What trials differ in besides the level."""
 
 _GROUPS = (
     ("scene",),
@@ -92,10 +95,13 @@ def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) 
 
 
 def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
-    """Paired t-tests level by level: of scenes over observers and sets, of sets over observers and scenes."""
+    """Paired t-tests level by level: of scenes over observers, sets and filters, of sets over observers, scenes and
+    filters, of filters over observers, scenes and sets.
+    """
     rows = []
-    for column, other in (("scene", "point_set"), ("point_set", "scene")):
-        shares = trials.pivot_table("correct", [column, "observer", other], "samples")
+    for column in CONDITIONS:
+        others = [name for name in CONDITIONS if name != column]
+        shares = trials.pivot_table("correct", [column, "observer", *others], "samples")
         for first, second in itertools.combinations(sorted(set(trials[column])), 2):
             for samples in sorted(trials["samples"].unique()):
                 both = _side_by_side(shares, first, second, samples)
@@ -113,10 +119,70 @@ def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def strongest(tested: pd.DataFrame) -> pd.DataFrame:
+    """Of each pair of conditions the level where they differ most clearly, and its p times the number of levels
+    compared (Bonferroni), at most 1.
+    """
+    rows = []
+    asked = tested.loc[tested["p"].notna()]
+    for pair, part in asked.groupby(["of", "first", "second"], sort=False):
+        best = part.loc[part["p"].idxmin()]
+        row = {name: best[name] for name in ("samples", "t", "degrees", "p", "mean_difference")}
+        corrected = min(1.0, float(best["p"]) * len(part))
+        names = dict(zip(("of", "first", "second"), np.atleast_1d(np.asarray(pair)).tolist(), strict=True))
+        rows.append({**names, **row, "levels": len(part), "corrected_p": corrected})
+    return pd.DataFrame(rows)
+
+
 def _side_by_side(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:
     """Shares ``(cells, 2)`` of two conditions at one level, for the cells that have both."""
     found = [dict(shares[samples].xs(name).dropna().items()) for name in (first, second)]
     return np.array([(found[0][cell], found[1][cell]) for cell in found[0] if cell in found[1]]).reshape(-1, 2)
+
+
+def recovery(
+    levels: Sequence[int],
+    jnd: float,
+    sigma: float,
+    lapse: float,
+    trials: int,
+    experiments: int,
+    bootstraps: int,
+    seed: int,
+) -> dict[str, Any]:
+    """How well fits give back a known threshold.
+
+    Args:
+        levels: samples per pixel.
+        jnd, sigma, lapse: of the true function: threshold, width in octaves, lapse rate.
+        trials: answers at each level.
+        experiments: studies simulated.
+        bootstraps: of each interval.
+        seed: of all.
+
+    Returns:
+        The share of intervals that hold the threshold, with Wilson's 95 % interval of that share; the median of the
+        fitted thresholds over the true one, and that of the intervals' upper over their lower ends.
+    """
+    from scipy.stats import binomtest
+
+    mu = np.log2(jnd) - np.log2(threshold_samples(0.0, sigma, lapse))
+    share = correct_share(np.asarray(levels, np.float64), mu, sigma, lapse)
+    asked = [trials] * len(levels)
+    held, ratios, widths = 0, [], []
+    for number in range(experiments):
+        drawn = np.random.default_rng([seed, number]).binomial(trials, share).tolist()
+        found = fit(levels, drawn, asked, bootstraps, seed + number)
+        low, high = found.interval or (0.0, np.inf)
+        held += low <= jnd <= high
+        ratios.append(found.jnd / jnd)
+        widths.append(high / max(low, 1e-9))
+    between = binomtest(held, experiments).proportion_ci(method="wilson")
+    return {
+        "jnd": jnd, "sigma": sigma, "lapse": lapse, "coverage": held / experiments, "coverage_low": between.low,
+        "coverage_high": between.high, "jnd_ratio_median": float(np.median(ratios)),
+        "interval_ratio_median": float(np.median(widths)),
+    }  # fmt: skip
 
 
 def power(

@@ -104,6 +104,39 @@ class AnalyseOptions:
 
 
 @dataclass(frozen=True)
+class RecoverOptions:
+    """Draws answers from known psychometric functions; counts how often the fits' intervals hold their thresholds."""
+
+    jnds: tuple[float, ...] = (40.0, 100.0)
+    """True thresholds, samples per pixel; the thesis' are about 40 and 100."""
+    sigmas: tuple[float, ...] = (1.0, 2.0)
+    """Widths of the functions, octaves."""
+    lapses: tuple[float, ...] = (0.0, 0.03)
+    """Lapse rates."""
+    trials: int = 144
+    """Answers at each of the eight levels; 12 observers with 4 answers in 3 point sets are 144."""
+    experiments: int = 300
+    """Studies simulated for each function."""
+    bootstraps: int = 400
+    """Data sets drawn for each interval."""
+    seed: int = 0
+    """Of answers and bootstraps."""
+    out: Path = Path("out/perception-recovery")
+    """Folder for recovery.csv and summary.json."""
+
+    def __post_init__(self) -> None:
+        for jnd in self.jnds:
+            require(1.0 < jnd < 512.0, "jnds", "between 1 and 512", jnd)
+        for sigma in self.sigmas:
+            require(0.25 <= sigma <= 6.0, "sigmas", "between 0.25 and 6", sigma)
+        for lapse in self.lapses:
+            require(0.0 <= lapse <= 0.08, "lapses", "between 0 and 0.08", lapse)
+        require(1 <= self.trials <= 1_000_000, "trials", "between 1 and 1000000", self.trials)
+        require(1 <= self.experiments <= 100_000, "experiments", "between 1 and 100000", self.experiments)
+        require(20 <= self.bootstraps <= 100_000, "bootstraps", "between 20 and 100000", self.bootstraps)
+
+
+@dataclass(frozen=True)
 class ServeOptions:
     """Shows the trials to a person on a page of this machine; goes on where it was stopped."""
 
@@ -166,5 +199,6 @@ Step = (
     | Annotated[ServeOptions, tyro.conf.subcommand("serve")]
     | Annotated[AdaptiveOptions, tyro.conf.subcommand("adaptive")]
     | Annotated[AnalyseOptions, tyro.conf.subcommand("analyse")]
+    | Annotated[RecoverOptions, tyro.conf.subcommand("recover")]
 )
 """One step of the study, chosen by its name on the command line."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from itertools import count
+from itertools import count, product
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,18 @@ from analysis.files import atomic
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
 from analysis.perception.observers import TASK, drawn_observers, simulated_trials
-from analysis.perception.options import AdaptiveOptions, AnalyseOptions, ServeOptions, SimulateOptions, StimuliOptions
+from analysis.perception.options import (
+    AdaptiveOptions,
+    AnalyseOptions,
+    RecoverOptions,
+    ServeOptions,
+    SimulateOptions,
+    StimuliOptions,
+)
 from analysis.perception.protocol import Session
 from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, read_manifest, render_stimuli
+from analysis.tracer_options import LEVELS
 
 Task = Callable[[str, int], Callable[[int], None]]
 Found = tuple[dict[str, Any], str]
@@ -108,6 +116,26 @@ def adaptive(options: AdaptiveOptions, task: Task) -> Found:
     return {"rows": table.to_dict("records"), "thresholds": found.to_dict("records")}, "\n".join(lines)
 
 
+def recover(options: RecoverOptions, task: Task) -> Found:
+    """Fits answers drawn from known functions."""
+    cases = list(product(options.jnds, options.sigmas, options.lapses))
+    done, rows = task("functions", len(cases)), []
+    for case in cases:
+        sizes = options.trials, options.experiments, options.bootstraps
+        rows.append(analyses.recovery(LEVELS, *case, *sizes, options.seed))
+        done(len(rows))
+    table = pd.DataFrame(rows)
+    with atomic(options.out / "recovery.csv") as path:
+        table.to_csv(path, index=False)
+    lines = [
+        f"JND {row['jnd']:g}, width {row['sigma']:g} octaves, lapses {row['lapse']:g}: the 95 % interval holds it in "
+        f"{100 * row['coverage']:.1f} % ({100 * row['coverage_low']:.1f} – {100 * row['coverage_high']:.1f}), "
+        f"median of the fits over it {row['jnd_ratio_median']:.3f}"
+        for row in rows
+    ]
+    return {"rows": rows}, "\n".join(lines)
+
+
 def analyse(options: AnalyseOptions, task: Task) -> Found:
     """Fits, tests, power and figures from a table of trials."""
     try:
@@ -122,7 +150,8 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
     steps(2)
     _figures(options, trials, fitted, kind)
     steps(3)
-    tables = {"fits": fitted, "tests": tested}
+    pairs = analyses.strongest(tested)
+    tables = {"fits": fitted, "tests": tested, "pairs": pairs}
     if options.power_repetitions:
         levels = sorted(int(level) for level in trials["samples"].unique())
         jnds = (analyses.THESIS_JND["planescene"], analyses.THESIS_JND["spheresscene"])
@@ -135,11 +164,13 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
         with atomic(options.out / f"{name}.csv") as path:
             rows.to_csv(path, index=False)
     found = {name: rows.to_dict("records") for name, rows in tables.items()}
-    return {"observer_kind": kind, "thesis_jnd": analyses.THESIS_JND, **found}, _text(fitted, tested, kind)
+    return {"observer_kind": kind, "thesis_jnd": analyses.THESIS_JND, **found}, _text(fitted, tested, pairs, kind)
 
 
 def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame, kind: str) -> None:
-    """Figures 19 and 20 by scene, 21 to 23 by set, 24 and 25 of all of both."""
+    """Figures 19 and 20 by scene, 21 to 23 by set, 24 and 25 of all of both; all of the first filter alone, and one of
+    the filters where there are several.
+    """
     from analysis.plots import save
 
     filters = list(dict.fromkeys(trials["time_filter"]))
@@ -150,24 +181,36 @@ def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame
         save(plots.psychometric_figure(alone, column, rows, kind), options.out / f"{name}.png")
         for value in values:
             save(plots.psychometric_figure(alone, column, {value: rows[value]}, kind), options.out / f"{value}.png")
+    if len(filters) > 1:
+        column = "time_filter"
+        rows = {value: analyses.fit_row(trials.loc[trials[column] == value], 0, options.seed) for value in filters}
+        save(plots.psychometric_figure(trials, column, rows, kind), options.out / "time_filters.png")
 
 
-def _text(fitted: pd.DataFrame, tested: pd.DataFrame, kind: str) -> str:
+def _text(fitted: pd.DataFrame, tested: pd.DataFrame, pairs: pd.DataFrame, kind: str) -> str:
     lines = [f"{kind} observers"]
+    shown = [["scene"], ["point_set", "time_filter"]]
+    if len(set(fitted["time_filter"].dropna())) > 1:
+        shown.append(["scene", "time_filter"])
     for row in fitted.to_dict("records"):
-        if not (pd.isna(row["point_set"]) and pd.isna(row["time_filter"])):
-            continue
+        of = [name for name in analyses.CONDITIONS if not pd.isna(row[name])]
+        if of not in shown:
+            continue  # in the table
         jnd, beside = str(row["status"]), analyses.THESIS_JND.get(row["scene"])
         if jnd == "within":
             jnd = f"{row['jnd']:.1f} ({row['low']:.1f} – {row['high']:.1f})"
             if np.isfinite(row.get("psignifit_jnd", np.nan)):
                 low, high = row["psignifit_low"], row["psignifit_high"]
                 jnd += f", by psignifit {row['psignifit_jnd']:.1f} ({low:.1f} – {high:.1f})"
-        end = f"; thesis about {beside:.0f}" if beside else ""
-        lines.append(f"{row['scene']}: JND {jnd} samples per pixel{end}")
+        end = f"; thesis about {beside:.0f}" if beside and of == ["scene"] else ""
+        lines.append(f"{', '.join(str(row[name]) for name in of)}: JND {jnd} samples per pixel{end}")
     for row in tested.to_dict("records"):
         if not pd.isna(row["thesis_p"]):
             what = f"{row['first']} against {row['second']} at {row['samples']:.0f}"
             found = f"t({row['degrees']:.0f}) = {row['t']:.2f}, p = {row['p']:.2g}"
             lines.append(f"{what}: {found}; thesis p = {row['thesis_p']:.2g}")
+    for row in pairs.to_dict("records"):
+        what = f"{row['first']} against {row['second']}: differ most at {row['samples']:.0f}"
+        found = f"t({row['degrees']:.0f}) = {row['t']:.2f}, p = {row['p']:.2g}"
+        lines.append(f"{what}, {found}, times {row['levels']} levels {row['corrected_p']:.2g}")
     return "\n".join(lines)

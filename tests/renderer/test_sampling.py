@@ -82,7 +82,8 @@ def test_owen_scrambling_is_even_over_its_seeds() -> None:
 @pytest.mark.parametrize(
     ("count", "ratio", "sides"),
     [(64, 1.0, (4, 4, 4)), (64, 8.0, (2, 2, 16)), (64, 0.125, (8, 8, 1)), (216, 8.0, (3, 3, 24)),
-     (512, 0.125, (16, 16, 2)), (512, 8.0, (4, 4, 32)), (48, 1.0, (4, 4, 3)), (48, 8.0, (2, 2, 12)), (1, 8.0, (1, 1, 1))],
+     (512, 0.125, (16, 16, 2)), (512, 8.0, (4, 4, 32)), (48, 1.0, (4, 4, 3)),
+     (48, 8.0, (2, 2, 12)), (1, 8.0, (1, 1, 1))],
 )  # fmt: skip
 def test_cells_are_as_many_in_time_as_the_ratio_wants(count: int, ratio: float, sides: tuple[int, ...]) -> None:
     assert cell_counts(count, ratio) == sides

@@ -89,6 +89,14 @@ def test_simulated_answers_and_their_analysis(tmp_path: Path, monkeypatch, capsy
     assert "simulated observers" in capsys.readouterr().out
 
 
+def test_known_thresholds_are_given_back(tmp_path: Path, monkeypatch, capsys) -> None:
+    short = ("--experiments", "12", "--bootstraps", "60", "--sigmas", "1", "--lapses", "0", "--jnds", "40")
+    assert call_script("perception.py", monkeypatch, "recover", *short, "--out", str(tmp_path)) == 0
+    (row,) = summary(tmp_path)["rows"]
+    assert row["coverage_low"] < 0.95 and row["jnd_ratio_median"] == pytest.approx(1.0, abs=0.15)
+    assert "the 95 % interval holds it in" in capsys.readouterr().out
+
+
 def test_a_changed_stimulus_is_noticed(tmp_path: Path, monkeypatch, capsys) -> None:
     stimuli = write_stimuli(tmp_path / "stimuli", side=16)
     frame = stimuli / "planescene" / "hammersley-box-0008" / "frame00000.png"
@@ -104,6 +112,7 @@ def test_a_changed_stimulus_is_noticed(tmp_path: Path, monkeypatch, capsys) -> N
         (("stimuli", "gone.txt"), ("gone.txt", "cannot be read")),
         (("stimuli", "--width-px", "4"), ("width_px", "4")),
         (("simulate", "nowhere"), ("manifest.json", "stimuli")),
+        (("recover", "--jnds", "1000"), ("jnds", "between 1 and 512", "1000")),
         (("analyse", "nowhere.parquet"), ("nowhere.parquet", "cannot be read as Parquet")),
         (("serve", " "), ("observer", "a name")),
         (("sing",), ("sing",)),

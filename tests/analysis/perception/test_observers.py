@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from analysis.cli import InputError
-from analysis.perception.analysis import checked_trials, comparisons, fits, power
+from analysis.perception.analysis import checked_trials, comparisons, fits, power, strongest
 from analysis.perception.observers import (
     COLUMNS,
     JOD_SIGMA,
@@ -76,6 +76,23 @@ def test_the_harder_scene_has_the_higher_threshold_and_the_tests_see_it() -> Non
     assert of_scenes["thesis_p"] == 0.0027
     of_sets = tested[(tested["of"] == "point_set")]
     assert (of_sets["p"].dropna() > 0.001).all()  # the sets do not differ here
+
+
+def test_filters_and_shifts_are_compared_as_scenes_are() -> None:
+    """One filter needs more samples: every level finds it over observers, scenes and sets, and says how many asked."""
+    box = stimuli()
+    both = pd.concat([box, box.assign(time_filter="triangle", jod=4.0 * box["jod"])], ignore_index=True)
+    trials = simulated_trials(both, drawn_observers(12, 1, 0.2, 0.01), 4, 3, 0.5)
+    tested = comparisons(trials)
+    filters = tested[tested["of"] == "time_filter"].set_index("samples")
+    assert filters.loc[27, "degrees"] == 12 * 2 * 2 - 1
+    assert filters.loc[64, "t"] < -4.0 and filters.loc[64, "p"] < 1e-3
+    best = strongest(tested).set_index(["first", "second"])
+    assert best.loc[("box", "triangle"), "p"] == filters["p"].min()
+    assert best.loc[("box", "triangle"), "corrected_p"] == pytest.approx(
+        filters["p"].min() * filters["p"].notna().sum()
+    )
+    assert best.loc[("hammersley", "stratified"), "corrected_p"] > 0.05
 
 
 def test_tables_that_are_no_trials() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.cli import InputError
+from analysis.perception.analysis import recovery
 from analysis.perception.peer import peer_fit
 from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples
 
@@ -48,11 +49,7 @@ def test_a_fit_is_at_least_as_likely_as_the_truth() -> None:
 
 
 def coverage(experiments: int, bootstraps: int) -> float:
-    inside = 0
-    for seed in range(experiments):
-        low, high = fit(LEVELS, drawn(60.0, 1.5, 144, seed), [144] * 8, bootstraps, seed).interval or (0.0, 0.0)
-        inside += low <= 60.0 <= high
-    return inside / experiments
+    return recovery(LEVELS, 60.0, 1.5, 0.0, 144, experiments, bootstraps, 0)["coverage"]
 
 
 def test_intervals_hold_the_threshold_about_as_often_as_they_say() -> None:
