@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "0.45")
+_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "#b02a2a", "0.45")
 
 
 def projections_figure(sets: Mapping[str, NDArray[np.float64]]) -> Figure:

@@ -34,7 +34,11 @@ def psychometric_figure(
     axis.axhline(GUESS, color="#2a8f4d", ls="--", lw=0.9)
     levels = sorted(trials["samples"].unique())
     axis.set(xscale="log", xlabel="samples per pixel", ylabel="share right", ylim=(0.35, 1.02))
-    axis.set_xticks(levels, [f"{int(level)}" for level in levels], minor=False)
+    apart = [levels[0]]
+    for level in levels[1:]:
+        if level > 1.25 * apart[-1]:  # labels of nearer ones would run into each other
+            apart.append(level)
+    axis.set_xticks(apart, [f"{int(level)}" for level in apart], minor=False)
     axis.set_xticks([], minor=True)
     axis.set_title(f"{kind} observers, N = {trials['observer'].nunique()}", fontsize=10)
     axis.legend(fontsize=8)
