@@ -62,7 +62,7 @@ def convergence_figure(errors: pd.DataFrame, sets: Sequence[str], kinds: Sequenc
     """Mean squared error against the number of points, a panel an integrand."""
     figure = Figure(figsize=(4.0 * len(kinds), 3.6), layout="constrained")
     for axis, kind in zip(np.atleast_1d(figure.subplots(1, len(kinds))), kinds, strict=True):
-        for name, ink in zip(sets, _INK, strict=False):
+        for name, ink in zip(sets, _INK, strict=True):
             part = errors[(errors["set"] == name) & (errors["integrand"] == kind) & (errors["points"] > 1)]
             axis.loglog(part["points"], np.maximum(part["mse"], 1e-12), marker="o", ms=3, color=ink, label=name)
         axis.set(title=kind, xlabel="samples", ylabel="mean squared error")
