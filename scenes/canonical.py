@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.surfaces import (
+    Bumped,
     CheckerboardTexture,
     ConstantTexture,
     Emissive,
@@ -31,6 +32,7 @@ from scenes.surfaces import (
     Glossy,
     HeightField,
     ImageTexture,
+    Masked,
     Material,
     Matte,
     Metal,
@@ -47,6 +49,7 @@ from scenes.surfaces import (
 from scenes.values import Matrix, Rgb, RigidTrack, SceneError, identity
 
 __all__ = [
+    "Bumped",
     "Camera",
     "CheckerboardTexture",
     "ConstantTexture",
@@ -64,6 +67,7 @@ __all__ = [
     "Instance",
     "Integrator",
     "Light",
+    "Masked",
     "Material",
     "Matrix",
     "Matte",

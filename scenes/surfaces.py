@@ -265,6 +265,29 @@ class Emissive:
     radiance: Rgb
 
 
+@dataclass(frozen=True)
+class Masked:
+    """A material with holes: ``opacity`` of it is there, the rest lets light pass unbent."""
+
+    base: Material
+    opacity: Texture
+
+
+@dataclass(frozen=True)
+class Bumped:
+    """A material whose shading normal follows a height field.
+
+    Attributes:
+        base: what is bumped.
+        height: displacement along the normal, of which the mean of the channels counts.
+        scale: of the height, scene units.
+    """
+
+    base: Material
+    height: Texture
+    scale: float = 1.0
+
+
 Material = (
     Phong
     | Matte
@@ -278,4 +301,6 @@ Material = (
     | MixMaterial
     | HeightField
     | Emissive
+    | Masked
+    | Bumped
 )

@@ -1,0 +1,48 @@
+"""Whether two scenes are the same, and where they differ."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+_NOT_COMPARED = ("source", "name", "materials", "filename")
+
+
+def difference(first: Any, second: Any, tolerance: float = 1e-5, where: str = "scene") -> str | None:
+    """The first place where two scenes, or parts of them, differ; None where they do not.
+
+    Names, files that parts came from, and named materials that nothing uses do not count. Numbers may differ by
+    ``tolerance`` of their size, or of that of the array they are in.
+    """
+    if dataclasses.is_dataclass(first) and not isinstance(first, type):
+        if type(first) is not type(second):
+            return f"{where}: {type(first).__name__} and {type(second).__name__}"
+        for part in dataclasses.fields(first):
+            if part.name not in _NOT_COMPARED:
+                values = getattr(first, part.name), getattr(second, part.name)
+                found = difference(*values, tolerance, f"{where}.{part.name}")
+                if found:
+                    return found
+        return None
+    if isinstance(first, tuple) and isinstance(second, tuple) and not _numeric(first):
+        if len(first) != len(second):
+            return f"{where}: {len(first)} and {len(second)} parts"
+        found = (
+            difference(a, b, tolerance, f"{where}[{n}]") for n, (a, b) in enumerate(zip(first, second, strict=True))
+        )
+        return next(filter(None, found), None)
+    if isinstance(first, float | np.ndarray) or _numeric(first):
+        a, b = np.asarray(first, np.float64), np.asarray(second, np.float64) if second is not None else None
+        if b is None or a.shape != b.shape:
+            return f"{where}: shapes {a.shape} and {None if b is None else b.shape}"
+        size = max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
+        if not (np.abs(a - b) <= tolerance * size + 1e-12).all():
+            return f"{where}: {np.abs(a - b).max():g} apart, of {size:g}"
+        return None
+    return None if first == second else f"{where}: {first!r} and {second!r}"
+
+
+def _numeric(value: Any) -> bool:
+    return isinstance(value, tuple) and bool(value) and all(isinstance(part, float) for part in value)

@@ -1,0 +1,212 @@
+"""The text of PBRT and LuxRender files: directives with values and typed parameters.
+
+Lists of numbers are one token each, so that a file of millions of vertices parses in the time that its numbers take.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); LuxRender 1.x scene files use the same syntax.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import lark
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.canonical import SceneError
+
+_GRAMMAR = r"""
+start: directive*
+directive: NAME value*
+value: STRING | NUMBER | NUMBERS | STRINGS | TRUTH
+TRUTH.2: /(true|false)\b/
+NAME: /[A-Za-z_]\w*/
+STRING: /"(?:[^"\\\n]|\\.)*"/
+NUMBER: /[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])/
+NUMBERS: /\[(?:[-+.\deE\s,]|#[^\n]*(?:\n|$))*\]/
+STRINGS: /\[(?:\s|#[^\n]*\n|true\b|false\b|"(?:[^"\\\n]|\\.)*")+\]/
+COMMENT: /#[^\n]*/
+%ignore /[\s]+/
+%ignore COMMENT
+"""
+
+NUMBER_MAX = 1e30
+"""Greatest magnitude of a number in a scene; beyond it products of float32 overflow."""
+
+Values = NDArray[np.float64] | tuple[str, ...]
+
+
+@lru_cache(maxsize=1)
+def _parser() -> lark.Lark:
+    return lark.Lark(_GRAMMAR, parser="lalr", propagate_positions=False, maybe_placeholders=False)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a text, from 1."""
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True)
+class Directive:
+    """A directive: its name, and its strings and numbers in order."""
+
+    name: str
+    values: tuple[Values, ...]
+    place: Place
+
+
+@dataclass
+class Parameters:
+    """Typed parameters of a directive; what is not asked for can be listed.
+
+    Attributes:
+        place: of the directive.
+        given: values by name.
+        types: the type that each was given with.
+    """
+
+    place: Place
+    given: Mapping[str, Values]
+    types: Mapping[str, str]
+    asked: set[str] = field(default_factory=set)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.given
+
+    def numbers(self, name: str, count: int | None = None) -> NDArray[np.float64] | None:
+        """Numbers of a parameter, None where it is not given; of so many, where a count is.
+
+        Raises:
+            SceneError: it holds no numbers, or another count.
+        """
+        self.asked.add(name)
+        if name not in self.given:
+            return None
+        found = self.given[name]
+        if isinstance(found, tuple):
+            raise SceneError(f"{self.place}: {name}: expected numbers, got {found[0]!r}")
+        if count is not None and len(found) != count:
+            raise SceneError(f"{self.place}: {name}: expected {count} numbers, got {len(found)}")
+        return found
+
+    def number(self, name: str, default: float) -> float:
+        """A single number; raises SceneError for several."""
+        found = self.numbers(name, 1)
+        return default if found is None else float(found[0])
+
+    def whole(self, name: str, default: int, least: int, most: int) -> int:
+        """A whole number within bounds; raises SceneError for another."""
+        value = self.number(name, default)
+        if value != int(value) or not least <= value <= most:
+            raise SceneError(f"{self.place}: {name}: expected a whole number from {least} to {most}, got {value:g}")
+        return int(value)
+
+    def text(self, name: str, default: str) -> str:
+        """A string; raises SceneError for numbers or several."""
+        self.asked.add(name)
+        found = self.given.get(name)
+        if found is None:
+            return default
+        if not isinstance(found, tuple) or len(found) != 1:
+            raise SceneError(f"{self.place}: {name}: expected one string")
+        return found[0]
+
+    def truth(self, name: str, default: bool) -> bool:
+        """A bool, quoted or not; raises SceneError for what is none."""
+        value = self.text(name, str(default).lower())
+        if value not in ("true", "false"):
+            raise SceneError(f"{self.place}: {name}: expected true or false, got {value!r}")
+        return value == "true"
+
+    def unasked(self) -> list[str]:
+        """Names of what was given and not asked for."""
+        return [name for name in self.given if name not in self.asked]
+
+
+def parse_directives(text: str, file: str) -> Iterator[Directive]:
+    """Directives of a text.
+
+    Raises:
+        SceneError: it is no such text; file, line, column.
+    """
+    try:
+        tree = _parser().parse(text)
+    except lark.exceptions.UnexpectedCharacters as error:
+        got = text[error.pos_in_stream : error.pos_in_stream + 20].split("\n")[0] if error.pos_in_stream else ""
+        place = Place(file, error.line, error.column)
+        raise SceneError(f"{place}: expected a directive, string or number, got {got!r}") from None
+    except lark.exceptions.UnexpectedToken as error:
+        place = Place(file, max(error.line, 1), max(error.column, 1))
+        raise SceneError(f"{place}: expected a directive, got {str(error.token)[:20]!r}") from None
+    nodes: list[Any] = tree.children
+    for node in nodes:
+        head = node.children[0]
+        place = Place(file, head.line, head.column)
+        yield Directive(str(head), tuple(_values(part.children[0], file) for part in node.children[1:]), place)
+
+
+def _values(token: Any, file: str) -> Values:
+    if token.type == "STRING":
+        return (_unquoted(token),)
+    if token.type == "TRUTH":
+        return (str(token),)
+    if token.type == "STRINGS":
+        return tuple(str(part) if part.type == "TRUTH" else _unquoted(part) for part in _strings(token))
+    place = Place(file, token.line, token.column)
+    body = str(token).strip("[]")
+    if "#" in body:
+        body = "\n".join(line.split("#")[0] for line in body.splitlines())
+    if not body.strip():
+        return np.zeros(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            found = np.fromstring(body.replace(",", " "), dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            raise SceneError(f"{place}: expected numbers, got {body.strip()[:30]!r}") from None
+    if not (np.abs(found) <= NUMBER_MAX).all():  # also not a number
+        raise SceneError(f"{place}: expected numbers up to {NUMBER_MAX:g}, got {body.strip()[:30]!r}")
+    return found
+
+
+def _strings(token: Any) -> list[Any]:
+    inner = str(token)[1:-1]
+    return [part for part in _parser().lex("x " + inner) if part.type in ("STRING", "TRUTH")]
+
+
+def _unquoted(token: Any) -> str:
+    return str(token)[1:-1].replace('\\"', '"').replace("\\\\", "\\")
+
+
+def parameters_of(directive: Directive, skip: int) -> Parameters:
+    """Parameters of a directive behind its first ``skip`` values: pairs of ``"type name"`` and values.
+
+    Raises:
+        SceneError: a declaration is none, or has no value.
+    """
+    given: dict[str, Values] = {}
+    types: dict[str, str] = {}
+    rest = directive.values[skip:]
+    for at in range(0, len(rest), 2):
+        head = rest[at]
+        if not isinstance(head, tuple) or len(head) != 1 or len(head[0].split()) != 2:
+            raise SceneError(
+                f'{directive.place}: {directive.name}: expected a parameter such as "float fov", got {head}'
+            )
+        kind, name = head[0].split()
+        if at + 1 >= len(rest):
+            raise SceneError(f"{directive.place}: {directive.name}: expected a value for {name!r}, got none")
+        if name not in given:  # the first counts, as in PBRT
+            given[name], types[name] = rest[at + 1], kind
+    return Parameters(directive.place, given, types)

@@ -1,0 +1,409 @@
+"""LuxRender 1.x scenes into the canonical scene.
+
+The syntax is PBRT's, and so is much of the meaning; this module holds what differs: ``LookAt`` is right-handed, images
+have their first row at ``v = 0``, lights have a gain and may be given by power, materials and metals have other names.
+
+Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
+ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenes import loading
+from scenes.canonical import (
+    ConstantTexture,
+    DirectionalLight,
+    EnvironmentLight,
+    Glass,
+    Glossy,
+    ImageTexture,
+    Integrator,
+    Material,
+    Matte,
+    Metal,
+    Mirror,
+    MixMaterial,
+    PointLight,
+    Rgb,
+    Sampler,
+    Scene,
+    SceneError,
+    SpotLight,
+    SunSky,
+    Texture,
+    Translucent,
+)
+from scenes.formats.directive_reader import typed, word
+from scenes.formats.directives import Directive, Parameters, parameters_of
+from scenes.formats.losses import LossReport
+from scenes.formats.pbrt import MAP_AXES, PbrtReader, scene_of
+from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, product
+from scenes.formats.recognition import as_mesh
+from scenes.formats.scene_files import SceneFiles
+from scenes.formats.spectra import grey, metal, rgb
+from scenes.values import Matrix
+
+_INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlighting": "direct", "distributedpath": "path",
+                "exphotonmap": "photonmap", "sppm": "photonmap", "igi": "direct", "single": "path",
+                "emission": "path", "multi": "path", "none": "path"}  # fmt: skip
+_SAMPLERS = {"lowdiscrepancy": "sobol", "random": "independent", "metropolis": "independent", "erpt": "independent",
+             "sobol": "sobol", "halton": "halton"}  # fmt: skip
+_NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
+_MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
+_LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+
+
+@dataclass
+class LuxSurfaces(Surfaces):
+    """Textures and materials of LuxRender; ``fresnel`` are its textures of complex indices."""
+
+    fresnel: dict[str, tuple[Rgb, Rgb]] = dataclasses.field(default_factory=dict)
+
+    def _image(self, parameters: Parameters, scale: tuple[float, float], offset: tuple[float, float]) -> Texture:
+        where = str(parameters.place)
+        path = self.files.path(parameters.text("filename", ""), where)
+        wrap = parameters.text("wrap", "repeat")
+        if wrap not in ("repeat", "clamp", "black"):
+            raise SceneError(f"{where}: wrap: expected repeat, clamp or black, got {wrap!r}")
+        image = lux_image(path, parameters.number("gamma", 2.2), parameters.number("gain", 1.0), where)
+        kind = parameters.text("filtertype", "bilinear")
+        kinds = {"nearest": "nearest", "bilinear": "bilinear", "mipmap_trilinear": "mipmap", "mipmap_ewa": "mipmap"}
+        if kind not in kinds:
+            raise SceneError(f"{where}: filtertype: expected one of {', '.join(kinds)}, got {kind!r}")
+        # the first row is at v = 0 here, and at v = 1 in the canonical scene
+        size, start = (scale[0], -scale[1]), (offset[0], 1.0 - offset[1])
+        return ImageTexture(image, size, start, wrap, kinds[kind], str(path))  # type: ignore[arg-type]
+
+    def make_fresnel(self, kind: str, parameters: Parameters) -> tuple[Rgb, Rgb]:
+        """Index of refraction of a fresnel texture."""
+        where = str(parameters.place)
+        if kind == "preset":
+            name = parameters.text("name", "")
+            found = metal(name)
+            if found is None:
+                self.report.add(where, f"the metal {name!r}, which is not known", "aluminium")
+                found = metal("Al")
+            assert found is not None
+            return found
+        if kind == "fresnelcolor":
+            return index_of_reflectance(self.color(parameters, "Kr", grey(0.5)))
+        if kind in ("constant", "cauchy"):
+            name = "value" if kind == "constant" else "index"
+            return grey(parameters.number(name, 1.5)), grey(0.0)
+        parameters.asked.update(parameters.given)
+        self.report.add(where, f"fresnel texture {kind!r}", "aluminium")
+        found = metal("Al")
+        assert found is not None
+        return found
+
+    def material(self, kind: str, parameters: Parameters) -> Material:
+        makers = {
+            "matte": self._matte, "mirror": self._mirror, "glass": self._glass, "glass2": self._glass,
+            "roughglass": self._glass, "metal": self._named_metal, "metal2": self._metal, "glossy": self._glossy,
+            "shinymetal": self._glossy, "mix": self._mix, "mattetranslucent": self._mattetranslucent,
+        }  # fmt: skip
+        where = str(parameters.place)
+        parameters.text("type", kind)
+        if kind in makers:
+            made = makers[kind](parameters)
+        elif kind == "null":
+            self.report.add(where, "a surface that is not there (null)", "black")
+            made = Matte(ConstantTexture(grey(0.0)))
+        elif kind in ("carpaint", "velvet", "cloth", "glossytranslucent", "scatter", "layered", "glossycoating",
+                      "doubleside"):  # fmt: skip
+            base = self.texture(parameters, "Kd", grey(0.5))
+            parameters.asked.update(parameters.given)
+            self.report.add(where, f"material {kind!r}", "matte of its base colour")
+            made = Matte(base)
+        else:
+            raise SceneError(f"{where}: expected a kind of material, got {kind!r}")
+        return made
+
+    def _mirror(self, parameters: Parameters) -> Material:
+        return Mirror(self.texture(parameters, "Kr", grey(1.0)))
+
+    def _alphas(self, parameters: Parameters, default: float) -> tuple[float, float]:
+        return self.scalar(parameters, "uroughness", default), self.scalar(parameters, "vroughness", default)
+
+    def _glass(self, parameters: Parameters) -> Material:
+        parts = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
+        rough = parameters.text("type", "glass") == "roughglass"
+        alphas = self._alphas(parameters, 0.001) if rough else (0.0, 0.0)
+        if parameters.number("cauchyb", 0.0):
+            self.report.add(str(parameters.place), "dispersion (cauchyb)", "one index for all colours")
+        thin = parameters.truth("architectural", False)
+        return Glass(*parts, self.scalar(parameters, "index", 1.5), alphas, thin)
+
+    def _named_metal(self, parameters: Parameters) -> Material:
+        name = parameters.text("name", "aluminium")
+        index = metal(name)
+        if index is None:
+            self.report.add(str(parameters.place), f"the metal {name!r}, which is not known", "aluminium")
+            index = metal("Al")
+        assert index is not None
+        return Metal(*index, self._alphas(parameters, 0.001))
+
+    def _metal(self, parameters: Parameters) -> Material:
+        name = parameters.text("fresnel", "")
+        index = self.fresnel.get(name)
+        if index is None:
+            self.report.add(str(parameters.place), f"fresnel texture {name!r}, which nothing defines", "aluminium")
+            index = metal("Al")
+        assert index is not None
+        return Metal(*index, self._alphas(parameters, 0.001))
+
+    def _glossy(self, parameters: Parameters) -> Material:
+        parts = self.texture(parameters, "Kd", grey(0.5)), self.texture(parameters, "Ks", grey(0.5))
+        if mean_of(self.texture(parameters, "Ka", grey(0.0))) != grey(0.0):
+            self.report.add(str(parameters.place), "absorption in the coat (Ka)")
+            parameters.asked.add("d")
+        if parameters.truth("multibounce", False):
+            self.report.add(str(parameters.place), "bounces between the facets of the coat (multibounce)", "one")
+        return Glossy(*parts, self._alphas(parameters, 0.1))
+
+    def _mix(self, parameters: Parameters) -> Material:
+        first, second = mixed_materials(self, parameters)
+        return MixMaterial(first, second, self.texture(parameters, "amount", grey(0.5)))
+
+    def _mattetranslucent(self, parameters: Parameters) -> Material:
+        sides = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
+        if not parameters.truth("energyconserving", False):
+            return Translucent(*sides)
+        if isinstance(sides[0], ConstantTexture):
+            return Translucent(sides[0], product(sides[1], ConstantTexture(rgb(1.0 - np.array(sides[0].value)))))
+        self.report.add(str(parameters.place), "energyconserving with a texture", "its mean")
+        rest = ConstantTexture(rgb(1.0 - np.array(mean_of(sides[0]))))
+        return Translucent(sides[0], product(sides[1], rest))
+
+
+def mixed_materials(surfaces: Surfaces, parameters: Parameters) -> tuple[Material, Material]:
+    """The two materials of a mixture by name."""
+    parts = []
+    for name in ("namedmaterial1", "namedmaterial2"):
+        wanted = parameters.text(name, "")
+        if wanted not in surfaces.materials:
+            raise SceneError(f"{parameters.place}: {name}: expected a named material, got {wanted!r}")
+        parts.append(surfaces.materials[wanted])
+    return parts[0], parts[1]
+
+
+def index_of_reflectance(reflectance: Rgb) -> tuple[Rgb, Rgb]:
+    """The real index that reflects so much at normal incidence: ``(1 + √r) / (1 - √r)``."""
+    root = np.sqrt(np.clip(reflectance, 0.0, 0.9999))
+    return rgb((1.0 + root) / (1.0 - root)), grey(0.0)
+
+
+def reflectance_of_index(eta: Rgb, k: Rgb) -> Rgb:
+    """What a conductor reflects at normal incidence (Fresnel's equations)."""
+    n, absorbed = np.array(eta), np.array(k)
+    return rgb(((n - 1.0) ** 2 + absorbed**2) / ((n + 1.0) ** 2 + absorbed**2))
+
+
+def lux_image(path: Path, gamma: float, gain: float, where: str) -> np.ndarray:
+    """An image by LuxRender's rule: values to the power of ``gamma``; 1 takes them as they are."""
+    if not 0.1 <= gamma <= 10.0:
+        raise SceneError(f"{where}: gamma: expected 0.1 to 10, got {gamma:g}")
+    image = loading.read_image(path)
+    encoded = image if path.suffix.lower() == ".exr" else encoded_again(image)
+    if gamma == 1.0 and gain == 1.0 and path.suffix.lower() == ".exr":
+        return image
+    return (np.float32(gain) * np.maximum(encoded, 0.0) ** np.float32(gamma)).astype(np.float32)
+
+
+@dataclass
+class LuxReader(PbrtReader):
+    """State of a LuxRender file while it is read."""
+
+    left_handed: bool = False
+    _power: float = 0.0
+    _halt_samples: int = 0
+
+    def __post_init__(self) -> None:
+        self.surfaces = LuxSurfaces(self.files, self.report, self.textures, self.materials)
+
+    def dialect(self) -> dict[str, Callable[[Directive], None]]:
+        return {
+            **super().dialect(),
+            **dict.fromkeys(_NO_EFFECT, lambda d: None),
+            **dict.fromkeys(_MEDIA, self._lose_medium),
+            "LightGroup": lambda d: self.report.add(str(d.place), f"light group {word(d)!r}", "no groups"),
+            "PortalShape": lambda d: self.report.add(str(d.place), "a portal"),
+            "MotionInstance": self._move_object,
+        }
+
+    def _read_texture(self, directive: Directive) -> None:
+        if word(directive, 1) != "fresnel":
+            super()._read_texture(directive)
+            return
+        parameters = parameters_of(directive, 3)
+        assert isinstance(self.surfaces, LuxSurfaces)
+        self.surfaces.fresnel[word(directive)] = self.surfaces.make_fresnel(word(directive, 2), parameters)
+        self.left_over(parameters, f"texture {word(directive)!r}")
+
+    def _move_object(self, directive: Directive) -> None:
+        self.report.add(str(directive.place), "MotionInstance", "its place at the start")
+        self._place_object(directive)
+
+    def _read_film(self, directive: Directive) -> None:
+        _, parameters = typed(directive)
+        self._halt_samples = parameters.whole("haltspp", 0, 0, 1 << 24)
+        size = parameters.whole("xresolution", 800, 1, 32768), parameters.whole("yresolution", 600, 1, 32768)
+        name = parameters.text("filename", "")
+        self.film = dataclasses.replace(self.film, width_px=size[0], height_px=size[1], filename=name)
+        if parameters.unasked():
+            self.report.add(
+                str(directive.place), f"{len(parameters.unasked())} settings of the film", "linear radiance"
+            )
+        if self._halt_samples:
+            self.sampler = Sampler(self.sampler.kind, self._halt_samples)
+
+    def _read_sampler(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        if kind not in _SAMPLERS:
+            raise SceneError(f"{directive.place}: expected a sampler of {', '.join(_SAMPLERS)}, got {kind!r}")
+        if kind in ("metropolis", "erpt"):
+            parameters.asked.update(parameters.given)
+            self.report.add(str(directive.place), f"sampler {kind!r}", "independent")
+        count = parameters.whole("pixelsamples", self._halt_samples or 4, 1, 1 << 24)
+        self.sampler = Sampler(_SAMPLERS[kind], self._halt_samples or count)  # type: ignore[arg-type]
+        self.left_over(parameters, f"sampler {kind!r}")
+
+    def _read_integrator(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        if kind not in _INTEGRATORS:
+            raise SceneError(f"{directive.place}: expected an integrator of {', '.join(_INTEGRATORS)}, got {kind!r}")
+        depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
+        parameters.whole("lightdepth", depth, 0, 1 << 20)
+        self.integrator = Integrator(_INTEGRATORS[kind], depth)  # type: ignore[arg-type]
+        self.left_over(parameters, f"integrator {kind!r}")
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _strength(self, parameters: Parameters) -> Rgb:
+        """``L`` times the gain; a power is reported where it cannot be met."""
+        gain = parameters.number("gain", 1.0)
+        if parameters.types.get("L") == "texture":
+            color = self._light_texture(parameters)
+        else:
+            color = self.surfaces.color(parameters, "L", grey(1.0))
+        return rgb(gain * np.array(color))
+
+    def _light_texture(self, parameters: Parameters) -> Rgb:
+        name = parameters.text("L", "")
+        found = self.surfaces.textures.get(name)
+        if found is None:
+            self.report.add(str(parameters.place), f"light texture {name!r}, which is not known", "white")
+            return grey(1.0)
+        if not isinstance(found, ConstantTexture):
+            self.report.add(str(parameters.place), "a light with a texture", "its mean")
+        return mean_of(found)
+
+    def _read_light(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        where = str(directive.place)
+        for hint in ("nsamples", "importance"):
+            if hint in parameters:
+                parameters.number(hint, 1.0)
+                self.report.add(where, f"{hint} of a light", "the renderer's own choice")
+        if kind in ("sun", "sky", "sky2", "sunsky", "sunsky2"):
+            self._daylight(kind, parameters)
+        elif kind in ("infinite", "infinitesample"):
+            self.lights.append(self._environment(parameters, self._strength(parameters), where))
+        elif kind in ("point", "spot", "distant", "projection", "goniometric"):
+            self._lamp(kind, parameters, where)
+        else:
+            raise SceneError(f"{where}: expected a kind of light, got {kind!r}")
+        self.left_over(parameters, f"light {kind!r}")
+
+    def _lamp(self, kind: str, parameters: Parameters, where: str) -> None:
+        strength = self._strength(parameters)
+        start = self._placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
+        target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
+        if kind in ("point", "spot"):
+            power = parameters.number("power", 0.0) * parameters.number("efficacy", 17.0)
+            luminance = float(np.dot(_LUMINANCE, strength))
+            if power > 0.0 and luminance > 0.0:
+                strength = rgb(np.array(strength) * power / (4.0 * math.pi * luminance))
+                self.report.add(where, "the power of a lamp", "an intensity, as even all round")
+        if kind == "distant":
+            direction = np.subtract(target, start)
+            if not np.linalg.norm(direction) > 0.0:
+                raise SceneError(f"{where}: distant: expected from and to apart")
+            angle = math.degrees(2.0 * parameters.number("theta", 0.0))
+            self.lights.append(DirectionalLight(rgb(direction / np.linalg.norm(direction)), strength, angle))
+        elif kind == "spot":
+            outer = parameters.number("coneangle", 30.0)
+            inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
+            self.lights.append(SpotLight(start, target, strength, inner, outer))
+        else:
+            if kind != "point":
+                parameters.asked.update(parameters.given)
+                self.report.add(where, f"light {kind!r}", "a point light as bright in all directions")
+            self.lights.append(PointLight(start, strength))
+
+    def _daylight(self, kind: str, parameters: Parameters) -> None:
+        toward = parameters.numbers("sundir", 3)
+        direction = np.array((0.0, 0.0, 1.0)) if toward is None else toward
+        if not np.linalg.norm(direction) > 0.0:
+            raise SceneError(f"{parameters.place}: sundir: expected a direction")
+        turned = self.transforms.current[0][:3, :3] @ direction
+        part = {"sun": "sun", "sky": "sky", "sky2": "sky"}.get(kind, "both")
+        if "relsize" in parameters:
+            parameters.number("relsize", 1.0)
+            self.report.add(str(parameters.place), "the size of the sun's disk", "the real one")
+        numbers = parameters.number("turbidity", 2.0), parameters.number("gain", 1.0)
+        self.lights.append(SunSky(rgb(turned / np.linalg.norm(turned)), *numbers, part))  # type: ignore[arg-type]
+
+    def _environment(self, parameters: Parameters, strength: Rgb, where: str) -> EnvironmentLight:
+        turn: Matrix = self.transforms.current[0].copy()
+        turn[:3, 3] = 0.0
+        file, gamma = parameters.text("mapname", ""), parameters.number("gamma", 2.2)
+        mapping = parameters.text("mapping", "latlong")
+        if mapping != "latlong":
+            self.report.add(where, f"mapping {mapping!r} of an environment map", "latlong")
+        if not file:
+            return EnvironmentLight(np.array([[list(strength)]], np.float32))
+        path = self.files.path(file, where)
+        image = lux_image(path, gamma, 1.0, where)
+        if strength[0] == strength[1] == strength[2]:
+            return EnvironmentLight(image, turn @ MAP_AXES, strength[0], str(path))
+        return EnvironmentLight((image * np.array(strength)).astype(np.float32), turn @ MAP_AXES, 1.0, str(path))
+
+    def _read_area_light(self, directive: Directive) -> None:
+        _, parameters = typed(directive)
+        self.attributes.emission = self._strength(parameters)
+        self.attributes.power = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
+        for hint in ("nsamples", "importance"):
+            if hint in parameters:
+                parameters.number(hint, 1.0)
+                self.report.add(str(directive.place), f"{hint} of a light", "the renderer's own choice")
+        self.left_over(parameters, "area light")
+
+    def _read_shape(self, directive: Directive) -> None:
+        count = len(self.instances)
+        super()._read_shape(directive)
+        power, emission = self.attributes.power, self.attributes.emission
+        if len(self.instances) == count or emission is None or not power > 0.0:
+            return
+        luminance = float(np.dot(_LUMINANCE, emission))
+        lamp = self.instances[-1]
+        corners = as_mesh(lamp.shape).vertices[as_mesh(lamp.shape).faces].astype(np.float64) @ lamp.to_world[:3, :3].T
+        area = (
+            0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        )
+        if luminance > 0.0 and area > 0.0:
+            radiance = rgb(np.array(emission) * power / (math.pi * area * luminance))
+            self.instances[-1] = dataclasses.replace(lamp, emission=radiance)
+
+
+def load_luxrender(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
+    """Reads a scene; see :func:`scenes.formats.pbrt.load_pbrt`."""
+    return scene_of(LuxReader(SceneFiles(path, root), report or LossReport()), path)

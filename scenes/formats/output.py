@@ -1,0 +1,101 @@
+"""Where a converted scene goes: its text, and the meshes and pictures beside it, all in place at once or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import loading
+from scenes.canonical import Mesh, SceneError
+from scenes.formats.ply_files import ply_bytes
+
+
+class Output:
+    """Files of a scene that is being written.
+
+    They are written to a folder of their own beside the target and moved when :meth:`place` is called.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Raises SceneError where the folder cannot be written to."""
+        self.path = Path(path)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._work = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.path.parent))
+        except OSError as error:
+            raise SceneError(f"{path}: cannot be written ({error.strerror})") from None
+        self._meshes: dict[int, tuple[Mesh, str]] = {}
+        self._pictures: dict[int, tuple[NDArray[np.float32], str]] = {}
+        self._names: set[str] = set()
+
+    def _free(self, folder: str, stem: str, ending: str) -> str:
+        name, number = f"{folder}/{stem}{ending}", 1
+        while name.lower() in self._names:
+            name, number = f"{folder}/{stem}-{number}{ending}", number + 1
+        self._names.add(name.lower())
+        (self._work / folder).mkdir(exist_ok=True)
+        return name
+
+    def mesh(self, mesh: Mesh) -> str:
+        """Writes a mesh once, as PLY; its name from the scene's folder."""
+        if id(mesh) not in self._meshes:
+            stem = Path(mesh.source).stem if mesh.source.endswith((".ply", ".obj", ".gz")) else "mesh"
+            name = self._free("models", _plain(stem), ".ply")
+            (self._work / name).write_bytes(ply_bytes(mesh))
+            self._meshes[id(mesh)] = mesh, name
+        return self._meshes[id(mesh)][1]
+
+    def picture(self, image: NDArray[np.float32], source: str) -> str:
+        """Copies the file that a picture came from, or writes it as EXR where it is another or has been changed."""
+        if id(image) not in self._pictures:
+            path = Path(source)
+            same = path.is_file() and np.array_equal(loading.read_image(path), image)
+            name = self._free("textures", _plain(path.stem or "picture"), path.suffix.lower() if same else ".exr")
+            if same:
+                shutil.copyfile(path, self._work / name)
+            else:
+                _write_exr(self._work / name, image)
+            self._pictures[id(image)] = image, name
+        return self._pictures[id(image)][1]
+
+    def text(self, name: str, content: str) -> None:
+        """Writes a text beside the others; the scene's own is that of :attr:`path`."""
+        (self._work / name).write_text(content, encoding="utf-8")
+
+    def place(self) -> None:
+        """Moves everything into place, the scene's own file last.
+
+        Raises:
+            SceneError: a file cannot be moved.
+        """
+        try:
+            files = sorted(file for file in self._work.rglob("*") if file.is_file())
+            files.sort(key=lambda file: file.name == self.path.name)
+            for file in files:
+                target = self.path.parent / file.relative_to(self._work)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(file, target)
+        except OSError as error:
+            raise SceneError(f"{self.path}: cannot be written ({error.strerror})") from None
+        finally:
+            self.discard()
+
+    def discard(self) -> None:
+        """Removes what was not placed."""
+        shutil.rmtree(self._work, ignore_errors=True)
+
+
+def _plain(stem: str) -> str:
+    return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in stem) or "part"
+
+
+def _write_exr(path: Path, image: NDArray[np.float32]) -> None:
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))

@@ -1,0 +1,492 @@
+"""PBRT v3 scenes into the canonical scene.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenes import loading
+from scenes.canonical import (
+    Camera,
+    ConstantTexture,
+    DirectionalLight,
+    Disk,
+    EnvironmentCamera,
+    EnvironmentLight,
+    Film,
+    Instance,
+    Integrator,
+    Light,
+    Masked,
+    Material,
+    Matte,
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    RealisticCamera,
+    Rectangle,
+    Rgb,
+    RigidTrack,
+    Sampler,
+    Scene,
+    SceneError,
+    Shape,
+    Sphere,
+    SpotLight,
+)
+from scenes.formats import revolution
+from scenes.formats.directive_reader import DirectiveReader, typed, word
+from scenes.formats.directives import Directive, Parameters, parameters_of
+from scenes.formats.losses import LossReport
+from scenes.formats.pbrt_surfaces import Surfaces
+from scenes.formats.ply_files import checked_mesh, read_ply
+from scenes.formats.recognition import recognised_rectangle
+from scenes.formats.scene_files import SceneFiles
+from scenes.formats.spectra import grey, rgb
+from scenes.formats.transform_stack import inverse, rigid_motion
+from scenes.values import Matrix
+
+FORWARD = np.diag([1.0, 1.0, -1.0, 1.0])
+"""From a camera that looks along +z with x to the right to the canonical one, which looks along -z."""
+
+MAP_AXES = np.array([[0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""From the canonical axes of environment maps to PBRT's: ``p = (-z, x, y)``."""
+
+FILTERS = {"box": "box", "triangle": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "sinc": "sinc"}
+_RADII = {"box": 0.5, "tent": 2.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 4.0}
+SAMPLERS = {"halton": "halton", "sobol": "sobol", "02sequence": "sobol", "lowdiscrepancy": "sobol",
+            "maxmindist": "sobol", "random": "independent", "stratified": "stratified"}  # fmt: skip
+INTEGRATORS = {"path": "path", "volpath": "path", "bdpt": "bidirectional", "directlighting": "direct",
+               "whitted": "whitted", "mlt": "metropolis", "sppm": "photonmap",
+               "ambientocclusion": "direct"}  # fmt: skip
+DEPTHS = {"path": 5, "bidirectional": 5, "direct": 5, "whitted": 5, "metropolis": 5, "photonmap": 5}
+FAR = 1e6
+"""Focal distance of a PBRT camera that says none."""
+
+_DEFAULT = Matte(ConstantTexture((0.5, 0.5, 0.5)))
+_SHAPE_MAX = 1 << 20
+"""Instances of a scene at most: nested object instances multiply."""
+
+
+@dataclass
+class PbrtReader(DirectiveReader):
+    """State of a PBRT file while it is read."""
+
+    camera: Camera | None = None
+    camera_moves: tuple[Matrix, Matrix] | None = None
+    film: Film = field(default_factory=Film)
+    sampler: Sampler = field(default_factory=lambda: Sampler("halton", 16))
+    integrator: Integrator = field(default_factory=lambda: Integrator("path", 5))
+    instances: list[Instance] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    objects: dict[str, list[Instance]] = field(default_factory=dict)
+    _object: list[Instance] | None = None
+    _filter: tuple[str, float] = ("box", 0.5)
+
+    def __post_init__(self) -> None:
+        self.surfaces = Surfaces(self.files, self.report, self.textures, self.materials)
+
+    # --- directives ----------------------------------------------------------------------------------------------
+
+    def dialect(self) -> dict[str, Callable[[Directive], None]]:
+        return {
+            "Camera": self._read_camera, "Film": self._read_film, "PixelFilter": self._read_filter,
+            "Sampler": self._read_sampler, "Integrator": self._read_integrator,
+            "SurfaceIntegrator": self._read_integrator, "Accelerator": lambda d: None,
+            "WorldBegin": self._begin_world, "WorldEnd": lambda d: None,
+            "Texture": self._read_texture, "Material": self._read_material,
+            "MakeNamedMaterial": self._name_material, "NamedMaterial": self._take_material,
+            "Shape": self._read_shape, "LightSource": self._read_light, "AreaLightSource": self._read_area_light,
+            "ObjectBegin": self._begin_object, "ObjectEnd": self._end_object, "ObjectInstance": self._place_object,
+            "MakeNamedMedium": self._lose_medium, "MediumInterface": self._lose_medium,
+        }  # fmt: skip
+
+    def _begin_world(self, directive: Directive) -> None:
+        self.transforms.replace(np.eye(4))
+        self.in_world = True
+
+    def _lose_medium(self, directive: Directive) -> None:
+        self.report.add(str(directive.place), f"{directive.name} (participating medium)")
+
+    def _read_texture(self, directive: Directive) -> None:
+        name, kind = word(directive), word(directive, 2)
+        parameters = parameters_of(directive, 3)
+        self.textures[name] = self.surfaces.made_texture(kind, parameters)
+        self.left_over(parameters, f"texture {name!r}")
+
+    def _read_material(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        self.attributes.material = self.surfaces.material(kind, parameters)
+        self.left_over(parameters, f"material {kind!r}")
+
+    def _name_material(self, directive: Directive) -> None:
+        name, parameters = typed(directive)
+        self.materials[name] = self.surfaces.material(parameters.text("type", ""), parameters)
+        self.left_over(parameters, f"material {name!r}")
+
+    def _take_material(self, directive: Directive) -> None:
+        name = word(directive)
+        if name not in self.materials:
+            raise SceneError(f"{directive.place}: NamedMaterial: expected a material made before, got {name!r}")
+        self.attributes.material = self.materials[name]
+
+    # --- camera, film, sampling ----------------------------------------------------------------------------------
+
+    def _read_camera(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        start, end = (inverse(matrix) @ FORWARD for matrix in self.transforms.current)
+        self.transforms.named["camera"] = [inverse(matrix) for matrix in self.transforms.current]
+        track = self._motion(start, end, str(directive.place))
+        shutter = parameters.number("shutteropen", 0.0), parameters.number("shutterclose", 1.0)
+        if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
+            shutter = 0.0, 0.0  # the default of a still
+        window, aspect = parameters.numbers("screenwindow", 4), parameters.number("frameaspectratio", 0.0)
+        if aspect:
+            self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
+        half = self._half_window(window, kind, directive)
+        if kind == "perspective":
+            fov = parameters.number("fov", 2.0 * parameters.number("halffov", 45.0))
+            if not 0.0 < fov < 180.0:
+                raise SceneError(f"{directive.place}: fov: expected an angle in (0, 180), got {fov:g}")
+            fov = math.degrees(2.0 * math.atan(math.tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
+            lens, focus = parameters.number("lensradius", 0.0), parameters.number("focaldistance", FAR)
+            self.camera = PerspectiveCamera(start, fov, lens, focus, track, shutter)
+        elif kind == "orthographic":
+            self.camera = OrthographicCamera(start, half, track)
+        elif kind == "environment":
+            self.camera = EnvironmentCamera(start)
+        elif kind == "realistic":
+            numbers = parameters.number("aperturediameter", 1.0), parameters.number("focusdistance", 10.0)
+            self.camera = RealisticCamera(start, parameters.text("lensfile", ""), *numbers)
+        else:
+            raise SceneError(f"{directive.place}: expected a kind of camera, got {kind!r}")
+        self.left_over(parameters, f"camera {kind!r}")
+
+    def _half_window(self, window: Any, kind: str, directive: Directive) -> float:
+        """Half the window's shorter side; a window off the middle is reported."""
+        if window is None:
+            return 1.0
+        left, right, bottom, top = window
+        half = 0.5 * min(right - left, top - bottom)
+        if abs(left + right) > 1e-6 * abs(right) or abs(bottom + top) > 1e-6 * abs(top):
+            self.report.add(str(directive.place), "a screen window off the middle", "one about the middle")
+        if not half > 0.0:
+            raise SceneError(f"{directive.place}: screenwindow: expected left < right and bottom < top")
+        return float(half)
+
+    def _read_film(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        size = parameters.whole("xresolution", 640, 1, 32768), parameters.whole("yresolution", 480, 1, 32768)
+        self.film = Film(*size, *self._filter, filename=parameters.text("filename", ""))  # type: ignore[arg-type]
+        self.left_over(parameters, f"film {kind!r}")
+
+    def _read_filter(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        if kind not in FILTERS:
+            raise SceneError(f"{directive.place}: expected a filter of {', '.join(FILTERS)}, got {kind!r}")
+        name = FILTERS[kind]
+        radius = parameters.number("xwidth", _RADII[name])
+        if parameters.number("ywidth", radius) != radius:
+            self.report.add(str(directive.place), "ywidth of the filter", "as wide as across")
+        self._filter = name, radius
+        self.film = dataclasses.replace(self.film, filter=name, filter_radius_px=radius)
+        self.left_over(parameters, f"filter {kind!r}")
+
+    def _read_sampler(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        if kind not in SAMPLERS:
+            raise SceneError(f"{directive.place}: expected a sampler of {', '.join(SAMPLERS)}, got {kind!r}")
+        count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
+        if kind == "stratified":
+            count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
+        self.sampler = Sampler(SAMPLERS[kind], count)  # type: ignore[arg-type]
+        self.left_over(parameters, f"sampler {kind!r}")
+
+    def _read_integrator(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        if kind not in INTEGRATORS:
+            raise SceneError(f"{directive.place}: expected an integrator of {', '.join(INTEGRATORS)}, got {kind!r}")
+        name = INTEGRATORS[kind]
+        self.integrator = Integrator(name, parameters.whole("maxdepth", DEPTHS[name], 0, 1 << 20))  # type: ignore[arg-type]
+        self.left_over(parameters, f"integrator {kind!r}")
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _placed(self, point: Any, default: tuple[float, float, float]) -> Rgb:
+        at = np.asarray(default if point is None else point, np.float64)
+        return rgb((self.transforms.current[0] @ np.append(at, 1.0))[:3])
+
+    def _read_light(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        where = str(directive.place)
+        scale = np.array(self.surfaces.color(parameters, "scale", (1.0, 1.0, 1.0)))
+        name = "I" if kind in ("point", "spot", "projection", "goniometric") else "L"
+        strength = rgb(scale * self.surfaces.color(parameters, name, (1.0, 1.0, 1.0)))
+        if self.transforms.moves:
+            self.report.add(where, "the motion of a light", "its place at the start")
+        start = self._placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
+        if kind in ("point", "projection", "goniometric"):
+            if kind != "point":
+                parameters.asked.update(parameters.given)
+                self.report.add(where, f"light {kind!r}", "a point light as bright in all directions")
+            self.lights.append(PointLight(start, strength))
+        elif kind == "spot":
+            outer = parameters.number("coneangle", 30.0)
+            inner = outer - parameters.number("conedeltaangle", 5.0)
+            target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
+            self.lights.append(SpotLight(start, target, strength, max(inner, 0.0), outer))
+        elif kind == "distant":
+            target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
+            direction = np.subtract(target, start)
+            if not np.linalg.norm(direction) > 0.0:
+                raise SceneError(f"{where}: distant: expected from and to apart")
+            self.lights.append(DirectionalLight(rgb(direction / np.linalg.norm(direction)), strength))
+        elif kind in ("infinite", "exinfinite"):
+            self.lights.append(self._environment(parameters, strength, where))
+        else:
+            raise SceneError(f"{where}: expected a kind of light, got {kind!r}")
+        for hint in ("samples", "nsamples"):
+            if hint in parameters:
+                parameters.whole(hint, 1, 1, 1 << 20)
+                self.report.add(where, f"{hint} of a light", "the renderer's own choice")
+        self.left_over(parameters, f"light {kind!r}")
+
+    def _environment(self, parameters: Parameters, strength: Rgb, where: str) -> EnvironmentLight:
+        to_world = self.transforms.current[0].copy()
+        to_world[:3, 3] = 0.0
+        file = parameters.text("mapname", "")
+        if not file:
+            return EnvironmentLight(np.array([[list(strength)]], np.float32))
+        path = self.files.path(file, where)
+        image = loading.read_image(path)
+        if strength[0] == strength[1] == strength[2]:
+            return EnvironmentLight(image, to_world @ MAP_AXES, strength[0], str(path))
+        return EnvironmentLight((image * np.array(strength)).astype(np.float32), to_world @ MAP_AXES, 1.0, str(path))
+
+    def _read_area_light(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        if kind not in ("diffuse", "area"):
+            raise SceneError(f"{directive.place}: expected the area light diffuse, got {kind!r}")
+        scale = np.array(self.surfaces.color(parameters, "scale", (1.0, 1.0, 1.0)))
+        self.attributes.emission = rgb(scale * self.surfaces.color(parameters, "L", (1.0, 1.0, 1.0)))
+        if parameters.truth("twosided", False):
+            self.report.add(str(directive.place), "an area light of two sides", "its front")
+        for hint in ("samples", "nsamples"):
+            if hint in parameters:
+                parameters.whole(hint, 1, 1, 1 << 20)
+                self.report.add(str(directive.place), f"{hint} of a light", "the renderer's own choice")
+        self.left_over(parameters, "area light")
+
+    # --- shapes --------------------------------------------------------------------------------------------------
+
+    def _begin_object(self, directive: Directive) -> None:
+        if self._object is not None:
+            raise SceneError(f"{directive.place}: ObjectBegin: expected ObjectEnd first")
+        self._begin("Object", directive)
+        self._object = self.objects[word(directive)] = []
+
+    def _end_object(self, directive: Directive) -> None:
+        self._end("Object", directive)
+        self._object = None
+
+    def _place_object(self, directive: Directive) -> None:
+        name = word(directive)
+        if name not in self.objects or self._object is not None:
+            raise SceneError(f"{directive.place}: ObjectInstance: expected an object made before, got {name!r}")
+        start, end = self.transforms.current
+        track = self._motion(start, end, str(directive.place))
+        for part in self.objects[name]:
+            self._keep(dataclasses.replace(part, to_world=start @ part.to_world, track=track), directive)
+
+    def _keep(self, instance: Instance, directive: Directive) -> None:
+        if len(self.instances) >= _SHAPE_MAX:
+            raise SceneError(f"{directive.place}: expected at most {_SHAPE_MAX:,} shapes")
+        (self.instances if self._object is None else self._object).append(instance)
+
+    def _motion(self, start: Matrix, end: Matrix, where: str) -> RigidTrack | None:
+        if np.array_equal(start, end):
+            return None
+        track = rigid_motion(start, end, self.times_s)
+        if track is None:
+            self.report.add(where, "a motion that is not rigid", "its place at the start")
+        return track
+
+    def _read_shape(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        made = self._shape(kind, parameters)
+        if made is None:
+            return
+        shape, local = made
+        material: Material = self.attributes.material or _DEFAULT
+        if parameters.types.get("alpha") == "texture":
+            material = Masked(material, self.surfaces.texture(parameters, "alpha", grey(1.0)))
+        elif parameters.number("alpha", 1.0) != 1.0:
+            material = Masked(material, ConstantTexture(grey(parameters.number("alpha", 1.0))))
+        if "shadowalpha" in parameters:
+            parameters.asked.add("shadowalpha")
+            self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
+        start, end = self.transforms.current
+        track = self._motion(start, end, str(directive.place))
+        self._keep(Instance(shape, material, start @ local, track, emission=self.attributes.emission), directive)
+        self.left_over(parameters, f"shape {kind!r}")
+
+    def _shape(self, kind: str, parameters: Parameters) -> tuple[Shape, Matrix] | None:
+        """A shape and where it lies in the current space; None for what cannot be had, reported."""
+        where = str(parameters.place)
+        if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
+            mesh = self._ply(parameters) if kind == "plymesh" else self._triangles(parameters)
+            if kind == "loopsubdiv":
+                parameters.asked.update(parameters.given)
+                self.report.add(where, "a subdivision surface", "its control mesh")
+            mesh = facing_normals(turned(mesh) if self.attributes.reversed else mesh)
+            matrix = recognised_rectangle(mesh)
+            return (mesh, np.eye(4)) if matrix is None else (Rectangle(), matrix)
+        if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
+            return self._quadric(kind, parameters)
+        if kind in ("curve", "nurbs", "heightfield"):
+            parameters.asked.update(parameters.given)
+            self.report.add(where, "hair (a curve)" if kind == "curve" else f"shape {kind!r}")
+            return None
+        raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
+
+    def _quadric(self, kind: str, parameters: Parameters) -> tuple[Shape, Matrix]:
+        place = np.eye(4)
+        radius = parameters.number("radius", 1.0)
+        if not radius > 0.0:
+            raise SceneError(f"{parameters.place}: radius: expected a positive number, got {radius:g}")
+        turn = parameters.number("phimax", 360.0)
+        if not 0.0 < turn <= 360.0:
+            raise SceneError(f"{parameters.place}: phimax: expected an angle in (0, 360], got {turn:g}")
+        if kind == "sphere":
+            low, high = parameters.number("zmin", -radius), parameters.number("zmax", radius)
+            if turn == 360.0 and low <= -radius and high >= radius and not self.attributes.reversed:
+                return Sphere(radius), place
+            if not min(low, high) < radius or not max(low, high) > -radius or low == high:
+                raise SceneError(f"{parameters.place}: zmin, zmax: expected heights within the sphere")
+            mesh = revolution.partial_sphere(radius, max(low, -radius), min(high, radius), turn)
+        elif kind == "disk":
+            inner, height = parameters.number("innerradius", 0.0), parameters.number("height", 0.0)
+            if turn == 360.0 and inner == 0.0 and not self.attributes.reversed:
+                place[2, 3] = height
+                return Disk(radius), place
+            if not 0.0 <= inner < radius:
+                raise SceneError(f"{parameters.place}: innerradius: expected less than the radius, got {inner:g}")
+            mesh = revolution.ring(radius, inner, height, turn)
+        elif kind == "cylinder":
+            heights = parameters.number("zmin", -1.0), parameters.number("zmax", 1.0)
+            mesh = revolution.cylinder(radius, *_apart(heights, parameters), turn)
+        elif kind == "cone":
+            mesh = revolution.cone(radius, *_apart((0.0, parameters.number("height", 1.0)), parameters)[1:], turn)
+        elif kind == "paraboloid":
+            heights = parameters.number("zmin", 0.0), parameters.number("zmax", 1.0)
+            if not 0.0 <= heights[0] < heights[1]:
+                raise SceneError(f"{parameters.place}: paraboloid: expected 0 <= zmin < zmax")
+            mesh = revolution.paraboloid(radius, *heights, turn)
+        else:
+            ends = [parameters.numbers(name, 3) for name in ("p1", "p2")]
+            first = np.zeros(3) if ends[0] is None else ends[0]
+            second = np.ones(3) if ends[1] is None else ends[1]
+            if np.array_equal(first, second):
+                raise SceneError(f"{parameters.place}: hyperboloid: expected p1 and p2 apart")
+            mesh = revolution.hyperboloid(first, second, turn)
+        self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
+        return (turned(mesh) if self.attributes.reversed else mesh), place
+
+    def _ply(self, parameters: Parameters) -> Mesh:
+        where = str(parameters.place)
+        path = self.files.path(parameters.text("filename", ""), where, self.beside)
+        return read_ply(self.files.read(path, where), str(path))
+
+    def _triangles(self, parameters: Parameters) -> Mesh:
+        points, indices = parameters.numbers("P"), parameters.numbers("indices")
+        if indices is None:
+            indices = parameters.numbers("triindices")
+        where = str(parameters.place)
+        if points is None or indices is None or len(points) % 3 or len(indices) % 3 or not len(indices):
+            raise SceneError(f"{where}: expected points P and indices, in threes")
+        normals = parameters.numbers("N")
+        pairs = [found for found in (parameters.numbers(name) for name in ("uv", "st")) if found is not None]
+        if parameters.numbers("S") is not None:
+            self.report.add(where, "tangents S of a mesh", "those of its texture coordinates")
+        count = len(points) // 3
+        for name, array, width in (("N", normals, 3), ("uv", pairs[0] if pairs else None, 2)):
+            if array is not None and len(array) != width * count:
+                raise SceneError(f"{where}: {name}: expected {width * count} numbers, got {len(array)}")
+        return checked_mesh(
+            points.reshape(-1, 3),
+            indices.reshape(-1, 3),
+            None if normals is None else normals.reshape(-1, 3),
+            pairs[0].reshape(-1, 2) if pairs else None,
+            where,
+        )
+
+
+def _apart(heights: tuple[float, float], parameters: Parameters) -> tuple[float, float]:
+    if heights[0] == heights[1]:
+        raise SceneError(f"{parameters.place}: expected two different heights, got {heights[0]:g} twice")
+    return heights
+
+
+def turned(mesh: Mesh) -> Mesh:
+    """The mesh with its outside in."""
+    normals = None if mesh.normals is None else -mesh.normals
+    return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
+
+
+def facing_normals(mesh: Mesh) -> Mesh:
+    """The mesh with every face counter-clockwise seen from where its normals point."""
+    if mesh.normals is None:
+        return mesh
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    wrong = (across * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
+    if not wrong.any():
+        return mesh
+    faces = np.where(wrong[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces).astype(np.int32)
+    return Mesh(mesh.vertices, faces, mesh.normals, mesh.uvs, mesh.source)
+
+
+def load_pbrt(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
+    """Reads a scene.
+
+    Args:
+        path: the file.
+        root: folder that nothing is read outside of; by default the file's own.
+        report: receives what could not be kept.
+
+    Raises:
+        SceneError: something cannot be read; file, line, column.
+    """
+    return scene_of(PbrtReader(SceneFiles(path, root), report or LossReport()), path)
+
+
+def scene_of(reader: PbrtReader, path: Path) -> Scene:
+    """Reads a file and makes a scene of it."""
+    main = reader.files.folder / Path(path).name
+    if not main.is_file():
+        raise SceneError(f"{path}: expected a scene file, found none")
+    reader.read(main)
+    reader.finish()
+    camera = reader.camera
+    if camera is None:
+        raise SceneError(f"{path}: expected a camera, found none")
+    return Scene(
+        camera,
+        tuple(reader.instances),
+        tuple(reader.lights),
+        reader.film,
+        reader.sampler,
+        reader.integrator,
+        materials=dict(reader.materials),
+        name=Path(path).stem,
+    )

@@ -1,0 +1,96 @@
+"""Shapes that the canonical scene does not have, as meshes: quadrics and parts of spheres and disks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.canonical import Mesh
+
+AROUND, ALONG = 64, 16
+"""Quadrilaterals of a full turn, and along the profile where it is curved."""
+
+Profile = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+
+
+def revolved(profile: Profile, along: int, turn_deg: float = 360.0, source: str = "") -> Mesh:
+    """The surface that a profile sweeps about the z axis, u along the turn and v along the profile.
+
+    Args:
+        profile: radius and z at parameters from 0 to 1.
+        along: quadrilaterals along it.
+        turn_deg: angle of the turn, from +x towards +y.
+        source: for messages.
+    """
+    around = max(3, math.ceil(AROUND * turn_deg / 360.0))
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, around + 1), np.linspace(0.0, 1.0, along + 1))
+    phi = np.radians(turn_deg) * u
+    radius, z = profile(v)
+    step = 1e-4
+    (r0, z0), (r1, z1) = profile(np.clip(v - step, 0.0, 1.0)), profile(np.clip(v + step, 0.0, 1.0))
+    # the derivatives by u and v span the surface; their product points the way that PBRT's quadrics do
+    dr, dz = r1 - r0, z1 - z0
+    normal = np.stack([dz * np.cos(phi), dz * np.sin(phi), -dr], axis=-1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    points = np.stack([radius * np.cos(phi), radius * np.sin(phi), z], axis=-1)
+    row = np.arange(along)[:, None] * (around + 1) + np.arange(around)
+    a, b, c, d = (part.ravel() for part in (row, row + 1, row + around + 2, row + around + 1))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    corners = points.reshape(-1, 3)[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return Mesh(
+        points.reshape(-1, 3).astype(np.float32),
+        faces[area > 1e-12 * area.max()].astype(np.int32),
+        normal.reshape(-1, 3).astype(np.float32),
+        np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32),
+        source,
+    )
+
+
+def cylinder(radius: float, z_min: float, z_max: float, turn_deg: float = 360.0) -> Mesh:
+    """An open cylinder about z."""
+    return revolved(lambda v: (np.full_like(v, radius), z_min + (z_max - z_min) * v), 1, turn_deg, "cylinder")
+
+
+def cone(radius: float, height: float, turn_deg: float = 360.0) -> Mesh:
+    """An open cone with its tip at ``height``."""
+    return revolved(lambda v: (radius * (1.0 - v), height * v), 1, turn_deg, "cone")
+
+
+def paraboloid(radius: float, z_min: float, z_max: float, turn_deg: float = 360.0) -> Mesh:
+    """``z = z_max (r / radius)²`` between two heights."""
+
+    def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        z = z_min + (z_max - z_min) * v
+        return radius * np.sqrt(np.maximum(z / z_max, 0.0)), z
+
+    return revolved(profile, ALONG, turn_deg, "paraboloid")
+
+
+def hyperboloid(p1: NDArray[np.float64], p2: NDArray[np.float64], turn_deg: float = 360.0) -> Mesh:
+    """What the segment between two points sweeps."""
+
+    def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        p = p1 + v[..., None] * (p2 - p1)
+        return np.hypot(p[..., 0], p[..., 1]), p[..., 2]
+
+    return revolved(profile, ALONG, turn_deg, "hyperboloid")
+
+
+def partial_sphere(radius: float, z_min: float, z_max: float, turn_deg: float = 360.0) -> Mesh:
+    """The part of a sphere between two heights."""
+    low, high = (math.acos(min(1.0, max(-1.0, z / radius))) for z in (z_min, z_max))
+
+    def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        theta = low + (high - low) * v
+        return radius * np.sin(theta), radius * np.cos(theta)
+
+    return revolved(profile, 2 * ALONG, turn_deg, "sphere")
+
+
+def ring(radius: float, inner: float, height: float, turn_deg: float = 360.0) -> Mesh:
+    """A disk with a hole, or part of one, facing +z."""
+    return revolved(lambda v: (inner + (radius - inner) * (1.0 - v), np.full_like(v, height)), 1, turn_deg, "disk")

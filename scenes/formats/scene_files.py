@@ -1,0 +1,92 @@
+"""Files that a scene file names. A scene file is not to be trusted: it reads what lies in its folder, and no more.
+
+Names are taken as relative; ones that lead out of the allowed folder, also through links, are refused. How much is read
+and how deep files include each other is bounded.
+"""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+from scenes.canonical import SceneError
+
+DEPTH_MAX = 16
+"""Files that include each other."""
+
+BYTES_MAX = 2 << 30
+"""Of text and meshes, of all files together."""
+
+
+class SceneFiles:
+    """The files of one scene."""
+
+    def __init__(self, main: Path, root: Path | None = None, bytes_max: int = BYTES_MAX) -> None:
+        """Opens nothing yet.
+
+        Args:
+            main: the scene's first file.
+            root: folder that no file may lie outside of; by default that of ``main``.
+            bytes_max: read at most.
+        """
+        self.main = Path(main)
+        self.folder = self.main.resolve().parent
+        self.root = (Path(root) if root is not None else self.folder).resolve()
+        self._left = bytes_max
+        if not self.folder.is_relative_to(self.root):
+            raise SceneError(f"{main}: expected a scene inside {self.root}")
+
+    def path(self, name: str, where: str, beside: Path | None = None) -> Path:
+        """The file of a name.
+
+        Args:
+            name: as the scene gives it, relative.
+            where: the name stands, for the message.
+            beside: file whose folder the name is relative to where it is not found beside the first file.
+
+        Raises:
+            SceneError: absolute, outside, or not there.
+        """
+        text = name.replace("\\", "/")
+        if not text or "\0" in text or Path(text).is_absolute() or text[1:2] == ":":
+            raise SceneError(f"{where}: expected a relative file name, got {name!r}")
+        places = [self.folder] + ([beside.resolve().parent] if beside is not None else [])
+        found = None
+        for place in places:
+            path = (place / text).resolve()
+            if not path.is_relative_to(self.root):
+                raise SceneError(f"{where}: expected a file inside {self.root}, got {name!r} (the root can be set)")
+            if path.is_file():
+                found = path
+                break
+        if found is None:
+            raise SceneError(f"{where}: expected a file at {self.folder / text}, found none")
+        return found
+
+    def read(self, path: Path, where: str) -> bytes:
+        """Content of a file, decompressed where its name ends in ``.gz``.
+
+        Raises:
+            SceneError: it cannot be read, or is more than may be read.
+        """
+        try:
+            if path.stat().st_size > self._left:
+                raise SceneError(f"{where}: {path}: expected at most {self._left:,} bytes, got {path.stat().st_size:,}")
+            if path.suffix == ".gz":
+                with gzip.open(path) as file:
+                    content = file.read(self._left + 1)
+            else:
+                content = path.read_bytes()
+        except (OSError, EOFError) as error:
+            raise SceneError(f"{where}: {path}: cannot be read ({error})") from None
+        if len(content) > self._left:
+            raise SceneError(f"{where}: {path}: expected at most {self._left:,} bytes")
+        self._left -= len(content)
+        return content
+
+    def text(self, path: Path, where: str) -> str:
+        """Content of a text file; raises SceneError where it is not UTF-8."""
+        try:
+            return self.read(path, where).decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise SceneError(f"{path}: expected UTF-8 text, byte {error.start} is none") from None
