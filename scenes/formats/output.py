@@ -50,11 +50,18 @@ class Output:
             self._meshes[id(mesh)] = mesh, name
         return self._meshes[id(mesh)][1]
 
-    def picture(self, image: NDArray[np.float32], source: str) -> str:
-        """Copies the file that a picture came from, or writes it as EXR where it is another or has been changed."""
+    def picture(self, image: NDArray[np.float32], source: str, linear: bool = False) -> str:
+        """Copies the file that a picture came from, or writes it as EXR where it is another or has been changed.
+
+        Args:
+            image: linear RGB.
+            source: file that it came from, or empty.
+            linear: whether 8-bit files, which are encoded, are written as EXR too.
+        """
         if id(image) not in self._pictures:
             path = Path(source)
-            same = path.is_file() and np.array_equal(loading.read_image(path), image)
+            wanted = path.is_file() and not (linear and path.suffix.lower() != ".exr")
+            same = wanted and np.array_equal(loading.read_image(path), image)
             name = self._free("textures", _plain(path.stem or "picture"), path.suffix.lower() if same else ".exr")
             if same:
                 shutil.copyfile(path, self._work / name)

@@ -91,6 +91,7 @@ class PbrtReader(DirectiveReader):
     lights: list[Light] = field(default_factory=list)
     objects: dict[str, list[Instance]] = field(default_factory=dict)
     _object: list[Instance] | None = None
+    _meshes: dict[Path, Mesh] = field(default_factory=dict)
     _filter: tuple[str, float] = ("box", 0.5)
 
     def __post_init__(self) -> None:
@@ -405,7 +406,9 @@ class PbrtReader(DirectiveReader):
     def _ply(self, parameters: Parameters) -> Mesh:
         where = str(parameters.place)
         path = self.files.path(parameters.text("filename", ""), where, self.beside)
-        return read_ply(self.files.read(path, where), str(path))
+        if path not in self._meshes:
+            self._meshes[path] = facing_normals(read_ply(self.files.read(path, where), str(path)))
+        return self._meshes[path]
 
     def _triangles(self, parameters: Parameters) -> Mesh:
         points, indices = parameters.numbers("P"), parameters.numbers("indices")

@@ -196,8 +196,8 @@ class PbrtWriter:
         if isinstance(texture, ImageTexture):
             file = self.output.picture(texture.image, texture.source)
             scale, offset = texture.uv_scale, texture.uv_offset
-            if texture.filter == "nearest":
-                self.report.add("texture", "nearest texel", "filtered")
+            if texture.filter != "mipmap":
+                self.report.add(f"texture {file}", f"the filter {texture.filter}", "levels of detail")
             return (
                 f'"imagemap" "string filename" [ "{file}" ] "string wrap" [ "{texture.wrap}" ] '
                 f'"float uscale" [ {number(scale[0])} ] "float vscale" [ {number(scale[1])} ] '

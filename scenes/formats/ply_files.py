@@ -226,7 +226,7 @@ def ply_bytes(mesh: Mesh) -> bytes:
         names += ["nx", "ny", "nz"]
     if mesh.uvs is not None:
         columns.append(mesh.uvs)
-        names += ["u", "v"]
+        names += ["s", "t"]  # what LuxCore and PBRT both know
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
     lines += [f"property float {name}" for name in names]
     lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]

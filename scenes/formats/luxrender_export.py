@@ -1,0 +1,329 @@
+"""The canonical scene as a LuxRender 1.x file, in the part of the format that LuxCore 2.10 reads as well.
+
+Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
+ch. 4.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from scenes.canonical import (
+    Bumped,
+    Camera,
+    CheckerboardTexture,
+    ConstantTexture,
+    Cube,
+    DirectionalLight,
+    Emissive,
+    EnvironmentLight,
+    Glass,
+    Glossy,
+    HeightField,
+    ImageTexture,
+    Instance,
+    Light,
+    Masked,
+    Material,
+    Matte,
+    Metal,
+    Mirror,
+    MixMaterial,
+    MixTexture,
+    Phong,
+    Plastic,
+    PointLight,
+    Rectangle,
+    ScaleTexture,
+    Scene,
+    SpotLight,
+    SunSky,
+    Texture,
+    Translucent,
+    Uber,
+)
+from scenes.formats.losses import LossReport
+from scenes.formats.luxrender import reflectance_of_index
+from scenes.formats.output import Output
+from scenes.formats.pbrt import FILTERS, MAP_AXES
+from scenes.formats.pbrt_export import INLINE_MAX, PbrtWriter, inline_mesh, listed, number, placed, written_matrix
+from scenes.formats.pbrt_surfaces import mean_of, product
+from scenes.formats.recognition import as_mesh
+from scenes.formats.spectra import METALS, rgb
+from scenes.formats.transform_stack import inverse
+
+_FILTERS = {ours: theirs for theirs, ours in FILTERS.items()}
+_SAMPLERS = {"sobol": "lowdiscrepancy", "halton": "lowdiscrepancy", "hammersley": "lowdiscrepancy",
+             "stratified": "lowdiscrepancy", "independent": "random"}  # fmt: skip
+_INTEGRATORS = {"path": "path", "whitted": "directlighting", "direct": "directlighting",
+                "bidirectional": "bidirectional", "photonmap": "exphotonmap", "metropolis": "path"}  # fmt: skip
+_METAL_NAMES = {"Ag": "silver", "Al": "aluminium", "Au": "gold", "Cu": "copper"}
+
+
+class LuxWriter(PbrtWriter):
+    """Lines of a LuxRender scene."""
+
+    _aspect: tuple[float, float] = (1.0, 1.0)
+
+    def _options(self, scene: Scene) -> None:
+        shorter = min(scene.film.width_px, scene.film.height_px)
+        self._aspect = scene.film.width_px / shorter, scene.film.height_px / shorter
+        integrator, sampler, film = scene.integrator, scene.sampler, scene.film
+        kind, depth = _INTEGRATORS[integrator.kind], integrator.depth
+        if depth < 0:
+            depth = 1000
+            self.report.add("integrator", "paths without a limit", "1000 bounces")
+        if integrator.kind in ("whitted", "metropolis"):
+            self.report.add("integrator", integrator.kind, kind)
+        limit = f'"integer eyedepth" [ {depth} ] "integer lightdepth" [ {depth} ]'
+        if kind != "bidirectional":
+            limit = f'"integer maxdepth" [ {depth} ]'
+        self.lines.append('Renderer "sampler"')
+        self.lines.append(f'SurfaceIntegrator "{kind}" {limit}')
+        if sampler.kind in ("halton", "hammersley", "stratified"):
+            self.report.add("sampler", sampler.kind, "lowdiscrepancy")
+        count = sampler.samples_per_pixel
+        self.lines.append(f'Sampler "{_SAMPLERS[sampler.kind]}" "integer pixelsamples" [ {count} ]')
+        radius = number(film.filter_radius_px)
+        width = f'"float xwidth" [ {radius} ] "float ywidth" [ {radius} ]'
+        self.lines.append(f'PixelFilter "{_FILTERS[film.filter]}" {width}')
+        size = f'"integer xresolution" [ {film.width_px} ] "integer yresolution" [ {film.height_px} ]'
+        name = (film.filename or "picture").rsplit(".", 1)[0].replace('"', "").replace("\\", "/")
+        tone = (
+            '"string tonemapkernel" [ "linear" ] "float linear_sensitivity" [ 100 ] "float linear_exposure" [ 1 ] '
+            '"float linear_fstop" [ 2.8 ] "float linear_gamma" [ 1 ] "float gamma" [ 2.2 ]'
+        )
+        self.lines.append(
+            f'Film "fleximage" {size} "string filename" [ "{name}" ] "integer haltspp" [ {count} ] {tone}'
+        )
+
+    def _camera(self, camera: Camera) -> None:
+        """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored camera by a transform."""
+        track = getattr(camera, "track", None)
+        if track is not None:
+            self.report.add("camera", "the motion of the camera", "its place at the start")
+        to_world = placed(track, camera.to_world)
+        axes = to_world[:3, :3]
+        unit = np.abs(axes.T @ axes - np.eye(3)).max() < 1e-4
+        if unit and np.linalg.det(axes) > 0.0:
+            eye = to_world[:3, 3]
+            ends = [*eye, *(eye - axes[:, 2]), *axes[:, 1]]
+            self.lines.append("LookAt " + " ".join(repr(float(value)) for value in ends))
+        else:
+            self.report.add("camera", "a mirrored or scaled camera", "a transform, which LuxCore passes over")
+            self.lines.append(f"Transform {written_matrix(inverse(to_world @ np.diag([1.0, 1.0, -1.0, 1.0])))}")
+        before = len(self.lines)
+        super()._camera(camera)
+        line = self.lines[-1]
+        del self.lines[before:]
+        if "screenwindow" not in line:
+            # without it LuxCore takes the field of view across, not along the shorter side
+            width, height = self._aspect
+            line += f' "float screenwindow" {listed((-width, width, -height, height))}'
+        self.lines.append(line)
+
+    # --- textures and materials ----------------------------------------------------------------------------------
+
+    def texture(self, texture: Texture, name: str) -> str:
+        if isinstance(texture, ConstantTexture):
+            return f'"color {name}" {listed(texture.value)}'
+        if id(texture) not in self._textures:
+            made = self._texture_line(texture)
+            label = self._label("t", "")
+            self._textures[id(texture)] = texture, label
+            self.lines.append(f'\tTexture "{label}" "color" {made}')
+        return f'"texture {name}" [ "{self._textures[id(texture)][1]}" ]'
+
+    def _texture_line(self, texture: Texture) -> str:
+        if isinstance(texture, ImageTexture):
+            file = self.output.picture(texture.image, texture.source, linear=True)
+            # the first row is at v = 0 here
+            size, start = (
+                (texture.uv_scale[0], -texture.uv_scale[1]),
+                (texture.uv_offset[0], 1.0 - texture.uv_offset[1]),
+            )
+            kind = {"nearest": "nearest", "bilinear": "bilinear", "mipmap": "mipmap_ewa"}[texture.filter]
+            return (
+                f'"imagemap" "string filename" [ "{file}" ] "string wrap" [ "{texture.wrap}" ] '
+                f'"string filtertype" [ "{kind}" ] "float gamma" [ 1 ] '
+                f'"float uscale" [ {number(size[0])} ] "float vscale" [ {number(size[1])} ] '
+                f'"float udelta" [ {number(start[0])} ] "float vdelta" [ {number(start[1])} ]'
+            )
+        if isinstance(texture, CheckerboardTexture):
+            return f'{super()._texture_line(texture)} "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
+        assert isinstance(texture, MixTexture | ScaleTexture)
+        return super()._texture_line(texture)
+
+    def _material_line(self, material: Material, name: str) -> str:
+        where = f"material {name!r}"
+        if isinstance(material, Bumped):
+            return f"{self._material_line(material.base, name)} {self.texture(material.height, 'bumpmap')}"
+        if isinstance(material, MixMaterial):
+            parts = f'"string namedmaterial1" [ "{self.material(material.first)}" ]'
+            parts += f' "string namedmaterial2" [ "{self.material(material.second)}" ]'
+            amount = material.amount
+            if not isinstance(amount, ConstantTexture):
+                self.report.add(where, "a mixture by a texture", "by its mean")
+            share = number(float(np.mean(mean_of(amount))))
+            return f'"string type" [ "mix" ] {parts} "float amount" [ {share} ]'
+        if isinstance(material, Masked | HeightField):
+            return super()._material_line(material, name)
+        kind, parameters = self._plain_material(material, where)
+        return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
+
+    def _plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
+        if isinstance(material, Matte):
+            sigma = [f'"float sigma" [ {number(material.sigma_deg)} ]'] if material.sigma_deg else []
+            return "matte", [self.texture(material.reflectance, "Kd"), *sigma]
+        if isinstance(material, Mirror):
+            if material.spread_deg:
+                self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
+            return "mirror", [self.texture(material.reflectance, "Kr")]
+        if isinstance(material, Glass):
+            return self._glass(material, where)
+        if isinstance(material, Metal):
+            return self._metal(material, where)
+        if isinstance(material, Translucent):
+            # LuxCore takes it for energy conserving whatever the file says
+            kept = 1.0 - np.array(mean_of(material.reflectance))
+            if isinstance(material.reflectance, ConstantTexture) and (kept > 1e-6).all():
+                through = product(material.transmittance, ConstantTexture(rgb(1.0 / kept)))
+            else:
+                through = material.transmittance
+                self.report.add(where, "what a textured translucent surface lets through", "less what it reflects")
+            sides = [self.texture(material.reflectance, "Kr"), self.texture(through, "Kt")]
+            return "mattetranslucent", [*sides, '"bool energyconserving" [ "true" ]']
+        if isinstance(material, Emissive):
+            return "matte", [f'"color Kd" {listed((0.0, 0.0, 0.0))}']
+        return self._coated(material, where)
+
+    def _coated(self, material: Material, where: str) -> tuple[str, list[str]]:
+        """What is a coat over a diffuse base, or becomes one."""
+        if isinstance(material, Glossy):
+            parts = material.diffuse, material.specular, material.roughness
+        elif isinstance(material, Plastic):
+            fresnel = ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
+            coat = ConstantTexture(rgb(fresnel * np.array(mean_of(material.specular))))
+            parts = material.diffuse, coat, (max(material.roughness, 1e-3),) * 2
+            self.report.add(
+                where, "plastic", f"glossy that reflects {fresnel:.3g} of its highlight at normal incidence"
+            )
+        elif isinstance(material, Phong):
+            alpha = math.sqrt(2.0 / (material.exponent + 2.0))
+            mirror = np.array(material.specular) + material.fresnel_min * np.array(material.mirror_tint)
+            parts = material.diffuse, ConstantTexture(rgb(mirror)), (alpha, alpha)
+            self.report.add(where, "Phong reflection with a Fresnel-weighted mirror", f"glossy of alpha {alpha:.3g}")
+        else:
+            assert isinstance(material, Uber)
+            parts = material.diffuse, material.specular, material.roughness
+            self.report.add(where, "uber", "glossy, without its mirror, transmission and opacity")
+        textures = [self.texture(parts[0], "Kd"), self.texture(parts[1], "Ks"), *_roughness(parts[2])]
+        return "glossy", [*textures, '"bool multibounce" [ "false" ]']
+
+    def _glass(self, material: Glass, where: str) -> tuple[str, list[str]]:
+        if material.spread_deg:
+            self.report.add(where, "rays spread about the perfect ones", "clear glass")
+        parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
+        parts.append(f'"float index" [ {number(material.ior)} ]')
+        if material.roughness != (0.0, 0.0):
+            return "roughglass", parts + _roughness(material.roughness)
+        return "glass", [*parts, f'"bool architectural" [ "{str(material.thin).lower()}" ]']
+
+    def _metal(self, material: Metal, where: str) -> tuple[str, list[str]]:
+        """A preset where the metal is one, else the colour that it reflects at normal incidence."""
+        label = self._label("t", "")
+        preset = next(
+            (_METAL_NAMES.get(name) for name, index in METALS.items() if index == (material.eta, material.k)), ""
+        )
+        if preset:
+            self.lines.append(f'\tTexture "{label}" "fresnel" "preset" "string name" [ "{preset}" ]')
+        else:
+            color = np.array(reflectance_of_index(material.eta, material.k)) * mean_of(material.reflectance_scale)
+            self.lines.append(f'\tTexture "{label}" "fresnel" "fresnelcolor" "color Kr" {listed(color)}')
+            if material.k != (0.0, 0.0, 0.0) or mean_of(material.reflectance_scale) != (1.0, 1.0, 1.0):
+                self.report.add(where, "the complex index of a metal", "its colour at normal incidence")
+        return "metal2", [f'"texture fresnel" [ "{label}" ]', *_roughness(material.roughness)]
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _light(self, light: Light) -> None:
+        if isinstance(light, PointLight):
+            line = f'"point" "point from" {listed(light.position)} "color L" {listed(light.intensity)}'
+        elif isinstance(light, SpotLight):
+            cone = f'"float coneangle" [ {number(light.outer_deg)} ]'
+            cone += f' "float conedeltaangle" [ {number(light.outer_deg - light.inner_deg)} ]'
+            ends = f'"point from" {listed(light.position)} "point to" {listed(light.target)}'
+            line = f'"spot" {ends} "color L" {listed(light.intensity)} {cone}'
+        elif isinstance(light, DirectionalLight):
+            ends = f'"point from" {listed((0.0, 0.0, 0.0))} "point to" {listed(light.direction)}'
+            theta = f' "float theta" [ {number(math.radians(light.angle_deg) / 2.0)} ]' if light.angle_deg else ""
+            line = f'"distant" {ends} "color L" {listed(light.irradiance)}{theta}'
+        elif isinstance(light, SunSky):
+            kind = {"sun": "sun", "sky": "sky2", "both": "sunsky2"}[light.part]
+            air = f'"float turbidity" [ {number(light.turbidity)} ] "float gain" [ {number(light.scale)} ]'
+            self.lines.append(f'\tLightSource "{kind}" "vector sundir" {listed(light.sun_direction)} {air}')
+            return
+        else:
+            self._infinite(light)
+            return
+        self.lines.append(f'\tLightSource {line} "float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]')
+
+    def _infinite(self, light: EnvironmentLight) -> None:
+        if light.image.shape[:2] == (1, 1):
+            radiance = light.scale * light.image[0, 0].astype(np.float64)
+            self.lines.append(f'\tLightSource "infinite" "color L" {listed(radiance)} "float gain" [ 1 ]')
+            return
+        file = self.output.picture(light.image, light.source, linear=True)
+        turn = light.to_world @ inverse(MAP_AXES)
+        self.lines += [
+            "\tTransformBegin",
+            f"\t\tTransform {written_matrix(turn)}",
+            f'\t\tLightSource "infinite" "string mapname" [ "{file}" ] "string mapping" [ "latlong" ] '
+            f'"float gamma" [ 1 ] "color L" [ 1 1 1 ] "float gain" [ {number(light.scale)} ]',
+            "\tTransformEnd",
+        ]
+
+    # --- shapes --------------------------------------------------------------------------------------------------
+
+    def _instance(self, instance: Instance) -> None:
+        material = instance.material
+        where = instance.name or "shape"
+        if isinstance(material, Emissive):
+            self.report.add(where, "a surface that shines on both sides", "on its front")
+        if isinstance(material, Masked):
+            self.report.add(where, "holes in a material", "none")
+            material = material.base
+        emission = material.radiance if isinstance(material, Emissive) else instance.emission
+        lines = ["\tAttributeBegin", f'\t\tNamedMaterial "{self.material(material)}"']
+        if emission is not None:
+            off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'
+            lines.append(f'\t\tAreaLightSource "area" "color L" {listed(emission)} {off}')
+        if instance.track is not None:
+            self.report.add(where, "the motion of a shape", "its place at the start")
+        to_world = placed(instance.track, instance.to_world)
+        if not np.array_equal(to_world, np.eye(4)):
+            lines.append(f"\t\tTransform {written_matrix(to_world)}")
+        self.lines += [*lines, f"\t\t{self._shape(instance)}", "\tAttributeEnd"]
+
+    def _shape(self, instance: Instance) -> str:
+        """Meshes only: LuxCore leaves spheres and disks out."""
+        mesh = as_mesh(instance.shape)
+        if mesh is not instance.shape and not isinstance(instance.shape, Rectangle | Cube):
+            what = f"shape {type(instance.shape).__name__.lower()}"
+            self.report.add(instance.name or "shape", what, f"a mesh of {len(mesh.faces)} triangles")
+        if len(mesh.faces) > INLINE_MAX:
+            return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
+        return f'Shape "trianglemesh" {inline_mesh(mesh, "uv")}'
+
+
+def _roughness(alphas: tuple[float, ...]) -> list[str]:
+    return [f'"float uroughness" [ {number(alphas[0])} ]', f'"float vroughness" [ {number(alphas[1])} ]']
+
+
+def save_luxrender(scene: Scene, output: Output, report: LossReport) -> None:
+    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    writer = LuxWriter(output, report)
+    writer.write(scene)
+    output.text(output.path.name, "\n".join(writer.lines) + "\n")

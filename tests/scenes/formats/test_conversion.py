@@ -1,0 +1,475 @@
+"""Scenes of PBRT and LuxRender into the canonical scene and out again; files that are not to be trusted."""
+
+from __future__ import annotations
+
+import gzip
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenes.canonical import (
+    CheckerboardTexture,
+    ConstantTexture,
+    DirectionalLight,
+    EnvironmentLight,
+    Glass,
+    Glossy,
+    ImageTexture,
+    Masked,
+    Matte,
+    Mesh,
+    Metal,
+    MixMaterial,
+    PerspectiveCamera,
+    Rectangle,
+    SceneError,
+    Sphere,
+    SpotLight,
+    Translucent,
+    Uber,
+)
+from scenes.formats.comparison import difference
+from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.losses import LossReport
+from scenes.formats.ply_files import ply_bytes
+from scenes.formats.recognition import as_mesh, recognised_rectangle
+from scenes.formats.scene_files import SceneFiles
+from scenes.formats.spectra import METALS, blackbody_rgb, sampled_rgb
+
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "scenes"
+REAL = sorted(
+    path.relative_to(DATA).as_posix()
+    for path in [*DATA.glob("pbrt/**/*.pbrt"), *DATA.glob("luxrender/**/*.lxs")]
+    if path.name != "cube.pbrt"  # part of others
+)
+HEAD = 'LookAt 0 0 5 0 0 0 0 1 0\nCamera "perspective"\nWorldBegin\n'
+MESH = 'Shape "trianglemesh" "integer indices"'
+needs_data = pytest.mark.skipif(not REAL, reason="the scene files are not beside this project")
+
+
+def pbrt(folder: Path, body: str, head: str = HEAD, name: str = "a.pbrt"):
+    """The scene of a text, and what it lost."""
+    (folder / name).write_text(head + body)
+    report = LossReport()
+    return load_scene_file(folder / name, None, report), [str(loss) for loss in report.losses]
+
+
+def real(name: str, report: LossReport | None = None):
+    return load_scene_file(DATA / name, DATA / name.split("/")[0], report)
+
+
+@needs_data
+@pytest.mark.parametrize("ending", [".pbrt", ".lxs"])
+@pytest.mark.parametrize("name", REAL)
+def test_real_scenes_come_back_the_same_after_the_first_trip(name: str, ending: str, tmp_path: Path) -> None:
+    scene = real(name)
+    save_scene_file(scene, tmp_path / f"first{ending}")
+    once = load_scene_file(tmp_path / f"first{ending}")
+    save_scene_file(once, tmp_path / f"second{ending}")
+    assert difference(once, load_scene_file(tmp_path / f"second{ending}")) is None
+    assert len(once.instances) == len(scene.instances) and len(once.lights) == len(scene.lights)
+    assert difference(once.camera, scene.camera) is None
+    if name.startswith("pbrt") and ending == ".pbrt":
+        assert difference(scene, once) is None
+    assert not list(tmp_path.glob(".partial*"))
+
+
+@needs_data
+def test_the_same_box_in_both_formats_is_the_same_scene() -> None:
+    """Files of one author in two syntaxes: cameras, walls, light and colours agree."""
+    ours, other = real("pbrt/cornell-box/scene.pbrt"), real("luxrender/cornell-box/cornell-box.lxs")
+    assert difference(ours.instances, other.instances) is None and difference(ours.camera, other.camera) is None
+    assert sum(isinstance(one.shape, Rectangle) for one in ours.instances) == 6
+    assert ours.instances[-1].emission == (17.0, 12.0, 4.0)
+
+
+@needs_data
+def test_what_real_files_say() -> None:
+    report = LossReport()
+    scene = real("pbrt/pbrt-v3-rs/objects/instances.pbrt", report)
+    assert len(scene.instances) == 11 and not report.losses
+    cubes = [one for one in scene.instances if isinstance(one.shape, Mesh)]
+    assert len({id(one.shape) for one in cubes}) == 1
+    assert all(one.material == Matte(ConstantTexture((0.8, 0.1, 0.01))) for one in cubes)
+    spheres = real("pbrt/pbrt-v3-rs/cameras/depth-of-field.pbrt").instances[:5]
+    np.testing.assert_allclose([one.to_world[:3, 3] for one in spheres], [[3 - 3 * n, 3 - 3 * n, 0] for n in range(5)])
+    assert len(real("pbrt/veach-bidir/scene.pbrt").instances) == 14
+    real("pbrt/pbrt-v3-rs/lights/spot.pbrt", report)
+    assert [str(loss) for loss in report.losses] == ["spot.pbrt:13:3: light 'spot': parameter 'conedelta': left out"]
+    lights = real("luxrender/materials-showcase/scene.lxs").lights
+    assert isinstance(lights[0], EnvironmentLight)
+    kinds = [type(one.material) for one in real("luxrender/materials-showcase/scene.lxs").instances]
+    assert {Metal, Glass, Glossy, MixMaterial, Translucent} <= set(kinds)
+
+
+def test_handedness_of_look_at(tmp_path: Path) -> None:
+    """PBRT's ``LookAt`` alone mirrors; with x turned before it, it is the right-handed view that LuxRender's is."""
+    alone, _ = pbrt(tmp_path, "")
+    turned, _ = pbrt(tmp_path, "", "Scale -1 1 1\n" + HEAD)
+    (tmp_path / "a.lxs").write_text(HEAD)
+    lux = load_scene_file(tmp_path / "a.lxs")
+    assert np.linalg.det(alone.camera.to_world) == pytest.approx(-1.0)
+    assert np.linalg.det(turned.camera.to_world) == pytest.approx(1.0)
+    np.testing.assert_allclose(turned.camera.to_world, lux.camera.to_world, atol=1e-12)
+    np.testing.assert_allclose(
+        lux.camera.to_world, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5], [0, 0, 0, 1]], atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ('"float fov" 35', 35.0),
+        ("", 90.0),
+        ('"float halffov" 20', 40.0),
+        (
+            '"float fov" 35 "float screenwindow" [-2 2 -2 2]',
+            math.degrees(2 * math.atan(2 * math.tan(math.radians(17.5)))),
+        ),
+        ('"float fov" 35 "float screenwindow" [-1.7778 1.7778 -1 1]', 35.0),
+    ],
+)
+def test_field_of_view_is_that_of_the_shorter_side(parameters: str, expected: float, tmp_path: Path) -> None:
+    scene, _ = pbrt(tmp_path, "", f'Camera "perspective" {parameters}\nWorldBegin\n')
+    assert isinstance(scene.camera, PerspectiveCamera) and scene.camera.fov_deg == pytest.approx(expected)
+
+
+def test_transforms_and_attribute_stacks(tmp_path: Path) -> None:
+    body = """
+    Translate 1 0 0
+    AttributeBegin
+      Scale 2 2 2
+      CoordinateSystem "here"
+      TransformBegin
+        Rotate 90 0 0 1
+        Translate 1 0 0
+        Shape "sphere"
+      TransformEnd
+      Shape "sphere" "float radius" 3
+      AttributeBegin
+        Identity
+        CoordSysTransform "here"
+        Shape "sphere"
+        Material "mirror"
+      AttributeEnd
+      Transform [1 0 0 0  0 1 0 0  0 0 1 0  7 8 9 1]
+      ConcatTransform [1 0 0 0  0 1 0 0  0 0 1 0  0 0 1 1]
+      Shape "sphere"
+    AttributeEnd
+    Shape "sphere"
+    """
+    scene, losses = pbrt(tmp_path, body)
+    found = [one.to_world[:3, 3].tolist() for one in scene.instances]
+    np.testing.assert_allclose(found, [[1, 2, 0], [1, 0, 0], [1, 0, 0], [7, 8, 10], [1, 0, 0]], atol=1e-12)
+    assert scene.instances[1].shape == Sphere(3.0) and not losses
+    assert all(one.material == Matte(ConstantTexture((0.5, 0.5, 0.5))) for one in scene.instances)
+
+
+def test_motion_is_kept_where_it_is_rigid(tmp_path: Path) -> None:
+    body = """
+    TransformTimes 0 2
+    AttributeBegin
+      ActiveTransform EndTime
+      Translate 4 0 0
+      Rotate 90 0 0 1
+      ActiveTransform All
+      Shape "sphere"
+      ActiveTransform EndTime
+      Scale 2 2 2
+      ActiveTransform All
+      Shape "sphere"
+    AttributeEnd
+    """
+    scene, losses = pbrt(tmp_path, body)
+    track = scene.instances[0].track
+    assert track is not None and (track.start_s, track.interval_s) == (0.0, 2.0)
+    np.testing.assert_allclose(track.translation, [[0, 0, 0], [4, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(track.rotation[1], [0, 0, math.sqrt(0.5), math.sqrt(0.5)], atol=1e-12)
+    assert scene.instances[1].track is None and ["a motion that is not rigid" in loss for loss in losses] == [True]
+
+
+def test_roughness_is_remapped_where_pbrt_does(tmp_path: Path) -> None:
+    """A roughness of 0.5 is an alpha of 0.8058 (the polynomial by hand); false takes it as it is."""
+    body = 'Material "metal" "float roughness" 0.5 {}\nShape "sphere"\n'
+    remapped, _ = pbrt(tmp_path, body.format(""))
+    plain, _ = pbrt(tmp_path, body.format('"bool remaproughness" "false"'))
+    x = math.log(0.5)
+    alpha = 1.62142 + 0.819955 * x + 0.1734 * x**2 + 0.0171201 * x**3 + 0.000640711 * x**4
+    assert remapped.instances[0].material.roughness == pytest.approx((alpha, alpha))
+    assert plain.instances[0].material.roughness == (0.5, 0.5)
+
+
+def test_materials_and_textures_of_pbrt(tmp_path: Path) -> None:
+    body = """
+    Texture "c" "spectrum" "checkerboard" "float uscale" 3 "float vscale" 2 "rgb tex1" [1 0 0] "rgb tex2" [0 0 1]
+    Texture "h" "float" "constant" "float value" 0.25
+    MakeNamedMaterial "a" "string type" "mirror"
+    MakeNamedMaterial "b" "string type" "matte" "texture Kd" "c" "float sigma" 20
+    Material "mix" "string namedmaterial1" "a" "string namedmaterial2" "b" "rgb amount" [0.2 0.2 0.2]
+    Shape "sphere"
+    Material "uber" "rgb Kd" [.1 .2 .3] "rgb opacity" [.5 .5 .5] "texture bumpmap" "h" "float strange" 3
+    Shape "sphere" "float alpha" 0.5
+    Material "hair"
+    Shape "curve" "point P" [0 0 0 1 1 1 2 2 2 3 3 3]
+    """
+    scene, losses = pbrt(tmp_path, body)
+    mixed, bumped = (one.material for one in scene.instances)
+    assert isinstance(mixed, MixMaterial) and isinstance(mixed.second, type(scene.materials["a"]))
+    assert mixed.first == scene.materials["b"] and mixed.amount == ConstantTexture((0.2, 0.2, 0.2))
+    checks = scene.materials["b"].reflectance
+    assert isinstance(checks, CheckerboardTexture) and checks.uv_scale == (3.0, 2.0)
+    assert isinstance(bumped, Masked) and isinstance(bumped.base.base, Uber)
+    assert [loss.split(": ", 1)[1] for loss in losses] == [
+        "material 'uber': parameter 'strange': left out",
+        "material 'hair': matte of its base colour",
+        "hair (a curve): left out",
+    ]
+
+
+def test_lights_of_pbrt(tmp_path: Path) -> None:
+    body = """
+    LightSource "distant" "point from" [0 0 9] "point to" [0 0 0] "rgb L" [1 2 3] "rgb scale" [2 2 2]
+    LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "rgb I" [1 1 1]
+    LightSource "infinite" "blackbody L" [6500 2]
+    MakeNamedMedium "fog" "string type" "homogeneous"
+    """
+    scene, losses = pbrt(tmp_path, body)
+    sun, spot, sky = scene.lights
+    assert sun == DirectionalLight((0.0, 0.0, -1.0), (2.0, 4.0, 6.0))
+    assert isinstance(spot, SpotLight) and (spot.inner_deg, spot.outer_deg) == (30.0, 40.0)
+    assert isinstance(sky, EnvironmentLight) and sky.image.shape == (1, 1, 3)
+    assert len(losses) == 1 and "participating medium" in losses[0]
+
+
+def test_environment_maps_keep_their_directions(tmp_path: Path) -> None:
+    """A texel of PBRT's map at u, θ lies along (cos 2πu sin θ, sin 2πu sin θ, cos θ), by our axes as by its."""
+    from torch import rand
+
+    from renderer.film import write_exr
+
+    write_exr(tmp_path / "sky.exr", rand(8, 16, 3))
+    body = 'Rotate 30 0 1 0\nLightSource "infinite" "string mapname" "sky.exr"\n'
+    scene, _ = pbrt(tmp_path, body)
+    (light,) = scene.lights
+    angle = math.radians(30.0)
+    turn = np.array([[math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)]])
+    for u, theta in ((0.1, 0.3), (0.6, 2.0), (0.9, 1.2)):
+        phi = 2.0 * math.pi * u
+        theirs = turn @ [math.cos(phi) * math.sin(theta), math.sin(phi) * math.sin(theta), math.cos(theta)]
+        canonical = [math.sin(phi) * math.sin(theta), math.cos(theta), -math.cos(phi) * math.sin(theta)]
+        np.testing.assert_allclose(light.to_world[:3, :3] @ canonical, theirs, atol=1e-12)
+
+
+def test_images_have_their_first_row_where_the_format_has_it(tmp_path: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (4, 4, 3), dtype=np.uint8)).save(tmp_path / "a.png")
+    body = HEAD + 'Texture "t" "color" "imagemap" "string filename" "a.png" "float vscale" -2\n'
+    body += 'MakeNamedMaterial "m" "string type" "matte" "texture Kd" "t"\nNamedMaterial "m" Shape "sphere"\n'
+    (tmp_path / "a.pbrt").write_text(body)
+    (tmp_path / "a.lxs").write_text(body)
+    ours, lux = (load_scene_file(tmp_path / name).instances[0].material.reflectance for name in ("a.pbrt", "a.lxs"))
+    assert isinstance(ours, ImageTexture) and (ours.uv_scale, ours.uv_offset) == ((1.0, -2.0), (0.0, 0.0))
+    assert isinstance(lux, ImageTexture) and (lux.uv_scale, lux.uv_offset) == ((1.0, 2.0), (0.0, 1.0))
+
+
+def test_light_given_by_power_is_spread_over_its_area(tmp_path: Path) -> None:
+    """100 W at 17 lm/W over a square of four units: radiance 1700 / (4 π) of luminance 1."""
+    body = 'AreaLightSource "area" "color L" [1 1 1]\nShape "trianglemesh" "integer indices" [0 1 2 0 2 3] '
+    body += '"point P" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]\n'
+    (tmp_path / "a.lxs").write_text(HEAD + body)
+    (lamp,) = load_scene_file(tmp_path / "a.lxs").instances
+    assert lamp.emission == pytest.approx((1700.0 / (4.0 * math.pi),) * 3, rel=1e-4)
+
+
+# --- recognition and spectra -----------------------------------------------------------------------------------------
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30, deadline=None)
+def test_rectangles_are_recognised_under_any_transform(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    matrix = np.eye(4)
+    matrix[:3, :2], matrix[:3, 3] = rng.normal(size=(3, 2)), rng.normal(size=3)
+    normal = np.cross(matrix[:3, 0], matrix[:3, 1])
+    matrix[:3, 2] = normal / np.linalg.norm(normal)
+    plain = as_mesh(Rectangle())
+    points = (plain.vertices @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    normals = np.tile(matrix[:3, 2], (4, 1)).astype(np.float32)
+    found = recognised_rectangle(Mesh(points, plain.faces, normals, plain.uvs))
+    assert found is not None
+    np.testing.assert_allclose(found, matrix, atol=1e-4 * np.abs(matrix).max() + 1e-5)
+    bent = points.copy()
+    bent[2] += 0.1 * np.abs(points).max()
+    assert recognised_rectangle(Mesh(bent, plain.faces, normals, plain.uvs)) is None
+    assert recognised_rectangle(Mesh(points, plain.faces, -normals, plain.uvs)) is None
+
+
+def test_metals_are_those_of_mitsuba() -> None:
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("scalar_rgb")
+    for name, (eta, k) in METALS.items():
+        found = mi.traverse(mi.load_dict({"type": "conductor", "material": name}))
+        np.testing.assert_allclose(eta, list(found["eta.value"]), atol=2e-5)
+        np.testing.assert_allclose(k, list(found["k.value"]), atol=2e-5)
+
+
+def test_colours_of_spectra() -> None:
+    flat = np.array(sampled_rgb(np.array([400.0, 700.0]), np.array([1.0, 1.0])))
+    assert flat @ [0.2126, 0.7152, 0.0722] == pytest.approx(1.0, abs=0.01)
+    red, _, blue = blackbody_rgb(2000.0, 1.0)
+    assert red > 5.0 * blue
+    warm = np.array(blackbody_rgb(6504.0, 1.0))
+    assert warm.max() / warm.min() < 1.1  # next to white D65
+
+
+# --- files that are not to be trusted --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["/etc/passwd", "../secret.pbrt", "..\\\\secret.pbrt", "C:/x.pbrt", "deep/../../secret.pbrt"]
+)
+@pytest.mark.parametrize("directive", ['Include "{}"', 'Shape "plymesh" "string filename" "{}"'])
+def test_paths_that_lead_out_are_refused(name: str, directive: str, tmp_path: Path) -> None:
+    (tmp_path / "secret.pbrt").write_text(HEAD)
+    (tmp_path / "scene" / "deep").mkdir(parents=True)
+    with pytest.raises(SceneError, match=r"expected a (relative file name|file inside)"):
+        pbrt(tmp_path / "scene", directive.format(name))
+
+
+def test_a_link_that_leads_out_is_refused_and_a_root_allows_it(tmp_path: Path) -> None:
+    (tmp_path / "part.pbrt").write_text('Shape "sphere"')
+    (tmp_path / "scene").mkdir()
+    (tmp_path / "scene" / "link.pbrt").symlink_to(tmp_path / "part.pbrt")
+    for name in ("link.pbrt", "../part.pbrt"):
+        file = tmp_path / "scene" / "a.pbrt"
+        file.write_text(f'{HEAD}Include "{name}"')
+        with pytest.raises(SceneError, match="expected a file inside"):
+            load_scene_file(file)
+        assert len(load_scene_file(file, tmp_path).instances) == 1
+
+
+def test_loops_and_depth_of_includes(tmp_path: Path) -> None:
+    (tmp_path / "b.pbrt").write_text('Include "a.pbrt"')
+    with pytest.raises(SceneError, match="do not include themselves"):
+        pbrt(tmp_path, 'Include "b.pbrt"')
+    for number in range(20):
+        (tmp_path / f"n{number}.pbrt").write_text(f'Include "n{number + 1}.pbrt"')
+    with pytest.raises(SceneError, match="at most 16 files inside each other"):
+        pbrt(tmp_path, 'Include "n0.pbrt"')
+
+
+def test_compressed_meshes_are_read_and_bombs_are_not(tmp_path: Path) -> None:
+    mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+    (tmp_path / "m.ply.gz").write_bytes(gzip.compress(ply_bytes(mesh)))
+    shape = 'Shape "plymesh" "string filename" "m.ply.gz"'
+    assert len(pbrt(tmp_path, shape)[0].instances) == 1
+    (tmp_path / "m.ply.gz").write_bytes(gzip.compress(b"ply\n" + bytes(1 << 22)))
+    files = SceneFiles(tmp_path / "a.pbrt", None, 1 << 16)
+    with pytest.raises(SceneError, match="expected at most 65,536 bytes"):
+        files.read(tmp_path / "m.ply.gz", "a.pbrt:1:1")
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("AttributeBegin", "expected every block to end, AttributeBegin does not"),
+        ("AttributeEnd", "a.pbrt:4:1: AttributeEnd: expected a AttributeBegin before it, got none"),
+        ("TransformBegin AttributeEnd", "expected a AttributeBegin before it, got TransformBegin"),
+        ("AttributeBegin\n" * 2000, "expected at most 1024 blocks"),
+        ("Strange 1 2", "a.pbrt:4:1: expected a directive, got 'Strange'"),
+        ("Translate 1 2", "expected 3 numbers, got 2"),
+        ("Scale 1 0 1", "expected a matrix that can be inverted"),
+        ("LookAt 0 0 0 0 0 1 0 0 1", "expected an upward direction across the line of sight"),
+        ('NamedMaterial "x"', "expected a material made before, got 'x'"),
+        ('ObjectInstance "x"', "expected an object made before, got 'x'"),
+        ('Shape "blob"', "expected a kind of shape, got 'blob'"),
+        ('Shape "sphere" "float radius" 0', "radius: expected a positive number, got 0"),
+        (
+            'Shape "trianglemesh" "integer indices" [0 1 5] "point P" [0 0 0 1 0 0 0 1 0]',
+            "expected indices below 3, got 5",
+        ),
+        ('Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1]', "expected points P and indices"),
+        ('Material "plaster"', "expected a kind of material, got 'plaster'"),
+        ('LightSource "bulb"', "expected a kind of light, got 'bulb'"),
+        ('Texture "t" "color" "imagemap" "string filename" "none.png"', "expected a file at .*none.png, found none"),
+        ('Include "none.pbrt"', "expected a file at .*none.pbrt, found none"),
+    ],
+)
+def test_faults_of_scenes(body: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=message):
+        pbrt(tmp_path, body)
+
+
+def test_a_loss_is_an_error_where_none_is_wanted_and_nothing_is_left(tmp_path: Path) -> None:
+    report = LossReport()
+    (tmp_path / "a.pbrt").write_text(HEAD + 'Shape "cone"\n')
+    scene = load_scene_file(tmp_path / "a.pbrt", None, report)
+    with pytest.raises(SceneError, match="expected a conversion without losses, got .*shape 'cone'"):
+        save_scene_file(scene, tmp_path / "out" / "b.pbrt", None, report, strict=True)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_cameras_of_other_kinds(tmp_path: Path) -> None:
+    for kind, ending in (("orthographic", ".pbrt"), ("environment", ".pbrt"), ("realistic", ".pbrt")):
+        scene, _ = pbrt(tmp_path, "", HEAD.replace("perspective", kind))
+        save_scene_file(scene, tmp_path / f"out{ending}")
+        assert difference(scene, load_scene_file(tmp_path / f"out{ending}")) is None
+
+
+def mutated(content: bytes, rng: np.random.Generator) -> bytes:
+    """A real file with some of it changed, cut, doubled or swapped."""
+    found = bytearray(content)
+    for _ in range(rng.integers(1, 4)):
+        at, size = int(rng.integers(0, len(found) + 1)), int(rng.integers(1, 40))
+        what = rng.integers(0, 5)
+        if what == 0:
+            found[at : at + size] = b""
+        elif what == 1:
+            found[at:at] = found[at : at + size]
+        elif what == 2:
+            found[at : at + 1] = bytes([int(rng.integers(0, 256))])
+        elif what == 3:
+            words = [b" nan ", b" 1e308 ", b" -1 ", b' "', b" [ ", b" ] ", b" 0 ", b"AttributeBegin ", b"AttributeEnd "]
+            found[at:at] = words[rng.integers(0, len(words))]
+        else:
+            found[at:] = found[at:][: int(rng.integers(0, max(1, len(found) - at)))]
+    return bytes(found)
+
+
+def fuzz(count: int, folder: Path) -> dict[str, int]:
+    """How many changed files made a scene, and how many a clear error; anything else is raised."""
+    for part in ("pbrt", "luxrender"):
+        shutil.copytree(DATA / part, folder / part)
+    sources = [(name, (DATA / name).read_bytes()) for name in REAL]
+    outcome = {"scene": 0, "error": 0}
+    for number in range(count):
+        rng = np.random.default_rng([7, number])
+        name, content = sources[rng.integers(0, len(sources))]
+        file = (folder / name).with_name(f"changed{Path(name).suffix}")
+        file.write_bytes(mutated(content, rng))
+        try:
+            load_scene_file(file, folder / name.split("/")[0])
+            outcome["scene"] += 1
+        except SceneError as error:
+            assert "\n" not in str(error) and len(str(error)) < 1000
+            outcome["error"] += 1
+    return outcome
+
+
+@needs_data
+def test_changed_files_make_a_scene_or_a_clear_error(tmp_path: Path) -> None:
+    outcome = fuzz(300, tmp_path)
+    assert outcome["scene"] > 10 and outcome["error"] > 50
+
+
+@needs_data
+@pytest.mark.slow
+def test_many_changed_files(tmp_path: Path) -> None:
+    outcome = fuzz(10_000, tmp_path)
+    assert outcome["scene"] + outcome["error"] == 10_000
