@@ -33,10 +33,12 @@ def difference(first: Any, second: Any, tolerance: float = 1e-5, where: str = "s
             difference(a, b, tolerance, f"{where}[{n}]") for n, (a, b) in enumerate(zip(first, second, strict=True))
         )
         return next(filter(None, found), None)
+    if (first is None) != (second is None):
+        return f"{where}: only one is there"
     if isinstance(first, float | np.ndarray) or _numeric(first):
-        a, b = np.asarray(first, np.float64), np.asarray(second, np.float64) if second is not None else None
-        if b is None or a.shape != b.shape:
-            return f"{where}: shapes {a.shape} and {None if b is None else b.shape}"
+        a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
+        if a.shape != b.shape:
+            return f"{where}: shapes {a.shape} and {b.shape}"
         size = max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
         if not (np.abs(a - b) <= tolerance * size + 1e-12).all():
             return f"{where}: {np.abs(a - b).max():g} apart, of {size:g}"

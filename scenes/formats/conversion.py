@@ -10,18 +10,20 @@ from scenes.canonical import Scene, SceneError
 from scenes.formats.losses import LossReport
 from scenes.formats.luxrender import load_luxrender
 from scenes.formats.luxrender_export import save_luxrender
+from scenes.formats.mitsuba import load_mitsuba
 from scenes.formats.output import Output
 from scenes.formats.pbrt import load_pbrt
 from scenes.formats.pbrt_export import save_pbrt
 
-FormatName = Literal["pbrt", "luxrender"]
+FormatName = Literal["pbrt", "luxrender", "mitsuba"]
 
-ENDINGS: dict[str, FormatName] = {".pbrt": "pbrt", ".lxs": "luxrender"}
+ENDINGS: dict[str, FormatName] = {".pbrt": "pbrt", ".lxs": "luxrender", ".xml": "mitsuba"}
 """Formats by how the names of their files end."""
 
 _LOADERS: dict[FormatName, Callable[[Path, Path | None, LossReport], Scene]] = {
     "pbrt": load_pbrt,
     "luxrender": load_luxrender,
+    "mitsuba": load_mitsuba,
 }
 _SAVERS: dict[FormatName, Callable[[Scene, Output, LossReport], None]] = {
     "pbrt": save_pbrt,

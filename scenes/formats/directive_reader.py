@@ -172,7 +172,7 @@ def numbers(directive: Directive, count: int) -> list[float]:
     found: list[float] = []
     for value in directive.values:
         if isinstance(value, tuple):
-            raise SceneError(f"{directive.place}: {directive.name}: expected {count} numbers, got {value[0]!r}")
+            raise SceneError(f"{directive.place}: {directive.name}: expected {count} numbers, got {value!s:.40}")
         found.extend(value.tolist())
     if len(found) != count:
         raise SceneError(f"{directive.place}: {directive.name}: expected {count} numbers, got {len(found)}")

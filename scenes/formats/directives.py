@@ -95,7 +95,7 @@ class Parameters:
             return None
         found = self.given[name]
         if isinstance(found, tuple):
-            raise SceneError(f"{self.place}: {name}: expected numbers, got {found[0]!r}")
+            raise SceneError(f"{self.place}: {name}: expected numbers, got {found!s:.40}")
         if count is not None and len(found) != count:
             raise SceneError(f"{self.place}: {name}: expected {count} numbers, got {len(found)}")
         return found

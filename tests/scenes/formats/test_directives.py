@@ -70,7 +70,7 @@ def test_faults_of_parameters(text: str, message: str) -> None:
     ("value", "ask", "message"),
     [
         ('"float r" [1 2]', lambda p: p.number("r", 0.0), "expected 1 numbers, got 2"),
-        ('"float r" "a"', lambda p: p.number("r", 0.0), "expected numbers, got 'a'"),
+        ('"float r" "a"', lambda p: p.number("r", 0.0), "expected numbers, got ..a"),
         ('"integer r" 1.5', lambda p: p.whole("r", 0, 0, 9), "expected a whole number from 0 to 9, got 1.5"),
         ('"string r" 1', lambda p: p.text("r", ""), "expected one string"),
         ('"bool r" "maybe"', lambda p: p.truth("r", True), "expected true or false, got 'maybe'"),

@@ -1,0 +1,417 @@
+"""Mitsuba 0.5 scenes into the canonical scene.
+
+Source: Mitsuba 0.5 documentation; conventions measured with Mitsuba 3; Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+
+from scenes import loading
+from scenes.canonical import (
+    Camera,
+    ConstantTexture,
+    Cube,
+    DirectionalLight,
+    Disk,
+    EnvironmentCamera,
+    EnvironmentLight,
+    Film,
+    Instance,
+    Integrator,
+    Light,
+    Material,
+    Matte,
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    Rectangle,
+    Rgb,
+    Sampler,
+    Scene,
+    SceneError,
+    Shape,
+    Sphere,
+    SpotLight,
+    SunSky,
+)
+from scenes.formats import revolution
+from scenes.formats.losses import LossReport
+from scenes.formats.mesh_files import read_obj, read_serialized
+from scenes.formats.mitsuba_properties import Properties
+from scenes.formats.mitsuba_surfaces import MitsubaSurfaces
+from scenes.formats.pbrt import facing_normals, turned
+from scenes.formats.ply_files import read_ply
+from scenes.formats.recognition import as_mesh, recognised_rectangle
+from scenes.formats.scene_files import DEPTH_MAX, SceneFiles
+from scenes.formats.spectra import grey, rgb
+from scenes.formats.transform_stack import translation
+from scenes.formats.xml_tree import Node, parse_xml
+from scenes.values import Matrix
+
+FORWARD = np.diag([-1.0, 1.0, -1.0, 1.0])
+"""From a camera that looks along +z with x to the left to the canonical one."""
+
+FILTERS = {"box": "box", "tent": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "catmullrom": "mitchell",
+           "lanczos": "sinc"}  # fmt: skip
+_RADII = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 3.0}
+SAMPLERS = {"independent": "independent", "stratified": "stratified", "ldsampler": "sobol", "sobol": "sobol",
+            "halton": "halton", "hammersley": "hammersley"}  # fmt: skip
+INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "direct": "direct", "ao": "direct",
+               "bdpt": "bidirectional", "mlt": "metropolis", "pssmlt": "metropolis", "erpt": "metropolis",
+               "photonmapper": "photonmap", "ppm": "photonmap", "sppm": "photonmap", "ptracer": "path",
+               "adaptive": "path", "irrcache": "path", "vpl": "path"}  # fmt: skip
+_TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
+FAR = 1e6
+_DEFAULT = Matte(ConstantTexture(grey(0.5)))
+
+
+class MitsubaReader:
+    """State of a Mitsuba file while it is read."""
+
+    def __init__(self, files: SceneFiles, report: LossReport) -> None:
+        self.files, self.report = files, report
+        self.names: dict[str, Node] = {}
+        self.defaults: dict[str, str] = {}
+        self.groups: dict[int, list[Instance]] = {}
+        self.surfaces = MitsubaSurfaces(files, report, self.find)
+        self.materials: dict[str, Material] = {}
+        self.camera: Camera | None = None
+        self.film, self.sampler, self.integrator = Film(768, 576), Sampler("independent", 4), Integrator("path", -1)
+        self.instances: list[Instance] = []
+        self.lights: list[Light] = []
+        self._meshes: dict[tuple, Mesh] = {}
+
+    # --- the tree ------------------------------------------------------------------------------------------------
+
+    def read(self, path: Path) -> None:
+        """Reads a file and what it includes."""
+        nodes = self._nodes(path, [])
+        for node in nodes:
+            self._node(node)
+
+    def _nodes(self, path: Path, inside: list[Path]) -> list[Node]:
+        """Elements of the scene, included ones in their place, parameters put in, names noted."""
+        where = str(inside[-1]) if inside else str(path)
+        if path in inside:
+            raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
+        if len(inside) >= DEPTH_MAX:
+            raise SceneError(f"{where}: expected at most {DEPTH_MAX} files inside each other")
+        root = parse_xml(self.files.read(path, where), path.name)
+        if root.tag != "scene":
+            raise SceneError(f"{root.place}: expected a scene, got {root.tag!r}")
+        found = []
+        for node in root.children:
+            if node.tag == "default":
+                self.defaults.setdefault(node.get("name"), node.get("value"))
+                continue
+            self._filled(node)
+            if node.tag == "include":
+                found += self._nodes(self.files.path(node.get("filename"), str(node.place), path), [*inside, path])
+            elif node.tag == "alias":
+                self._named(node, node.get("id"))
+                self.names[node.get("as")] = self.names[node.get("id")]
+            else:
+                found.append(node)
+        return found
+
+    def _filled(self, node: Node) -> None:
+        """Puts parameters in the place of ``$name``, and notes what has a name of its own."""
+        for key, value in node.attributes.items():
+            if value.startswith("$"):
+                if value[1:] not in self.defaults:
+                    raise SceneError(f"{node.place}: expected a parameter with a default, got {value!r}")
+                node.attributes[key] = self.defaults[value[1:]]
+        if node.tag not in ("ref", "alias") and "id" in node.attributes:
+            self.names[node.get("id")] = node
+        for child in node.children:
+            self._filled(child)
+
+    def _named(self, node: Node, name: str) -> Node:
+        if name not in self.names:
+            raise SceneError(f"{node.place}: expected a name of something before it, got {name!r}")
+        return self.names[name]
+
+    def find(self, reference: Node) -> Node:
+        """What a reference names; raises SceneError where nothing has the name."""
+        return self._named(reference, reference.get("id"))
+
+    def _node(self, node: Node) -> None:
+        if node.tag == "integrator":
+            self._integrator(node)
+        elif node.tag in ("sensor", "camera"):
+            self._sensor(node)
+        elif node.tag == "bsdf":
+            self.materials[node.get("id") or f"bsdf{len(self.materials)}"] = self.surfaces.material(node)
+        elif node.tag == "texture":
+            self.surfaces.made_texture(node)
+        elif node.tag == "shape":
+            self.instances += self._shape(node)
+        elif node.tag == "emitter":
+            self._emitter(node)
+        elif node.tag in ("medium", "phase", "volume", "subsurface"):
+            self.report.add(str(node.place), f"{node.tag} (participating medium)")
+        elif node.tag in ("sampler", "film"):
+            (self._sampler if node.tag == "sampler" else self._film)(node)
+        else:
+            raise SceneError(f"{node.place}: expected an element of a scene, got {node.tag!r}")
+
+    # --- camera, film, sampling ----------------------------------------------------------------------------------
+
+    def _integrator(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        if kind not in INTEGRATORS:
+            raise SceneError(f"{node.place}: expected an integrator of {', '.join(INTEGRATORS)}, got {kind!r}")
+        edges = properties.whole("maxDepth", -1, -1, 1 << 20)
+        # it counts the edges of a path, the canonical scene its bounces
+        self.integrator = Integrator(INTEGRATORS[kind], -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
+        self.surfaces.left_over(properties)
+
+    def _film(self, node: Node) -> None:
+        properties = Properties(node, self.report)
+        size = properties.whole("width", 768, 1, 32768), properties.whole("height", 576, 1, 32768)
+        name, radius = "gaussian", None
+        for child in properties.rest:
+            if child.tag == "rfilter":
+                kind, inner = child.get("type"), Properties(child, self.report)
+                if kind not in FILTERS:
+                    raise SceneError(f"{child.place}: expected a filter of {', '.join(FILTERS)}, got {kind!r}")
+                name = FILTERS[kind]
+                radius = inner.number("radius", _RADII[name])
+                self.surfaces.left_over(inner)
+        width = _RADII[name] if radius is None else radius
+        self.film = Film(*size, name, width, properties.text("filename", ""))  # type: ignore[arg-type]
+        for setting in ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod"):
+            properties.asked.add(setting)
+        self.surfaces.left_over(properties)
+
+    def _sampler(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        if kind not in SAMPLERS:
+            raise SceneError(f"{node.place}: expected a sampler of {', '.join(SAMPLERS)}, got {kind!r}")
+        self.sampler = Sampler(SAMPLERS[kind], properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
+        self.surfaces.left_over(properties)
+
+    def _sensor(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        for child in properties.rest:
+            if child.tag in ("film", "sampler"):
+                self._node(child)
+        to_world = properties.transform() @ FORWARD
+        properties.asked.update(("nearClip", "farClip"))
+        shutter = properties.number("shutterOpen", 0.0), properties.number("shutterClose", 0.0)
+        if kind in ("perspective", "thinlens"):
+            lens = properties.number("apertureRadius", 0.0) if kind == "thinlens" else 0.0
+            focus = properties.number("focusDistance", FAR)
+            self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, None, shutter)
+        elif kind == "orthographic":
+            self.camera = OrthographicCamera(to_world)
+        elif kind == "spherical":
+            self.camera = EnvironmentCamera(to_world)
+        else:
+            raise SceneError(f"{node.place}: expected a kind of sensor, got {kind!r}")
+        self.surfaces.left_over(properties)
+
+    def _field(self, properties: Properties) -> float:
+        """Field of view of the shorter side, degrees."""
+        width, height = self.film.width_px, self.film.height_px
+        axis = properties.text("fovAxis", "x")
+        sides = {"x": width, "y": height, "smaller": min(width, height), "larger": max(width, height),
+                 "diagonal": math.hypot(width, height)}  # fmt: skip
+        if axis not in sides:
+            raise SceneError(f"{properties.where}: fovAxis: expected one of {', '.join(sides)}, got {axis!r}")
+        if "fov" in properties or "focalLength" not in properties:
+            fov = properties.number("fov", -1.0)
+            if fov < 0.0 and "fov" not in properties:  # 50 mm on film of 36 x 24 mm
+                fov, axis = 2.0 * math.degrees(math.atan(math.hypot(36.0, 24.0) / 100.0)), "diagonal"
+        else:
+            text = properties.text("focalLength", "50mm").removesuffix("mm").strip()
+            try:
+                length = float(text)
+            except ValueError:
+                length = 0.0
+            if not 0.1 <= length <= 1e5:
+                raise SceneError(f"{properties.where}: focalLength: expected millimetres, got {text[:20]!r}")
+            fov, axis = 2.0 * math.degrees(math.atan(math.hypot(36.0, 24.0) / (2.0 * length))), "diagonal"
+        if not 0.0 < fov < 180.0:
+            raise SceneError(f"{properties.where}: fov: expected an angle in (0, 180), got {fov:g}")
+        if sides[axis] == min(width, height):
+            return fov
+        return math.degrees(2.0 * math.atan(math.tan(math.radians(fov) / 2.0) * min(width, height) / sides[axis]))
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _emitter(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        matrix = properties.transform()
+        if kind == "point":
+            place = matrix @ np.append(properties.vector("position", grey(0.0)), 1.0)
+            self.lights.append(PointLight(rgb(place[:3]), properties.color("intensity", grey(1.0))))
+        elif kind == "spot":
+            outer = properties.number("cutoffAngle", 20.0)
+            inner = properties.number("beamWidth", 0.75 * outer)
+            ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]))
+            if any(child.tag in ("texture", "ref") for child in properties.rest):
+                self.report.add(properties.where, "a picture in a spot light", "none")
+            self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer))
+        elif kind in ("directional", "collimated"):
+            direction = properties.vector("direction", rgb(matrix[:3, 2]))
+            if not np.linalg.norm(direction) > 0.0:
+                raise SceneError(f"{properties.where}: direction: expected one")
+            if kind == "collimated":
+                self.report.add(properties.where, "a beam of no width", "a parallel light")
+            unit = rgb(direction / np.linalg.norm(direction))
+            self.lights.append(DirectionalLight(unit, properties.color("irradiance", grey(1.0))))
+        elif kind == "constant":
+            radiance = properties.color("radiance", grey(1.0))
+            self.lights.append(EnvironmentLight(np.array([[list(radiance)]], np.float32)))
+        elif kind == "envmap":
+            path = self.files.path(properties.text("filename", ""), properties.where)
+            matrix[:3, 3] = 0.0
+            image = loading.read_image(path)
+            self.lights.append(EnvironmentLight(image, matrix, properties.number("scale", 1.0), str(path)))
+        elif kind in ("sun", "sky", "sunsky"):
+            self._daylight(kind, properties, matrix)
+        elif kind == "area":
+            raise SceneError(f"{node.place}: area: expected it inside a shape")
+        else:
+            raise SceneError(f"{node.place}: expected a kind of emitter, got {kind!r}")
+        if "samplingWeight" in properties:
+            self.report.add(properties.where, "samplingWeight of a light", "the renderer's own choice")
+            properties.asked.add("samplingWeight")
+        self.surfaces.left_over(properties)
+
+    def _daylight(self, kind: str, properties: Properties, matrix: Matrix) -> None:
+        toward = properties.vector("sunDirection", (0.0, 1.0, 0.0))
+        if "sunDirection" not in properties:
+            self.report.add(properties.where, "the sun's place by time and latitude", "overhead")
+            properties.asked.update(
+                ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
+            )
+        direction = matrix[:3, :3] @ toward
+        if not np.linalg.norm(direction) > 0.0:
+            raise SceneError(f"{properties.where}: sunDirection: expected a direction")
+        numbers = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
+        part = "both" if kind == "sunsky" else kind
+        self.lights.append(SunSky(rgb(direction / np.linalg.norm(direction)), *numbers, part))  # type: ignore[arg-type]
+
+    # --- shapes --------------------------------------------------------------------------------------------------
+
+    def _shape(self, node: Node) -> list[Instance]:
+        """Instances of a shape: one, those of a group, or none, reported."""
+        kind, properties = node.get("type"), Properties(node, self.report)
+        if kind == "shapegroup":
+            parts = [child for child in properties.rest if child.tag == "shape"]
+            self.groups[id(node)] = [found for part in parts for found in self._shape(part)]
+            return []
+        if kind == "instance":
+            return self._instances(properties)
+        if kind in ("hair", "heightfield", "deformable"):
+            self.report.add(properties.where, "hair" if kind == "hair" else f"shape {kind!r}")
+            return []
+        matrix = properties.transform()
+        shape, local = self._made(kind, properties)
+        material, emission = self._inside(properties)
+        if properties.truth("flipNormals", False):
+            shape = turned(as_mesh(shape))
+        self.surfaces.left_over(properties)
+        return [Instance(shape, material, matrix @ local, name=node.get("id"), emission=emission)]
+
+    def _instances(self, properties: Properties) -> list[Instance]:
+        matrix = properties.transform()
+        for child in properties.rest:
+            group = self.find(child) if child.tag == "ref" else child
+            if id(group) in self.groups:
+                self.surfaces.left_over(properties)
+                parts = self.groups[id(group)]
+                return [dataclasses.replace(part, to_world=matrix @ part.to_world) for part in parts]
+        raise SceneError(f"{properties.where}: instance: expected a reference to a shapegroup before it")
+
+    def _inside(self, properties: Properties) -> tuple[Material, Rgb | None]:
+        """Material and emission of a shape."""
+        material, emission = None, None
+        for child in properties.rest:
+            node = self.find(child) if child.tag == "ref" else child
+            if node.tag == "bsdf":
+                material = self.surfaces.material(node)
+            elif node.tag == "emitter" and node.get("type") == "area":
+                inner = Properties(node, self.report)
+                emission = inner.color("radiance", grey(1.0))
+                if "samplingWeight" in inner:
+                    self.report.add(inner.where, "samplingWeight of a light", "the renderer's own choice")
+                    inner.asked.add("samplingWeight")
+                self.surfaces.left_over(inner)
+            elif node.tag in ("medium", "subsurface"):
+                self.report.add(str(node.place), f"{node.tag} (participating medium)")
+            elif node.tag not in ("texture",):
+                raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
+        return material or _DEFAULT, emission
+
+    def _made(self, kind: str, properties: Properties) -> tuple[Shape, Matrix]:
+        where, place = properties.where, np.eye(4)
+        if kind == "sphere":
+            radius = properties.number("radius", 1.0)
+            if not radius > 0.0:
+                raise SceneError(f"{where}: radius: expected a positive number, got {radius:g}")
+            return Sphere(radius), translation(*properties.vector("center", grey(0.0)).tolist())
+        if kind in ("rectangle", "cube", "disk"):
+            return {"rectangle": Rectangle(), "cube": Cube(), "disk": Disk()}[kind], place
+        if kind == "cylinder":
+            return self._cylinder(properties)
+        if kind in ("obj", "ply", "serialized"):
+            mesh = self._file(kind, properties)
+            matrix = recognised_rectangle(mesh)
+            return (mesh, place) if matrix is None else (Rectangle(), matrix)
+        raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
+
+    def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
+        first, last = properties.vector("p0", grey(0.0)), properties.vector("p1", (0.0, 0.0, 1.0))
+        radius, length = properties.number("radius", 1.0), float(np.linalg.norm(last - first))
+        if not (radius > 0.0 and length > 0.0):
+            raise SceneError(f"{properties.where}: cylinder: expected a radius and two ends apart")
+        axis = (last - first) / length
+        side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+        side /= np.linalg.norm(side)
+        place = np.eye(4)
+        place[:3] = np.stack([side, np.cross(axis, side), axis, first], axis=1)
+        mesh = revolution.cylinder(radius, 0.0, length)
+        self.report.add(properties.where, "shape 'cylinder'", f"a mesh of {len(mesh.faces)} triangles")
+        return mesh, place
+
+    def _file(self, kind: str, properties: Properties) -> Mesh:
+        path = self.files.path(properties.text("filename", ""), properties.where)
+        index = properties.whole("shapeIndex", 0, 0, 1 << 20)
+        faceted, flipped = properties.truth("faceNormals", False), properties.truth("flipTexCoords", kind == "obj")
+        if properties.number("maxSmoothAngle", 0.0):
+            self.report.add(properties.where, "maxSmoothAngle of a mesh", "its normals as they are")
+        key = (path, index, faceted, flipped)
+        if key not in self._meshes:
+            content = self.files.read(path, properties.where)
+            if kind == "serialized":
+                mesh = read_serialized(content, index, str(path))
+            else:
+                mesh = read_obj(content, str(path)) if kind == "obj" else read_ply(content, str(path))
+            uvs = mesh.uvs
+            if uvs is not None and flipped:
+                uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1).astype(np.float32)
+            mesh = facing_normals(mesh) if not faceted else mesh
+            self._meshes[key] = Mesh(mesh.vertices, mesh.faces, None if faceted else mesh.normals, uvs, str(path))
+        return self._meshes[key]
+
+
+def load_mitsuba(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
+    """Reads a scene; see :func:`scenes.formats.pbrt.load_pbrt`."""
+    reader = MitsubaReader(SceneFiles(path, root), report or LossReport())
+    main = reader.files.folder / Path(path).name
+    if not main.is_file():
+        raise SceneError(f"{path}: expected a scene file, found none")
+    reader.read(main)
+    if reader.camera is None:
+        raise SceneError(f"{path}: expected a sensor, found none")
+    parts = tuple(reader.instances), tuple(reader.lights), reader.film, reader.sampler, reader.integrator
+    return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem)
