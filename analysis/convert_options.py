@@ -16,11 +16,11 @@ class ConvertOptions:
     """A scene file of one renderer as that of another, with its meshes and pictures, and a report of what was lost."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """Scene file: PBRT v3 (.pbrt) or LuxRender 1.x (.lxs)."""
+    """Scene file: PBRT v3 (.pbrt), LuxRender 1.x (.lxs) or Mitsuba 0.5 (.xml)."""
     target: Annotated[Path, tyro.conf.Positional]
     """File to write; meshes and pictures go to the folders models and textures beside it."""
-    to: Literal["", "pbrt", "luxrender"] = ""
-    """Its format; by default that of its name."""
+    to: Literal["", "pbrt", "luxrender", "mitsuba", "mitsuba3"] = ""
+    """Its format; by default that of its name, for .xml Mitsuba 0.5. Mitsuba 3 can be written only."""
     strict: bool = False
     """A loss is an error, and nothing is written."""
     report: Path | None = None

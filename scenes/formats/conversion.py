@@ -11,11 +11,12 @@ from scenes.formats.losses import LossReport
 from scenes.formats.luxrender import load_luxrender
 from scenes.formats.luxrender_export import save_luxrender
 from scenes.formats.mitsuba import load_mitsuba
+from scenes.formats.mitsuba_export import save_mitsuba, save_mitsuba3
 from scenes.formats.output import Output
 from scenes.formats.pbrt import load_pbrt
 from scenes.formats.pbrt_export import save_pbrt
 
-FormatName = Literal["pbrt", "luxrender", "mitsuba"]
+FormatName = Literal["pbrt", "luxrender", "mitsuba", "mitsuba3"]
 
 ENDINGS: dict[str, FormatName] = {".pbrt": "pbrt", ".lxs": "luxrender", ".xml": "mitsuba"}
 """Formats by how the names of their files end."""
@@ -28,6 +29,8 @@ _LOADERS: dict[FormatName, Callable[[Path, Path | None, LossReport], Scene]] = {
 _SAVERS: dict[FormatName, Callable[[Scene, Output, LossReport], None]] = {
     "pbrt": save_pbrt,
     "luxrender": save_luxrender,
+    "mitsuba": save_mitsuba,
+    "mitsuba3": save_mitsuba3,
 }
 
 

@@ -290,9 +290,7 @@ class MitsubaReader:
         toward = properties.vector("sunDirection", (0.0, 1.0, 0.0))
         if "sunDirection" not in properties:
             self.report.add(properties.where, "the sun's place by time and latitude", "overhead")
-            properties.asked.update(
-                ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
-            )
+            properties.asked.update(_TIME_AND_PLACE)
         direction = matrix[:3, :3] @ toward
         if not np.linalg.norm(direction) > 0.0:
             raise SceneError(f"{properties.where}: sunDirection: expected a direction")

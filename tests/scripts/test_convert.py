@@ -51,7 +51,7 @@ def test_strict_writes_nothing_where_something_is_lost(source: Path, tmp_path: P
     [
         (("gone.pbrt", "b.lxs"), ("source", "a scene file", "gone.pbrt")),
         (("a.pbrt", "a.pbrt"), ("target", "another file than the source")),
-        (("a.pbrt", "b.txt"), ("b.txt", "expected a name that ends in .pbrt, .lxs")),
+        (("a.pbrt", "b.txt"), ("b.txt", "expected a name that ends in .pbrt, .lxs, .xml")),
         (("a.pbrt", "b.lxs", "--root", "nowhere"), ("root", "a folder")),
         (("broken.pbrt", "b.lxs"), ("broken.pbrt:1:1", "expected a directive, got 'Nonsense'")),
     ],
