@@ -328,9 +328,11 @@ class MitsubaWriter:
         elif isinstance(material, Glossy | Uber):
             # the coat's share at normal incidence is that of Fresnel's equations times the factor
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
-            factor = rgb(np.array(mean_of(material.specular)) / 0.04)
-            specular = material.specular if isinstance(material, Uber) else ConstantTexture(factor)
-            parts = material.diffuse, specular, 1.5, alpha
+            wanted = np.array(mean_of(material.specular)) / (0.04 if isinstance(material, Glossy) else 1.0)
+            factor = rgb(np.minimum(wanted, 1.0))
+            if (wanted > 1.0).any():
+                self.report.add(where, "a coat that reflects more than 4 %", "one that reflects as much")
+            parts = material.diffuse, ConstantTexture(factor), 1.5, alpha
             self.report.add(where, type(material).__name__.lower(), f"rough plastic of alpha {alpha:.3g}")
         else:
             assert isinstance(material, Phong)
