@@ -38,6 +38,7 @@ class Setup:
 
     scene: Scene
     renderer: Renderer
+    losses: tuple[str, ...] = ()
 
 
 def prepare(options: RunOptions) -> Setup:
@@ -56,8 +57,10 @@ def prepare(options: RunOptions) -> Setup:
         from scenes import catalog
 
     with bad_input():
-        scene = catalog.load(options.input, options.phase)
-        return Setup(scene, _renderer(options, scene, 1))
+        scene, losses = catalog.load_any(options.input, options.phase, options.camera_path)
+        for loss in losses:
+            print(loss)
+        return Setup(scene, _renderer(options, scene, 1), losses)
 
 
 def _renderer(options: RunOptions, scene: Scene, axis: int) -> Renderer:

@@ -18,7 +18,7 @@ class RunOptions:
     """One comparison of the adaptive renderer with the framed one at equal cost."""
 
     input: Annotated[str, tyro.conf.Positional]
-    """Built-in input (by name or number) or a scene file."""
+    """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
     tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
     """The adaptive pipeline."""
     seconds: float = 2.0
@@ -27,6 +27,8 @@ class RunOptions:
     """Where in the animation the measurement starts, seconds."""
     phase: float = 0.0
     """Phase of the animation, for repetitions."""
+    camera_path: Literal["", "turntable", "fly-through"] = ""
+    """Motion of the camera of a scene file that has none."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Simulated time by the cost model, or measured time (the same as the ledger wall)."""
     ledger: Ledger = "thesis"

@@ -98,7 +98,8 @@ def draw_2d(draw: Draw, purpose: wp.int32) -> wp.vec2:
     key = hashed(draw.key, wp.uint32(purpose) + _POINT)
     columns = wp.max(wp.int32(wp.sqrt(wp.float32(draw.count))), 1)
     rows = (draw.count + columns - 1) / columns
-    cell = permuted(draw.index, draw.count, key)
+    # of all cells, also where there are more than samples: any left out must be left out by chance
+    cell = permuted(draw.index, columns * rows, key)
     column = cell % columns
     row = cell / columns
     # a cell's place within its column and row: a permutation of the rows and of the columns

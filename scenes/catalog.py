@@ -18,6 +18,10 @@ BLUR_SCENES = {"planescene": "plane/planescene.txt", "spheresscene": "spheres/sp
 """The two scenes of the motion-blur perception study, and their files among the assets."""
 
 
+FILE_ENDINGS = (".pbrt", ".lxs", ".xml")
+"""Of scene files of other renderers."""
+
+
 def all_names() -> tuple[str, ...]:
     """Names of all built-in scenes."""
     return (*NAMES, *BLUR_SCENES, *effects.EFFECTS, *report.IMAGES)
@@ -26,6 +30,42 @@ def all_names() -> tuple[str, ...]:
 def blur_scene_file(name: str) -> Path:
     """The block file of a scene of the study."""
     return asset(BLUR_SCENES[name])
+
+
+def is_scene_file(name: str) -> bool:
+    """Whether a name is that of a scene file of another renderer."""
+    return Path(name).suffix.lower() in FILE_ENDINGS
+
+
+def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
+    """A scene file of another renderer, as this one can draw it, and what was lost on the way.
+
+    Args:
+        name: of the file.
+        camera_path: ``turntable`` or ``fly-through`` for motion where the file has none; empty for none.
+
+    Raises:
+        SceneError: it cannot be read.
+    """
+    from scenes.camera_paths import on_a_path
+    from scenes.formats.approximation import drawable
+    from scenes.formats.conversion import load_scene_file
+    from scenes.formats.losses import LossReport
+
+    losses = LossReport()
+    scene = drawable(load_scene_file(Path(name), None, losses), losses)
+    if camera_path:
+        scene = on_a_path(scene, camera_path)  # type: ignore[arg-type]
+    return scene, tuple(str(loss) for loss in losses.losses)
+
+
+def load_any(name: str, phase: float = 0.0, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
+    """A built-in scene or that of a file, and what was lost; a camera path is for files alone."""
+    if is_scene_file(name):
+        return load_file(name, camera_path)
+    if camera_path:
+        raise SceneError(f"camera_path: expected none for a built-in scene, got {camera_path}")
+    return load(name, phase), ()
 
 
 def load(name: str, phase: float = 0.0) -> Scene:

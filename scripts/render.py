@@ -26,7 +26,9 @@ def main() -> None:
     from scenes import catalog
 
     with bad_input():
-        scene = catalog.load(options.scene, options.phase)
+        scene, losses = catalog.load_any(options.scene, options.phase)
+        for loss in losses:
+            print(loss)
         if options.explain:
             print("\n".join(explanation(scene)))
             return

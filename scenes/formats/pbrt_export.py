@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scenes.animation import pose_at
 from scenes.canonical import (
     Bumped,
     Camera,
@@ -396,12 +397,7 @@ def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:
     """Where something is at the first key of its motion."""
     if track is None:
         return to_world
-    from scipy.spatial.transform import Rotation
-
-    pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_quat(track.rotation[0]).as_matrix()
-    pose[:3, 3] = track.translation[0]
-    return pose @ to_world
+    return pose_at(track, track.start_s) @ to_world
 
 
 def _roughness(alphas: tuple[float, float]) -> list[str]:

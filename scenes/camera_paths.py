@@ -1,0 +1,70 @@
+"""Motion for scenes that have none: the camera goes round what it looks at, or towards it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from scenes.canonical import Mesh, PerspectiveCamera, Scene, SceneError
+from scenes.formats.recognition import as_mesh
+from scenes.values import RigidTrack
+
+CameraPath = Literal["turntable", "fly-through"]
+TURN_S = 8.0
+"""Of a full turn, seconds."""
+
+FLIGHT_S, FLIGHT_SHARE = 4.0, 0.5
+"""Of the flight, seconds, and how much of the way to what is looked at it takes."""
+
+_KEYS = 65
+
+
+def on_a_path(scene: Scene, path: CameraPath) -> Scene:
+    """The scene with its camera in motion.
+
+    ``turntable`` turns about the vertical through the point looked at, once in :data:`TURN_S`; the vertical is the axis
+    of the world nearest to the camera's own. ``fly-through`` goes straight ahead, and back.
+
+    Raises:
+        SceneError: the camera has a path already, or is none with a place.
+    """
+    camera = scene.camera
+    if not isinstance(camera, PerspectiveCamera):
+        raise SceneError(f"camera_path: expected a perspective camera, got {type(camera).__name__}")
+    if camera.track is not None:
+        raise SceneError("camera_path: expected a scene whose camera stands still, this one moves")
+    eye = camera.to_world[:3, 3]
+    forward = -camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
+    way = looked_at_distance(scene, eye, forward)
+    if path == "turntable":
+        up = camera.to_world[:3, 1]
+        axis = np.zeros(3)
+        axis[int(np.abs(up).argmax())] = np.sign(up[int(np.abs(up).argmax())])
+        center = eye + way * forward
+        turns = Rotation.from_rotvec(np.linspace(0.0, 2.0 * np.pi, _KEYS)[:, None] * axis)
+        rotation = turns.as_quat()
+        rotation[1:] *= np.cumprod(np.where((rotation[1:] * rotation[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))[:, None]
+        translation = center - turns.apply(center)
+        track = RigidTrack(0.0, TURN_S / (_KEYS - 1), translation, rotation)
+        return dataclasses.replace(scene, camera=dataclasses.replace(camera, track=track), duration_s=TURN_S)
+    there = 0.5 - 0.5 * np.cos(np.linspace(0.0, 2.0 * np.pi, _KEYS))
+    translation = FLIGHT_SHARE * way * there[:, None] * forward
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (_KEYS, 1))
+    track = RigidTrack(0.0, FLIGHT_S / (_KEYS - 1), translation, still)
+    return dataclasses.replace(scene, camera=dataclasses.replace(camera, track=track), duration_s=FLIGHT_S)
+
+
+def looked_at_distance(scene: Scene, eye: np.ndarray, forward: np.ndarray) -> float:
+    """How far ahead the middle of what lies in front of the camera is: the median of the shapes' middles."""
+    middles = []
+    for instance in scene.instances:
+        shape = instance.shape
+        points = shape.vertices if isinstance(shape, Mesh) else as_mesh(shape).vertices
+        center = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
+        middles.append((instance.to_world @ np.append(center, 1.0))[:3])
+    ahead = np.array([(middle - eye) @ forward for middle in middles])
+    ahead = ahead[ahead > 0.0]
+    return float(np.median(ahead)) if len(ahead) else 1.0
