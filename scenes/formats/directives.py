@@ -27,7 +27,7 @@ TRUTH.2: /(true|false)\b/
 NAME: /[A-Za-z_]\w*/
 STRING: /"(?:[^"\\\n]|\\.)*"/
 NUMBER: /[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])/
-NUMBERS: /\[(?:[-+.\deE\s,]|#[^\n]*(?:\n|$))*\]/
+NUMBERS: /\[[-+.\deE\s,]*(?:#[^\n]*(?:\n|$)[-+.\deE\s,]*)*\]/
 STRINGS: /\[(?:\s|#[^\n]*\n|true\b|false\b|"(?:[^"\\\n]|\\.)*")+\]/
 COMMENT: /#[^\n]*/
 %ignore /[\s]+/
@@ -164,15 +164,17 @@ def _values(token: Any, file: str) -> Values:
     if token.type == "STRINGS":
         return tuple(str(part) if part.type == "TRUTH" else _unquoted(part) for part in _strings(token))
     place = Place(file, token.line, token.column)
-    body = str(token).strip("[]")
+    body = token[1:-1] if token.type == "NUMBERS" else str(token)
     if "#" in body:
         body = "\n".join(line.split("#")[0] for line in body.splitlines())
-    if not body.strip():
+    if "," in body:
+        body = body.replace(",", " ")
+    if not body or body.isspace():
         return np.zeros(0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            found = np.fromstring(body.replace(",", " "), dtype=np.float64, sep=" ")
+            found = np.fromstring(body, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
             raise SceneError(f"{place}: expected numbers, got {body.strip()[:30]!r}") from None
     if not (np.abs(found) <= NUMBER_MAX).all():  # also not a number
