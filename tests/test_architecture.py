@@ -32,6 +32,7 @@ WIRING = {
     "analysis/bench_scenes.py": ("renderer", "scenes"),
     "analysis/bench_shading.py": ("renderer", "scenes"),
     "analysis/bench_threads.py": ("renderer", "scenes"),
+    "analysis/conversion_check.py": ("renderer", "scenes"),
     "analysis/cost_measurement.py": ("renderer", "scenes", "tsar"),
     "analysis/estimate_check.py": ("tsar",),
     "analysis/evaluation.py": ("renderer", "scenes", "tsar"),
