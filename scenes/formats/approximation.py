@@ -127,7 +127,8 @@ class Approximation:
         if isinstance(material, Matte):
             if material.sigma_deg:
                 self.report.add(where, f"a roughness of {material.sigma_deg:g} degrees", "smooth")
-            return Matte(self.texture(material.reflectance, where))
+            base = self.texture(material.reflectance, where)
+            return material if base is material.reflectance and not material.sigma_deg else Matte(base)
         if isinstance(material, Glass):
             return self._glass(material, where)
         if isinstance(material, Metal):

@@ -50,7 +50,6 @@ class DirectiveReader:
     attributes: Attributes = field(default_factory=Attributes)
     textures: dict[str, Texture] = field(default_factory=dict)
     materials: dict[str, Material] = field(default_factory=dict)
-    in_world: bool = False
     times_s: tuple[float, float] = (0.0, 1.0)
     _saved: list[tuple[str, Attributes | None]] = field(default_factory=list)
     _including: list[Path] = field(default_factory=list)

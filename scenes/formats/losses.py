@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 from scenes.canonical import SceneError
@@ -35,6 +36,19 @@ class LossReport:
         """Writes a loss down."""
         self._losses.setdefault(Loss(where, what, became))
 
+    def kind(self, table: Mapping[str, str], wanted: str, what: str, where: object) -> str:
+        """The canonical kind of a file's; of several that become the same one, all but the first are written down.
+
+        Raises:
+            SceneError: the table does not have it.
+        """
+        if wanted not in table:
+            raise SceneError(f"{where}: expected a kind of {what} of {', '.join(table)}, got {wanted!r}")
+        found = table[wanted]
+        if first_of(table)[found] != wanted:
+            self.add(str(where), f"{what} {wanted!r}", found)
+        return found
+
     @property
     def losses(self) -> tuple[Loss, ...]:
         """All of them, in the order that they were met."""
@@ -53,3 +67,8 @@ class LossReport:
         if self._losses:
             rest = f" (and {len(self._losses) - 1} more)" if len(self._losses) > 1 else ""
             raise SceneError(f"expected a conversion without losses, got {next(iter(self._losses))}{rest}")
+
+
+def first_of(table: Mapping[str, str]) -> dict[str, str]:
+    """A file's kind for each canonical one: the first that becomes it."""
+    return {ours: theirs for theirs, ours in reversed(list(table.items()))}

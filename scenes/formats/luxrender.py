@@ -44,12 +44,11 @@ from scenes.canonical import (
 from scenes.formats.directive_reader import typed, word
 from scenes.formats.directives import Directive, Parameters, parameters_of
 from scenes.formats.losses import LossReport
-from scenes.formats.pbrt import MAP_AXES, PbrtReader, scene_of
+from scenes.formats.pbrt import PbrtReader, scene_of
 from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, product
 from scenes.formats.recognition import as_mesh
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, metal, rgb
-from scenes.values import Matrix
 
 _INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlighting": "direct", "distributedpath": "path",
                 "exphotonmap": "photonmap", "sppm": "photonmap", "igi": "direct", "single": "path",
@@ -170,7 +169,7 @@ class LuxSurfaces(Surfaces):
         return Glossy(*parts, self._alphas(parameters, 0.1))
 
     def _mix(self, parameters: Parameters) -> Material:
-        first, second = mixed_materials(self, parameters)
+        first, second = self.mixed(parameters)
         return MixMaterial(first, second, self.texture(parameters, "amount", grey(0.5)))
 
     def _mattetranslucent(self, parameters: Parameters) -> Material:
@@ -182,17 +181,6 @@ class LuxSurfaces(Surfaces):
         self.report.add(str(parameters.place), "energyconserving with a texture", "its mean")
         rest = ConstantTexture(rgb(1.0 - np.array(mean_of(sides[0]))))
         return Translucent(sides[0], product(sides[1], rest))
-
-
-def mixed_materials(surfaces: Surfaces, parameters: Parameters) -> tuple[Material, Material]:
-    """The two materials of a mixture by name."""
-    parts = []
-    for name in ("namedmaterial1", "namedmaterial2"):
-        wanted = parameters.text(name, "")
-        if wanted not in surfaces.materials:
-            raise SceneError(f"{parameters.place}: {name}: expected a named material, got {wanted!r}")
-        parts.append(surfaces.materials[wanted])
-    return parts[0], parts[1]
 
 
 def index_of_reflectance(reflectance: Rgb) -> tuple[Rgb, Rgb]:
@@ -223,7 +211,6 @@ class LuxReader(PbrtReader):
     """State of a LuxRender file while it is read."""
 
     left_handed: bool = False
-    _power: float = 0.0
     _halt_samples: int = 0
 
     def __post_init__(self) -> None:
@@ -267,22 +254,19 @@ class LuxReader(PbrtReader):
 
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        if kind not in _SAMPLERS:
-            raise SceneError(f"{directive.place}: expected a sampler of {', '.join(_SAMPLERS)}, got {kind!r}")
+        name = self.report.kind(_SAMPLERS, kind, "sampler", directive.place)
         if kind in ("metropolis", "erpt"):
             parameters.asked.update(parameters.given)
-            self.report.add(str(directive.place), f"sampler {kind!r}", "independent")
         count = parameters.whole("pixelsamples", self._halt_samples or 4, 1, 1 << 24)
-        self.sampler = Sampler(_SAMPLERS[kind], self._halt_samples or count)  # type: ignore[arg-type]
+        self.sampler = Sampler(name, self._halt_samples or count)  # type: ignore[arg-type]
         self.left_over(parameters, f"sampler {kind!r}")
 
     def _read_integrator(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        if kind not in _INTEGRATORS:
-            raise SceneError(f"{directive.place}: expected an integrator of {', '.join(_INTEGRATORS)}, got {kind!r}")
+        name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place)
         depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
         parameters.whole("lightdepth", depth, 0, 1 << 20)
-        self.integrator = Integrator(_INTEGRATORS[kind], depth)  # type: ignore[arg-type]
+        self.integrator = Integrator(name, depth)  # type: ignore[arg-type]
         self.left_over(parameters, f"integrator {kind!r}")
 
     # --- lights --------------------------------------------------------------------------------------------------
@@ -309,10 +293,7 @@ class LuxReader(PbrtReader):
     def _read_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         where = str(directive.place)
-        for hint in ("nsamples", "importance"):
-            if hint in parameters:
-                parameters.number(hint, 1.0)
-                self.report.add(where, f"{hint} of a light", "the renderer's own choice")
+        self._lose_hints(parameters)
         if kind in ("sun", "sky", "sky2", "sunsky", "sunsky2"):
             self._daylight(kind, parameters)
         elif kind in ("infinite", "infinitesample"):
@@ -363,8 +344,6 @@ class LuxReader(PbrtReader):
         self.lights.append(SunSky(rgb(turned / np.linalg.norm(turned)), *numbers, part))  # type: ignore[arg-type]
 
     def _environment(self, parameters: Parameters, strength: Rgb, where: str) -> EnvironmentLight:
-        turn: Matrix = self.transforms.current[0].copy()
-        turn[:3, 3] = 0.0
         file, gamma = parameters.text("mapname", ""), parameters.number("gamma", 2.2)
         mapping = parameters.text("mapping", "latlong")
         if mapping != "latlong":
@@ -372,19 +351,13 @@ class LuxReader(PbrtReader):
         if not file:
             return EnvironmentLight(np.array([[list(strength)]], np.float32))
         path = self.files.path(file, where)
-        image = lux_image(path, gamma, 1.0, where)
-        if strength[0] == strength[1] == strength[2]:
-            return EnvironmentLight(image, turn @ MAP_AXES, strength[0], str(path))
-        return EnvironmentLight((image * np.array(strength)).astype(np.float32), turn @ MAP_AXES, 1.0, str(path))
+        return self._map(lux_image(path, gamma, 1.0, where), strength, path)
 
     def _read_area_light(self, directive: Directive) -> None:
         _, parameters = typed(directive)
         self.attributes.emission = self._strength(parameters)
         self.attributes.power = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
-        for hint in ("nsamples", "importance"):
-            if hint in parameters:
-                parameters.number(hint, 1.0)
-                self.report.add(str(directive.place), f"{hint} of a light", "the renderer's own choice")
+        self._lose_hints(parameters)
         self.left_over(parameters, "area light")
 
     def _read_shape(self, directive: Directive) -> None:

@@ -44,7 +44,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import LossReport, first_of
 from scenes.formats.luxrender import reflectance_of_index
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FILTERS, MAP_AXES
@@ -54,7 +54,7 @@ from scenes.formats.recognition import as_mesh
 from scenes.formats.spectra import METALS, rgb
 from scenes.formats.transform_stack import inverse
 
-_FILTERS = {ours: theirs for theirs, ours in FILTERS.items()}
+_FILTERS = first_of(FILTERS)
 _SAMPLERS = {"sobol": "lowdiscrepancy", "halton": "lowdiscrepancy", "hammersley": "lowdiscrepancy",
              "stratified": "lowdiscrepancy", "independent": "random"}  # fmt: skip
 _INTEGRATORS = {"path": "path", "whitted": "directlighting", "direct": "directlighting",
@@ -114,10 +114,7 @@ class LuxWriter(PbrtWriter):
         else:
             self.report.add("camera", "a mirrored or scaled camera", "a transform, which LuxCore passes over")
             self.lines.append(f"Transform {written_matrix(inverse(to_world @ np.diag([1.0, 1.0, -1.0, 1.0])))}")
-        before = len(self.lines)
-        super()._camera(camera)
-        line = self.lines[-1]
-        del self.lines[before:]
+        line = self._camera_line(camera)
         if "screenwindow" not in line:
             # without it LuxCore takes the field of view across, not along the shorter side
             width, height = self._aspect
@@ -159,6 +156,8 @@ class LuxWriter(PbrtWriter):
     def _material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"
         if isinstance(material, Bumped):
+            if material.scale != 1.0:
+                self.report.add(where, "the scale of a bump map", "1")
             return f"{self._material_line(material.base, name)} {self.texture(material.height, 'bumpmap')}"
         if isinstance(material, MixMaterial):
             parts = f'"string namedmaterial1" [ "{self.material(material.first)}" ]'
@@ -234,15 +233,16 @@ class LuxWriter(PbrtWriter):
     def _metal(self, material: Metal, where: str) -> tuple[str, list[str]]:
         """A preset where the metal is one, else the colour that it reflects at normal incidence."""
         label = self._label("t", "")
-        preset = next(
-            (_METAL_NAMES.get(name) for name, index in METALS.items() if index == (material.eta, material.k)), ""
-        )
-        if preset:
+        known = (_METAL_NAMES.get(name) for name, index in METALS.items() if index == (material.eta, material.k))
+        preset, plain = next(known, ""), mean_of(material.reflectance_scale) == (1.0, 1.0, 1.0)
+        if material.distribution != "ggx":
+            self.report.add(where, f"the distribution {material.distribution} of facets", "LuxRender's own")
+        if preset and plain:
             self.lines.append(f'\tTexture "{label}" "fresnel" "preset" "string name" [ "{preset}" ]')
         else:
             color = np.array(reflectance_of_index(material.eta, material.k)) * mean_of(material.reflectance_scale)
             self.lines.append(f'\tTexture "{label}" "fresnel" "fresnelcolor" "color Kr" {listed(color)}')
-            if material.k != (0.0, 0.0, 0.0) or mean_of(material.reflectance_scale) != (1.0, 1.0, 1.0):
+            if material.k != (0.0, 0.0, 0.0) or not plain:
                 self.report.add(where, "the complex index of a metal", "its colour at normal incidence")
         return "metal2", [f'"texture fresnel" [ "{label}" ]', *_roughness(material.roughness)]
 

@@ -60,7 +60,7 @@ FORWARD = np.diag([-1.0, 1.0, -1.0, 1.0])
 FILTERS = {"box": "box", "tent": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "catmullrom": "mitchell",
            "lanczos": "sinc"}  # fmt: skip
 _RADII = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 3.0}
-SAMPLERS = {"independent": "independent", "stratified": "stratified", "ldsampler": "sobol", "sobol": "sobol",
+SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "ldsampler": "sobol",
             "halton": "halton", "hammersley": "hammersley"}  # fmt: skip
 INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "direct": "direct", "ao": "direct",
                "bdpt": "bidirectional", "mlt": "metropolis", "pssmlt": "metropolis", "erpt": "metropolis",
@@ -165,11 +165,10 @@ class MitsubaReader:
 
     def _integrator(self, node: Node) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
-        if kind not in INTEGRATORS:
-            raise SceneError(f"{node.place}: expected an integrator of {', '.join(INTEGRATORS)}, got {kind!r}")
+        name = self.report.kind(INTEGRATORS, kind, "integrator", node.place)
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
         # it counts the edges of a path, the canonical scene its bounces
-        self.integrator = Integrator(INTEGRATORS[kind], -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
+        self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
         self.surfaces.left_over(properties)
 
     def _film(self, node: Node) -> None:
@@ -178,10 +177,8 @@ class MitsubaReader:
         name, radius = "gaussian", None
         for child in properties.rest:
             if child.tag == "rfilter":
-                kind, inner = child.get("type"), Properties(child, self.report)
-                if kind not in FILTERS:
-                    raise SceneError(f"{child.place}: expected a filter of {', '.join(FILTERS)}, got {kind!r}")
-                name = FILTERS[kind]
+                inner = Properties(child, self.report)
+                name = self.report.kind(FILTERS, child.get("type"), "filter", child.place)
                 radius = inner.number("radius", _RADII[name])
                 self.surfaces.left_over(inner)
         width = _RADII[name] if radius is None else radius
@@ -192,9 +189,8 @@ class MitsubaReader:
 
     def _sampler(self, node: Node) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
-        if kind not in SAMPLERS:
-            raise SceneError(f"{node.place}: expected a sampler of {', '.join(SAMPLERS)}, got {kind!r}")
-        self.sampler = Sampler(SAMPLERS[kind], properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
+        name = self.report.kind(SAMPLERS, kind, "sampler", node.place)
+        self.sampler = Sampler(name, properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
         self.surfaces.left_over(properties)
 
     def _sensor(self, node: Node) -> None:

@@ -49,7 +49,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba import FAR, FILTERS, FORWARD
 from scenes.formats.output import Output
 from scenes.formats.pbrt_export import number, placed
@@ -59,7 +59,7 @@ from scenes.values import Matrix, Rgb
 
 Element = ElementTree.Element
 
-_FILTERS = {ours: theirs for theirs, ours in reversed(FILTERS.items())}
+_FILTERS = first_of(FILTERS)
 _SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "halton": "halton",
              "hammersley": "hammersley"}  # fmt: skip
 _INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidirectional": "bdpt",

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes import loading
 from scenes.canonical import (
@@ -69,7 +70,7 @@ SAMPLERS = {"halton": "halton", "sobol": "sobol", "02sequence": "sobol", "lowdis
 INTEGRATORS = {"path": "path", "volpath": "path", "bdpt": "bidirectional", "directlighting": "direct",
                "whitted": "whitted", "mlt": "metropolis", "sppm": "photonmap",
                "ambientocclusion": "direct"}  # fmt: skip
-DEPTHS = {"path": 5, "bidirectional": 5, "direct": 5, "whitted": 5, "metropolis": 5, "photonmap": 5}
+_DEPTH = 5
 FAR = 1e6
 """Focal distance of a PBRT camera that says none."""
 
@@ -83,7 +84,6 @@ class PbrtReader(DirectiveReader):
     """State of a PBRT file while it is read."""
 
     camera: Camera | None = None
-    camera_moves: tuple[Matrix, Matrix] | None = None
     film: Film = field(default_factory=Film)
     sampler: Sampler = field(default_factory=lambda: Sampler("halton", 16))
     integrator: Integrator = field(default_factory=lambda: Integrator("path", 5))
@@ -114,7 +114,6 @@ class PbrtReader(DirectiveReader):
 
     def _begin_world(self, directive: Directive) -> None:
         self.transforms.replace(np.eye(4))
-        self.in_world = True
 
     def _lose_medium(self, directive: Directive) -> None:
         self.report.add(str(directive.place), f"{directive.name} (participating medium)")
@@ -154,7 +153,7 @@ class PbrtReader(DirectiveReader):
         window, aspect = parameters.numbers("screenwindow", 4), parameters.number("frameaspectratio", 0.0)
         if aspect:
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
-        half = self._half_window(window, kind, directive)
+        half = self._half_window(window, directive)
         if kind == "perspective":
             fov = parameters.number("fov", 2.0 * parameters.number("halffov", 45.0))
             if not 0.0 < fov < 180.0:
@@ -173,7 +172,7 @@ class PbrtReader(DirectiveReader):
             raise SceneError(f"{directive.place}: expected a kind of camera, got {kind!r}")
         self.left_over(parameters, f"camera {kind!r}")
 
-    def _half_window(self, window: Any, kind: str, directive: Directive) -> float:
+    def _half_window(self, window: Any, directive: Directive) -> float:
         """Half the window's shorter side; a window off the middle is reported."""
         if window is None:
             return 1.0
@@ -193,9 +192,7 @@ class PbrtReader(DirectiveReader):
 
     def _read_filter(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        if kind not in FILTERS:
-            raise SceneError(f"{directive.place}: expected a filter of {', '.join(FILTERS)}, got {kind!r}")
-        name = FILTERS[kind]
+        name = self.report.kind(FILTERS, kind, "filter", directive.place)
         radius = parameters.number("xwidth", _RADII[name])
         if parameters.number("ywidth", radius) != radius:
             self.report.add(str(directive.place), "ywidth of the filter", "as wide as across")
@@ -205,20 +202,17 @@ class PbrtReader(DirectiveReader):
 
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        if kind not in SAMPLERS:
-            raise SceneError(f"{directive.place}: expected a sampler of {', '.join(SAMPLERS)}, got {kind!r}")
+        name = self.report.kind(SAMPLERS, kind, "sampler", directive.place)
         count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         if kind == "stratified":
             count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
-        self.sampler = Sampler(SAMPLERS[kind], count)  # type: ignore[arg-type]
+        self.sampler = Sampler(name, count)  # type: ignore[arg-type]
         self.left_over(parameters, f"sampler {kind!r}")
 
     def _read_integrator(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        if kind not in INTEGRATORS:
-            raise SceneError(f"{directive.place}: expected an integrator of {', '.join(INTEGRATORS)}, got {kind!r}")
-        name = INTEGRATORS[kind]
-        self.integrator = Integrator(name, parameters.whole("maxdepth", DEPTHS[name], 0, 1 << 20))  # type: ignore[arg-type]
+        name = self.report.kind(INTEGRATORS, kind, "integrator", directive.place)
+        self.integrator = Integrator(name, parameters.whole("maxdepth", _DEPTH, 0, 1 << 20))  # type: ignore[arg-type]
         self.left_over(parameters, f"integrator {kind!r}")
 
     # --- lights --------------------------------------------------------------------------------------------------
@@ -256,20 +250,27 @@ class PbrtReader(DirectiveReader):
             self.lights.append(self._environment(parameters, strength, where))
         else:
             raise SceneError(f"{where}: expected a kind of light, got {kind!r}")
-        for hint in ("samples", "nsamples"):
-            if hint in parameters:
-                parameters.whole(hint, 1, 1, 1 << 20)
-                self.report.add(where, f"{hint} of a light", "the renderer's own choice")
+        self._lose_hints(parameters)
         self.left_over(parameters, f"light {kind!r}")
 
+    def _lose_hints(self, parameters: Parameters) -> None:
+        """Reports what says how to sample a light, not how it shines."""
+        for hint in ("samples", "nsamples", "importance"):
+            if hint in parameters:
+                parameters.number(hint, 1.0)
+                self.report.add(str(parameters.place), f"{hint} of a light", "the renderer's own choice")
+
     def _environment(self, parameters: Parameters, strength: Rgb, where: str) -> EnvironmentLight:
-        to_world = self.transforms.current[0].copy()
-        to_world[:3, 3] = 0.0
         file = parameters.text("mapname", "")
         if not file:
             return EnvironmentLight(np.array([[list(strength)]], np.float32))
         path = self.files.path(file, where)
-        image = loading.read_image(path)
+        return self._map(loading.read_image(path), strength, path)
+
+    def _map(self, image: NDArray[np.float32], strength: Rgb, path: Path) -> EnvironmentLight:
+        """An environment map under the current transform."""
+        to_world = self.transforms.current[0].copy()
+        to_world[:3, 3] = 0.0
         if strength[0] == strength[1] == strength[2]:
             return EnvironmentLight(image, to_world @ MAP_AXES, strength[0], str(path))
         return EnvironmentLight((image * np.array(strength)).astype(np.float32), to_world @ MAP_AXES, 1.0, str(path))
@@ -282,10 +283,7 @@ class PbrtReader(DirectiveReader):
         self.attributes.emission = rgb(scale * self.surfaces.color(parameters, "L", (1.0, 1.0, 1.0)))
         if parameters.truth("twosided", False):
             self.report.add(str(directive.place), "an area light of two sides", "its front")
-        for hint in ("samples", "nsamples"):
-            if hint in parameters:
-                parameters.whole(hint, 1, 1, 1 << 20)
-                self.report.add(str(directive.place), f"{hint} of a light", "the renderer's own choice")
+        self._lose_hints(parameters)
         self.left_over(parameters, "area light")
 
     # --- shapes --------------------------------------------------------------------------------------------------

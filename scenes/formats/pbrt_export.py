@@ -53,7 +53,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import LossReport, first_of
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, FORWARD, INTEGRATORS, MAP_AXES, SAMPLERS
 from scenes.formats.pbrt_surfaces import mean_of
@@ -65,10 +65,8 @@ from scenes.values import Matrix
 INLINE_MAX = 64
 """Triangles of a mesh that is written into the scene file; larger ones get a file of their own."""
 
-_FILTERS = {ours: theirs for theirs, ours in FILTERS.items()}
-_SAMPLERS = {"halton": "halton", "sobol": "sobol", "independent": "random", "hammersley": "halton"}
-_INTEGRATORS = {ours: theirs for theirs, ours in reversed(INTEGRATORS.items())}
-assert set(SAMPLERS.values()) <= set(_SAMPLERS) | {"stratified"}
+_FILTERS, _INTEGRATORS = first_of(FILTERS), first_of(INTEGRATORS)
+_SAMPLERS = {**first_of(SAMPLERS), "hammersley": "halton"}
 
 
 def number(value: float) -> str:
@@ -153,6 +151,10 @@ class PbrtWriter:
         if track is not None:
             self.report.add("camera", "the motion of the camera", "its place at the start")
         self.lines.append(f"Transform {written_matrix(inverse(placed(track, camera.to_world) @ FORWARD))}")
+        self.lines.append(self._camera_line(camera))
+
+    def _camera_line(self, camera: Camera) -> str:
+        """What a camera is, without its place."""
         if isinstance(camera, PerspectiveCamera):
             line = f'Camera "perspective" "float fov" [ {number(camera.fov_deg)} ]'
             if camera.lens_radius > 0.0:
@@ -178,7 +180,7 @@ class PbrtWriter:
                 f'"float focusdistance" [ {number(camera.focus_distance)} ]'
             )
             line = f'Camera "realistic" "string lensfile" [ {_quoted(camera.lens_file)} ] {numbers}'
-        self.lines.append(line)
+        return line
 
     # --- textures and materials ----------------------------------------------------------------------------------
 
@@ -261,9 +263,10 @@ class PbrtWriter:
                 self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
             return "mirror", [self.texture(material.reflectance, "Kr")]
         if isinstance(material, Glass):
-            if material.thin or material.spread_deg:
-                what = "a pane without thickness" if material.thin else "rays spread about the perfect ones"
-                self.report.add(where, what, "clear glass")
+            if material.thin:
+                self.report.add(where, "a pane without thickness", "clear glass")
+            if material.spread_deg:
+                self.report.add(where, "rays spread about the perfect ones", "clear glass")
             parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
             parts.append(f'"float eta" [ {number(material.ior)} ]')
             return "glass", parts + (_roughness(material.roughness) if material.roughness != (0.0, 0.0) else [])

@@ -260,15 +260,19 @@ class Surfaces:
         return Uber(*parts, ior=ior, roughness=self._alphas(parameters, 0.1))
 
     def _mix(self, parameters: Parameters) -> Material:
-        amount = self.texture(parameters, "amount", grey(0.5))
+        first, second = self.mixed(parameters)
+        # PBRT's amount is that of the first
+        return MixMaterial(second, first, self.texture(parameters, "amount", grey(0.5)))
+
+    def mixed(self, parameters: Parameters) -> list[Material]:
+        """The two materials of a mixture by name."""
         parts = []
         for name in ("namedmaterial1", "namedmaterial2"):
             wanted = parameters.text(name, "")
             if wanted not in self.materials:
                 raise SceneError(f"{parameters.place}: {name}: expected a named material, got {wanted!r}")
             parts.append(self.materials[wanted])
-        # PBRT's amount is that of the first
-        return MixMaterial(parts[1], parts[0], amount)
+        return parts
 
 
 def product(first: Texture, second: Texture) -> Texture:

@@ -102,7 +102,11 @@ def test_every_shape_and_light_of_the_feature_scene() -> None:
     assert isinstance(pane, Glass) and pane.thin and pane.ior == pytest.approx(1.5046 / 1.00028)
     assert isinstance(scene.instances[6].material, Masked)
     assert scene.film.width_px == 480 and scene.sampler.samples_per_pixel == 64
-    assert [loss.what for loss in report.losses] == ["path: property 'rrDepth'", "shape 'cylinder'"]
+    assert [loss.what for loss in report.losses] == [
+        "path: property 'rrDepth'",
+        "sampler 'ldsampler'",
+        "shape 'cylinder'",
+    ]
 
 
 def test_transforms_are_chains_and_look_at_is_right_handed(tmp_path: Path) -> None:
