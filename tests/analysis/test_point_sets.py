@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,7 +20,8 @@ from analysis.point_sets import (
     slopes,
     squared_error,
 )
-from renderer.point_sets import point_set
+from analysis.tracer_options import PointSetName
+from renderer.point_sets import POINT_SETS, point_set
 
 
 def grid(side: int) -> np.ndarray:
@@ -81,3 +84,7 @@ def test_tables_and_slopes() -> None:
     table = mean_errors(errors, 64).set_index("set")
     assert table.loc["hammersley", "moving edge"] < 0.5 * table.loc["random", "moving edge"]
     assert isinstance(even, pd.DataFrame)
+
+
+def test_the_command_line_offers_every_set_there_is() -> None:
+    assert get_args(PointSetName) == POINT_SETS
