@@ -248,12 +248,23 @@ class EnvironmentLight:
 
 @dataclass(frozen=True)
 class SunSky:
-    """Analytic daylight: direction towards the sun and turbidity."""
+    """Analytic daylight (:mod:`scenes.daylight`).
+
+    Attributes:
+        sun_direction: towards the sun, in the world.
+        turbidity: of the air, 1 (none) to 10 (haze).
+        scale: multiplies the radiance, which is in W m⁻² sr⁻¹ nm⁻¹ where it is 1.
+        part: what of it shines.
+        up: towards the zenith, in the world.
+        ground_albedo: of the ground, which lights the sky from below, 0 to 1.
+    """
 
     sun_direction: Rgb
     turbidity: float = 3.0
     scale: float = 1.0
     part: Literal["sun", "sky", "both"] = "both"
+    up: Rgb = (0.0, 0.0, 1.0)
+    ground_albedo: float = 0.15
 
 
 Light = PointLight | DirectionalLight | SpotLight | EnvironmentLight | SunSky

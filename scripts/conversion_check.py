@@ -1,6 +1,7 @@
 """Renders converted scenes with Mitsuba 3 and LuxCore and compares their pictures.
 
-Example: python scripts/conversion_check.py scene.xml other.lxs --out out/conversion-check
+Examples: python scripts/conversion_check.py scene.xml other.lxs --out out/conversion-check
+          python scripts/conversion_check.py --markers
 """
 
 from __future__ import annotations
@@ -27,20 +28,27 @@ def main() -> None:
     import pandas as pd
 
     from analysis.conversion_check import checked
+    from analysis.conversion_markers import marker_offsets
     from analysis.progress import bars
     from analysis.records import provenance
 
     config = dataclasses.asdict(options)
     with bad_input(), bars() as shown:
         done, number = shown.task("scenes", len(options.scenes)), count(1)
-        table = pd.DataFrame(checked(options, lambda: done(next(number))))
-        with atomic(options.out / "table.csv") as path:
-            table.to_csv(path, index=False)
+        rows = checked(options, lambda: done(next(number)))
+        markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []
+        for name, found in (("table", rows), ("markers", markers)):
+            if found:
+                with atomic(options.out / f"{name}.csv") as path:
+                    pd.DataFrame(found).to_csv(path, index=False)
         source = provenance(ROOT, config, seed=0)
         write_json(
-            options.out / "summary.json", {"rows": table.to_dict("records"), "config": config, "provenance": source}
+            options.out / "summary.json", {"rows": rows, "markers": markers, "config": config, "provenance": source}
         )
-    print(table.round(4).to_string(index=False))
+    for found in (rows, markers):
+        if found:
+            brief = [{**row, "losses": len(row["losses"])} if "losses" in row else row for row in found]
+            print(pd.DataFrame(brief).round(4).to_string(index=False))
     print(f"written to {options.out}")
 
 

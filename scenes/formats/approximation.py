@@ -42,6 +42,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.daylight import sky_map, sun_light
 from scenes.formats.losses import LossReport
 from scenes.formats.luxrender import reflectance_of_index
 from scenes.formats.pbrt_surfaces import mean_of
@@ -75,23 +76,21 @@ class Approximation:
             self.report.add(
                 "integrator", f"{scene.integrator.kind}: light between surfaces", "direct light, mirrors, glass"
             )
-        lights = tuple(self.light(light) for light in scene.lights)
+        lights = tuple(made for light in scene.lights for made in self.light(light))
         instances = tuple(self.instance(instance, number) for number, instance in enumerate(scene.instances))
         integrator = dataclasses.replace(scene.integrator, depth=depth)
         return dataclasses.replace(scene, camera=camera, lights=lights, instances=instances, integrator=integrator)
 
-    def light(self, light: Light) -> Light:
-        """Daylight becomes an even sky; the sky of a clear day is about as bright as its turbidity says."""
+    def light(self, light: Light) -> list[Light]:
+        """Daylight becomes a map and a light as wide as the sun."""
         if not isinstance(light, SunSky):
-            return light
-        from scenes.canonical import DirectionalLight, EnvironmentLight
-
-        if light.part == "sun":
-            self.report.add("light", "the analytic sun", "a white parallel light")
-            away = rgb(-np.array(light.sun_direction))
-            return DirectionalLight(away, rgb(light.scale * np.ones(3)), 0.53)
-        self.report.add("light", "the analytic sky", "an even one")
-        return EnvironmentLight(np.array([[[0.25, 0.4, 0.7]]], np.float32), scale=light.scale)
+            return [light]
+        made: list[Light] = [] if light.part == "sky" else [sun_light(light)]
+        if light.part != "sun":
+            sky = sky_map(light)
+            self.report.add("light", "the analytic sky", f"a map of {sky.image.shape[0]} rows")
+            made.append(sky)
+        return made
 
     def instance(self, instance: Instance, number: int) -> Instance:
         """A shape; lamps are rectangles and spheres, others are seen and give no light."""

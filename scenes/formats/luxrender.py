@@ -57,6 +57,9 @@ _SAMPLERS = {"lowdiscrepancy": "sobol", "random": "independent", "metropolis": "
              "sobol": "sobol", "halton": "halton"}  # fmt: skip
 _NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
 _MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
+SKY_UNIT, SUN_UNIT = 64_000.0, 46_000.0
+"""Radiance of LuxCore 2.10's sky2 and sun at a gain of 1 over that of Mitsuba 3 at a scale of 1, within 2 and 11 %
+(the sun's blue), at a turbidity of 3 and 45 degrees."""
 _LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 
 
@@ -340,8 +343,12 @@ class LuxReader(PbrtReader):
         if "relsize" in parameters:
             parameters.number("relsize", 1.0)
             self.report.add(str(parameters.place), "the size of the sun's disk", "the real one")
-        numbers = parameters.number("turbidity", 2.0), parameters.number("gain", 1.0)
-        self.lights.append(SunSky(rgb(turned / np.linalg.norm(turned)), *numbers, part))  # type: ignore[arg-type]
+        turbidity, gain = parameters.number("turbidity", 2.0), parameters.number("gain", 1.0)
+        up = self.transforms.current[0][:3, 2]
+        unit, zenith = rgb(turned / np.linalg.norm(turned)), rgb(up / np.linalg.norm(up))
+        for one, size in (("sun", SUN_UNIT), ("sky", SKY_UNIT)):
+            if part in (one, "both"):
+                self.lights.append(SunSky(unit, turbidity, gain * size, one, zenith, 0.0))  # type: ignore[arg-type]
 
     def _environment(self, parameters: Parameters, strength: Rgb, where: str) -> EnvironmentLight:
         file, gamma = parameters.text("mapname", ""), parameters.number("gamma", 2.2)

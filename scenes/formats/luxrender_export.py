@@ -6,6 +6,7 @@ ch. 4.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -32,6 +33,8 @@ from scenes.canonical import (
     Mirror,
     MixMaterial,
     MixTexture,
+    OrthographicCamera,
+    PerspectiveCamera,
     Phong,
     Plastic,
     PointLight,
@@ -44,15 +47,26 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.daylight import sky_map
 from scenes.formats.losses import LossReport, first_of
-from scenes.formats.luxrender import reflectance_of_index
+from scenes.formats.luxrender import SKY_UNIT, SUN_UNIT, reflectance_of_index
 from scenes.formats.output import Output
-from scenes.formats.pbrt import FILTERS, MAP_AXES
-from scenes.formats.pbrt_export import INLINE_MAX, PbrtWriter, inline_mesh, listed, number, placed, written_matrix
+from scenes.formats.pbrt import FAR, FILTERS, MAP_AXES
+from scenes.formats.pbrt_export import (
+    INLINE_MAX,
+    PbrtWriter,
+    aspect_of,
+    inline_mesh,
+    listed,
+    number,
+    placed,
+    written_matrix,
+)
 from scenes.formats.pbrt_surfaces import mean_of, product
 from scenes.formats.recognition import as_mesh
 from scenes.formats.spectra import METALS, rgb
 from scenes.formats.transform_stack import inverse
+from scenes.values import Rgb
 
 _FILTERS = first_of(FILTERS)
 _SAMPLERS = {"sobol": "lowdiscrepancy", "halton": "lowdiscrepancy", "hammersley": "lowdiscrepancy",
@@ -65,11 +79,8 @@ _METAL_NAMES = {"Ag": "silver", "Al": "aluminium", "Au": "gold", "Cu": "copper"}
 class LuxWriter(PbrtWriter):
     """Lines of a LuxRender scene."""
 
-    _aspect: tuple[float, float] = (1.0, 1.0)
-
     def _options(self, scene: Scene) -> None:
-        shorter = min(scene.film.width_px, scene.film.height_px)
-        self._aspect = scene.film.width_px / shorter, scene.film.height_px / shorter
+        self.aspect = aspect_of(scene.film)
         integrator, sampler, film = scene.integrator, scene.sampler, scene.film
         kind, depth = _INTEGRATORS[integrator.kind], integrator.depth
         if depth < 0:
@@ -100,26 +111,25 @@ class LuxWriter(PbrtWriter):
         )
 
     def _camera(self, camera: Camera) -> None:
-        """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored camera by a transform."""
+        """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored picture by a window from right to left."""
         track = getattr(camera, "track", None)
         if track is not None:
             self.report.add("camera", "the motion of the camera", "its place at the start")
         to_world = placed(track, camera.to_world)
-        axes = to_world[:3, :3]
-        unit = np.abs(axes.T @ axes - np.eye(3)).max() < 1e-4
-        if unit and np.linalg.det(axes) > 0.0:
-            eye = to_world[:3, 3]
-            ends = [*eye, *(eye - axes[:, 2]), *axes[:, 1]]
-            self.lines.append("LookAt " + " ".join(repr(float(value)) for value in ends))
-        else:
-            self.report.add("camera", "a mirrored or scaled camera", "a transform, which LuxCore passes over")
-            self.lines.append(f"Transform {written_matrix(inverse(to_world @ np.diag([1.0, 1.0, -1.0, 1.0])))}")
-        line = self._camera_line(camera)
-        if "screenwindow" not in line:
-            # without it LuxCore takes the field of view across, not along the shorter side
-            width, height = self._aspect
-            line += f' "float screenwindow" {listed((-width, width, -height, height))}'
-        self.lines.append(line)
+        size = abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
+        axes = to_world[:3, :3] / size
+        if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-4:
+            self.report.add("camera", "a sheared camera", "an upright one")
+        if isinstance(camera, PerspectiveCamera) and abs(size - 1.0) > 1e-6:
+            lens, focus = size * camera.lens_radius, camera.focal_distance
+            camera = dataclasses.replace(camera, lens_radius=lens, focal_distance=size * focus if focus != FAR else FAR)
+        eye = to_world[:3, 3]
+        ends = [*eye, *(eye - axes[:, 2]), *axes[:, 1]]
+        self.lines.append("LookAt " + " ".join(repr(float(value)) for value in ends))
+        half = camera.half_width if isinstance(camera, OrthographicCamera) else 1.0
+        plain = dataclasses.replace(camera, half_width=1.0) if isinstance(camera, OrthographicCamera) else camera
+        # without a window LuxCore takes the field of view across, not along the shorter side
+        self.lines.append(self._camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0)))
 
     # --- textures and materials ----------------------------------------------------------------------------------
 
@@ -261,14 +271,31 @@ class LuxWriter(PbrtWriter):
             theta = f' "float theta" [ {number(math.radians(light.angle_deg) / 2.0)} ]' if light.angle_deg else ""
             line = f'"distant" {ends} "color L" {listed(light.irradiance)}{theta}'
         elif isinstance(light, SunSky):
-            kind = {"sun": "sun", "sky": "sky2", "both": "sunsky2"}[light.part]
-            air = f'"float turbidity" [ {number(light.turbidity)} ] "float gain" [ {number(light.scale)} ]'
-            self.lines.append(f'\tLightSource "{kind}" "vector sundir" {listed(light.sun_direction)} {air}')
+            self._daylight(light)
             return
         else:
             self._infinite(light)
             return
         self.lines.append(f'\tLightSource {line} "float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]')
+
+    def _daylight(self, light: SunSky) -> None:
+        """The zenith is z whatever the transform says (LuxCore); a sky that is turned becomes a map."""
+        if light.part != "sky":
+            self._sun_or_sky("sun", light.sun_direction, light.turbidity, light.scale / SUN_UNIT)
+        if light.part == "sun":
+            return
+        if light.up != (0.0, 0.0, 1.0):
+            sky = sky_map(light)
+            self.report.add("light", "a sky with its zenith not along z", f"a map of {sky.image.shape[0]} rows")
+            self._infinite(sky)
+            return
+        if light.ground_albedo:
+            self.report.add("light", f"a sky over ground of albedo {light.ground_albedo:g}", "over black ground")
+        self._sun_or_sky("sky2", light.sun_direction, light.turbidity, light.scale / SKY_UNIT)
+
+    def _sun_or_sky(self, kind: str, toward: Rgb, turbidity: float, gain: float) -> None:
+        air = f'"float turbidity" [ {number(turbidity)} ] "float gain" [ {number(gain)} ]'
+        self.lines.append(f'\tLightSource "{kind}" "vector sundir" {listed(toward)} {air}')
 
     def _infinite(self, light: EnvironmentLight) -> None:
         if light.image.shape[:2] == (1, 1):

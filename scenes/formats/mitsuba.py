@@ -40,6 +40,7 @@ from scenes.canonical import (
     SpotLight,
     SunSky,
 )
+from scenes.daylight import sun_at
 from scenes.formats import revolution
 from scenes.formats.losses import LossReport
 from scenes.formats.mesh_files import read_obj, read_serialized
@@ -283,16 +284,35 @@ class MitsubaReader:
         self.surfaces.left_over(properties)
 
     def _daylight(self, kind: str, properties: Properties, matrix: Matrix) -> None:
-        toward = properties.vector("sunDirection", (0.0, 1.0, 0.0))
+        turned = matrix[:3, :3]
+        direction = properties.vector("sunDirection", (0.0, 1.0, 0.0))
         if "sunDirection" not in properties:
-            self.report.add(properties.where, "the sun's place by time and latitude", "overhead")
-            properties.asked.update(_TIME_AND_PLACE)
-        direction = matrix[:3, :3] @ toward
+            direction = turned @ self._by_time(properties)
         if not np.linalg.norm(direction) > 0.0:
             raise SceneError(f"{properties.where}: sunDirection: expected a direction")
-        numbers = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
-        part = "both" if kind == "sunsky" else kind
-        self.lights.append(SunSky(rgb(direction / np.linalg.norm(direction)), *numbers, part))  # type: ignore[arg-type]
+        unit, up = rgb(direction / np.linalg.norm(direction)), rgb(turned[:, 1] / np.linalg.norm(turned[:, 1]))
+        turbidity, scale = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
+        albedo = float(np.mean(properties.color("albedo", grey(0.15))))
+        shares = {part: properties.number(f"{part}Scale", 1.0) for part in ("sun", "sky")}
+        if kind != "sunsky" or shares["sun"] == shares["sky"]:
+            part = "both" if kind == "sunsky" else kind
+            factor = scale * (shares["sky"] if kind == "sunsky" else 1.0)
+            self.lights.append(SunSky(unit, turbidity, factor, part, up, albedo))  # type: ignore[arg-type]
+            return
+        for part, share in shares.items():
+            self.lights.append(SunSky(unit, turbidity, scale * share, part, up, albedo))  # type: ignore[arg-type]
+
+    def _by_time(self, properties: Properties) -> np.ndarray:
+        """Towards the sun, by date and place; east is x, north -z."""
+        names = zip(_TIME_AND_PLACE, (2010, 7, 10, 15, 0, 0, 35.6894, 139.6917, 9), strict=True)
+        values = {name: properties.number(name, default) for name, default in names}
+        if not (1 <= values["month"] <= 12 and 1 <= values["day"] <= 31 and abs(values["year"]) < 1e4):
+            raise SceneError(f"{properties.where}: expected a date")
+        hour = values["hour"] + values["minute"] / 60.0 + values["second"] / 3600.0
+        date = int(values["year"]), int(values["month"]), int(values["day"])
+        east, north, up = sun_at(date, hour, values["latitude"], values["longitude"], values["timezone"])
+        self.report.add(properties.where, "the sun's place by time and latitude", "its direction, x to the east")
+        return np.array([east, up, -north])
 
     # --- shapes --------------------------------------------------------------------------------------------------
 

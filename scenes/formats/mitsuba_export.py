@@ -5,6 +5,7 @@ Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Ha
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import xml.etree.ElementTree as ElementTree
@@ -49,12 +50,13 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.daylight import facing_up
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba import FAR, FILTERS, FORWARD
 from scenes.formats.output import Output
 from scenes.formats.pbrt_export import number, placed
 from scenes.formats.pbrt_surfaces import mean_of
-from scenes.formats.spectra import rgb
+from scenes.formats.spectra import grey, rgb
 from scenes.values import Matrix, Rgb
 
 Element = ElementTree.Element
@@ -426,13 +428,7 @@ class MitsubaWriter:
             ElementTree.SubElement(made, "vector", {"name": "direction", **way})
             self.color(made, "irradiance", light.irradiance)
         elif isinstance(light, SunSky):
-            kind = {"both": "sunsky"}.get(light.part, light.part)
-            made = self.plugin("emitter", "sunsky" if self.modern else kind, self.root)
-            way = {axis: number(value) for axis, value in zip("xyz", light.sun_direction, strict=True)}
-            ElementTree.SubElement(made, "vector", {"name": self.name("sunDirection"), **way})
-            self.put(made, "float", "turbidity", number(light.turbidity))
-            if not self.modern:
-                self.put(made, "float", "scale", number(light.scale))
+            self._daylight(light)
         elif light.image.shape[:2] == (1, 1):
             made = self.plugin("emitter", "constant", self.root)
             self.color(made, "radiance", rgb(light.scale * light.image[0, 0].astype(np.float64)))
@@ -441,6 +437,27 @@ class MitsubaWriter:
             self.put(made, "string", "filename", self.output.picture(light.image, light.source))
             self.put(made, "float", "scale", number(light.scale))
             self.matrix(made, "toWorld", light.to_world)
+
+    def _daylight(self, light: SunSky) -> None:
+        """Directions are those of the world here; the transform turns the zenith, y or in Mitsuba 3 z."""
+        kind = "sunsky" if self.modern or light.part == "both" else light.part
+        made = self.plugin("emitter", kind, self.root)
+        way = {axis: number(value) for axis, value in zip("xyz", light.sun_direction, strict=True)}
+        ElementTree.SubElement(made, "vector", {"name": self.name("sunDirection"), **way})
+        air = light
+        if self.modern and not 1.0 <= light.turbidity <= 10.0:
+            air = dataclasses.replace(light, turbidity=min(max(light.turbidity, 1.0), 10.0))
+            self.report.add("light", f"a turbidity of {light.turbidity:g}", f"{air.turbidity:g}")
+        self.put(made, "float", "turbidity", number(air.turbidity))
+        self.color(made, "albedo", grey(light.ground_albedo))
+        if self.modern:
+            for part in ("sun", "sky"):
+                self.put(made, "float", f"{part}Scale", number(light.scale if light.part in (part, "both") else 0.0))
+        else:
+            self.put(made, "float", "scale", number(light.scale))
+        turn = facing_up(light.up, 2 if self.modern else 1)
+        if not np.array_equal(turn, np.eye(4)):
+            self.matrix(made, "toWorld", turn)
 
     def _shape(self, instance: Instance) -> None:
         shape, material = instance.shape, instance.material

@@ -150,10 +150,10 @@ class PbrtReader(DirectiveReader):
         shutter = parameters.number("shutteropen", 0.0), parameters.number("shutterclose", 1.0)
         if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
             shutter = 0.0, 0.0  # the default of a still
-        window, aspect = parameters.numbers("screenwindow", 4), parameters.number("frameaspectratio", 0.0)
-        if aspect:
+        half, mirror = self._window(parameters, directive)
+        start = start @ mirror
+        if parameters.number("frameaspectratio", 0.0):
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
-        half = self._half_window(window, directive)
         if kind == "perspective":
             fov = parameters.number("fov", 2.0 * parameters.number("halffov", 45.0))
             if not 0.0 < fov < 180.0:
@@ -172,17 +172,19 @@ class PbrtReader(DirectiveReader):
             raise SceneError(f"{directive.place}: expected a kind of camera, got {kind!r}")
         self.left_over(parameters, f"camera {kind!r}")
 
-    def _half_window(self, window: Any, directive: Directive) -> float:
-        """Half the window's shorter side; a window off the middle is reported."""
+    def _window(self, parameters: Parameters, directive: Directive) -> tuple[float, Matrix]:
+        """Half the window's shorter side, and the mirror that one from right to left is; one off the middle is
+        reported."""
+        window = parameters.numbers("screenwindow", 4)
         if window is None:
-            return 1.0
+            return 1.0, np.eye(4)
         left, right, bottom, top = window
-        half = 0.5 * min(right - left, top - bottom)
+        signs = np.sign([right - left, top - bottom])
         if abs(left + right) > 1e-6 * abs(right) or abs(bottom + top) > 1e-6 * abs(top):
             self.report.add(str(directive.place), "a screen window off the middle", "one about the middle")
-        if not half > 0.0:
-            raise SceneError(f"{directive.place}: screenwindow: expected left < right and bottom < top")
-        return float(half)
+        if not signs.all():
+            raise SceneError(f"{directive.place}: screenwindow: expected left and right, bottom and top apart")
+        return 0.5 * float(min(abs(right - left), abs(top - bottom))), np.diag([*signs, 1.0, 1.0])
 
     def _read_film(self, directive: Directive) -> None:
         kind, parameters = typed(directive)

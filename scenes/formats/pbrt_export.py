@@ -22,6 +22,7 @@ from scenes.canonical import (
     Emissive,
     EnvironmentCamera,
     EnvironmentLight,
+    Film,
     Glass,
     Glossy,
     HeightField,
@@ -53,6 +54,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.daylight import sky_map, sun_light
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, FORWARD, INTEGRATORS, MAP_AXES, SAMPLERS
@@ -91,6 +93,7 @@ class PbrtWriter:
     output: Output
     report: LossReport
     lines: list[str] = field(default_factory=list)
+    aspect: tuple[float, float] = (1.0, 1.0)
     _textures: dict[int, tuple[Texture, str]] = field(default_factory=dict)
     _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
@@ -121,6 +124,7 @@ class PbrtWriter:
     # --- options -------------------------------------------------------------------------------------------------
 
     def _options(self, scene: Scene) -> None:
+        self.aspect = aspect_of(scene.film)
         integrator, sampler, film = scene.integrator, scene.sampler, scene.film
         depth = integrator.depth
         if depth < 0:
@@ -153,6 +157,12 @@ class PbrtWriter:
         self.lines.append(f"Transform {written_matrix(inverse(placed(track, camera.to_world) @ FORWARD))}")
         self.lines.append(self._camera_line(camera))
 
+    def window(self, half: float, mirrored: bool = False) -> str:
+        """The screen window of an image whose shorter side is twice ``half``."""
+        width, height = (half * side for side in self.aspect)
+        left = width if mirrored else -width
+        return f' "float screenwindow" {listed((left, -left, -height, height))}'
+
     def _camera_line(self, camera: Camera) -> str:
         """What a camera is, without its place."""
         if isinstance(camera, PerspectiveCamera):
@@ -165,12 +175,9 @@ class PbrtWriter:
                 line += f' "float shutteropen" [ {number(camera.shutter_s[0])} ]'
                 line += f' "float shutterclose" [ {number(camera.shutter_s[1])} ]'
         elif isinstance(camera, OrthographicCamera):
-            half = camera.half_width
-            line = f'Camera "orthographic" "float screenwindow" {listed((-half, half, -half, half))}'
-            if half == 1.0:
-                line = 'Camera "orthographic"'
-            else:
-                self.report.add("camera", "a parallel view of another shape than square", "a square window")
+            line = 'Camera "orthographic"'
+            if camera.half_width != 1.0:
+                line += self.window(camera.half_width)
         elif isinstance(camera, EnvironmentCamera):
             line = 'Camera "environment"'
         else:
@@ -328,9 +335,18 @@ class PbrtWriter:
             start = f'"point from" {listed((0.0, 0.0, 0.0))} "point to" {listed(light.direction)}'
             self.lines.append(f'\tLightSource "distant" {start} "rgb L" {listed(light.irradiance)}')
         elif isinstance(light, SunSky):
-            self.report.add("light", "analytic sun and sky")
+            self._daylight(light)
         else:
             self._infinite(light)
+
+    def _daylight(self, light: SunSky) -> None:
+        """The sky as a picture, the sun as a light from one direction."""
+        if light.part != "sun":
+            sky = sky_map(light)
+            self.report.add("light", "the analytic sky", f"a map of {sky.image.shape[0]} rows")
+            self._infinite(sky)
+        if light.part != "sky":
+            self._light(sun_light(light))
 
     def _infinite(self, light: EnvironmentLight) -> None:
         if light.image.shape[:2] == (1, 1):
@@ -406,6 +422,12 @@ def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:
 def _roughness(alphas: tuple[float, float]) -> list[str]:
     pair = f'"float uroughness" [ {number(alphas[0])} ] "float vroughness" [ {number(alphas[1])} ]'
     return [f'{pair} "bool remaproughness" [ "false" ]']
+
+
+def aspect_of(film: Film) -> tuple[float, float]:
+    """Width and height of a film in units of its shorter side."""
+    shorter = min(film.width_px, film.height_px)
+    return film.width_px / shorter, film.height_px / shorter
 
 
 def _most_even(count: int) -> int:

@@ -20,6 +20,7 @@ from scenes.canonical import (
     ConstantTexture,
     Disk,
     Emissive,
+    EnvironmentLight,
     Glass,
     Glossy,
     Instance,
@@ -38,6 +39,7 @@ from scenes.canonical import (
     SunSky,
     Translucent,
 )
+from scenes.daylight import sun_light
 from scenes.formats.approximation import DEPTH_MAX, drawable, spread_deg
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
@@ -98,12 +100,12 @@ def test_lamps_of_any_shape() -> None:
     assert len(report.losses) == 2
 
 
-def test_daylight_is_something() -> None:
+def test_daylight_becomes_a_wide_light_and_a_map() -> None:
     report = LossReport()
-    scene = drawable(
-        Scene(PerspectiveCamera(), (), (SunSky((0.0, 1.0, 0.0), part="sun"), SunSky((0.0, 1.0, 0.0)))), report
-    )
-    assert scene.lights[0].direction == (0.0, -1.0, 0.0) and len(report.losses) == 2  # type: ignore[union-attr]
+    sun = SunSky((0.0, 1.0, 0.0), part="sun", up=(0.0, 1.0, 0.0))
+    scene = drawable(Scene(PerspectiveCamera(), (), (sun, dataclasses.replace(sun, part="both"))), report)
+    assert scene.lights[0] == scene.lights[1] == sun_light(sun)
+    assert isinstance(scene.lights[2], EnvironmentLight) and len(report.losses) == 1
 
 
 def test_the_turntable_keeps_what_is_looked_at_in_place() -> None:

@@ -1,0 +1,138 @@
+"""Mitsuba 3 and LuxCore as renderers of scene files, each in a process of its own.
+
+Both bring libraries that do not go together, and a scene that one cannot load may end it. Both are told to average a
+pixel over its own square, whatever filter a file asks for, so that pictures differ by what the scene is.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A file of Mitsuba 0.5 is brought to what Mitsuba 3 knows by its tree alone, without this project's importer: that
+# makes its picture a witness of its own. Version 3 renames most properties itself.
+_MITSUBA = """
+import os, sys, numpy as np, mitsuba as mi, xml.etree.ElementTree as E
+file, out, width, height, samples, seed = sys.argv[1], sys.argv[2], *map(int, sys.argv[3:])
+mi.set_variant("scalar_rgb")
+root = E.parse(file).getroot()
+old = root.get("version", "").startswith("0.")
+
+def linear(text):
+    if text.startswith("#"):
+        values = [int(text[n:n + 2], 16) / 255 for n in (1, 3, 5)]
+    else:
+        values = [float(part) for part in text.replace(",", " ").split()]
+    return ", ".join(repr(v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4) for v in values)
+
+for parent in list(root.iter()):
+    for node in list(parent):
+        if node.tag == "film":
+            names = ("width", "height")
+            keep = [part for part in node if part.get("name") in names]
+            node[:] = keep + [E.Element("rfilter", type="box")]
+            node.set("type", "hdrfilm")
+        elif old and node.tag == "sampler":
+            node.set("type", "independent")
+            node[:] = []
+        elif old and node.tag == "integrator":
+            node.set("type", "path")
+            node[:] = [part for part in node if part.get("name") == "maxDepth"]
+        elif old and node.tag == "srgb":
+            node.tag = "rgb"
+            node.set("value", linear(node.get("value")))
+        elif old and node.tag in ("lookAt", "lookat"):
+            node.tag = "lookat"
+            if "up" not in node.attrib:
+                ends = [np.array([float(p) for p in node.get(n).replace(",", " ").split()]) for n in ("target", "origin")]
+                node.set("up", ", ".join(map(str, np.eye(3)[np.abs(ends[0] - ends[1]).argmin()])))
+        elif old and node.get("name") in ("filterType", "strictNormals", "flipTexCoords", "maxAnisotropy"):
+            parent.remove(node)
+        elif old and node.tag == "bsdf" and node.get("type") == "roughdiffuse":
+            node.set("type", "diffuse")
+            node[:] = [part for part in node if part.get("name") == "reflectance"]
+mi.file_resolver().prepend(os.path.dirname(os.path.abspath(file)))
+config = mi.parser.ParserConfig("scalar_rgb")
+config.unused_properties = mi.LogLevel.Debug
+state = mi.parser.parse_string(config, E.tostring(root, "unicode"))
+mi.parser.transform_all(config, state)
+scene = mi.parser.instantiate(config, state)
+scene = scene[0] if isinstance(scene, list) else scene
+parameters = mi.traverse(scene)
+(size,) = [key for key in parameters.keys() if key.endswith("film.size")]
+parameters[size] = [width, height]
+parameters.update()
+np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
+"""
+
+# Its pictures come bottom row first, and one row too low: it takes the ray of row y from height - y - 1, not from
+# height - y. The row that is missing at the bottom is that above it once more.
+_LUXCORE = """
+import os, sys, time, numpy as np
+import pyluxcore as lux  # after NumPy: its allocator stops a later import
+file, out = sys.argv[1], os.path.abspath(sys.argv[2])
+width, height, samples, seed = map(int, sys.argv[3:])
+lux.Init()
+os.chdir(os.path.dirname(os.path.abspath(file)))
+how, what = lux.Properties(), lux.Properties()
+lux.ParseLXS(os.path.basename(file), how, what)
+for name in list(how.GetAllNames()):
+    if name.startswith("film.imagepipeline"):
+        how.Delete(name)
+for name, value in {"renderengine.type": "PATHCPU", "sampler.type": "SOBOL", "batch.haltspp": samples,
+                    "film.width": width, "film.height": height, "film.filter.type": "NONE",
+                    "renderengine.seed": seed + 1}.items():
+    how.Set(lux.Property(name, value))
+scene = lux.Scene()
+scene.Parse(what)
+session = lux.RenderSession(lux.RenderConfig(how, scene))
+session.Start()
+while not session.HasDone():
+    time.sleep(0.02)
+    session.UpdateStats()
+session.Stop()
+pixels = np.zeros((height, width, 3), np.float32)
+session.GetFilm().GetOutputFloat(lux.FilmOutputType.RGB, pixels, 0)
+pixels = pixels[::-1]
+np.save(out, np.concatenate([pixels[1:], pixels[-1:]]))
+sys.stdout.flush()
+os._exit(0)
+"""
+
+_PROGRAMS = {"mitsuba": _MITSUBA, "luxcore": _LUXCORE}
+
+Picture = NDArray[np.float32]
+
+
+def rendered(
+    program: str, file: Path, out: Path, size: tuple[int, int], samples: int, limit_s: float, seed: int = 0
+) -> Picture | str:
+    """The picture of a renderer, or a line that says why there is none.
+
+    Args:
+        program: ``mitsuba`` (scenes of version 3, and of 0.5 as far as 3 has their plugins) or ``luxcore``.
+        file: the scene.
+        out: file that the picture is stored in, ``.npy``.
+        size: width and height, pixels.
+        samples: per pixel.
+        limit_s: seconds at most.
+        seed: of the noise.
+
+    Returns:
+        ``(height, width, 3)`` linear radiance, or the last line that the renderer said.
+    """
+    numbers = map(str, (*size, samples, seed))
+    out.unlink(missing_ok=True)
+    command = [sys.executable, "-c", _PROGRAMS[program], str(file), str(out), *numbers]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit_s, check=False)
+    except subprocess.TimeoutExpired:
+        return f"no picture within {limit_s:g} s"
+    if not out.is_file():
+        lines = (done.stderr or done.stdout).strip().splitlines() or [f"exit code {done.returncode}"]
+        return lines[-1].strip()[:160]
+    return np.load(out)

@@ -1,0 +1,165 @@
+"""Analytic daylight: the sky's radiance, the sun's irradiance, and where the sun stands.
+
+Source: L. Hošek and A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Trans. Graph. 31 (4), 2012
+(the sky, eq. 8 and its published coefficients); "Adding a Solar-Radiance Function to the Hošek–Wilkie Skylight Model",
+IEEE CG&A 33 (3), 2013 (the sun, as Mitsuba 3.9 evaluates it); M. Blanco-Muriel et al., "Computing the solar vector",
+Solar Energy 70 (5), 2001.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.canonical import DirectionalLight, EnvironmentLight, Matrix, SunSky
+from scenes.loading import asset
+
+SUN_DEG = 0.5358
+"""Full angle of the sun's disk."""
+
+MAP_HEIGHT = 256
+"""Rows of a sky that is written as a picture."""
+
+_UNIT = 0.00936766
+"""From the coefficients' radiance to that of Mitsuba 3: W m⁻² sr⁻¹ nm⁻¹, as measured."""
+
+
+@lru_cache(maxsize=1)
+def _tables() -> dict[str, NDArray[np.float64]]:
+    """Turbidity 1 to 10 along the first axis of each."""
+    with np.load(asset("daylight/hosek_wilkie.npz")) as stored:
+        return {name: stored[name].astype(np.float64) for name in stored.files}
+
+
+def _between(table: NDArray[np.float64], at: float) -> NDArray[np.float64]:
+    """Linear interpolation along the first axis, held at the ends."""
+    at = min(max(at, 0.0), table.shape[0] - 1.0)
+    low = min(int(at), table.shape[0] - 2)
+    return table[low] + (at - low) * (table[low + 1] - table[low])
+
+
+def _elevation_rad(light: SunSky) -> float:
+    """Of the sun, at least zero."""
+    sun, up = (np.array(part) / np.linalg.norm(part) for part in (light.sun_direction, light.up))
+    return max(math.asin(float(np.clip(sun @ up, -1.0, 1.0))), 0.0)
+
+
+def sky_radiance(light: SunSky, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radiance of the sky without the sun (Hošek and Wilkie 2012, eq. 8); black below the horizon.
+
+    Args:
+        light: turbidity from 1 to 10 and a sun above the horizon; others are held at the nearest.
+        directions: ``(n, 3)`` unit, towards the sky.
+
+    Returns:
+        ``(n, 3)`` linear RGB, not negative.
+    """
+    tables, elevation = _tables(), _elevation_rad(light)
+    x = (elevation / (0.5 * math.pi)) ** (1.0 / 3.0)
+    weights = np.array([math.comb(5, n) * (1.0 - x) ** (5 - n) * x**n for n in range(6)])
+    mixed = []
+    for name in ("sky_radiance", "sky_shape"):
+        of_albedo = _between(tables[name], light.turbidity - 1.0)
+        mixed.append(np.tensordot(weights, _between(of_albedo, light.ground_albedo), 1))
+    a, b, c, d, e, f, g, i, h = mixed[1].T
+    sun, up = (np.array(part) / np.linalg.norm(part) for part in (light.sun_direction, light.up))
+    height = (directions @ up)[:, None]
+    toward = np.clip(directions @ sun, -1.0, 1.0)[:, None]
+    above = np.maximum(height, 0.0)
+    anisotropy = (1.0 + toward**2) / (1.0 + h * h - 2.0 * h * toward) ** 1.5
+    horizon = 1.0 + a * np.exp(b / (above + 0.01))
+    glow = c + d * np.exp(e * np.arccos(toward)) + f * toward**2 + g * anisotropy + i * np.sqrt(above)
+    radiance = light.scale * _UNIT * mixed[0] * horizon * glow
+    return np.where(height >= 0.0, np.maximum(radiance, 0.0), 0.0)
+
+
+def sky_map(light: SunSky, height: int = MAP_HEIGHT) -> EnvironmentLight:
+    """The sky as an environment map of ``height`` rows and twice as many columns."""
+    to_world = facing_up(light.up)
+    polar = (np.arange(height) + 0.5) * math.pi / height
+    around = (np.arange(2 * height) + 0.5) * math.pi / height
+    sine = np.sin(polar)[:, None]
+    local = np.stack(
+        [np.sin(around) * sine, np.broadcast_to(np.cos(polar)[:, None], (height, 2 * height)), -np.cos(around) * sine],
+        axis=-1,
+    )
+    world = local.reshape(-1, 3) @ to_world[:3, :3].T
+    image = sky_radiance(light, world).reshape(height, 2 * height, 3).astype(np.float32)
+    return EnvironmentLight(image, to_world, source="sky")
+
+
+def sun_light(light: SunSky) -> DirectionalLight:
+    """The sun as a light from one direction, as wide as its disk."""
+    x = (_elevation_rad(light) / (0.5 * math.pi)) ** (1.0 / 3.0)
+    of_height = _between(_tables()["sun_irradiance"], light.turbidity - 1.0)
+    irradiance = light.scale * np.maximum(_between(of_height, x * (len(of_height) - 1)), 0.0)
+    away = -np.array(light.sun_direction) / np.linalg.norm(light.sun_direction)
+    return DirectionalLight((away[0], away[1], away[2]), (irradiance[0], irradiance[1], irradiance[2]), SUN_DEG)
+
+
+def facing_up(up: tuple[float, float, float], axis: int = 1) -> Matrix:
+    """A rotation that takes an axis (y, unless another is asked for) to ``up``; identity where it is that already."""
+    unit = np.array(up) / np.linalg.norm(up)
+    matrix = np.eye(4)
+    if np.array_equal(unit, np.eye(3)[axis]):
+        return matrix
+    first = np.eye(3)[int(np.abs(unit).argmin())]
+    first = first - (first @ unit) * unit
+    first /= np.linalg.norm(first)
+    matrix[:3, axis] = unit
+    matrix[:3, (axis + 1) % 3] = first
+    matrix[:3, (axis + 2) % 3] = np.cross(unit, first)
+    return matrix
+
+
+def sun_at(
+    date: tuple[int, int, int], hour: float, latitude_deg: float, longitude_deg: float, timezone: float
+) -> tuple[float, float, float]:
+    """Where the sun stands, within a hundredth of a degree for the years 1999 to 2015 (Blanco-Muriel et al. 2001).
+
+    Args:
+        date: year, month, day.
+        hour: local time, hours with fractions.
+        latitude_deg, longitude_deg: north and east are positive.
+        timezone: hours ahead of Greenwich.
+
+    Returns:
+        Direction towards it: east, north, up.
+    """
+    year, month, day = date
+    late = (month - 14) // 12 + (1 if (month - 14) % 12 and month < 14 else 0)  # division towards zero
+    days = (
+        (1461 * (year + 4800 + late)) // 4
+        + (367 * (month - 2 - 12 * late)) // 12
+        - (3 * ((year + 4900 + late) // 100)) // 4
+        + day
+        - 32075
+    )
+    utc = hour - timezone
+    elapsed = days - 0.5 + utc / 24.0 - 2451545.0
+    omega = 2.1429 - 0.0010394594 * elapsed
+    mean_longitude = 4.8950630 + 0.017202791698 * elapsed
+    anomaly = 6.2400600 + 0.0172019699 * elapsed
+    longitude = (
+        mean_longitude
+        + 0.03341607 * math.sin(anomaly)
+        + 0.00034894 * math.sin(2.0 * anomaly)
+        - 0.0001134
+        - 0.0000203 * math.sin(omega)
+    )
+    obliquity = 0.4090928 - 6.2140e-9 * elapsed + 0.0000396 * math.cos(omega)
+    ascension = math.atan2(math.cos(obliquity) * math.sin(longitude), math.cos(longitude))
+    declination = math.asin(math.sin(obliquity) * math.sin(longitude))
+    sidereal = math.radians((6.6974243242 + 0.0657098283 * elapsed + utc) * 15.0 + longitude_deg)
+    angle, latitude = sidereal - ascension, math.radians(latitude_deg)
+    east = -math.cos(declination) * math.sin(angle)
+    north = math.cos(latitude) * math.sin(declination) - math.sin(latitude) * math.cos(declination) * math.cos(angle)
+    height = math.sin(latitude) * math.sin(declination) + math.cos(latitude) * math.cos(declination) * math.cos(angle)
+    parallax = 6371.01 / 149597890.0 * math.sqrt(max(1.0 - height * height, 0.0))
+    zenith = math.acos(min(max(height, -1.0), 1.0)) + parallax
+    flat = math.hypot(east, north)
+    sine = math.sin(zenith) / flat if flat > 0.0 else 0.0
+    return east * sine, north * sine, math.cos(zenith)
