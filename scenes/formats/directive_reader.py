@@ -50,7 +50,6 @@ class DirectiveReader:
     attributes: Attributes = field(default_factory=Attributes)
     textures: dict[str, Texture] = field(default_factory=dict)
     materials: dict[str, Material] = field(default_factory=dict)
-    times_s: tuple[float, float] = (0.0, 1.0)
     _saved: list[tuple[str, Attributes | None]] = field(default_factory=list)
     _including: list[Path] = field(default_factory=list)
 
@@ -131,11 +130,11 @@ class DirectiveReader:
         if name not in self.transforms.named:
             self.report.add(str(directive.place), f"coordinate system {name!r}, which nothing defines")
         else:
-            self.transforms.current = [part.copy() for part in self.transforms.named[name]]
+            self.transforms.take(name)
 
     def _set_times(self, directive: Directive) -> None:
         start, end = numbers(directive, 2)
-        self.times_s = start, end
+        self.transforms.times_s = start, end
 
     def _begin(self, kind: str, directive: Directive) -> None:
         if len(self._saved) >= SAVED_MAX:

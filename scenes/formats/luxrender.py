@@ -49,6 +49,7 @@ from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, produ
 from scenes.formats.recognition import as_mesh
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, metal, rgb
+from scenes.formats.transform_stack import KEYS_MAX
 
 _INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlighting": "direct", "distributedpath": "path",
                 "exphotonmap": "photonmap", "sppm": "photonmap", "igi": "direct", "single": "path",
@@ -60,6 +61,16 @@ _MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
 SKY_UNIT, SUN_UNIT = 64_000.0, 46_000.0
 """Radiance of LuxCore 2.10's sky2 and sun at a gain of 1 over that of Mitsuba 3 at a scale of 1, within 2 and 11 %
 (the sun's blue), at a turbidity of 3 and 45 degrees."""
+_TRANSFORMS = (
+    "Identity",
+    "Translate",
+    "Scale",
+    "Rotate",
+    "LookAt",
+    "Transform",
+    "ConcatTransform",
+    "CoordSysTransform",
+)
 _LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 
 
@@ -215,6 +226,7 @@ class LuxReader(PbrtReader):
 
     left_handed: bool = False
     _halt_samples: int = 0
+    _motion_key: int | None = None
 
     def __post_init__(self) -> None:
         self.surfaces = LuxSurfaces(self.files, self.report, self.textures, self.materials)
@@ -227,7 +239,39 @@ class LuxReader(PbrtReader):
             "LightGroup": lambda d: self.report.add(str(d.place), f"light group {word(d)!r}", "no groups"),
             "PortalShape": lambda d: self.report.add(str(d.place), "a portal"),
             "MotionInstance": self._move_object,
+            "MotionBegin": self._begin_motion,
+            "MotionEnd": self._end_motion,
         }
+
+    def _do(self, directive: Directive) -> None:
+        """Inside a motion each transform is that of the next key."""
+        key = self._motion_key
+        if key is None or directive.name == "MotionEnd":
+            super()._do(directive)
+            return
+        if directive.name not in _TRANSFORMS:
+            raise SceneError(f"{directive.place}: MotionBegin: expected transforms and MotionEnd, got {directive.name}")
+        count = len(self.transforms.current)
+        if key >= count:
+            raise SceneError(f"{directive.place}: MotionBegin: expected {count} transforms, got more")
+        self.transforms.active = tuple(number == key for number in range(count))
+        super()._do(directive)
+        self._motion_key = key + 1
+
+    def _begin_motion(self, directive: Directive) -> None:
+        times_s = [value for part in directive.values if not isinstance(part, tuple) for value in part.tolist()]
+        if not 2 <= len(times_s) <= KEYS_MAX or not (np.diff(times_s) > 0.0).all():
+            raise SceneError(f"{directive.place}: MotionBegin: expected 2 to {KEYS_MAX} times, each after the last")
+        if self.transforms.moves:
+            self.report.add(str(directive.place), "a motion within a motion", "the inner one")
+        self.transforms.retime(times_s)
+        self._motion_key = 0
+
+    def _end_motion(self, directive: Directive) -> None:
+        count = len(self.transforms.current)
+        if self._motion_key != count:
+            raise SceneError(f"{directive.place}: MotionEnd: expected {count} transforms before it")
+        self.transforms.active, self._motion_key = (True,) * count, None
 
     def _read_texture(self, directive: Directive) -> None:
         if word(directive, 1) != "fresnel":

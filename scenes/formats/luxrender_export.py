@@ -57,16 +57,15 @@ from scenes.formats.pbrt_export import (
     PbrtWriter,
     aspect_of,
     inline_mesh,
-    listed,
-    number,
-    placed,
     written_matrix,
 )
+from scenes.formats.pbrt_surface_export import listed, number
 from scenes.formats.pbrt_surfaces import mean_of, product
+from scenes.formats.placing import motion_keys, part_key
 from scenes.formats.recognition import as_mesh
 from scenes.formats.spectra import METALS, rgb
 from scenes.formats.transform_stack import inverse
-from scenes.values import Rgb
+from scenes.values import Matrix, Rgb
 
 _FILTERS = first_of(FILTERS)
 _SAMPLERS = {"sobol": "lowdiscrepancy", "halton": "lowdiscrepancy", "hammersley": "lowdiscrepancy",
@@ -112,20 +111,15 @@ class LuxWriter(PbrtWriter):
 
     def _camera(self, camera: Camera) -> None:
         """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored picture by a window from right to left."""
-        track = getattr(camera, "track", None)
-        if track is not None:
-            self.report.add("camera", "the motion of the camera", "its place at the start")
-        to_world = placed(track, camera.to_world)
-        size = abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
-        axes = to_world[:3, :3] / size
+        poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
+        size = abs(np.linalg.det(poses[0][:3, :3])) ** (1.0 / 3.0)
+        axes = poses[0][:3, :3] / size
         if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-4:
             self.report.add("camera", "a sheared camera", "an upright one")
         if isinstance(camera, PerspectiveCamera) and abs(size - 1.0) > 1e-6:
             lens, focus = size * camera.lens_radius, camera.focal_distance
             camera = dataclasses.replace(camera, lens_radius=lens, focal_distance=size * focus if focus != FAR else FAR)
-        eye = to_world[:3, 3]
-        ends = [*eye, *(eye - axes[:, 2]), *axes[:, 1]]
-        self.lines.append("LookAt " + " ".join(repr(float(value)) for value in ends))
+        self.lines += _in_motion([_looking(pose) for pose in poses], times_s)
         half = camera.half_width if isinstance(camera, OrthographicCamera) else 1.0
         plain = dataclasses.replace(camera, half_width=1.0) if isinstance(camera, OrthographicCamera) else camera
         # without a window LuxCore takes the field of view across, not along the shorter side
@@ -314,25 +308,30 @@ class LuxWriter(PbrtWriter):
 
     # --- shapes --------------------------------------------------------------------------------------------------
 
+    def _times(self, scene: Scene) -> None:
+        """Each motion has times of its own."""
+
     def _instance(self, instance: Instance) -> None:
-        material = instance.material
-        where = instance.name or "shape"
+        """LuxCore makes objects of mesh files only, and shows a motion's last key."""
+        made = [self._object(instance)] if part_key(instance) in self.shared else self._part(instance)
+        poses, times_s = motion_keys(instance.track, instance.to_world)
+        lines = [f"Transform {written_matrix(pose)}" for pose in poses]
+        placing = [] if len(poses) == 1 and np.array_equal(poses[0], np.eye(4)) else _in_motion(lines, times_s)
+        self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
+
+    def _part(self, instance: Instance) -> list[str]:
+        material, where = instance.material, instance.name or "shape"
         if isinstance(material, Emissive):
             self.report.add(where, "a surface that shines on both sides", "on its front")
         if isinstance(material, Masked):
             self.report.add(where, "holes in a material", "none")
             material = material.base
         emission = material.radiance if isinstance(material, Emissive) else instance.emission
-        lines = ["\tAttributeBegin", f'\t\tNamedMaterial "{self.material(material)}"']
+        lines = [f'NamedMaterial "{self.material(material)}"']
         if emission is not None:
             off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'
-            lines.append(f'\t\tAreaLightSource "area" "color L" {listed(emission)} {off}')
-        if instance.track is not None:
-            self.report.add(where, "the motion of a shape", "its place at the start")
-        to_world = placed(instance.track, instance.to_world)
-        if not np.array_equal(to_world, np.eye(4)):
-            lines.append(f"\t\tTransform {written_matrix(to_world)}")
-        self.lines += [*lines, f"\t\t{self._shape(instance)}", "\tAttributeEnd"]
+            lines.append(f'AreaLightSource "area" "color L" {listed(emission)} {off}')
+        return [*lines, self._shape(instance)]
 
     def _shape(self, instance: Instance) -> str:
         """Meshes only: LuxCore leaves spheres and disks out."""
@@ -340,9 +339,22 @@ class LuxWriter(PbrtWriter):
         if mesh is not instance.shape and not isinstance(instance.shape, Rectangle | Cube):
             what = f"shape {type(instance.shape).__name__.lower()}"
             self.report.add(instance.name or "shape", what, f"a mesh of {len(mesh.faces)} triangles")
-        if len(mesh.faces) > INLINE_MAX:
+        if len(mesh.faces) > INLINE_MAX or part_key(instance) in self.shared:
             return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
         return f'Shape "trianglemesh" {inline_mesh(mesh, "uv")}'
+
+
+def _looking(pose: Matrix) -> str:
+    eye = pose[:3, 3]
+    ends = [*eye, *(eye - pose[:3, 2]), *pose[:3, 1]]
+    return "LookAt " + " ".join(repr(float(value)) for value in ends)
+
+
+def _in_motion(lines: list[str], times_s: list[float]) -> list[str]:
+    """Transforms as the keys of a motion; one alone is itself."""
+    if len(lines) == 1:
+        return lines
+    return [f"MotionBegin [ {' '.join(repr(time_s) for time_s in times_s)} ]", *lines, "MotionEnd"]
 
 
 def _roughness(alphas: tuple[float, ...]) -> list[str]:

@@ -32,6 +32,7 @@ from scenes.canonical import (
     PointLight,
     Rectangle,
     Rgb,
+    RigidTrack,
     Sampler,
     Scene,
     SceneError,
@@ -46,12 +47,12 @@ from scenes.formats.losses import LossReport
 from scenes.formats.mesh_files import read_obj, read_serialized
 from scenes.formats.mitsuba_properties import Properties
 from scenes.formats.mitsuba_surfaces import MitsubaSurfaces
-from scenes.formats.pbrt import facing_normals, turned
+from scenes.formats.pbrt import duration_s, facing_normals, turned
 from scenes.formats.ply_files import read_ply
 from scenes.formats.recognition import as_mesh, recognised_rectangle
 from scenes.formats.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.spectra import grey, rgb
-from scenes.formats.transform_stack import translation
+from scenes.formats.transform_stack import moved_by, rigid_motion, translation
 from scenes.formats.xml_tree import Node, parse_xml
 from scenes.values import Matrix
 
@@ -199,20 +200,30 @@ class MitsubaReader:
         for child in properties.rest:
             if child.tag in ("film", "sampler"):
                 self._node(child)
-        to_world = properties.transform() @ FORWARD
+        keys, times_s = properties.motion()
+        to_world, track = keys[0] @ FORWARD, self._track(keys, times_s, properties.where)
         properties.asked.update(("nearClip", "farClip"))
         shutter = properties.number("shutterOpen", 0.0), properties.number("shutterClose", 0.0)
         if kind in ("perspective", "thinlens"):
             lens = properties.number("apertureRadius", 0.0) if kind == "thinlens" else 0.0
             focus = properties.number("focusDistance", FAR)
-            self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, None, shutter)
+            self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, track, shutter)
         elif kind == "orthographic":
-            self.camera = OrthographicCamera(to_world)
+            self.camera = OrthographicCamera(to_world, track=track)
         elif kind == "spherical":
             self.camera = EnvironmentCamera(to_world)
         else:
             raise SceneError(f"{node.place}: expected a kind of sensor, got {kind!r}")
         self.surfaces.left_over(properties)
+
+    def _track(self, keys: list[Matrix], times_s: list[float], where: str) -> RigidTrack | None:
+        """The motion through keys, outside the first of them; None where nothing moves."""
+        if all(np.array_equal(keys[0], key) for key in keys[1:]):
+            return None
+        track = rigid_motion(keys, times_s)
+        if track is None:
+            self.report.add(where, "a motion that is not rigid", "its place at the start")
+        return track
 
     def _field(self, properties: Properties) -> float:
         """Field of view of the shorter side, degrees."""
@@ -328,22 +339,33 @@ class MitsubaReader:
         if kind in ("hair", "heightfield", "deformable"):
             self.report.add(properties.where, "hair" if kind == "hair" else f"shape {kind!r}")
             return []
-        matrix = properties.transform()
+        keys, times_s = properties.motion()
+        track = self._track(keys, times_s, properties.where)
         shape, local = self._made(kind, properties)
         material, emission = self._inside(properties)
         if properties.truth("flipNormals", False):
             shape = turned(as_mesh(shape))
         self.surfaces.left_over(properties)
-        return [Instance(shape, material, matrix @ local, name=node.get("id"), emission=emission)]
+        return [Instance(shape, material, keys[0] @ local, track, node.get("id"), emission)]
 
     def _instances(self, properties: Properties) -> list[Instance]:
-        matrix = properties.transform()
+        keys, times_s = properties.motion()
+        track = self._track(keys, times_s, properties.where)
         for child in properties.rest:
             group = self.find(child) if child.tag == "ref" else child
             if id(group) in self.groups:
                 self.surfaces.left_over(properties)
                 parts = self.groups[id(group)]
-                return [dataclasses.replace(part, to_world=matrix @ part.to_world) for part in parts]
+                if track is not None and any(part.track is not None for part in parts):
+                    self.report.add(properties.where, "a motion within a motion", "that of the instance")
+                return [
+                    dataclasses.replace(
+                        part,
+                        to_world=keys[0] @ part.to_world,
+                        track=moved_by(keys[0], part.track) if track is None and part.track is not None else track,
+                    )
+                    for part in parts
+                ]
         raise SceneError(f"{properties.where}: instance: expected a reference to a shapegroup before it")
 
     def _inside(self, properties: Properties) -> tuple[Material, Rgb | None]:
@@ -428,4 +450,5 @@ def load_mitsuba(path: Path, root: Path | None = None, report: LossReport | None
     if reader.camera is None:
         raise SceneError(f"{path}: expected a sensor, found none")
     parts = tuple(reader.instances), tuple(reader.lights), reader.film, reader.sampler, reader.integrator
-    return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem)
+    lasts = duration_s(reader.camera, reader.instances)
+    return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem, duration_s=lasts)

@@ -11,7 +11,7 @@ from scenes.canonical import Rgb, SceneError
 from scenes.formats.directives import NUMBER_MAX
 from scenes.formats.losses import LossReport
 from scenes.formats.spectra import blackbody_rgb, grey, rgb, sampled_rgb, xyz_to_rgb
-from scenes.formats.transform_stack import rotation, scaling, translation
+from scenes.formats.transform_stack import KEYS_MAX, rotation, scaling, translation
 from scenes.formats.xml_tree import Node
 from scenes.loading import decode_srgb
 from scenes.values import Matrix
@@ -86,18 +86,27 @@ class Properties:
         return grey(self.number(name, 0.0)) if node.tag in ("float", "integer") else color_of(node)
 
     def transform(self, name: str = "toWorld") -> Matrix:
-        """A transform; of an animation its first."""
+        """A transform; of an animation its first, reported."""
+        keys, _ = self.motion(name)
+        if len(keys) > 1:
+            self.report.add(str(self.given[name].place), "an animated transform", "the first of its transforms")
+        return keys[0]
+
+    def motion(self, name: str = "toWorld") -> tuple[list[Matrix], list[float]]:
+        """Transforms of an animation and their times, seconds; one at time zero where nothing moves."""
         self.asked.add(name)
         if name not in self.given:
-            return np.eye(4)
+            return [np.eye(4)], [0.0]
         node = self.given[name]
-        if node.tag == "animation":
-            steps = [child for child in node.children if child.tag == "transform"]
-            if not steps:
-                raise SceneError(f"{node.place}: animation: expected transforms")
-            self.report.add(str(node.place), "an animated transform", "the first of its transforms")
-            node = steps[0]
-        return transform_of(node)
+        if node.tag != "animation":
+            return [transform_of(node)], [0.0]
+        steps = [child for child in node.children if child.tag == "transform"]
+        times_s = [numbers(step, step.get("time", "0"), 1)[0] for step in steps]
+        if not 1 <= len(steps) <= KEYS_MAX or not (np.diff(times_s) > 0.0).all():
+            raise SceneError(
+                f"{node.place}: animation: expected 1 to {KEYS_MAX} transforms, each later than the one before"
+            )
+        return [transform_of(step) for step in steps], times_s
 
     def unasked(self) -> list[str]:
         """Names of what was given and not asked for."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,7 @@ from scenes.formats.ply_files import checked_mesh, read_ply
 from scenes.formats.recognition import recognised_rectangle
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, rgb
-from scenes.formats.transform_stack import inverse, rigid_motion
+from scenes.formats.transform_stack import inverse, moved_by, rigid_motion, track_times
 from scenes.values import Matrix
 
 FORWARD = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -144,14 +144,14 @@ class PbrtReader(DirectiveReader):
 
     def _read_camera(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        start, end = (inverse(matrix) @ FORWARD for matrix in self.transforms.current)
-        self.transforms.named["camera"] = [inverse(matrix) for matrix in self.transforms.current]
-        track = self._motion(start, end, str(directive.place))
+        keys = [inverse(matrix) for matrix in self.transforms.current]
+        self.transforms.named["camera"] = keys
+        track = self._motion(keys, str(directive.place))
         shutter = parameters.number("shutteropen", 0.0), parameters.number("shutterclose", 1.0)
         if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
             shutter = 0.0, 0.0  # the default of a still
         half, mirror = self._window(parameters, directive)
-        start = start @ mirror
+        start = keys[0] @ FORWARD @ mirror
         if parameters.number("frameaspectratio", 0.0):
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
         if kind == "perspective":
@@ -304,20 +304,25 @@ class PbrtReader(DirectiveReader):
         name = word(directive)
         if name not in self.objects or self._object is not None:
             raise SceneError(f"{directive.place}: ObjectInstance: expected an object made before, got {name!r}")
-        start, end = self.transforms.current
-        track = self._motion(start, end, str(directive.place))
+        start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
         for part in self.objects[name]:
-            self._keep(dataclasses.replace(part, to_world=start @ part.to_world, track=track), directive)
+            moved = track
+            if part.track is not None and track is None:
+                moved = moved_by(start, part.track)
+            elif part.track is not None:
+                self.report.add(str(directive.place), "a motion within a motion", "that of the instance")
+            self._keep(dataclasses.replace(part, to_world=start @ part.to_world, track=moved), directive)
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
         if len(self.instances) >= _SHAPE_MAX:
             raise SceneError(f"{directive.place}: expected at most {_SHAPE_MAX:,} shapes")
         (self.instances if self._object is None else self._object).append(instance)
 
-    def _motion(self, start: Matrix, end: Matrix, where: str) -> RigidTrack | None:
-        if np.array_equal(start, end):
+    def _motion(self, keys: Sequence[Matrix], where: str) -> RigidTrack | None:
+        """The motion through keys, outside the first of them; None where nothing moves."""
+        if all(np.array_equal(keys[0], key) for key in keys[1:]):
             return None
-        track = rigid_motion(start, end, self.times_s)
+        track = rigid_motion(keys, self.transforms.times_s)
         if track is None:
             self.report.add(where, "a motion that is not rigid", "its place at the start")
         return track
@@ -336,8 +341,7 @@ class PbrtReader(DirectiveReader):
         if "shadowalpha" in parameters:
             parameters.asked.add("shadowalpha")
             self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
-        start, end = self.transforms.current
-        track = self._motion(start, end, str(directive.place))
+        start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
         self._keep(Instance(shape, material, start @ local, track, emission=self.attributes.emission), directive)
         self.left_over(parameters, f"shape {kind!r}")
 
@@ -492,4 +496,11 @@ def scene_of(reader: PbrtReader, path: Path) -> Scene:
         reader.integrator,
         materials=dict(reader.materials),
         name=Path(path).stem,
+        duration_s=duration_s(camera, reader.instances),
     )
+
+
+def duration_s(camera: Camera, instances: Sequence[Instance]) -> float:
+    """When the last motion ends, seconds; 0 where nothing moves."""
+    tracks = [getattr(camera, "track", None), *(instance.track for instance in instances)]
+    return max((track_times(track)[-1] for track in tracks if track is not None), default=0.0)

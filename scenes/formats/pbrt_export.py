@@ -6,16 +6,13 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scenes.animation import pose_at
 from scenes.canonical import (
-    Bumped,
     Camera,
-    CheckerboardTexture,
     ConstantTexture,
     DirectionalLight,
     Disk,
@@ -23,45 +20,29 @@ from scenes.canonical import (
     EnvironmentCamera,
     EnvironmentLight,
     Film,
-    Glass,
-    Glossy,
-    HeightField,
-    ImageTexture,
     Instance,
     Light,
     Masked,
-    Material,
-    Matte,
     Mesh,
-    Metal,
-    Mirror,
-    MixMaterial,
-    MixTexture,
     OrthographicCamera,
     PerspectiveCamera,
-    Phong,
-    Plastic,
     PointLight,
     RealisticCamera,
     Rgb,
     RigidTrack,
-    ScaleTexture,
     Scene,
     Sphere,
     SpotLight,
     SunSky,
-    Texture,
-    Translucent,
-    Uber,
 )
 from scenes.daylight import sky_map, sun_light
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, FORWARD, INTEGRATORS, MAP_AXES, SAMPLERS
-from scenes.formats.pbrt_surfaces import mean_of
+from scenes.formats.pbrt_surface_export import PbrtSurfaceWriter, listed, number
+from scenes.formats.placing import PartKey, motion_keys, part_key, shared_parts, tracks_of
 from scenes.formats.recognition import as_mesh
-from scenes.formats.spectra import rgb
-from scenes.formats.transform_stack import inverse
+from scenes.formats.transform_stack import inverse, track_times
 from scenes.values import Matrix
 
 INLINE_MAX = 64
@@ -71,35 +52,24 @@ _FILTERS, _INTEGRATORS = first_of(FILTERS), first_of(INTEGRATORS)
 _SAMPLERS = {**first_of(SAMPLERS), "hammersley": "halton"}
 
 
-def number(value: float) -> str:
-    """A number with what float32 holds, and more where it is needed."""
-    return f"{float(value):.9g}"
-
-
-def listed(values: Iterable[float]) -> str:
-    """Numbers in brackets."""
-    return f"[ {' '.join(number(value) for value in values)} ]"
-
-
 def written_matrix(matrix: Matrix) -> str:
     """Sixteen numbers, column by column, with all digits."""
     return f"[ {' '.join(repr(float(value)) for value in matrix.T.ravel())} ]"
 
 
 @dataclass
-class PbrtWriter:
+class PbrtWriter(PbrtSurfaceWriter):
     """Lines of a scene, as they are made."""
 
-    output: Output
-    report: LossReport
-    lines: list[str] = field(default_factory=list)
     aspect: tuple[float, float] = (1.0, 1.0)
-    _textures: dict[int, tuple[Texture, str]] = field(default_factory=dict)
-    _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
-    _taken: set[str] = field(default_factory=set)
+    times_s: tuple[float, float] = (0.0, 1.0)
+    shared: frozenset[PartKey] = frozenset()
+    _objects: dict[PartKey, str] = field(default_factory=dict)
 
     def write(self, scene: Scene) -> None:
         """Writes a scene."""
+        self.shared = shared_parts(scene)
+        self._times(scene)
         self._options(scene)
         self._camera(scene.camera)
         self.lines.append("WorldBegin")
@@ -118,8 +88,14 @@ class PbrtWriter:
             self._light(scene.background)
         if scene.ambient != (0.0, 0.0, 0.0):
             self.report.add(scene.name or "scene", "constant ambient light")
-        if scene.duration_s:
-            self.report.add(scene.name or "scene", "an animation over many frames", "its first frame")
+
+    def _times(self, scene: Scene) -> None:
+        """All motions share the two times of a PBRT file."""
+        tracks = tracks_of(scene)
+        if tracks:
+            times_s = [time_s for track in tracks for time_s in (track_times(track)[0], track_times(track)[-1])]
+            self.times_s = min(times_s), max(times_s)
+            self.lines.append(f"TransformTimes {self.times_s[0]!r} {self.times_s[1]!r}")
 
     # --- options -------------------------------------------------------------------------------------------------
 
@@ -152,10 +128,25 @@ class PbrtWriter:
 
     def _camera(self, camera: Camera) -> None:
         track = getattr(camera, "track", None)
-        if track is not None:
-            self.report.add("camera", "the motion of the camera", "its place at the start")
-        self.lines.append(f"Transform {written_matrix(inverse(placed(track, camera.to_world) @ FORWARD))}")
+        keys = self.keys(track, camera.to_world, "camera")
+        self.lines += self.moved([inverse(key @ FORWARD) for key in keys])
         self.lines.append(self._camera_line(camera))
+
+    def keys(self, track: RigidTrack | None, to_world: Matrix, where: str) -> list[Matrix]:
+        """Where something is at the two times of the file; one matrix where it rests."""
+        poses, times_s = motion_keys(track, to_world)
+        if track is None or len(poses) == 1:
+            return poses
+        if len(poses) > 2 or (times_s[0], times_s[-1]) != self.times_s:
+            self.report.add(where, f"a motion of {len(poses)} keys", "from its first place to its last, evenly")
+        return [pose_at(track, time_s) @ to_world for time_s in self.times_s]
+
+    def moved(self, keys: list[Matrix]) -> list[str]:
+        """Lines that set the transform."""
+        if len(keys) == 1:
+            return [] if np.array_equal(keys[0], np.eye(4)) else [f"Transform {written_matrix(keys[0])}"]
+        start, end = (f"Transform {written_matrix(key)}" for key in keys)
+        return ["ActiveTransform StartTime", start, "ActiveTransform EndTime", end, "ActiveTransform All"]
 
     def window(self, half: float, mirrored: bool = False) -> str:
         """The screen window of an image whose shorter side is twice ``half``."""
@@ -188,134 +179,6 @@ class PbrtWriter:
             )
             line = f'Camera "realistic" "string lensfile" [ {_quoted(camera.lens_file)} ] {numbers}'
         return line
-
-    # --- textures and materials ----------------------------------------------------------------------------------
-
-    def texture(self, texture: Texture, name: str) -> str:
-        """A parameter of a material or texture, its texture written before."""
-        if isinstance(texture, ConstantTexture):
-            return f'"rgb {name}" {listed(texture.value)}'
-        if id(texture) not in self._textures:
-            made = self._texture_line(texture)
-            label = self._label("t", "")
-            self._textures[id(texture)] = texture, label
-            self.lines.append(f'\tTexture "{label}" "spectrum" {made}')
-        return f'"texture {name}" [ "{self._textures[id(texture)][1]}" ]'
-
-    def _texture_line(self, texture: Texture) -> str:
-        if isinstance(texture, ImageTexture):
-            file = self.output.picture(texture.image, texture.source)
-            scale, offset = texture.uv_scale, texture.uv_offset
-            if texture.filter != "mipmap":
-                self.report.add(f"texture {file}", f"the filter {texture.filter}", "levels of detail")
-            return (
-                f'"imagemap" "string filename" [ "{file}" ] "string wrap" [ "{texture.wrap}" ] '
-                f'"float uscale" [ {number(scale[0])} ] "float vscale" [ {number(scale[1])} ] '
-                f'"float udelta" [ {number(offset[0])} ] "float vdelta" [ {number(offset[1])} ]'
-            )
-        if isinstance(texture, CheckerboardTexture):
-            parts = f"{self.texture(texture.even, 'tex1')} {self.texture(texture.odd, 'tex2')}"
-            scale = texture.uv_scale
-            return f'"checkerboard" {parts} "float uscale" [ {number(scale[0])} ] "float vscale" [ {number(scale[1])} ]'
-        assert isinstance(texture, MixTexture | ScaleTexture)
-        parts = f"{self.texture(texture.first, 'tex1')} {self.texture(texture.second, 'tex2')}"
-        if isinstance(texture, MixTexture):
-            return f'"mix" {parts} "float amount" [ {number(texture.amount)} ]'
-        return f'"scale" {parts}'
-
-    def _label(self, prefix: str, wanted: str) -> str:
-        """A name that nothing has yet."""
-        label, count = wanted or f"{prefix}1", 1
-        while label in self._taken or '"' in label or "\\" in label or "\n" in label:
-            count += 1
-            label = f"{prefix}{count}"
-        self._taken.add(label)
-        return label
-
-    def material(self, material: Material, name: str = "") -> str:
-        """Name of a material, written before where it is new."""
-        if id(material) not in self._materials:
-            made = self._material_line(material, name or type(material).__name__)
-            label = self._label("m", name)
-            self._materials[id(material)] = material, label
-            self.lines.append(f'\tMakeNamedMaterial "{label}" {made}')
-        return self._materials[id(material)][1]
-
-    def _material_line(self, material: Material, name: str) -> str:
-        where = f"material {name!r}"
-        if isinstance(material, Bumped):
-            if material.scale != 1.0:
-                self.report.add(where, "the scale of a bump map", "1")
-            bump = self.texture(material.height, "bumpmap")
-            return f"{self._material_line(material.base, name)} {bump}"
-        if isinstance(material, Masked):
-            self.report.add(where, "holes in a material", "those of the shapes that have it")
-            return self._material_line(material.base, name)
-        if isinstance(material, HeightField):
-            self.report.add(where, "a height field", "its material, flat")
-            return self._material_line(material.base, name)
-        if isinstance(material, MixMaterial):
-            parts = f'"string namedmaterial1" [ "{self.material(material.second)}" ]'
-            parts += f' "string namedmaterial2" [ "{self.material(material.first)}" ]'
-            return f'"string type" [ "mix" ] {parts} {self.texture(material.amount, "amount")}'
-        kind, parameters = self._plain_material(material, where)
-        return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
-
-    def _plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
-        if isinstance(material, Matte):
-            sigma = [f'"float sigma" [ {number(material.sigma_deg)} ]'] if material.sigma_deg else []
-            return "matte", [self.texture(material.reflectance, "Kd"), *sigma]
-        if isinstance(material, Mirror):
-            if material.spread_deg:
-                self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
-            return "mirror", [self.texture(material.reflectance, "Kr")]
-        if isinstance(material, Glass):
-            if material.thin:
-                self.report.add(where, "a pane without thickness", "clear glass")
-            if material.spread_deg:
-                self.report.add(where, "rays spread about the perfect ones", "clear glass")
-            parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
-            parts.append(f'"float eta" [ {number(material.ior)} ]')
-            return "glass", parts + (_roughness(material.roughness) if material.roughness != (0.0, 0.0) else [])
-        if isinstance(material, Metal):
-            if mean_of(material.reflectance_scale) != (1.0, 1.0, 1.0):
-                self.report.add(where, "a factor on what metal reflects", "1")
-            if material.distribution != "ggx":
-                self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
-            index = [f'"rgb eta" {listed(material.eta)}', f'"rgb k" {listed(material.k)}']
-            return "metal", index + _roughness(material.roughness)
-        if isinstance(material, Glossy):
-            parts = [self.texture(material.diffuse, "Kd"), self.texture(material.specular, "Ks")]
-            return "substrate", parts + _roughness(material.roughness)
-        if isinstance(material, Plastic):
-            if material.ior != 1.5:
-                self.report.add(where, f"the index {material.ior:g} of a plastic", "1.5")
-            parts = [self.texture(material.diffuse, "Kd"), self.texture(material.specular, "Ks")]
-            rough = f'"float roughness" [ {number(material.roughness)} ] "bool remaproughness" [ "false" ]'
-            return "plastic", [*parts, rough]
-        if isinstance(material, Translucent):
-            white, black = f'"rgb Kd" {listed((1.0, 1.0, 1.0))}', f'"rgb Ks" {listed((0.0, 0.0, 0.0))}'
-            sides = [self.texture(material.reflectance, "reflect"), self.texture(material.transmittance, "transmit")]
-            return "translucent", [white, black, *sides]
-        if isinstance(material, Uber):
-            names = ("diffuse", "Kd"), ("specular", "Ks"), ("reflectance", "Kr"), ("transmittance", "Kt")
-            parts = [self.texture(getattr(material, ours), theirs) for ours, theirs in names]
-            parts += [self.texture(material.opacity, "opacity"), f'"float eta" [ {number(material.ior)} ]']
-            return "uber", parts + _roughness(material.roughness)
-        if isinstance(material, Phong):
-            return self._phong(material, where)
-        assert isinstance(material, Emissive)
-        return "matte", [f'"rgb Kd" {listed((0.0, 0.0, 0.0))}']
-
-    def _phong(self, material: Phong, where: str) -> tuple[str, list[str]]:
-        """Highlights as wide: alpha² = 2 / (exponent + 2) (Walter et al. 2007, sec. 5.2)."""
-        alpha = math.sqrt(2.0 / (material.exponent + 2.0))
-        became = f"uber with a highlight of alpha {alpha:.3g}"
-        self.report.add(where, "Phong reflection with a Fresnel-weighted mirror", became)
-        black = listed((0.0, 0.0, 0.0))
-        parts = [self.texture(material.diffuse, "Kd"), f'"rgb Ks" {listed(material.specular)}']
-        mirrored = rgb(material.fresnel_min * np.array(material.mirror_tint))
-        return "uber", [*parts, f'"rgb Kr" {listed(mirrored)}', f'"rgb Kt" {black}', *_roughness((alpha, alpha))]
 
     # --- lights --------------------------------------------------------------------------------------------------
 
@@ -365,23 +228,34 @@ class PbrtWriter:
     # --- shapes --------------------------------------------------------------------------------------------------
 
     def _instance(self, instance: Instance) -> None:
+        """A shape, or an object that was made before, in its place."""
+        where = instance.name or "shape"
+        made = self._part(instance) if part_key(instance) not in self.shared else [self._object(instance)]
+        placing = self.moved(self.keys(instance.track, instance.to_world, where))
+        self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
+
+    def _object(self, instance: Instance) -> str:
+        """The line that places an object; the object is made where it is new."""
+        key = part_key(instance)
+        if key not in self._objects:
+            made = self._part(instance)
+            label = self._label("o", "")
+            self._objects[key] = label
+            self.lines += [f'\tObjectBegin "{label}"', *(f"\t\t{line}" for line in made), "\tObjectEnd"]
+        return f'ObjectInstance "{self._objects[key]}"'
+
+    def _part(self, instance: Instance) -> list[str]:
+        """Lines of a shape and what it is made of, without its place."""
         material = instance.material
-        lines = ["\tAttributeBegin"]
         if isinstance(material, Emissive):
             self.report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
         emission: Rgb | None = material.radiance if isinstance(material, Emissive) else instance.emission
         named = self.material(material.base if isinstance(material, Masked) else material)
         alpha = f" {self._alpha(material)}" if isinstance(material, Masked) else ""
+        lines = [f'NamedMaterial "{named}"']
         if emission is not None:
-            lines.append(f'\t\tAreaLightSource "diffuse" "rgb L" {listed(emission)}')
-        lines.append(f'\t\tNamedMaterial "{named}"')
-        if instance.track is not None:
-            self.report.add(instance.name or "shape", "the motion of a shape", "its place at the start")
-        to_world = placed(instance.track, instance.to_world)
-        if not np.array_equal(to_world, np.eye(4)):
-            lines.append(f"\t\tTransform {written_matrix(to_world)}")
-        lines += [f"\t\t{self._shape(instance)}{alpha}", "\tAttributeEnd"]
-        self.lines += lines
+            lines.append(f'AreaLightSource "diffuse" "rgb L" {listed(emission)}')
+        return [*lines, f"{self._shape(instance)}{alpha}"]
 
     def _alpha(self, material: Masked) -> str:
         opacity = material.opacity
@@ -410,18 +284,6 @@ def inline_mesh(mesh: Mesh, uv: str) -> str:
     if mesh.uvs is not None:
         parts.append(f'"float {uv}" {listed(mesh.uvs.ravel())}')
     return " ".join(parts)
-
-
-def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:
-    """Where something is at the first key of its motion."""
-    if track is None:
-        return to_world
-    return pose_at(track, track.start_s) @ to_world
-
-
-def _roughness(alphas: tuple[float, float]) -> list[str]:
-    pair = f'"float uroughness" [ {number(alphas[0])} ] "float vroughness" [ {number(alphas[1])} ]'
-    return [f'{pair} "bool remaproughness" [ "false" ]']
 
 
 def aspect_of(film: Film) -> tuple[float, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from scenes.canonical import Cube, Disk, Mesh, Rectangle, Shape, Sphere
@@ -65,8 +67,12 @@ def _quad(mesh: Mesh) -> np.ndarray | None:
 
 def as_mesh(shape: Shape) -> Mesh:
     """A shape as triangles: exact for rectangle and cube, fine for sphere and disk."""
-    if isinstance(shape, Mesh):
-        return shape
+    return shape if isinstance(shape, Mesh) else _meshed(shape)
+
+
+@lru_cache(maxsize=256)
+def _meshed(shape: Rectangle | Cube | Disk | Sphere) -> Mesh:
+    """Once for all shapes of a size, so that it is written once."""
     if isinstance(shape, Rectangle):
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
         normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))

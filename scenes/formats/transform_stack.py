@@ -1,12 +1,18 @@
-"""The transforms of PBRT and LuxRender files: matrices, named coordinate systems, and the two ends of a motion."""
+"""The transforms of PBRT and LuxRender files: matrices, named coordinate systems, and the keys of a motion."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
+from scenes.animation import continuous_quaternions, pose_at
 from scenes.values import Matrix, RigidTrack
+
+KEYS_MAX = 1024
+"""Of a motion."""
 
 _RIGID = 1e-4
 
@@ -55,48 +61,90 @@ def look_at(
     return inverse(matrix)
 
 
-def rigid_motion(start: Matrix, end: Matrix, times_s: tuple[float, float]) -> RigidTrack | None:
-    """The track that, applied outside ``start``, leads to ``end``; None where it is not a rigid motion."""
-    moved = end @ np.linalg.inv(start)
-    turn = moved[:3, :3]
-    if np.abs(turn @ turn.T - np.eye(3)).max() > _RIGID or np.linalg.det(turn) < 0.0 or not times_s[1] > times_s[0]:
+def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack | None:
+    """The track that, applied outside the first key, passes through all; None where the motion is not rigid.
+
+    Keys at uneven times are sampled at even ones, no further apart than the nearest two, ``KEYS_MAX`` at most.
+    """
+    gaps = np.diff(times_s)
+    if not (gaps > 0.0).all():
         return None
-    quaternion = Rotation.from_matrix(turn).as_quat()
-    if quaternion[3] < 0.0:
-        quaternion = -quaternion
-    rotations = np.stack([[0.0, 0.0, 0.0, 1.0], quaternion])
-    return RigidTrack(times_s[0], times_s[1] - times_s[0], np.stack([np.zeros(3), moved[:3, 3]]), rotations)
+    moved = np.stack(keys) @ np.linalg.inv(keys[0])
+    turns = moved[:, :3, :3]
+    if np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max() > _RIGID or (np.linalg.det(turns) < 0.0).any():
+        return None
+    shifts, turned = moved[:, :3, 3], Rotation.from_matrix(turns)
+    interval = float(gaps.mean())
+    if np.abs(gaps - interval).max() > 1e-6 * interval:
+        count = min(int(np.ceil((times_s[-1] - times_s[0]) / gaps.min())) + 1, KEYS_MAX)
+        at = np.linspace(times_s[0], times_s[-1], count)
+        shifts = np.stack([np.interp(at, times_s, shifts[:, axis]) for axis in range(3)], axis=1)
+        turned, interval = Slerp(times_s, turned)(at), float(at[1] - at[0])
+    quaternions = turned.as_quat()
+    if quaternions[0, 3] < 0.0:
+        quaternions = -quaternions
+    return RigidTrack(float(times_s[0]), interval, shifts, continuous_quaternions(quaternions))
+
+
+def track_times(track: RigidTrack) -> list[float]:
+    """Times of a track's keys, seconds."""
+    return [track.start_s + track.interval_s * key for key in range(len(track.translation))]
+
+
+def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
+    """The motion of what moves inside a space that ``matrix`` places; None where that is not rigid."""
+    times_s = track_times(track)
+    return rigid_motion([matrix @ pose_at(track, time_s) @ inverse(matrix) for time_s in times_s], times_s)
 
 
 class TransformStack:
-    """The current transform at both ends of a motion, those saved, and those with names."""
+    """The current transform at the keys of a motion, those saved, and those with names.
+
+    Attributes:
+        current: one matrix a key.
+        active: keys that transforms apply to.
+        times_s: of the keys, seconds.
+        named: coordinate systems.
+    """
 
     def __init__(self) -> None:
         self.current = [np.eye(4), np.eye(4)]
-        self.active = (True, True)
+        self.active: tuple[bool, ...] = (True, True)
+        self.times_s: tuple[float, ...] = (0.0, 1.0)
         self.named: dict[str, list[Matrix]] = {}
-        self._saved: list[tuple[list[Matrix], tuple[bool, bool]]] = []
+        self._saved: list[tuple[list[Matrix], tuple[bool, ...], tuple[float, ...]]] = []
 
     def push(self) -> None:
         """Saves the state."""
-        self._saved.append(([matrix.copy() for matrix in self.current], self.active))
+        self._saved.append(([matrix.copy() for matrix in self.current], self.active, self.times_s))
 
     def pop(self) -> bool:
         """Restores it; False where none is saved."""
         if not self._saved:
             return False
-        self.current, self.active = self._saved.pop()
+        self.current, self.active, self.times_s = self._saved.pop()
         return True
 
     def replace(self, matrix: Matrix) -> None:
-        """Sets the transform, at the active ends."""
+        """Sets the transform, at the active keys."""
         self.current = [matrix.copy() if on else old for on, old in zip(self.active, self.current, strict=True)]
 
     def apply(self, matrix: Matrix) -> None:
-        """Applies a transform inside the current one, at the active ends."""
+        """Applies a transform inside the current one, at the active keys."""
         self.current = [old @ matrix if on else old for on, old in zip(self.active, self.current, strict=True)]
+
+    def take(self, name: str) -> None:
+        """Sets the transform to that of a name, at all keys; one with other keys is held at its first."""
+        found = self.named[name]
+        same = len(found) == len(self.current)
+        self.current = [part.copy() for part in (found if same else [found[0]] * len(self.current))]
+
+    def retime(self, times_s: Sequence[float]) -> None:
+        """Other keys, all where the first is now."""
+        self.current = [self.current[0].copy() for _ in times_s]
+        self.active, self.times_s = (True,) * len(times_s), tuple(times_s)
 
     @property
     def moves(self) -> bool:
-        """Whether the two ends differ."""
-        return not np.array_equal(self.current[0], self.current[1])
+        """Whether the keys differ."""
+        return any(not np.array_equal(self.current[0], key) for key in self.current[1:])
