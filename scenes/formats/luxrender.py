@@ -229,6 +229,7 @@ class LuxReader(PbrtReader):
     _motion_key: int | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.surfaces = LuxSurfaces(self.files, self.report, self.textures, self.materials)
 
     def dialect(self) -> dict[str, Callable[[Directive], None]]:

@@ -47,7 +47,8 @@ from scenes.formats.losses import LossReport
 from scenes.formats.mesh_files import read_obj, read_serialized
 from scenes.formats.mitsuba_properties import Properties
 from scenes.formats.mitsuba_surfaces import MitsubaSurfaces
-from scenes.formats.pbrt import duration_s, facing_normals, turned
+from scenes.formats.pbrt import duration_s
+from scenes.formats.pbrt_shapes import facing_normals, turned
 from scenes.formats.ply_files import read_ply
 from scenes.formats.recognition import as_mesh, recognised_rectangle
 from scenes.formats.scene_files import DEPTH_MAX, SceneFiles

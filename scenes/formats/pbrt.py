@@ -20,7 +20,6 @@ from scenes.canonical import (
     Camera,
     ConstantTexture,
     DirectionalLight,
-    Disk,
     EnvironmentCamera,
     EnvironmentLight,
     Film,
@@ -30,28 +29,22 @@ from scenes.canonical import (
     Masked,
     Material,
     Matte,
-    Mesh,
     OrthographicCamera,
     PerspectiveCamera,
     PointLight,
     RealisticCamera,
-    Rectangle,
     Rgb,
     RigidTrack,
     Sampler,
     Scene,
     SceneError,
-    Shape,
-    Sphere,
     SpotLight,
 )
-from scenes.formats import revolution
 from scenes.formats.directive_reader import DirectiveReader, typed, word
 from scenes.formats.directives import Directive, Parameters, parameters_of
 from scenes.formats.losses import LossReport
+from scenes.formats.pbrt_shapes import ShapeReader
 from scenes.formats.pbrt_surfaces import Surfaces
-from scenes.formats.ply_files import checked_mesh, read_ply
-from scenes.formats.recognition import recognised_rectangle
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, rgb
 from scenes.formats.transform_stack import inverse, moved_by, rigid_motion, track_times
@@ -91,10 +84,10 @@ class PbrtReader(DirectiveReader):
     lights: list[Light] = field(default_factory=list)
     objects: dict[str, list[Instance]] = field(default_factory=dict)
     _object: list[Instance] | None = None
-    _meshes: dict[Path, Mesh] = field(default_factory=dict)
     _filter: tuple[str, float] = ("box", 0.5)
 
     def __post_init__(self) -> None:
+        self.shapes = ShapeReader(self.files, self.report)
         self.surfaces = Surfaces(self.files, self.report, self.textures, self.materials)
 
     # --- directives ----------------------------------------------------------------------------------------------
@@ -329,7 +322,7 @@ class PbrtReader(DirectiveReader):
 
     def _read_shape(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        made = self._shape(kind, parameters)
+        made = self.shapes.made(kind, parameters, self.attributes.reversed, self.beside)
         if made is None:
             return
         shape, local = made
@@ -344,123 +337,6 @@ class PbrtReader(DirectiveReader):
         start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
         self._keep(Instance(shape, material, start @ local, track, emission=self.attributes.emission), directive)
         self.left_over(parameters, f"shape {kind!r}")
-
-    def _shape(self, kind: str, parameters: Parameters) -> tuple[Shape, Matrix] | None:
-        """A shape and where it lies in the current space; None for what cannot be had, reported."""
-        where = str(parameters.place)
-        if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
-            mesh = self._ply(parameters) if kind == "plymesh" else self._triangles(parameters)
-            if kind == "loopsubdiv":
-                parameters.asked.update(parameters.given)
-                self.report.add(where, "a subdivision surface", "its control mesh")
-            mesh = facing_normals(turned(mesh) if self.attributes.reversed else mesh)
-            matrix = recognised_rectangle(mesh)
-            return (mesh, np.eye(4)) if matrix is None else (Rectangle(), matrix)
-        if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
-            return self._quadric(kind, parameters)
-        if kind in ("curve", "nurbs", "heightfield"):
-            parameters.asked.update(parameters.given)
-            self.report.add(where, "hair (a curve)" if kind == "curve" else f"shape {kind!r}")
-            return None
-        raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
-
-    def _quadric(self, kind: str, parameters: Parameters) -> tuple[Shape, Matrix]:
-        place = np.eye(4)
-        radius = parameters.number("radius", 1.0)
-        if not radius > 0.0:
-            raise SceneError(f"{parameters.place}: radius: expected a positive number, got {radius:g}")
-        turn = parameters.number("phimax", 360.0)
-        if not 0.0 < turn <= 360.0:
-            raise SceneError(f"{parameters.place}: phimax: expected an angle in (0, 360], got {turn:g}")
-        if kind == "sphere":
-            low, high = parameters.number("zmin", -radius), parameters.number("zmax", radius)
-            if turn == 360.0 and low <= -radius and high >= radius and not self.attributes.reversed:
-                return Sphere(radius), place
-            if not min(low, high) < radius or not max(low, high) > -radius or low == high:
-                raise SceneError(f"{parameters.place}: zmin, zmax: expected heights within the sphere")
-            mesh = revolution.partial_sphere(radius, max(low, -radius), min(high, radius), turn)
-        elif kind == "disk":
-            inner, height = parameters.number("innerradius", 0.0), parameters.number("height", 0.0)
-            if turn == 360.0 and inner == 0.0 and not self.attributes.reversed:
-                place[2, 3] = height
-                return Disk(radius), place
-            if not 0.0 <= inner < radius:
-                raise SceneError(f"{parameters.place}: innerradius: expected less than the radius, got {inner:g}")
-            mesh = revolution.ring(radius, inner, height, turn)
-        elif kind == "cylinder":
-            heights = parameters.number("zmin", -1.0), parameters.number("zmax", 1.0)
-            mesh = revolution.cylinder(radius, *_apart(heights, parameters), turn)
-        elif kind == "cone":
-            mesh = revolution.cone(radius, *_apart((0.0, parameters.number("height", 1.0)), parameters)[1:], turn)
-        elif kind == "paraboloid":
-            heights = parameters.number("zmin", 0.0), parameters.number("zmax", 1.0)
-            if not 0.0 <= heights[0] < heights[1]:
-                raise SceneError(f"{parameters.place}: paraboloid: expected 0 <= zmin < zmax")
-            mesh = revolution.paraboloid(radius, *heights, turn)
-        else:
-            ends = [parameters.numbers(name, 3) for name in ("p1", "p2")]
-            first = np.zeros(3) if ends[0] is None else ends[0]
-            second = np.ones(3) if ends[1] is None else ends[1]
-            if np.array_equal(first, second):
-                raise SceneError(f"{parameters.place}: hyperboloid: expected p1 and p2 apart")
-            mesh = revolution.hyperboloid(first, second, turn)
-        self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
-        return (turned(mesh) if self.attributes.reversed else mesh), place
-
-    def _ply(self, parameters: Parameters) -> Mesh:
-        where = str(parameters.place)
-        path = self.files.path(parameters.text("filename", ""), where, self.beside)
-        if path not in self._meshes:
-            self._meshes[path] = facing_normals(read_ply(self.files.read(path, where), str(path)))
-        return self._meshes[path]
-
-    def _triangles(self, parameters: Parameters) -> Mesh:
-        points, indices = parameters.numbers("P"), parameters.numbers("indices")
-        if indices is None:
-            indices = parameters.numbers("triindices")
-        where = str(parameters.place)
-        if points is None or indices is None or len(points) % 3 or len(indices) % 3 or not len(indices):
-            raise SceneError(f"{where}: expected points P and indices, in threes")
-        normals = parameters.numbers("N")
-        pairs = [found for found in (parameters.numbers(name) for name in ("uv", "st")) if found is not None]
-        if parameters.numbers("S") is not None:
-            self.report.add(where, "tangents S of a mesh", "those of its texture coordinates")
-        count = len(points) // 3
-        for name, array, width in (("N", normals, 3), ("uv", pairs[0] if pairs else None, 2)):
-            if array is not None and len(array) != width * count:
-                raise SceneError(f"{where}: {name}: expected {width * count} numbers, got {len(array)}")
-        return checked_mesh(
-            points.reshape(-1, 3),
-            indices.reshape(-1, 3),
-            None if normals is None else normals.reshape(-1, 3),
-            pairs[0].reshape(-1, 2) if pairs else None,
-            where,
-        )
-
-
-def _apart(heights: tuple[float, float], parameters: Parameters) -> tuple[float, float]:
-    if heights[0] == heights[1]:
-        raise SceneError(f"{parameters.place}: expected two different heights, got {heights[0]:g} twice")
-    return heights
-
-
-def turned(mesh: Mesh) -> Mesh:
-    """The mesh with its outside in."""
-    normals = None if mesh.normals is None else -mesh.normals
-    return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
-
-
-def facing_normals(mesh: Mesh) -> Mesh:
-    """The mesh with every face counter-clockwise seen from where its normals point."""
-    if mesh.normals is None:
-        return mesh
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    wrong = (across * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
-    if not wrong.any():
-        return mesh
-    faces = np.where(wrong[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces).astype(np.int32)
-    return Mesh(mesh.vertices, faces, mesh.normals, mesh.uvs, mesh.source)
 
 
 def load_pbrt(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
