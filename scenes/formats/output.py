@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -13,6 +15,8 @@ from numpy.typing import NDArray
 from scenes import loading
 from scenes.canonical import Mesh, SceneError
 from scenes.formats.ply_files import ply_bytes
+
+_OF_CONTENT = re.compile(r"-[0-9a-f]{8}$")
 
 
 class Output:
@@ -31,23 +35,20 @@ class Output:
             raise SceneError(f"{path}: cannot be written ({error.strerror})") from None
         self._meshes: dict[int, tuple[Mesh, str]] = {}
         self._pictures: dict[int, tuple[NDArray[np.float32], str]] = {}
-        self._names: set[str] = set()
 
-    def _free(self, folder: str, stem: str, ending: str) -> str:
-        name, number = f"{folder}/{stem}{ending}", 1
-        while name.lower() in self._names:
-            name, number = f"{folder}/{stem}-{number}{ending}", number + 1
-        self._names.add(name.lower())
+    def _named(self, folder: str, stem: str, ending: str, content: bytes) -> str:
+        """Writes a file whose name tells its content, so that scenes in one folder do not take each other's."""
+        digest = hashlib.blake2b(content, digest_size=4).hexdigest()
+        name = f"{folder}/{_OF_CONTENT.sub('', _plain(stem))}-{digest}{ending}"
         (self._work / folder).mkdir(exist_ok=True)
+        (self._work / name).write_bytes(content)
         return name
 
     def mesh(self, mesh: Mesh) -> str:
         """Writes a mesh once, as PLY; its name from the scene's folder."""
         if id(mesh) not in self._meshes:
             stem = Path(mesh.source).stem if mesh.source.endswith((".ply", ".obj", ".gz")) else "mesh"
-            name = self._free("models", _plain(stem), ".ply")
-            (self._work / name).write_bytes(ply_bytes(mesh))
-            self._meshes[id(mesh)] = mesh, name
+            self._meshes[id(mesh)] = mesh, self._named("models", stem, ".ply", ply_bytes(mesh))
         return self._meshes[id(mesh)][1]
 
     def picture(self, image: NDArray[np.float32], source: str, linear: bool = False) -> str:
@@ -62,13 +63,20 @@ class Output:
             path = Path(source)
             wanted = path.is_file() and not (linear and path.suffix.lower() != ".exr")
             same = wanted and np.array_equal(loading.read_image(path), image)
-            name = self._free("textures", _plain(path.stem or "picture"), path.suffix.lower() if same else ".exr")
-            if same:
-                shutil.copyfile(path, self._work / name)
-            else:
-                _write_exr(self._work / name, image)
+            content = path.read_bytes() if same else self._exr_bytes(image)
+            name = self._named("textures", path.stem or "picture", path.suffix.lower() if same else ".exr", content)
             self._pictures[id(image)] = image, name
         return self._pictures[id(image)][1]
+
+    def _exr_bytes(self, image: NDArray[np.float32]) -> bytes:
+        import OpenEXR
+
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        path = self._work / "picture.exr"
+        OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))
+        content = path.read_bytes()
+        path.unlink()
+        return content
 
     def text(self, name: str, content: str) -> None:
         """Writes a text beside the others; the scene's own is that of :attr:`path`."""
@@ -99,10 +107,3 @@ class Output:
 
 def _plain(stem: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in stem) or "part"
-
-
-def _write_exr(path: Path, image: NDArray[np.float32]) -> None:
-    import OpenEXR
-
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))

@@ -473,3 +473,15 @@ def test_changed_files_make_a_scene_or_a_clear_error(tmp_path: Path) -> None:
 def test_many_changed_files(tmp_path: Path) -> None:
     outcome = fuzz(10_000, tmp_path)
     assert outcome["scene"] + outcome["error"] == 10_000
+
+
+def test_scenes_in_one_folder_keep_their_meshes(tmp_path: Path) -> None:
+    """Two formats write other meshes of the same scene under the same stem."""
+    scene, _ = pbrt(tmp_path, 'Shape "sphere"\nShape "cone"\n')
+    save_scene_file(scene, tmp_path / "b.xml")
+    before = load_scene_file(tmp_path / "b.xml")
+    save_scene_file(scene, tmp_path / "b.lxs")
+    assert difference(before, load_scene_file(tmp_path / "b.xml")) is None
+    names = [file.name for file in (tmp_path / "models").iterdir()]
+    save_scene_file(load_scene_file(tmp_path / "b.lxs"), tmp_path / "c.lxs")
+    assert len(names) == 2 and sorted(names) == sorted(file.name for file in (tmp_path / "models").iterdir())
