@@ -184,6 +184,8 @@ def _spot_row(light: SpotLight) -> dict:
         raise SceneError(
             f"SpotLight: expected 0 <= inner_deg <= outer_deg < 180, got {light.inner_deg}, {light.outer_deg}"
         )
+    if light.profile != "hermite":
+        raise SceneError(f"SpotLight.profile: expected hermite, which the renderer draws, got {light.profile}")
     cosines = np.cos(np.radians([light.inner_deg, light.outer_deg]))
     row = {"kind": LIGHT_SPOT, "place": light.position, "color": light.intensity, "across": axis / length}
     return row | {"cos_inner": cosines[0], "cos_outer": cosines[1]}

@@ -219,13 +219,19 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class SpotLight:
-    """Intensity within a cone, falling off smoothly from ``inner_deg`` to ``outer_deg`` (half angles)."""
+    """Intensity within a cone, falling off from ``inner_deg`` to ``outer_deg`` (half angles).
+
+    Attributes:
+        profile: of the fall-off, with ``x`` from 0 at the edge to 1: ``3x² - 2x³`` or ``x⁴`` in the cosine, or ``x`` in
+            the angle. The renderer draws the first.
+    """
 
     position: Rgb
     target: Rgb
     intensity: Rgb
     inner_deg: float
     outer_deg: float
+    profile: Literal["hermite", "quartic", "linear"] = "hermite"
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,16 +37,19 @@ from scenes.canonical import (
     Rectangle,
     Scene,
     Sphere,
+    SpotLight,
     SunSky,
     Texture,
     Translucent,
     Uber,
 )
 from scenes.daylight import sky_map, sun_light
+from scenes.formats.folding import folded
 from scenes.formats.losses import LossReport
 from scenes.formats.luxrender import reflectance_of_index
 from scenes.formats.pbrt_surfaces import mean_of
 from scenes.formats.spectra import rgb
+from scenes.formats.spot_profiles import reshaped
 
 DEPTH_MAX = 8
 """Bounces that mirrored and refracted rays are followed for."""
@@ -83,6 +86,8 @@ class Approximation:
 
     def light(self, light: Light) -> list[Light]:
         """Daylight becomes a map and a light as wide as the sun."""
+        if isinstance(light, SpotLight):
+            return [reshaped(light, "hermite", self.report)]
         if not isinstance(light, SunSky):
             return [light]
         made: list[Light] = [] if light.part == "sky" else [sun_light(light)]
@@ -107,7 +112,8 @@ class Approximation:
         return dataclasses.replace(made, material=Emissive(instance.emission), emission=None)
 
     def texture(self, texture: Texture, where: str) -> Texture:
-        """A texture; products and mixtures become their mean."""
+        """A texture; products and mixtures that are none of the plain ones become their mean."""
+        texture = folded(texture)
         if isinstance(texture, ConstantTexture | ImageTexture):
             return texture
         if isinstance(texture, CheckerboardTexture):

@@ -26,11 +26,11 @@ from scenes.canonical import (
     Glossy,
     ImageTexture,
     Integrator,
+    Masked,
     Material,
     Matte,
     Metal,
     Mirror,
-    MixMaterial,
     PointLight,
     Rgb,
     Sampler,
@@ -45,7 +45,7 @@ from scenes.formats.directive_reader import typed, word
 from scenes.formats.directives import Directive, Parameters, parameters_of
 from scenes.formats.losses import LossReport
 from scenes.formats.pbrt import PbrtReader, scene_of
-from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, product
+from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, mixture, product
 from scenes.formats.recognition import as_mesh
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, metal, rgb
@@ -128,8 +128,7 @@ class LuxSurfaces(Surfaces):
         if kind in makers:
             made = makers[kind](parameters)
         elif kind == "null":
-            self.report.add(where, "a surface that is not there (null)", "black")
-            made = Matte(ConstantTexture(grey(0.0)))
+            made = Masked(Matte(ConstantTexture(grey(0.0))), ConstantTexture(grey(0.0)))
         elif kind in ("carpaint", "velvet", "cloth", "glossytranslucent", "scatter", "layered", "glossycoating",
                       "doubleside"):  # fmt: skip
             base = self.texture(parameters, "Kd", grey(0.5))
@@ -184,7 +183,8 @@ class LuxSurfaces(Surfaces):
 
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)
-        return MixMaterial(first, second, self.texture(parameters, "amount", grey(0.5)))
+        amount = self.texture(parameters, "amount", grey(0.5))
+        return Masked(second, amount) if _nothing(first) else mixture(first, second, amount)
 
     def _mattetranslucent(self, parameters: Parameters) -> Material:
         sides = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
@@ -195,6 +195,11 @@ class LuxSurfaces(Surfaces):
         self.report.add(str(parameters.place), "energyconserving with a texture", "its mean")
         rest = ConstantTexture(rgb(1.0 - np.array(mean_of(sides[0]))))
         return Translucent(sides[0], product(sides[1], rest))
+
+
+def _nothing(material: Material) -> bool:
+    """Whether a surface is not there."""
+    return isinstance(material, Masked) and material.opacity == ConstantTexture(grey(0.0))
 
 
 def index_of_reflectance(reflectance: Rgb) -> tuple[Rgb, Rgb]:
@@ -371,7 +376,7 @@ class LuxReader(PbrtReader):
         elif kind == "spot":
             outer = parameters.number("coneangle", 30.0)
             inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
-            self.lights.append(SpotLight(start, target, strength, inner, outer))
+            self.lights.append(SpotLight(start, target, strength, inner, outer, "quartic"))
         else:
             if kind != "point":
                 parameters.asked.update(parameters.given)

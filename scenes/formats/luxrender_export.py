@@ -41,6 +41,7 @@ from scenes.canonical import (
     Rectangle,
     ScaleTexture,
     Scene,
+    Sphere,
     SpotLight,
     SunSky,
     Texture,
@@ -59,11 +60,13 @@ from scenes.formats.pbrt_export import (
     inline_mesh,
     written_matrix,
 )
-from scenes.formats.pbrt_surface_export import listed, number
+from scenes.formats.pbrt_surface_export import Kind, dimmed, listed, number
 from scenes.formats.pbrt_surfaces import mean_of, product
-from scenes.formats.placing import motion_keys, part_key
+from scenes.formats.placing import motion_keys, part_key, shines
 from scenes.formats.recognition import as_mesh
+from scenes.formats.revolution import lamp_sphere
 from scenes.formats.spectra import METALS, rgb
+from scenes.formats.spot_profiles import reshaped
 from scenes.formats.transform_stack import inverse
 from scenes.values import Matrix, Rgb
 
@@ -127,54 +130,63 @@ class LuxWriter(PbrtWriter):
 
     # --- textures and materials ----------------------------------------------------------------------------------
 
-    def texture(self, texture: Texture, name: str) -> str:
-        if isinstance(texture, ConstantTexture):
-            return f'"color {name}" {listed(texture.value)}'
-        if id(texture) not in self._textures:
-            made = self._texture_line(texture)
-            label = self._label("t", "")
-            self._textures[id(texture)] = texture, label
-            self.lines.append(f'\tTexture "{label}" "color" {made}')
-        return f'"texture {name}" [ "{self._textures[id(texture)][1]}" ]'
+    color_kind: str = "color"
+    _null: Matte | None = None
 
-    def _texture_line(self, texture: Texture) -> str:
+    def constant(self, name: str, value: Rgb, kind: Kind) -> str:
+        if kind == "float":
+            return super().constant(name, value, kind)
+        return f'"color {name}" {listed(value)}'
+
+    def _texture_line(self, texture: Texture, kind: Kind) -> str:
         if isinstance(texture, ImageTexture):
-            file = self.output.picture(texture.image, texture.source, linear=True)
+            file = self.output.picture(texture.image, texture.source, (".exr",))
             # the first row is at v = 0 here
             size, start = (
                 (texture.uv_scale[0], -texture.uv_scale[1]),
                 (texture.uv_offset[0], 1.0 - texture.uv_offset[1]),
             )
-            kind = {"nearest": "nearest", "bilinear": "bilinear", "mipmap": "mipmap_ewa"}[texture.filter]
+            levels = {"nearest": "nearest", "bilinear": "bilinear", "mipmap": "mipmap_ewa"}[texture.filter]
             return (
                 f'"imagemap" "string filename" [ "{file}" ] "string wrap" [ "{texture.wrap}" ] '
-                f'"string filtertype" [ "{kind}" ] "float gamma" [ 1 ] '
+                f'"string filtertype" [ "{levels}" ] "float gamma" [ 1 ] '
                 f'"float uscale" [ {number(size[0])} ] "float vscale" [ {number(size[1])} ] '
                 f'"float udelta" [ {number(start[0])} ] "float vdelta" [ {number(start[1])} ]'
             )
         if isinstance(texture, CheckerboardTexture):
-            return f'{super()._texture_line(texture)} "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
+            return f'{super()._texture_line(texture, kind)} "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
         assert isinstance(texture, MixTexture | ScaleTexture)
-        return super()._texture_line(texture)
+        return super()._texture_line(texture, kind)
 
     def _material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"
         if isinstance(material, Bumped):
             if material.scale != 1.0:
                 self.report.add(where, "the scale of a bump map", "1")
-            return f"{self._material_line(material.base, name)} {self.texture(material.height, 'bumpmap')}"
+            return f"{self._material_line(material.base, name)} {self.texture(material.height, 'bumpmap', 'float')}"
         if isinstance(material, MixMaterial):
             parts = f'"string namedmaterial1" [ "{self.material(material.first)}" ]'
             parts += f' "string namedmaterial2" [ "{self.material(material.second)}" ]'
-            amount = material.amount
-            if not isinstance(amount, ConstantTexture):
-                self.report.add(where, "a mixture by a texture", "by its mean")
-            share = number(float(np.mean(mean_of(amount))))
-            return f'"string type" [ "mix" ] {parts} "float amount" [ {share} ]'
-        if isinstance(material, Masked | HeightField):
+            if isinstance(material.amount, ConstantTexture) and len(set(material.amount.value)) > 1:
+                self.report.add(where, "a mixture of each colour by itself", "by their mean")
+            return f'"string type" [ "mix" ] {parts} {self.texture(material.amount, "amount", "float")}'
+        if isinstance(material, Masked):
+            return self._material_line(MixMaterial(self._nothing(), material.base, material.opacity), name)
+        if isinstance(material, Metal) and _even(material.reflectance_scale):
+            return self._material_line(dimmed(material), name)
+        if isinstance(material, HeightField):
             return super()._material_line(material, name)
         kind, parameters = self._plain_material(material, where)
         return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
+
+    def _nothing(self) -> Material:
+        """A surface that is not there."""
+        if self._null is None:
+            self._null = Matte(ConstantTexture((0.0, 0.0, 0.0)))
+            label = self._label("m", "nothing")
+            self._materials[id(self._null)] = self._null, label
+            self.lines.append(f'\tMakeNamedMaterial "{label}" "string type" [ "null" ]')
+        return self._null
 
     def _plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
         if isinstance(material, Matte):
@@ -256,6 +268,7 @@ class LuxWriter(PbrtWriter):
         if isinstance(light, PointLight):
             line = f'"point" "point from" {listed(light.position)} "color L" {listed(light.intensity)}'
         elif isinstance(light, SpotLight):
+            light = reshaped(light, "quartic", self.report)
             cone = f'"float coneangle" [ {number(light.outer_deg)} ]'
             cone += f' "float conedeltaangle" [ {number(light.outer_deg - light.inner_deg)} ]'
             ends = f'"point from" {listed(light.position)} "point to" {listed(light.target)}'
@@ -296,7 +309,7 @@ class LuxWriter(PbrtWriter):
             radiance = light.scale * light.image[0, 0].astype(np.float64)
             self.lines.append(f'\tLightSource "infinite" "color L" {listed(radiance)} "float gain" [ 1 ]')
             return
-        file = self.output.picture(light.image, light.source, linear=True)
+        file = self.output.picture(light.image, light.source, (".exr",))
         turn = light.to_world @ inverse(MAP_AXES)
         self.lines += [
             "\tTransformBegin",
@@ -323,9 +336,6 @@ class LuxWriter(PbrtWriter):
         material, where = instance.material, instance.name or "shape"
         if isinstance(material, Emissive):
             self.report.add(where, "a surface that shines on both sides", "on its front")
-        if isinstance(material, Masked):
-            self.report.add(where, "holes in a material", "none")
-            material = material.base
         emission = material.radiance if isinstance(material, Emissive) else instance.emission
         lines = [f'NamedMaterial "{self.material(material)}"']
         if emission is not None:
@@ -335,13 +345,19 @@ class LuxWriter(PbrtWriter):
 
     def _shape(self, instance: Instance) -> str:
         """Meshes only: LuxCore leaves spheres and disks out."""
-        mesh = as_mesh(instance.shape)
-        if mesh is not instance.shape and not isinstance(instance.shape, Rectangle | Cube):
-            what = f"shape {type(instance.shape).__name__.lower()}"
+        shape = instance.shape
+        mesh = lamp_sphere(shape.radius) if isinstance(shape, Sphere) and shines(instance) else as_mesh(shape)
+        if mesh is not shape and not isinstance(shape, Rectangle | Cube):
+            what = f"shape {type(shape).__name__.lower()}"
             self.report.add(instance.name or "shape", what, f"a mesh of {len(mesh.faces)} triangles")
         if len(mesh.faces) > INLINE_MAX or part_key(instance) in self.shared:
             return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
         return f'Shape "trianglemesh" {inline_mesh(mesh, "uv")}'
+
+
+def _even(scale: Texture) -> bool:
+    """Whether a factor is less than one and the same for all colours."""
+    return isinstance(scale, ConstantTexture) and len(set(scale.value)) == 1 and scale.value[0] < 1.0
 
 
 def _looking(pose: Matrix) -> str:

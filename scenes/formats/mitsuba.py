@@ -267,7 +267,7 @@ class MitsubaReader:
             ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]))
             if any(child.tag in ("texture", "ref") for child in properties.rest):
                 self.report.add(properties.where, "a picture in a spot light", "none")
-            self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer))
+            self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
         elif kind in ("directional", "collimated"):
             direction = properties.vector("direction", rgb(matrix[:3, 2]))
             if not np.linalg.norm(direction) > 0.0:

@@ -38,6 +38,7 @@ from scenes.formats.output import Output
 from scenes.formats.pbrt_surface_export import number
 from scenes.formats.placing import PartKey, motion_keys, part_key, shared_parts, shines
 from scenes.formats.spectra import grey, rgb
+from scenes.formats.spot_profiles import reshaped
 
 _FILTERS = first_of(FILTERS)
 _SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "halton": "halton",
@@ -142,6 +143,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
             ElementTree.SubElement(made, "point", {"name": "position", **place})
             self.color(made, "intensity", light.intensity)
         elif isinstance(light, SpotLight):
+            light = reshaped(light, "linear", self.report)
             made = self.plugin("emitter", "spot", self.root)
             holder = ElementTree.SubElement(made, "transform", {"name": self.name("toWorld")})
             ends = {name: ", ".join(number(value) for value in point) for name, point in

@@ -33,6 +33,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.formats.folding import folded
 from scenes.formats.losses import LossReport
 from scenes.formats.output import Output
 from scenes.formats.pbrt_surface_export import number
@@ -54,6 +55,7 @@ class MitsubaSurfaceWriter:
     modern: bool = False
     root: Element = field(default_factory=lambda: Element("scene"))
     _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
+    _folded: dict[int, tuple[Texture, Texture]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
 
     # --- elements ------------------------------------------------------------------------------------------------
@@ -86,6 +88,9 @@ class MitsubaSurfaceWriter:
 
     def texture(self, parent: Element, texture: Texture, name: str) -> None:
         """A texture or colour as a property."""
+        if id(texture) not in self._folded:
+            self._folded[id(texture)] = texture, folded(texture)
+        texture = self._folded[id(texture)][1]
         if isinstance(texture, ConstantTexture):
             self.color(parent, name, texture.value)
             return

@@ -51,17 +51,19 @@ class Output:
             self._meshes[id(mesh)] = mesh, self._named("models", stem, ".ply", ply_bytes(mesh))
         return self._meshes[id(mesh)][1]
 
-    def picture(self, image: NDArray[np.float32], source: str, linear: bool = False) -> str:
+    def picture(
+        self, image: NDArray[np.float32], source: str, endings: tuple[str, ...] = (".exr", ".png", ".jpg", ".jpeg")
+    ) -> str:
         """Copies the file that a picture came from, or writes it as EXR where it is another or has been changed.
 
         Args:
             image: linear RGB.
             source: file that it came from, or empty.
-            linear: whether 8-bit files, which are encoded, are written as EXR too.
+            endings: of the files that may be copied.
         """
         if id(image) not in self._pictures:
             path = Path(source)
-            wanted = path.is_file() and not (linear and path.suffix.lower() != ".exr")
+            wanted = path.is_file() and path.suffix.lower() in endings
             same = wanted and np.array_equal(loading.read_image(path), image)
             content = path.read_bytes() if same else self._exr_bytes(image)
             name = self._named("textures", path.stem or "picture", path.suffix.lower() if same else ".exr", content)

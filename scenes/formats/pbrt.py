@@ -234,7 +234,7 @@ class PbrtReader(DirectiveReader):
             outer = parameters.number("coneangle", 30.0)
             inner = outer - parameters.number("conedeltaangle", 5.0)
             target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
-            self.lights.append(SpotLight(start, target, strength, max(inner, 0.0), outer))
+            self.lights.append(SpotLight(start, target, strength, max(inner, 0.0), outer, "quartic"))
         elif kind == "distant":
             target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
             direction = np.subtract(target, start)

@@ -39,9 +39,10 @@ from scenes.daylight import sky_map, sun_light
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, FORWARD, INTEGRATORS, MAP_AXES, SAMPLERS
-from scenes.formats.pbrt_surface_export import PbrtSurfaceWriter, listed, number
+from scenes.formats.pbrt_surface_export import PICTURES, PbrtSurfaceWriter, listed, number
 from scenes.formats.placing import PartKey, motion_keys, part_key, shared_parts, tracks_of
 from scenes.formats.recognition import as_mesh
+from scenes.formats.spot_profiles import reshaped
 from scenes.formats.transform_stack import inverse, track_times
 from scenes.values import Matrix
 
@@ -188,6 +189,7 @@ class PbrtWriter(PbrtSurfaceWriter):
                 f'\tLightSource "point" "point from" {listed(light.position)} "rgb I" {listed(light.intensity)}'
             )
         elif isinstance(light, SpotLight):
+            light = reshaped(light, "quartic", self.report)
             cone = f'"float coneangle" [ {number(light.outer_deg)} ]'
             cone += f' "float conedeltaangle" [ {number(light.outer_deg - light.inner_deg)} ]'
             ends = f'"point from" {listed(light.position)} "point to" {listed(light.target)}'
@@ -216,7 +218,7 @@ class PbrtWriter(PbrtSurfaceWriter):
             radiance = light.scale * light.image[0, 0].astype(np.float64)
             self.lines.append(f'\tLightSource "infinite" "rgb L" {listed(radiance)}')
             return
-        file = self.output.picture(light.image, light.source)
+        file = self.output.picture(light.image, light.source, PICTURES)
         turn = light.to_world @ inverse(MAP_AXES)
         self.lines += [
             "\tAttributeBegin",
@@ -261,7 +263,7 @@ class PbrtWriter(PbrtSurfaceWriter):
         opacity = material.opacity
         if isinstance(opacity, ConstantTexture):
             return f'"float alpha" [ {number(float(np.mean(opacity.value)))} ]'
-        return self.texture(opacity, "alpha")
+        return self.texture(opacity, "alpha", "float")
 
     def _shape(self, instance: Instance) -> str:
         shape = instance.shape

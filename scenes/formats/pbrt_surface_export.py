@@ -5,9 +5,11 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018,
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -29,6 +31,7 @@ from scenes.canonical import (
     MixTexture,
     Phong,
     Plastic,
+    Rgb,
     ScaleTexture,
     Texture,
     Translucent,
@@ -36,8 +39,12 @@ from scenes.canonical import (
 )
 from scenes.formats.losses import LossReport
 from scenes.formats.output import Output
-from scenes.formats.pbrt_surfaces import mean_of
 from scenes.formats.spectra import rgb
+
+Kind = Literal["color", "float"]
+
+PICTURES = (".exr", ".png", ".tga", ".pfm")
+"""Endings of pictures that PBRT v3 reads."""
 
 
 def number(value: float) -> str:
@@ -50,6 +57,16 @@ def listed(values: Iterable[float]) -> str:
     return f"[ {' '.join(number(value) for value in values)} ]"
 
 
+WHITE = ConstantTexture((1.0, 1.0, 1.0))
+_BLACK = Matte(ConstantTexture((0.0, 0.0, 0.0)))
+
+
+def dimmed(material: Metal) -> MixMaterial:
+    """A metal whose reflection is multiplied by a factor, as a mixture with black."""
+    bright = dataclasses.replace(material, reflectance_scale=WHITE)
+    return MixMaterial(_BLACK, bright, material.reflectance_scale)
+
+
 @dataclass
 class PbrtSurfaceWriter:
     """Lines of a scene, as they are made, and the names of what they define."""
@@ -57,24 +74,32 @@ class PbrtSurfaceWriter:
     output: Output
     report: LossReport
     lines: list[str] = field(default_factory=list)
-    _textures: dict[int, tuple[Texture, str]] = field(default_factory=dict)
+    color_kind: str = "spectrum"
+    _textures: dict[tuple[int, str], tuple[Texture, str]] = field(default_factory=dict)
     _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
 
-    def texture(self, texture: Texture, name: str) -> str:
-        """A parameter of a material or texture, its texture written before."""
+    def texture(self, texture: Texture, name: str, kind: Kind = "color") -> str:
+        """A parameter of a material or texture, its texture written before; of numbers where the kind is ``float``."""
         if isinstance(texture, ConstantTexture):
-            return f'"rgb {name}" {listed(texture.value)}'
-        if id(texture) not in self._textures:
-            made = self._texture_line(texture)
+            return self.constant(name, texture.value, kind)
+        key = id(texture), kind
+        if key not in self._textures:
+            made = self._texture_line(texture, kind)
             label = self._label("t", "")
-            self._textures[id(texture)] = texture, label
-            self.lines.append(f'\tTexture "{label}" "spectrum" {made}')
-        return f'"texture {name}" [ "{self._textures[id(texture)][1]}" ]'
+            self._textures[key] = texture, label
+            self.lines.append(f'\tTexture "{label}" "{self.color_kind if kind == "color" else kind}" {made}')
+        return f'"texture {name}" [ "{self._textures[key][1]}" ]'
 
-    def _texture_line(self, texture: Texture) -> str:
+    def constant(self, name: str, value: Rgb, kind: Kind) -> str:
+        """A colour, or its mean as a number."""
+        if kind == "float":
+            return f'"float {name}" [ {number(sum(value) / 3.0)} ]'
+        return f'"rgb {name}" {listed(value)}'
+
+    def _texture_line(self, texture: Texture, kind: Kind) -> str:
         if isinstance(texture, ImageTexture):
-            file = self.output.picture(texture.image, texture.source)
+            file = self.output.picture(texture.image, texture.source, PICTURES)
             scale, offset = texture.uv_scale, texture.uv_offset
             if texture.filter != "mipmap":
                 self.report.add(f"texture {file}", f"the filter {texture.filter}", "levels of detail")
@@ -84,11 +109,11 @@ class PbrtSurfaceWriter:
                 f'"float udelta" [ {number(offset[0])} ] "float vdelta" [ {number(offset[1])} ]'
             )
         if isinstance(texture, CheckerboardTexture):
-            parts = f"{self.texture(texture.even, 'tex1')} {self.texture(texture.odd, 'tex2')}"
+            parts = f"{self.texture(texture.even, 'tex1', kind)} {self.texture(texture.odd, 'tex2', kind)}"
             scale = texture.uv_scale
             return f'"checkerboard" {parts} "float uscale" [ {number(scale[0])} ] "float vscale" [ {number(scale[1])} ]'
         assert isinstance(texture, MixTexture | ScaleTexture)
-        parts = f"{self.texture(texture.first, 'tex1')} {self.texture(texture.second, 'tex2')}"
+        parts = f"{self.texture(texture.first, 'tex1', kind)} {self.texture(texture.second, 'tex2', kind)}"
         if isinstance(texture, MixTexture):
             return f'"mix" {parts} "float amount" [ {number(texture.amount)} ]'
         return f'"scale" {parts}'
@@ -116,7 +141,7 @@ class PbrtSurfaceWriter:
         if isinstance(material, Bumped):
             if material.scale != 1.0:
                 self.report.add(where, "the scale of a bump map", "1")
-            bump = self.texture(material.height, "bumpmap")
+            bump = self.texture(material.height, "bumpmap", "float")
             return f"{self._material_line(material.base, name)} {bump}"
         if isinstance(material, Masked):
             self.report.add(where, "holes in a material", "those of the shapes that have it")
@@ -128,6 +153,8 @@ class PbrtSurfaceWriter:
             parts = f'"string namedmaterial1" [ "{self.material(material.second)}" ]'
             parts += f' "string namedmaterial2" [ "{self.material(material.first)}" ]'
             return f'"string type" [ "mix" ] {parts} {self.texture(material.amount, "amount")}'
+        if isinstance(material, Metal) and material.reflectance_scale != WHITE:
+            return self._material_line(dimmed(material), name)
         kind, parameters = self._plain_material(material, where)
         return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
 
@@ -148,8 +175,6 @@ class PbrtSurfaceWriter:
             parts.append(f'"float eta" [ {number(material.ior)} ]')
             return "glass", parts + (_roughness(material.roughness) if material.roughness != (0.0, 0.0) else [])
         if isinstance(material, Metal):
-            if mean_of(material.reflectance_scale) != (1.0, 1.0, 1.0):
-                self.report.add(where, "a factor on what metal reflects", "1")
             if material.distribution != "ggx":
                 self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
             index = [f'"rgb eta" {listed(material.eta)}', f'"rgb k" {listed(material.k)}']

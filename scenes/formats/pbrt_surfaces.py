@@ -5,6 +5,7 @@ Source: PBRT v3 file format, sections on materials and textures; Pharr, Jakob an
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -262,7 +263,7 @@ class Surfaces:
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)
         # PBRT's amount is that of the first
-        return MixMaterial(second, first, self.texture(parameters, "amount", grey(0.5)))
+        return mixture(second, first, self.texture(parameters, "amount", grey(0.5)))
 
     def mixed(self, parameters: Parameters) -> list[Material]:
         """The two materials of a mixture by name."""
@@ -273,6 +274,14 @@ class Surfaces:
                 raise SceneError(f"{parameters.place}: {name}: expected a named material, got {wanted!r}")
             parts.append(self.materials[wanted])
         return parts
+
+
+def mixture(first: Material, second: Material, amount: Texture) -> Material:
+    """A mixture, ``amount`` of the second; a metal in black is one that reflects less."""
+    black = isinstance(first, Matte) and first.reflectance == ConstantTexture(grey(0.0))
+    if black and isinstance(second, Metal) and second.reflectance_scale == ConstantTexture(grey(1.0)):
+        return dataclasses.replace(second, reflectance_scale=amount)
+    return MixMaterial(first, second, amount)
 
 
 def product(first: Texture, second: Texture) -> Texture:
