@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from scenes.canonical import Mesh, PerspectiveCamera, Scene, SceneError
-from scenes.formats.recognition import as_mesh
+from scenes.formats.meshed import as_mesh
 from scenes.values import RigidTrack
 
 CameraPath = Literal["turntable", "fly-through"]

@@ -44,9 +44,9 @@ from scenes.canonical import (
 from scenes.formats.directive_reader import typed, word
 from scenes.formats.directives import Directive, Parameters, parameters_of
 from scenes.formats.losses import LossReport
+from scenes.formats.meshed import as_mesh
 from scenes.formats.pbrt import PbrtReader, scene_of
 from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, mixture, product
-from scenes.formats.recognition import as_mesh
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, metal, rgb
 from scenes.formats.transform_stack import KEYS_MAX

@@ -51,6 +51,7 @@ from scenes.canonical import (
 from scenes.daylight import sky_map
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.luxrender import SKY_UNIT, SUN_UNIT, reflectance_of_index
+from scenes.formats.meshed import as_mesh
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, MAP_AXES
 from scenes.formats.pbrt_export import (
@@ -63,7 +64,6 @@ from scenes.formats.pbrt_export import (
 from scenes.formats.pbrt_surface_export import Kind, dimmed, listed, number
 from scenes.formats.pbrt_surfaces import mean_of, product
 from scenes.formats.placing import motion_keys, part_key, shines
-from scenes.formats.recognition import as_mesh
 from scenes.formats.revolution import lamp_sphere
 from scenes.formats.spectra import METALS, rgb
 from scenes.formats.spot_profiles import reshaped

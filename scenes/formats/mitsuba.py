@@ -45,12 +45,13 @@ from scenes.daylight import sun_at
 from scenes.formats import revolution
 from scenes.formats.losses import LossReport
 from scenes.formats.mesh_files import read_obj, read_serialized
+from scenes.formats.meshed import as_mesh
 from scenes.formats.mitsuba_properties import Properties
 from scenes.formats.mitsuba_surfaces import MitsubaSurfaces
 from scenes.formats.pbrt import duration_s
 from scenes.formats.pbrt_shapes import facing_normals, turned
 from scenes.formats.ply_files import read_ply
-from scenes.formats.recognition import as_mesh, recognised_rectangle
+from scenes.formats.recognition import shape_of
 from scenes.formats.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.spectra import grey, rgb
 from scenes.formats.transform_stack import moved_by, rigid_motion, translation
@@ -401,9 +402,7 @@ class MitsubaReader:
         if kind == "cylinder":
             return self._cylinder(properties)
         if kind in ("obj", "ply", "serialized"):
-            mesh = self._file(kind, properties)
-            matrix = recognised_rectangle(mesh)
-            return (mesh, place) if matrix is None else (Rectangle(), matrix)
+            return shape_of(self._file(kind, properties), where, self.report)
         raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
 
     def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:

@@ -37,11 +37,11 @@ from scenes.canonical import (
 )
 from scenes.daylight import sky_map, sun_light
 from scenes.formats.losses import LossReport, first_of
+from scenes.formats.meshed import as_mesh
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, FORWARD, INTEGRATORS, MAP_AXES, SAMPLERS
 from scenes.formats.pbrt_surface_export import PICTURES, PbrtSurfaceWriter, listed, number
 from scenes.formats.placing import PartKey, motion_keys, part_key, shared_parts, tracks_of
-from scenes.formats.recognition import as_mesh
 from scenes.formats.spot_profiles import reshaped
 from scenes.formats.transform_stack import inverse, track_times
 from scenes.values import Matrix

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.canonical import Disk, Mesh, Rectangle, SceneError, Shape, Sphere
+from scenes.canonical import Disk, Mesh, SceneError, Shape, Sphere
 from scenes.formats import revolution
 from scenes.formats.directives import Parameters
 from scenes.formats.losses import LossReport
 from scenes.formats.ply_files import checked_mesh, read_ply
-from scenes.formats.recognition import recognised_rectangle
+from scenes.formats.recognition import shape_of
 from scenes.formats.scene_files import SceneFiles
 from scenes.values import Matrix
 
@@ -42,8 +42,7 @@ class ShapeReader:
                 parameters.asked.update(parameters.given)
                 self.report.add(where, "a subdivision surface", "its control mesh")
             mesh = facing_normals(turned(mesh) if turn_over else mesh)
-            matrix = recognised_rectangle(mesh)
-            return (mesh, np.eye(4)) if matrix is None else (Rectangle(), matrix)
+            return shape_of(mesh, where, self.report)
         if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
             return self._quadric(kind, parameters, turn_over)
         if kind in ("curve", "nurbs", "heightfield"):

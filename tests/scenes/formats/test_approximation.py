@@ -43,7 +43,7 @@ from scenes.daylight import sun_light
 from scenes.formats.approximation import DEPTH_MAX, drawable, spread_deg
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
-from scenes.formats.recognition import as_mesh
+from scenes.formats.meshed import as_mesh
 from scenes.formats.spectra import METALS
 from tests.scenes.formats.test_conversion import DATA, REAL, needs_data
 from tests.scenes.formats.test_mitsuba import MITSUBA

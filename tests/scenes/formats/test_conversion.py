@@ -36,8 +36,9 @@ from scenes.canonical import (
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
+from scenes.formats.meshed import as_mesh
 from scenes.formats.ply_files import ply_bytes
-from scenes.formats.recognition import as_mesh, recognised_rectangle
+from scenes.formats.recognition import recognised_rectangle
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import METALS, blackbody_rgb, sampled_rgb
 
