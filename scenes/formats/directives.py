@@ -41,8 +41,9 @@ Values = NDArray[np.float64] | tuple[str, ...]
 
 
 @lru_cache(maxsize=1)
-def _parser() -> lark.Lark:
-    return lark.Lark(_GRAMMAR, parser="lalr", propagate_positions=False, maybe_placeholders=False)
+def _lexer() -> lark.Lark:
+    """Only its tokens are needed: a directive is a name and all values up to the next."""
+    return lark.Lark(_GRAMMAR, parser="lalr", lexer="basic")
 
 
 @dataclass(frozen=True)
@@ -140,20 +141,32 @@ def parse_directives(text: str, file: str) -> Iterator[Directive]:
     Raises:
         SceneError: it is no such text; file, line, column.
     """
+    head, values = None, []
+    for token in _tokens(text, file):
+        if token.type == "NAME":
+            if head is not None:
+                yield _directive(head, values, file)
+            head, values = token, []
+        elif head is None:
+            raise SceneError(f"{Place(file, token.line, token.column)}: expected a directive, got {str(token)[:20]!r}")
+        else:
+            values.append(_values(token, file))
+    if head is not None:
+        yield _directive(head, values, file)
+
+
+def _tokens(text: str, file: str) -> Iterator[Any]:
+    """One after the other, so that no more than one list of numbers is there as text and as numbers."""
     try:
-        tree = _parser().parse(text)
+        yield from _lexer().lex(text)
     except lark.exceptions.UnexpectedCharacters as error:
         got = text[error.pos_in_stream : error.pos_in_stream + 20].split("\n")[0] if error.pos_in_stream else ""
         place = Place(file, error.line, error.column)
         raise SceneError(f"{place}: expected a directive, string or number, got {got!r}") from None
-    except lark.exceptions.UnexpectedToken as error:
-        place = Place(file, max(error.line, 1), max(error.column, 1))
-        raise SceneError(f"{place}: expected a directive, got {str(error.token)[:20]!r}") from None
-    nodes: list[Any] = tree.children
-    for node in nodes:
-        head = node.children[0]
-        place = Place(file, head.line, head.column)
-        yield Directive(str(head), tuple(_values(part.children[0], file) for part in node.children[1:]), place)
+
+
+def _directive(head: Any, values: list[Values], file: str) -> Directive:
+    return Directive(str(head), tuple(values), Place(file, head.line, head.column))
 
 
 def _values(token: Any, file: str) -> Values:
@@ -184,7 +197,7 @@ def _values(token: Any, file: str) -> Values:
 
 def _strings(token: Any) -> list[Any]:
     inner = str(token)[1:-1]
-    return [part for part in _parser().lex("x " + inner) if part.type in ("STRING", "TRUTH")]
+    return [part for part in _lexer().lex("x " + inner) if part.type in ("STRING", "TRUTH")]
 
 
 def _unquoted(token: Any) -> str:

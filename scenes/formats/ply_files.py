@@ -8,6 +8,7 @@ Source: G. Turk, "The PLY Polygon File Format" (1994).
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,22 +40,26 @@ def read_ply(content: bytes, name: str) -> Mesh:
         SceneError: it is no PLY file, or not what its header says.
     """
     order, elements, body = _header(content, name)
-    tables: dict[str, dict[str, NDArray[np.float64]]] = {}
+    numbers = _numbers(body, name) if order == "" else None
+    tables: dict[str, dict[str, NDArray]] = {}
     at = 0
-    words = body.split() if order == "" else []
     for element in elements:
         if any(kind for _, _, kind in element.properties):
             if element.name != "face":
                 raise SceneError(f"{name}: expected lists in faces only, got some in {element.name!r}")
-            reader = _ascii_faces if order == "" else _binary_faces
-            faces, at = reader(words if order == "" else body, at, element, order, name)  # type: ignore[arg-type]
+            if numbers is None:
+                faces, at = _binary_faces(body, at, element, order, name)
+            else:
+                faces, at = _ascii_faces(numbers, at, element, name)
             tables["face"] = {"corners": faces}
+        elif numbers is None:
+            tables[element.name], at = _binary_columns(body, at, element, order, name)
         else:
-            tables[element.name], at = _plain(words if order == "" else body, at, element, order, name)
+            tables[element.name], at = _ascii_columns(numbers, at, element, name)
     return _mesh(tables, name)
 
 
-def _header(content: bytes, name: str) -> tuple[str, list[_Element], bytes]:
+def _header(content: bytes, name: str) -> tuple[str, list[_Element], memoryview]:
     end = content.find(b"end_header", 0, 1 << 16)
     newline = content.find(b"\n", end)
     if not content.startswith(b"ply") or end < 0 or newline < 0:
@@ -76,29 +81,33 @@ def _header(content: bytes, name: str) -> tuple[str, list[_Element], bytes]:
             raise SceneError(f"{name}: expected a line of a PLY header, got {line[:40]!r}")
     if order is None:
         raise SceneError(f"{name}: expected a format in the PLY header, got none")
-    return order, elements, content[newline + 1 :]
+    return order, elements, memoryview(content)[newline + 1 :]
 
 
 def _with(element: _Element, added: tuple[str, str, str]) -> _Element:
     return _Element(element.name, element.count, (*element.properties, added))
 
 
-def _plain(
-    body: bytes | list[bytes], at: int, element: _Element, order: str, name: str
-) -> tuple[dict[str, NDArray[np.float64]], int]:
+def _ascii_columns(
+    numbers: NDArray[np.float64], at: int, element: _Element, name: str
+) -> tuple[dict[str, NDArray], int]:
     """Columns of an element without lists, and where the next begins."""
     width = len(element.properties)
-    if isinstance(body, list):
-        end = at + element.count * width
-        _enough(len(body), end, element, name)
-        table = _floats(body[at:end], name).reshape(element.count, width)
-        return {part[0]: table[:, column] for column, part in enumerate(element.properties)}, end
+    end = at + element.count * width
+    _enough(len(numbers), end, element, name)
+    table = numbers[at:end].reshape(element.count, width)
+    return {part[0]: table[:, column] for column, part in enumerate(element.properties)}, end
+
+
+def _binary_columns(
+    body: memoryview, at: int, element: _Element, order: str, name: str
+) -> tuple[dict[str, NDArray], int]:
+    """The same of binary rows; columns are views of the content."""
     row = np.dtype([(f"{column}", order + part[1]) for column, part in enumerate(element.properties)])
     end = at + element.count * row.itemsize
     _enough(len(body), end, element, name)
     rows = np.frombuffer(body, row, element.count, at) if element.count else np.zeros(0, row)
-    found = {part[0]: rows[f"{column}"].astype(np.float64) for column, part in enumerate(element.properties)}
-    return found, end
+    return {part[0]: rows[f"{column}"] for column, part in enumerate(element.properties)}, end
 
 
 def _enough(there: int, wanted: int, element: _Element, name: str) -> None:
@@ -106,14 +115,20 @@ def _enough(there: int, wanted: int, element: _Element, name: str) -> None:
         raise SceneError(f"{name}: expected {element.count} of {element.name!r} as its header says, got fewer")
 
 
-def _floats(words: list[bytes], name: str) -> NDArray[np.float64]:
-    try:
-        return np.array(words, dtype="S").astype(np.float64) if words else np.zeros(0)
-    except ValueError:
-        raise SceneError(f"{name}: expected numbers behind the PLY header") from None
+def _numbers(body: memoryview, name: str) -> NDArray[np.float64]:
+    """All numbers of a text; raises SceneError where something else is among them."""
+    text = body.tobytes().strip()
+    if not text:
+        return np.zeros(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            raise SceneError(f"{name}: expected numbers behind the PLY header") from None
 
 
-def _binary_faces(body: bytes, at: int, element: _Element, order: str, name: str) -> tuple[NDArray[np.float64], int]:
+def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name: str) -> tuple[NDArray, int]:
     """Triangles ``(n, 3)``; fast where all faces have as many corners, which is the rule."""
     lists = [part for part in element.properties if part[2]]
     if len(lists) != 1 or not lists[0][0].startswith("vertex_ind"):
@@ -138,7 +153,7 @@ def _binary_faces(body: bytes, at: int, element: _Element, order: str, name: str
     if 3 <= corners <= _CORNERS_MAX and at + element.count * row(corners).itemsize <= len(body):
         rows = np.frombuffer(body, row(corners), element.count, at)
         if (rows["count"] == corners).all():
-            return _fans(rows["corners"].astype(np.float64)), at + element.count * row(corners).itemsize
+            return _fans(rows["corners"]), at + element.count * row(corners).itemsize
     triangles = []
     for _ in range(element.count):
         _enough(len(body), at + before + counter.itemsize, element, name)
@@ -146,38 +161,48 @@ def _binary_faces(body: bytes, at: int, element: _Element, order: str, name: str
         if not 3 <= corners <= _CORNERS_MAX:
             raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners}")
         _enough(len(body), at + row(corners).itemsize, element, name)
-        triangles.append(_fans(np.frombuffer(body, row(corners), 1, at)["corners"].astype(np.float64)))
+        triangles.append(_fans(np.frombuffer(body, row(corners), 1, at)["corners"]))
         at += row(corners).itemsize
     return np.concatenate(triangles), at
 
 
 def _ascii_faces(
-    words: list[bytes], at: int, element: _Element, order: str, name: str
+    numbers: NDArray[np.float64], at: int, element: _Element, name: str
 ) -> tuple[NDArray[np.float64], int]:
+    """As :func:`_binary_faces`."""
+    if len(element.properties) == 1 and element.count and at < len(numbers):
+        corners = numbers[at]
+        end = at + element.count * (int(corners) + 1) if 3 <= corners <= _CORNERS_MAX else len(numbers) + 1
+        if end <= len(numbers):
+            rows = numbers[at:end].reshape(element.count, -1)
+            if (rows[:, 0] == corners).all():
+                return _fans(rows[:, 1:]), end
     triangles = [np.zeros((0, 3))]
     for _ in range(element.count):
         for part in element.properties:
-            _enough(len(words), at + 1, element, name)
+            _enough(len(numbers), at + 1, element, name)
             if not part[2]:
                 at += 1
                 continue
-            corners = _floats(words[at : at + 1], name)[0]
-            if not (corners == int(corners) and 3 <= corners <= _CORNERS_MAX):
+            corners = numbers[at]
+            if not (3 <= corners <= _CORNERS_MAX and corners == int(corners)):
                 raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners:g}")
-            _enough(len(words), at + 1 + int(corners), element, name)
+            _enough(len(numbers), at + 1 + int(corners), element, name)
             if part[0].startswith("vertex_ind"):
-                triangles.append(_fans(_floats(words[at + 1 : at + 1 + int(corners)], name)[None]))
+                triangles.append(_fans(numbers[None, at + 1 : at + 1 + int(corners)]))
             at += 1 + int(corners)
     return np.concatenate(triangles), at
 
 
-def _fans(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fans(polygons: NDArray) -> NDArray:
     """Polygons ``(n, corners)`` as triangles about their first corner."""
+    if polygons.shape[1] == 3:
+        return polygons
     parts = [polygons[:, [0, n, n + 1]] for n in range(1, polygons.shape[1] - 1)]
     return np.stack(parts, axis=1).reshape(-1, 3)
 
 
-def _mesh(tables: dict[str, dict[str, NDArray[np.float64]]], name: str) -> Mesh:
+def _mesh(tables: dict[str, dict[str, NDArray]], name: str) -> Mesh:
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not {"x", "y", "z"} <= set(vertex) or "corners" not in face:
         raise SceneError(f"{name}: expected vertices with x, y and z, and faces")
@@ -188,10 +213,10 @@ def _mesh(tables: dict[str, dict[str, NDArray[np.float64]]], name: str) -> Mesh:
 
 
 def checked_mesh(
-    points: NDArray[np.float64],
-    faces: NDArray[np.float64],
-    normals: NDArray[np.float64] | None,
-    uvs: NDArray[np.float64] | None,
+    points: NDArray,
+    faces: NDArray,
+    normals: NDArray | None,
+    uvs: NDArray | None,
     name: str,
 ) -> Mesh:
     """A mesh of numbers from a file.
