@@ -5,6 +5,7 @@ Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Ha
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import xml.etree.ElementTree as ElementTree
@@ -42,6 +43,9 @@ from scenes.formats.spectra import rgb
 from scenes.values import Matrix, Rgb
 
 Element = ElementTree.Element
+
+BLUNT = 0.002
+"""Alpha of mirrors in mixtures for Mitsuba 3."""
 
 _NEW_NAMES = {"toWorld": "to_world", "intIOR": "int_ior", "extIOR": "ext_ior"}
 
@@ -159,7 +163,7 @@ class MitsubaSurfaceWriter:
             made = self.plugin("bsdf", "blendbsdf")
             self.texture(made, material.amount, "weight")
             for part in (material.first, material.second):
-                made.append(self.bsdf(part, where))
+                made.append(self.bsdf(self._blunt(part, where) if self.modern else part, where))
             return made
         if isinstance(material, Bumped):
             made = self.plugin("bsdf", "bumpmap" if self.modern else "bump")
@@ -178,6 +182,17 @@ class MitsubaSurfaceWriter:
         both = self.plugin("bsdf", "twosided")
         both.append(self._opaque(material, where))
         return both
+
+    def _blunt(self, material: Material, where: str) -> Material:
+        """A sharp mirror or glass with facets of a small alpha: Mitsuba 3.9's blend of a sharp one loses light."""
+        made = material
+        if isinstance(material, Mirror):
+            made = Metal((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (BLUNT, BLUNT), material.reflectance)
+        elif isinstance(material, Metal | Glass) and material.roughness == (0.0, 0.0):
+            made = dataclasses.replace(material, roughness=(BLUNT, BLUNT))
+        if made is not material:
+            self.report.add(where, "a sharp mirror or glass in a mixture", f"one of alpha {BLUNT:g}")
+        return made
 
     def _opaque(self, material: Material, where: str) -> Element:
         if isinstance(material, Matte):
@@ -228,13 +243,14 @@ class MitsubaSurfaceWriter:
         if isinstance(material, Plastic):
             parts = material.diffuse, material.specular, material.ior, material.roughness
         elif isinstance(material, Glossy | Uber):
-            # the coat's share at normal incidence is that of Fresnel's equations times the factor
+            # Fresnel's equations of an index reflect at normal incidence what the coat does
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
-            wanted = np.array(mean_of(material.specular)) / (0.04 if isinstance(material, Glossy) else 1.0)
-            factor = rgb(np.minimum(wanted, 1.0))
-            if (wanted > 1.0).any():
-                self.report.add(where, "a coat that reflects more than 4 %", "one that reflects as much")
-            parts = material.diffuse, ConstantTexture(factor), 1.5, alpha
+            coat = np.array(mean_of(material.specular)) * (1.0 if isinstance(material, Glossy) else 0.04)
+            most = float(np.clip(coat.max(), 1e-4, 0.25))
+            if coat.max() > most:
+                self.report.add(where, f"a coat that reflects {coat.max():.3g}", f"one that reflects {most:.3g}")
+            index = (1.0 + math.sqrt(most)) / (1.0 - math.sqrt(most))
+            parts = material.diffuse, ConstantTexture(rgb(np.minimum(coat / most, 1.0))), index, alpha
             self.report.add(where, type(material).__name__.lower(), f"rough plastic of alpha {alpha:.3g}")
         else:
             assert isinstance(material, Phong)
