@@ -37,6 +37,8 @@ COMMENT: /#[^\n]*/
 NUMBER_MAX = 1e30
 """Greatest magnitude of a number in a scene; beyond it products of float32 overflow."""
 
+_PIECE = 1 << 20  # characters of a list of numbers that are read at a time
+
 Values = NDArray[np.float64] | tuple[str, ...]
 
 
@@ -177,21 +179,33 @@ def _values(token: Any, file: str) -> Values:
     if token.type == "STRINGS":
         return tuple(str(part) if part.type == "TRUTH" else _unquoted(part) for part in _strings(token))
     place = Place(file, token.line, token.column)
-    body = token[1:-1] if token.type == "NUMBERS" else str(token)
+    body = str(token) if token.type == "NUMBER" or "#" in token else token
     if "#" in body:
-        body = "\n".join(line.split("#")[0] for line in body.splitlines())
-    if "," in body:
-        body = body.replace(",", " ")
-    if not body or body.isspace():
+        body = "[" + "\n".join(line.split("#")[0] for line in body[1:-1].splitlines()) + "]"
+    start, end = (0, len(body)) if token.type == "NUMBER" else (1, len(body) - 1)
+    parts = []
+    while start < end:  # piece by piece: the numbers of a large mesh are not copied as text
+        cut = start + _PIECE
+        while cut < end and body[cut] not in " \t\r\n,":
+            cut += 1
+        parts.append(_parsed(body[start : min(cut, end)], place))
+        start = cut
+    return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _parsed(text: str, place: Place) -> NDArray[np.float64]:
+    """Numbers apart by blanks and commas."""
+    text = text.replace(",", " ")
+    if not text or text.isspace():
         return np.zeros(0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            found = np.fromstring(body, dtype=np.float64, sep=" ")
+            found = np.fromstring(text, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
-            raise SceneError(f"{place}: expected numbers, got {body.strip()[:30]!r}") from None
+            raise SceneError(f"{place}: expected numbers, got {text.strip()[:30]!r}") from None
     if not (np.abs(found) <= NUMBER_MAX).all():  # also not a number
-        raise SceneError(f"{place}: expected numbers up to {NUMBER_MAX:g}, got {body.strip()[:30]!r}")
+        raise SceneError(f"{place}: expected numbers up to {NUMBER_MAX:g}, got {text.strip()[:30]!r}")
     return found
 
 

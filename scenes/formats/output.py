@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from scenes import loading
 from scenes.canonical import Mesh, SceneError
-from scenes.formats.ply_files import ply_bytes
+from scenes.formats.ply_files import ply_parts
 
 _OF_CONTENT = re.compile(r"-[0-9a-f]{8}$")
 
@@ -36,19 +37,23 @@ class Output:
         self._meshes: dict[int, tuple[Mesh, str]] = {}
         self._pictures: dict[int, tuple[NDArray[np.float32], str]] = {}
 
-    def _named(self, folder: str, stem: str, ending: str, content: bytes) -> str:
+    def _named(self, folder: str, stem: str, ending: str, parts: Iterable[bytes | memoryview]) -> str:
         """Writes a file whose name tells its content, so that scenes in one folder do not take each other's."""
-        digest = hashlib.blake2b(content, digest_size=4).hexdigest()
-        name = f"{folder}/{_OF_CONTENT.sub('', _plain(stem))}-{digest}{ending}"
         (self._work / folder).mkdir(exist_ok=True)
-        (self._work / name).write_bytes(content)
+        partial, digest = self._work / folder / "partial", hashlib.blake2b(digest_size=4)
+        with partial.open("wb") as file:
+            for part in parts:
+                digest.update(part)
+                file.write(part)
+        name = f"{folder}/{_OF_CONTENT.sub('', _plain(stem))}-{digest.hexdigest()}{ending}"
+        partial.rename(self._work / name)
         return name
 
     def mesh(self, mesh: Mesh) -> str:
         """Writes a mesh once, as PLY; its name from the scene's folder."""
         if id(mesh) not in self._meshes:
             stem = Path(mesh.source).stem if mesh.source.endswith((".ply", ".obj", ".gz")) else "mesh"
-            self._meshes[id(mesh)] = mesh, self._named("models", stem, ".ply", ply_bytes(mesh))
+            self._meshes[id(mesh)] = mesh, self._named("models", stem, ".ply", ply_parts(mesh))
         return self._meshes[id(mesh)][1]
 
     def picture(
@@ -66,7 +71,7 @@ class Output:
             wanted = path.is_file() and path.suffix.lower() in endings
             same = wanted and np.array_equal(loading.read_image(path), image)
             content = path.read_bytes() if same else self._exr_bytes(image)
-            name = self._named("textures", path.stem or "picture", path.suffix.lower() if same else ".exr", content)
+            name = self._named("textures", path.stem or "picture", path.suffix.lower() if same else ".exr", [content])
             self._pictures[id(image)] = image, name
         return self._pictures[id(image)][1]
 

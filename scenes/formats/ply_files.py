@@ -9,6 +9,7 @@ Source: G. Turk, "The PLY Polygon File Format" (1994).
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ _TYPES = {
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 _CORNERS_MAX = 64
+_PIECE = 1 << 16  # rows that are written at a time
 
 
 @dataclass(frozen=True)
@@ -242,8 +244,8 @@ def checked_mesh(
     )
 
 
-def ply_bytes(mesh: Mesh) -> bytes:
-    """A mesh as a binary PLY file."""
+def ply_parts(mesh: Mesh) -> Iterator[bytes | memoryview]:
+    """A mesh as a binary PLY file, in pieces."""
     columns = [mesh.vertices]
     names = ["x", "y", "z"]
     if mesh.normals is not None:
@@ -255,6 +257,17 @@ def ply_bytes(mesh: Mesh) -> bytes:
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
     lines += [f"property float {name}" for name in names]
     lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]
-    rows = np.empty(len(mesh.faces), np.dtype([("count", "u1"), ("corners", "<i4", (3,))]))
-    rows["count"], rows["corners"] = 3, mesh.faces
-    return "\n".join(lines).encode() + np.concatenate(columns, axis=1).astype("<f4").tobytes() + rows.tobytes()
+    yield "\n".join(lines).encode()
+    for start in range(0, len(mesh.vertices), _PIECE):
+        piece = [column[start : start + _PIECE] for column in columns]
+        yield np.concatenate(piece, axis=1).astype("<f4", copy=False).data.cast("B")
+    for start in range(0, len(mesh.faces), _PIECE):
+        piece = mesh.faces[start : start + _PIECE]
+        rows = np.empty(len(piece), np.dtype([("count", "u1"), ("corners", "<i4", (3,))]))
+        rows["count"], rows["corners"] = 3, piece
+        yield rows.tobytes()
+
+
+def ply_bytes(mesh: Mesh) -> bytes:
+    """All of it at once."""
+    return b"".join(ply_parts(mesh))
