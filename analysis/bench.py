@@ -22,10 +22,10 @@ from tsar.config import require
 if TYPE_CHECKING:
     from analysis.progress import Bars
 
-GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "features", "overhead", "growth", "start")
+GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "features", "overhead", "growth", "conversion", "start")
 """Groups of rows, in the order of the table."""
 
-ON_CPU_ONLY = ("coherent", "incoherent", "cores", "start")
+ON_CPU_ONLY = ("coherent", "incoherent", "cores", "conversion", "start")
 """Groups of what does not run on a GPU."""
 
 SPREAD = "quartiles of the ratio over the repetitions"
@@ -42,7 +42,7 @@ class BenchOptions:
     """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
-    cores, order, features, overhead, growth, start."""
+    cores, order, features, overhead, growth, conversion, start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of ours are compared; runs nothing."""
     device: Literal["cpu", "cuda:0"] = "cpu"
@@ -59,6 +59,10 @@ class BenchOptions:
     """Cycles over which the group growth watches memory."""
     scenes: tuple[str, ...] = ()
     """Built-in scenes; all where none is named."""
+    scene_files: tuple[Path, ...] = ()
+    """Scene files that the group conversion converts; the delivered Cornell boxes where none is named."""
+    scene_root: Path | None = None
+    """Folder that they may read from; by default their own."""
 
     def __post_init__(self) -> None:
         for name in self.groups:
@@ -71,6 +75,8 @@ class BenchOptions:
             require(0 <= name <= 9, "subdivisions", "between 0 and 9", name)
         most = (side // FRAMELET_SIDE) ** 2
         require(1 <= self.batch_size <= most, "batch_size", f"between 1 and {most}, a picture's", self.batch_size)
+        for file in self.scene_files:
+            require(file.is_file(), "scene_files", "scene files", file)
         require(self.cycles >= 100, "cycles", "at least 100", self.cycles)
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 
 from analysis import progress
 from analysis.bench import ON_CPU_ONLY, SPREAD, BenchOptions, Group, Row
+from analysis.bench_conversion import conversion
 from analysis.bench_features import features
 from analysis.bench_growth import growth
 from analysis.bench_machine import machine, versions
@@ -33,6 +34,7 @@ MEASURED_BY: Mapping[str, Group] = {
     "features": features,
     "overhead": overhead,
     "growth": growth,
+    "conversion": conversion,
     "start": start_rows,
 }
 

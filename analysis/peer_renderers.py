@@ -48,8 +48,8 @@ for parent in list(root.iter()):
         elif old and node.tag in ("lookAt", "lookat"):
             node.tag = "lookat"
             if "up" not in node.attrib:
-                ends = [np.array([float(p) for p in node.get(n).replace(",", " ").split()]) for n in ("target", "origin")]
-                node.set("up", ", ".join(map(str, np.eye(3)[np.abs(ends[0] - ends[1]).argmin()])))
+                target, origin = (np.array(node.get(n).replace(",", " ").split(), float) for n in ("target", "origin"))
+                node.set("up", ", ".join(map(str, np.eye(3)[np.abs(target - origin).argmin()])))
         elif old and node.get("name") in ("filterType", "strictNormals", "flipTexCoords", "maxAnisotropy"):
             parent.remove(node)
         elif old and node.tag == "bsdf" and node.get("type") == "roughdiffuse":

@@ -45,7 +45,7 @@ Values = NDArray[np.float64] | tuple[str, ...]
 @lru_cache(maxsize=1)
 def _lexer() -> lark.Lark:
     """Only its tokens are needed: a directive is a name and all values up to the next."""
-    return lark.Lark(_GRAMMAR, parser="lalr", lexer="basic")
+    return lark.Lark(_GRAMMAR, parser=None, lexer="basic")
 
 
 @dataclass(frozen=True)
