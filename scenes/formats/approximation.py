@@ -15,6 +15,7 @@ from scenes.canonical import (
     Bumped,
     CheckerboardTexture,
     ConstantTexture,
+    Cube,
     Disk,
     Emissive,
     EnvironmentCamera,
@@ -47,6 +48,7 @@ from scenes.daylight import sky_map, sun_light
 from scenes.formats.folding import folded
 from scenes.formats.losses import LossReport
 from scenes.formats.luxrender import reflectance_of_index
+from scenes.formats.meshed import as_mesh, depends_on_uv
 from scenes.formats.pbrt_surfaces import mean_of
 from scenes.formats.spectra import rgb
 from scenes.formats.spot_profiles import reshaped
@@ -101,6 +103,8 @@ class Approximation:
         """A shape; lamps are rectangles and spheres, others are seen and give no light."""
         name = instance.name or f"shape {number}"
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
+        if isinstance(instance.shape, Cube | Disk) and instance.emission is None and depends_on_uv(made.material):
+            return dataclasses.replace(made, shape=as_mesh(instance.shape))
         if instance.emission is None or isinstance(instance.shape, Rectangle | Sphere):
             return made
         if isinstance(instance.shape, Disk):

@@ -29,6 +29,7 @@ from scenes.canonical import (
     Masked,
     Material,
     Matte,
+    Mesh,
     Metal,
     Mirror,
     MixMaterial,
@@ -51,7 +52,7 @@ from scenes.canonical import (
 from scenes.daylight import sky_map
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.luxrender import SKY_UNIT, SUN_UNIT, reflectance_of_index
-from scenes.formats.meshed import as_mesh
+from scenes.formats.meshed import as_mesh, upright
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, MAP_AXES
 from scenes.formats.pbrt_export import (
@@ -326,6 +327,9 @@ class LuxWriter(PbrtWriter):
 
     def _instance(self, instance: Instance) -> None:
         """LuxCore makes objects of mesh files only, and shows a motion's last key."""
+        if isinstance(instance.shape, Sphere) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+            mesh, matrix = upright(self._meshed(instance), instance.to_world)
+            instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)
         made = [self._object(instance)] if part_key(instance) in self.shared else self._part(instance)
         poses, times_s = motion_keys(instance.track, instance.to_world)
         lines = [f"Transform {written_matrix(pose)}" for pose in poses]
@@ -343,13 +347,17 @@ class LuxWriter(PbrtWriter):
             lines.append(f'AreaLightSource "area" "color L" {listed(emission)} {off}')
         return [*lines, self._shape(instance)]
 
-    def _shape(self, instance: Instance) -> str:
-        """Meshes only: LuxCore leaves spheres and disks out."""
+    def _meshed(self, instance: Instance) -> Mesh:
+        """A shape as triangles: LuxCore leaves spheres and disks out."""
         shape = instance.shape
         mesh = lamp_sphere(shape.radius) if isinstance(shape, Sphere) and shines(instance) else as_mesh(shape)
         if mesh is not shape and not isinstance(shape, Rectangle | Cube):
             what = f"shape {type(shape).__name__.lower()}"
             self.report.add(instance.name or "shape", what, f"a mesh of {len(mesh.faces)} triangles")
+        return mesh
+
+    def _shape(self, instance: Instance) -> str:
+        mesh = self._meshed(instance)
         if len(mesh.faces) > INLINE_MAX or part_key(instance) in self.shared:
             return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
         return f'Shape "trianglemesh" {inline_mesh(mesh, "uv")}'

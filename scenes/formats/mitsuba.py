@@ -45,7 +45,7 @@ from scenes.daylight import sun_at
 from scenes.formats import revolution
 from scenes.formats.losses import LossReport
 from scenes.formats.mesh_files import read_obj, read_serialized
-from scenes.formats.meshed import as_mesh
+from scenes.formats.meshed import FLIPPED, as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk
 from scenes.formats.mitsuba_properties import Properties
 from scenes.formats.mitsuba_surfaces import MitsubaSurfaces
 from scenes.formats.pbrt import duration_s
@@ -343,8 +343,8 @@ class MitsubaReader:
             return []
         keys, times_s = properties.motion()
         track = self._track(keys, times_s, properties.where)
-        shape, local = self._made(kind, properties)
         material, emission = self._inside(properties)
+        shape, local = self._made(kind, properties, material)
         if properties.truth("flipNormals", False):
             shape = turned(as_mesh(shape))
         self.surfaces.left_over(properties)
@@ -390,19 +390,26 @@ class MitsubaReader:
                 raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
         return material or _DEFAULT, emission
 
-    def _made(self, kind: str, properties: Properties) -> tuple[Shape, Matrix]:
+    def _made(self, kind: str, properties: Properties, material: Material) -> tuple[Shape, Matrix]:
         where, place = properties.where, np.eye(4)
         if kind == "sphere":
             radius = properties.number("radius", 1.0)
             if not radius > 0.0:
                 raise SceneError(f"{where}: radius: expected a positive number, got {radius:g}")
-            return Sphere(radius), translation(*properties.vector("center", grey(0.0)).tolist())
+            place = translation(*properties.vector("center", grey(0.0)).tolist())
+            return Sphere(radius), place @ FLIPPED if depends_on_uv(material) else place
         if kind in ("rectangle", "cube", "disk"):
-            return {"rectangle": Rectangle(), "cube": Cube(), "disk": Disk()}[kind], place
+            shapes = {"rectangle": Rectangle(), "cube": Cube(), "disk": Disk()}
+            if not depends_on_uv(material) or kind == "rectangle":
+                return shapes[kind], place
+            mesh = mitsuba_cube() if kind == "cube" else mitsuba_disk()
+            if kind == "disk":
+                self.report.add(where, "a textured disk", f"a mesh of {len(mesh.faces)} triangles")
+            return mesh, place
         if kind == "cylinder":
             return self._cylinder(properties)
         if kind in ("obj", "ply", "serialized"):
-            return shape_of(self._file(kind, properties), where, self.report)
+            return shape_of(self._file(kind, properties), material, where, self.report)
         raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
 
     def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:

@@ -32,6 +32,7 @@ from scenes.canonical import (
 )
 from scenes.daylight import facing_up
 from scenes.formats.losses import LossReport, first_of
+from scenes.formats.meshed import FLIPPED, as_mesh, depends_on_uv
 from scenes.formats.mitsuba import FAR, FILTERS, FORWARD
 from scenes.formats.mitsuba_surface_export import Element, MitsubaSurfaceWriter
 from scenes.formats.output import Output
@@ -230,9 +231,27 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         if not np.array_equal(keys[0], np.eye(4)):
             self.matrix(made, "toWorld", keys[0])
 
+    def _as_triangles(self, instance: Instance) -> bool:
+        """Whether a shape is not one of Mitsuba's: by its texture coordinates, or as a sphere that is stretched."""
+        shape, textured = instance.shape, depends_on_uv(instance.material)
+        if isinstance(shape, Cube | Disk):
+            return textured
+        if not isinstance(shape, Sphere):
+            return False
+        axes = instance.to_world[:3, :3]
+        even = axes.T @ axes
+        stretched = np.abs(even - even.trace() / 3.0 * np.eye(3)).max() > 1e-4 * even.trace()
+        return bool(stretched) or (textured and float(np.linalg.det(axes)) > 0.0)
+
     def _shape(self, instance: Instance) -> tuple[Element, Matrix]:
         """A shape's element without its place, and the transform of its own size."""
         shape, material = instance.shape, instance.material
+        if self._as_triangles(instance):
+            if isinstance(shape, Disk | Sphere):
+                what = f"{'a textured' if depends_on_uv(material) else 'a stretched'} {type(shape).__name__.lower()}"
+                became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
+                self.report.add(instance.name or "shape", what, became)
+            shape = as_mesh(shape)
         label, local = self.material(material), np.eye(4)
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
         made = self.plugin("shape", kinds[type(shape)])
@@ -242,6 +261,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
                 self.put(made, "boolean", "faceNormals", "true")
         elif isinstance(shape, Sphere):
             self.put(made, "float", "radius", number(shape.radius))
+            local = FLIPPED if np.linalg.det(instance.to_world[:3, :3]) < 0.0 else local
         elif isinstance(shape, Disk):
             local = np.diag([shape.radius, shape.radius, 1.0, 1.0])
         ElementTree.SubElement(made, "ref", {"id": label})

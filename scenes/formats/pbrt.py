@@ -29,6 +29,7 @@ from scenes.canonical import (
     Masked,
     Material,
     Matte,
+    Mesh,
     OrthographicCamera,
     PerspectiveCamera,
     PointLight,
@@ -45,6 +46,7 @@ from scenes.formats.directives import Directive, Parameters, parameters_of
 from scenes.formats.losses import LossReport
 from scenes.formats.pbrt_shapes import ShapeReader
 from scenes.formats.pbrt_surfaces import Surfaces
+from scenes.formats.recognition import shape_of
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, rgb
 from scenes.formats.transform_stack import inverse, moved_by, rigid_motion, track_times
@@ -334,6 +336,8 @@ class PbrtReader(DirectiveReader):
         if "shadowalpha" in parameters:
             parameters.asked.add("shadowalpha")
             self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
+        if isinstance(shape, Mesh):
+            shape, local = shape_of(shape, material, str(directive.place), self.report)
         start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
         self._keep(Instance(shape, material, start @ local, track, emission=self.attributes.emission), directive)
         self.left_over(parameters, f"shape {kind!r}")

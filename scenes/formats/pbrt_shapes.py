@@ -15,7 +15,6 @@ from scenes.formats import revolution
 from scenes.formats.directives import Parameters
 from scenes.formats.losses import LossReport
 from scenes.formats.ply_files import checked_mesh, read_ply
-from scenes.formats.recognition import shape_of
 from scenes.formats.scene_files import SceneFiles
 from scenes.values import Matrix
 
@@ -41,8 +40,7 @@ class ShapeReader:
             if kind == "loopsubdiv":
                 parameters.asked.update(parameters.given)
                 self.report.add(where, "a subdivision surface", "its control mesh")
-            mesh = facing_normals(turned(mesh) if turn_over else mesh)
-            return shape_of(mesh, where, self.report)
+            return facing_normals(turned(mesh) if turn_over else mesh), np.eye(4)
         if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
             return self._quadric(kind, parameters, turn_over)
         if kind in ("curve", "nurbs", "heightfield"):

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import lru_cache
 from itertools import combinations, permutations, product
 
 import numpy as np
 
-from scenes.canonical import Cube, Disk, Mesh, Rectangle, Shape, Sphere
+from scenes.canonical import Cube, Disk, Material, Mesh, Rectangle, Shape, Sphere
 from scenes.formats.losses import LossReport
-from scenes.formats.meshed import SQUARE_UV, as_mesh
+from scenes.formats.meshed import SQUARE_UV, as_mesh, depends_on_uv
 from scenes.values import Matrix
 
 DISK_MIN, SPHERE_MIN = 32, 512
@@ -93,9 +94,13 @@ def recognised(mesh: Mesh) -> tuple[Shape, Matrix] | None:
     return Sphere(radius), matrix
 
 
-def shape_of(mesh: Mesh, where: str, report: LossReport) -> tuple[Shape, Matrix]:
-    """A mesh as what it is, and where it lies; round shapes in the place of triangles are reported."""
-    found = recognised(mesh)
+def shape_of(mesh: Mesh, material: Material, where: str, report: LossReport) -> tuple[Shape, Matrix]:
+    """A mesh as what it is, and where it lies; round shapes in the place of triangles are reported.
+
+    Its texture coordinates count only where the material depends on them.
+    """
+    textured = mesh.uvs is None or depends_on_uv(material)
+    found = recognised(mesh) or (None if textured else recognised(dataclasses.replace(mesh, uvs=None)))
     if found is None:
         return mesh, np.eye(4)
     if isinstance(found[0], Disk | Sphere):

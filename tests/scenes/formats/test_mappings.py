@@ -12,6 +12,8 @@ import pytest
 from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
+    Cube,
+    Disk,
     ImageTexture,
     Instance,
     Masked,
@@ -31,6 +33,8 @@ from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.folding import folded
 from scenes.formats.losses import LossReport
+from scenes.formats.meshed import FLIPPED, as_mesh
+from scenes.formats.ply_files import read_ply
 from scenes.formats.revolution import area, lamp_sphere
 from scenes.formats.spectra import METALS
 from scenes.formats.spot_profiles import flux, reshaped
@@ -160,3 +164,74 @@ def test_pictures_that_pbrt_cannot_read_are_written_anew(tmp_path: Path) -> None
         found, _, text = through(Matte(texture), tmp_path / ending[1:] / f"b{ending}")
         assert kept in text and isinstance(found, Matte) and isinstance(found.reflectance, ImageTexture)
         np.testing.assert_allclose(found.reflectance.image, texture.image, rtol=1e-3)
+
+
+def seen_by_mitsuba(kind: str, points: np.ndarray, outward: np.ndarray) -> np.ndarray:
+    """Texture coordinates of points on one of Mitsuba's shapes."""
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("scalar_rgb")
+    shape = mi.load_dict({"type": "scene", "shape": {"type": kind}})
+    found = []
+    for point, away in zip(points, outward, strict=True):
+        ray = mi.Ray3f((point + away).tolist(), (-away).tolist())
+        found.append(np.array(shape.ray_intersect(ray).uv).ravel())
+    return np.array(found)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "cube", "disk", "sphere"])
+def test_textures_lie_as_on_the_shapes_of_mitsuba(kind: str, tmp_path: Path) -> None:
+    """In the middle of triangles of what the importer makes of a textured shape."""
+    text = (
+        f'<scene version="0.5.0"><sensor type="perspective"/><shape type="{kind}"><bsdf type="diffuse">'
+        '<texture type="checkerboard" name="reflectance"/></bsdf></shape></scene>'
+    )
+    (tmp_path / "a.xml").write_text(text)
+    (made,) = load_scene_file(tmp_path / "a.xml").instances
+    mesh = as_mesh(made.shape)
+    assert mesh.uvs is not None and mesh.normals is not None
+    faces = mesh.faces[:: max(1, len(mesh.faces) // 60)]
+    points = mesh.vertices[faces].mean(axis=1) @ made.to_world[:3, :3].T
+    outward = mesh.normals[faces].mean(axis=1) @ np.linalg.inv(made.to_world[:3, :3])
+    ours = mesh.uvs[faces].mean(axis=1)
+    apart = np.abs(seen_by_mitsuba(kind, points, outward / np.linalg.norm(outward, axis=1, keepdims=True)) - ours)
+    # the triangles of a sphere are flat, and those at the middle of a disk and at poles wide
+    assert np.median(apart) < 3e-3 and np.quantile(apart, 0.9) < 0.02
+    exact = kind in ("rectangle", "cube")
+    assert apart.max() < (1e-5 if exact else 0.1)
+
+
+@pytest.mark.parametrize("shape", [Sphere(), Disk(), Cube()], ids=["sphere", "disk", "cube"])
+def test_textured_shapes_for_mitsuba_keep_where_textures_lie(shape, tmp_path: Path) -> None:
+    """As meshes with the canonical coordinates; a sphere of Mitsuba's own comes back as one."""
+    scene = Scene(PerspectiveCamera(), (Instance(shape, Matte(CHECKS)),))
+    save_scene_file(scene, tmp_path / "a.xml")
+    assert 'type="ply"' in (tmp_path / "a.xml").read_text()
+    (found,) = load_scene_file(tmp_path / "a.xml").instances
+    assert type(found.shape) is type(shape)  # recognised by its coordinates
+    np.testing.assert_allclose(found.to_world, np.eye(4), atol=1e-5)
+    turned = Scene(PerspectiveCamera(), (Instance(Sphere(), Matte(CHECKS), FLIPPED),))
+    save_scene_file(turned, tmp_path / "b.xml")
+    text = (tmp_path / "b.xml").read_text()
+    assert 'type="sphere"' in text and "toWorld" not in text.split("<shape")[1]
+
+
+def test_a_stretched_sphere_is_triangles_for_mitsuba(tmp_path: Path) -> None:
+    scene = Scene(PerspectiveCamera(), (Instance(Sphere(), Matte(RED), np.diag([1.0, 2.0, 1.0, 1.0])),))
+    report = LossReport()
+    save_scene_file(scene, tmp_path / "a.xml", None, report)
+    assert 'type="ply"' in (tmp_path / "a.xml").read_text() and "a stretched sphere" in report.text()
+
+
+def test_a_mirrored_textured_sphere_is_a_mesh_with_its_outside_out_for_luxrender(tmp_path: Path) -> None:
+    scene = Scene(PerspectiveCamera(), (Instance(Sphere(), Matte(CHECKS), FLIPPED),))
+    save_scene_file(scene, tmp_path / "a.lxs")
+    (file,) = (tmp_path / "models").iterdir()
+    mesh = read_ply(file.read_bytes(), "sphere")
+    corners = mesh.vertices[mesh.faces]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((outward * corners.mean(axis=1)).sum(axis=1) > 0.0).all()
+    top = mesh.uvs[mesh.vertices[:, 2] > 0.999]  # type: ignore[index]
+    assert (top[:, 1] < 0.02).all()  # where an unturned sphere has v = 1
+    (found,) = load_scene_file(tmp_path / "a.lxs").instances
+    assert isinstance(found.shape, Sphere)
+    np.testing.assert_allclose(found.to_world, FLIPPED, atol=1e-5)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenes.canonical import Cube, Disk, Mesh, Rectangle, Shape, Sphere
+from scenes.canonical import ConstantTexture, Cube, Disk, Matte, Mesh, Rectangle, Shape, Sphere
 from scenes.formats.losses import LossReport
 from scenes.formats.meshed import as_mesh
 from scenes.formats.recognition import recognised, shape_of
@@ -147,5 +147,5 @@ def test_near_disks_are_none() -> None:
 def test_round_shapes_in_the_place_of_triangles_are_reported() -> None:
     for shape, losses in ((Sphere(), 1), (Disk(), 1), (Cube(), 0), (Rectangle(), 0)):
         report = LossReport()
-        found, _ = shape_of(as_mesh(shape), "here", report)
+        found, _ = shape_of(as_mesh(shape), Matte(ConstantTexture((0.5, 0.5, 0.5))), "here", report)
         assert type(found) is type(shape) and len(report.losses) == losses
