@@ -82,7 +82,9 @@ class Approximation:
                 "integrator", f"{scene.integrator.kind}: light between surfaces", "direct light, mirrors, glass"
             )
         lights = tuple(made for light in scene.lights for made in self.light(light))
-        instances = tuple(self.instance(instance, number) for number, instance in enumerate(scene.instances))
+        instances = tuple(
+            made for number, instance in enumerate(scene.instances) for made in self.instance(instance, number)
+        )
         integrator = dataclasses.replace(scene.integrator, depth=depth)
         return dataclasses.replace(scene, camera=camera, lights=lights, instances=instances, integrator=integrator)
 
@@ -99,21 +101,26 @@ class Approximation:
             made.append(sky)
         return made
 
-    def instance(self, instance: Instance, number: int) -> Instance:
-        """A shape; lamps are rectangles and spheres, others are seen and give no light."""
+    def instance(self, instance: Instance, number: int) -> list[Instance]:
+        """A shape; lamps are rectangles and spheres, a cube is six, others are seen and give no light."""
         name = instance.name or f"shape {number}"
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
-        if isinstance(instance.shape, Cube | Disk) and instance.emission is None and depends_on_uv(made.material):
-            return dataclasses.replace(made, shape=as_mesh(instance.shape))
-        if instance.emission is None or isinstance(instance.shape, Rectangle | Sphere):
-            return made
+        if instance.emission is None:
+            if isinstance(instance.shape, Cube | Disk) and depends_on_uv(made.material):
+                return [dataclasses.replace(made, shape=as_mesh(instance.shape))]
+            return [made]
+        if isinstance(instance.shape, Rectangle | Sphere):
+            return [made]
+        if isinstance(instance.shape, Cube):
+            places = [instance.to_world @ side for side in _sides()]
+            return [dataclasses.replace(made, shape=Rectangle(), to_world=place) for place in places]
         if isinstance(instance.shape, Disk):
             side = math.sqrt(math.pi) / 2.0 * instance.shape.radius
             self.report.add(name, "a round lamp", "a square one of the same area")
             scaled = instance.to_world @ np.diag([side, side, 1.0, 1.0])
-            return dataclasses.replace(made, shape=Rectangle(), to_world=scaled)
+            return [dataclasses.replace(made, shape=Rectangle(), to_world=scaled)]
         self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
-        return dataclasses.replace(made, material=Emissive(instance.emission), emission=None)
+        return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
 
     def texture(self, texture: Texture, where: str) -> Texture:
         """A texture; products and mixtures that are none of the plain ones become their mean."""
@@ -203,6 +210,18 @@ class Approximation:
             1.0 if mirrored else 0.0,
             mirror_spread_deg=spread_deg(alpha) if mirrored and alpha > _SMOOTH else 0.0,
         )
+
+
+def _sides() -> list[np.ndarray]:
+    """Where the rectangle lies as each side of the cube, facing outwards."""
+    made = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            matrix = np.eye(4)
+            normal, first = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
+            matrix[:3] = np.stack([first, np.cross(normal, first), normal, normal], axis=1)
+            made.append(matrix)
+    return made
 
 
 def spread_deg(alpha: float) -> float:

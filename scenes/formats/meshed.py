@@ -55,7 +55,7 @@ def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
 
 
 def _mirrored(mesh: Mesh) -> Mesh:
-    away = np.float32([1.0, 1.0, -1.0])
+    away = np.array([1.0, 1.0, -1.0], np.float32)
     normals = None if mesh.normals is None else mesh.normals * away
     return Mesh(mesh.vertices * away, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
 

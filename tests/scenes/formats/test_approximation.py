@@ -18,6 +18,7 @@ from scenes.animation import pose_at
 from scenes.camera_paths import on_a_path
 from scenes.canonical import (
     ConstantTexture,
+    Cube,
     Disk,
     Emissive,
     EnvironmentLight,
@@ -178,3 +179,18 @@ def test_tsar_runs_on_a_file_with_a_turntable(tmp_path: Path, monkeypatch, capsy
     found = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert found["invariants"]["ok"] and found["cycles"] > 2
     assert "light between surfaces: direct light, mirrors, glass" in capsys.readouterr().out
+
+
+def test_a_cube_that_shines_is_six_rectangles_facing_outwards() -> None:
+    report = LossReport()
+    place = np.diag([1.0, 2.0, 3.0, 1.0]) @ as_place(0.5, 0.0, 0.0)
+    lamp = Instance(Cube(), Matte(GREY), place, emission=(1.0, 2.0, 3.0))
+    sides = drawable(Scene(PerspectiveCamera(), (lamp,)), report).instances
+    assert len(sides) == 6 and not report.losses and all(isinstance(side.shape, Rectangle) for side in sides)
+    total = 0.0
+    for side in sides:
+        axes = side.to_world[:3, :3]
+        normal = np.cross(axes[:, 0], axes[:, 1])
+        assert normal @ (side.to_world[:3, 3] - place[:3, 3]) > 0.0 and side.emission == (1.0, 2.0, 3.0)
+        total += 4.0 * float(np.linalg.norm(normal))
+    assert total == pytest.approx(8.0 * (2.0 + 3.0 + 6.0))
