@@ -39,15 +39,20 @@ class LossReport:
     def kind(self, table: Mapping[str, str], wanted: str, what: str, where: object) -> str:
         """The canonical kind of a file's; of several that become the same one, all but the first are written down.
 
-        Raises:
-            SceneError: the table does not have it.
+        One that the table does not have becomes its first.
         """
         if wanted not in table:
-            raise SceneError(f"{where}: expected a kind of {what} of {', '.join(table)}, got {wanted!r}")
+            found = next(iter(table.values()))
+            self.unknown(where, what, wanted, found)
+            return found
         found = table[wanted]
         if first_of(table)[found] != wanted:
             self.add(str(where), f"{what} {wanted!r}", found)
         return found
+
+    def unknown(self, where: object, what: str, wanted: str, became: str = "left out") -> None:
+        """Writes down a kind of something that is not known, and what stands in its place."""
+        self.add(str(where), f"{what} {wanted!r}, which is not known", became)
 
     @property
     def losses(self) -> tuple[Loss, ...]:

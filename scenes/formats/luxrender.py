@@ -48,7 +48,7 @@ from scenes.formats.meshed import as_mesh
 from scenes.formats.pbrt import PbrtReader, scene_of
 from scenes.formats.pbrt_surfaces import Surfaces, encoded_again, mean_of, mixture, product
 from scenes.formats.scene_files import SceneFiles
-from scenes.formats.spectra import grey, metal, rgb
+from scenes.formats.spectra import blackbody_rgb, grey, metal, rgb
 from scenes.formats.transform_stack import KEYS_MAX
 
 _INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlighting": "direct", "distributedpath": "path",
@@ -97,6 +97,14 @@ class LuxSurfaces(Surfaces):
         size, start = (scale[0], -scale[1]), (offset[0], 1.0 - offset[1])
         return ImageTexture(image, size, start, wrap, kinds[kind], str(path))  # type: ignore[arg-type]
 
+    def made_texture(self, kind: str, parameters: Parameters) -> Texture:
+        """The spectra of lamps are textures here."""
+        if kind == "blackbody":
+            return ConstantTexture(blackbody_rgb(min(max(parameters.number("temperature", 6500.0), 100.0), 1e6), 1.0))
+        if kind == "equalenergy":
+            return ConstantTexture(grey(parameters.number("energy", 1.0)))
+        return super().made_texture(kind, parameters)
+
     def make_fresnel(self, kind: str, parameters: Parameters) -> tuple[Rgb, Rgb]:
         """Index of refraction of a fresnel texture."""
         where = str(parameters.place)
@@ -138,7 +146,7 @@ class LuxSurfaces(Surfaces):
             self.report.add(where, f"material {kind!r}", "matte of its base colour")
             made = Matte(base)
         else:
-            raise SceneError(f"{where}: expected a kind of material, got {kind!r}")
+            made = self.unknown_material(kind, parameters)
         return made
 
     def _mirror(self, parameters: Parameters) -> Material:
@@ -356,7 +364,8 @@ class LuxReader(PbrtReader):
         elif kind in ("point", "spot", "distant", "projection", "goniometric"):
             self._lamp(kind, parameters, where)
         else:
-            raise SceneError(f"{where}: expected a kind of light, got {kind!r}")
+            parameters.asked.update(parameters.given)
+            self.report.unknown(where, "light", kind)
         self.left_over(parameters, f"light {kind!r}")
 
     def _lamp(self, kind: str, parameters: Parameters, where: str) -> None:

@@ -72,6 +72,7 @@ INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "dir
                "adaptive": "path", "irrcache": "path", "vpl": "path"}  # fmt: skip
 _TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
 FAR = 1e6
+_SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized")
 _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
 
@@ -159,7 +160,8 @@ class MitsubaReader:
         elif node.tag == "emitter":
             self._emitter(node)
         elif node.tag in ("medium", "phase", "volume", "subsurface"):
-            self.report.add(str(node.place), f"{node.tag} (participating medium)")
+            named = f" {node.get('id')!r}" if node.get("id") else ""
+            self.report.add(str(node.place), f"{node.tag}{named} (participating medium)")
         elif node.tag in ("sampler", "film"):
             (self._sampler if node.tag == "sampler" else self._film)(node)
         else:
@@ -290,7 +292,8 @@ class MitsubaReader:
         elif kind == "area":
             raise SceneError(f"{node.place}: area: expected it inside a shape")
         else:
-            raise SceneError(f"{node.place}: expected a kind of emitter, got {kind!r}")
+            properties.asked.update(properties.given)
+            self.report.unknown(node.place, "emitter", kind)
         if "samplingWeight" in properties:
             self.report.add(properties.where, "samplingWeight of a light", "the renderer's own choice")
             properties.asked.add("samplingWeight")
@@ -340,6 +343,9 @@ class MitsubaReader:
             return self._instances(properties)
         if kind in ("hair", "heightfield", "deformable"):
             self.report.add(properties.where, "hair" if kind == "hair" else f"shape {kind!r}")
+            return []
+        if kind not in _SHAPES:
+            self.report.unknown(properties.where, "shape", kind)
             return []
         keys, times_s = properties.motion()
         track = self._track(keys, times_s, properties.where)
@@ -408,9 +414,7 @@ class MitsubaReader:
             return mesh, place
         if kind == "cylinder":
             return self._cylinder(properties)
-        if kind in ("obj", "ply", "serialized"):
-            return shape_of(self._file(kind, properties), material, where, self.report)
-        raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
+        return shape_of(self._file(kind, properties), material, where, self.report)
 
     def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
         first, last = properties.vector("p0", grey(0.0)), properties.vector("p1", (0.0, 0.0, 1.0))

@@ -130,7 +130,7 @@ class MitsubaSurfaces:
     # --- materials -----------------------------------------------------------------------------------------------
 
     def material(self, node: Node) -> Material:
-        """The material of an element, made once; raises SceneError for one that Mitsuba does not have."""
+        """The material of an element, made once; one that Mitsuba does not have is reported."""
         if id(node) in self.made:
             return self.made[id(node)]
         makers = {
@@ -152,7 +152,8 @@ class MitsubaSurfaces:
             self.report.add(properties.where, f"material {kind!r}", "grey, matte")
             made = Matte(ConstantTexture(grey(0.5)))
         else:
-            raise SceneError(f"{node.place}: expected a kind of bsdf, got {kind!r}")
+            self.report.unknown(properties.where, "material", kind, "grey, matte")
+            made = Matte(ConstantTexture(grey(0.5)))
         self._deep -= 1
         self.made[id(node)] = made
         return made

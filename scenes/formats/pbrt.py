@@ -111,7 +111,8 @@ class PbrtReader(DirectiveReader):
         self.transforms.replace(np.eye(4))
 
     def _lose_medium(self, directive: Directive) -> None:
-        self.report.add(str(directive.place), f"{directive.name} (participating medium)")
+        named = f" {word(directive)!r}" if directive.values and isinstance(directive.values[0], tuple) else ""
+        self.report.add(str(directive.place), f"{directive.name}{named} (participating medium)")
 
     def _read_texture(self, directive: Directive) -> None:
         name, kind = word(directive), word(directive, 2)
@@ -246,7 +247,8 @@ class PbrtReader(DirectiveReader):
         elif kind in ("infinite", "exinfinite"):
             self.lights.append(self._environment(parameters, strength, where))
         else:
-            raise SceneError(f"{where}: expected a kind of light, got {kind!r}")
+            parameters.asked.update(parameters.given)
+            self.report.unknown(where, "light", kind)
         self._lose_hints(parameters)
         self.left_over(parameters, f"light {kind!r}")
 
@@ -275,7 +277,7 @@ class PbrtReader(DirectiveReader):
     def _read_area_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         if kind not in ("diffuse", "area"):
-            raise SceneError(f"{directive.place}: expected the area light diffuse, got {kind!r}")
+            self.report.unknown(directive.place, "area light", kind, "diffuse")
         scale = np.array(self.surfaces.color(parameters, "scale", (1.0, 1.0, 1.0)))
         self.attributes.emission = rgb(scale * self.surfaces.color(parameters, "L", (1.0, 1.0, 1.0)))
         if parameters.truth("twosided", False):

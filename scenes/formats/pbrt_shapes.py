@@ -43,11 +43,14 @@ class ShapeReader:
             return facing_normals(turned(mesh) if turn_over else mesh), np.eye(4)
         if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
             return self._quadric(kind, parameters, turn_over)
-        if kind in ("curve", "nurbs", "heightfield"):
-            parameters.asked.update(parameters.given)
-            self.report.add(where, "hair (a curve)" if kind == "curve" else f"shape {kind!r}")
-            return None
-        raise SceneError(f"{where}: expected a kind of shape, got {kind!r}")
+        parameters.asked.update(parameters.given)
+        if kind in ("curve", "hairfile"):
+            self.report.add(where, f"hair ({kind})")
+        elif kind in ("nurbs", "heightfield", "stlmesh", "torus", "lenscomponent"):
+            self.report.add(where, f"shape {kind!r}")
+        else:
+            self.report.unknown(where, "shape", kind)
+        return None
 
     def _quadric(self, kind: str, parameters: Parameters, turn_over: bool) -> tuple[Shape, Matrix]:
         place = np.eye(4)

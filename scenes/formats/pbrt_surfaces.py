@@ -155,12 +155,12 @@ class Surfaces:
             return CheckerboardTexture(*parts, scale)
         if kind == "imagemap":
             return self._image(parameters, scale, offset)
+        parameters.asked.update(parameters.given)
         if kind in _NO_TEXTURES:
-            mean = ConstantTexture((0.5, 0.5, 0.5))
-            parameters.asked.update(parameters.given)
             self.report.add(where, f"texture {kind!r}", "the constant 0.5")
-            return mean
-        raise SceneError(f"{where}: expected a kind of texture, got {kind!r}")
+        else:
+            self.report.unknown(where, "texture", kind, "the constant 0.5")
+        return ConstantTexture((0.5, 0.5, 0.5))
 
     def _image(self, parameters: Parameters, scale: tuple[float, float], offset: tuple[float, float]) -> Texture:
         where = str(parameters.place)
@@ -181,7 +181,7 @@ class Surfaces:
     # --- materials -----------------------------------------------------------------------------------------------
 
     def material(self, kind: str, parameters: Parameters) -> Material:
-        """The material of a kind; raises SceneError for one that PBRT does not have."""
+        """The material of a kind; one that PBRT does not have is reported."""
         makers = {
             "matte": self._matte, "mirror": self._mirror, "glass": self._glass, "metal": self._metal,
             "substrate": self._substrate, "plastic": self._plastic, "translucent": self._translucent,
@@ -200,7 +200,7 @@ class Surfaces:
             self.report.add(where, f"material {kind!r}", "matte of its base colour")
             made = Matte(base)
         else:
-            raise SceneError(f"{where}: expected a kind of material, got {kind!r}")
+            made = self.unknown_material(kind, parameters)
         if "bumpmap" in parameters and parameters.types["bumpmap"] == "texture":
             made = Bumped(made, self.texture(parameters, "bumpmap", (0.0, 0.0, 0.0)))
         return made
@@ -264,6 +264,12 @@ class Surfaces:
         first, second = self.mixed(parameters)
         # PBRT's amount is that of the first
         return mixture(second, first, self.texture(parameters, "amount", grey(0.5)))
+
+    def unknown_material(self, kind: str, parameters: Parameters) -> Material:
+        """Grey, reported."""
+        parameters.asked.update(parameters.given)
+        self.report.unknown(parameters.place, "material", kind, "grey, matte")
+        return Matte(ConstantTexture(grey(0.5)))
 
     def mixed(self, parameters: Parameters) -> list[Material]:
         """The two materials of a mixture by name."""
