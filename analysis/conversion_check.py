@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import tyro
 
 from analysis.peer_renderers import Picture, rendered
 from tsar.config import require
+
+if TYPE_CHECKING:
+    from scenes.canonical import Instance, Scene
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,8 @@ class CheckOptions:
     """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
     markers: bool = False
     """Where lamps at known places appear in the picture, from every format to every other."""
+    plain: bool = False
+    """Compare both renderers on each scene with every surface matte, too: what differs then is not materials."""
     width_px: int = 160
     """Width, pixels; the height follows the film."""
     samples: int = 256
@@ -66,10 +72,12 @@ def checked(options: CheckOptions, tick: Callable[[], None]) -> list[dict[str, A
     for number, source in enumerate(options.scenes):
         name = f"{source.parent.name}/{source.name}"
         folder = options.out / f"{number:02d}-{source.parent.name}-{source.stem}"
-        pictures, again, lost = _pictures(options, source, folder)
+        scene, pictures, again, lost = _pictures(options, source, folder)
         first = next(iter(pictures))
         for other in [other for other in pictures if other != first]:
             rows.append(_row(name, (first, other), pictures, again, lost))
+        if options.plain:
+            rows.append(_plain_row(options, name, scene, folder))
         shown += [(f"{name}: {what}", one) for what, one in pictures.items() if not isinstance(one, str)]
         tick()
     if shown:
@@ -79,14 +87,14 @@ def checked(options: CheckOptions, tick: Callable[[], None]) -> list[dict[str, A
 
 def _pictures(
     options: CheckOptions, source: Path, folder: Path
-) -> tuple[dict[str, Picture | str], Picture | str, dict[str, list[str]]]:
-    """Pictures of a scene by what rendered them, the first once more with other noise, and what was lost for each."""
+) -> tuple[Scene, dict[str, Picture | str], Picture | str, dict[str, list[str]]]:
+    """A scene, its pictures by what rendered them, the first once more with other noise, and what was lost for each."""
     from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
     from scenes.formats.losses import LossReport
 
     read = LossReport()
     scene = load_scene_file(source, options.root, read)
-    size = options.width_px, max(1, round(options.width_px * scene.film.height_px / scene.film.width_px))
+    size = _size(options, scene)
     targets = {"mitsuba": ("mitsuba3", folder / "mitsuba3.xml"), "luxcore": ("luxrender", folder / "luxrender.lxs")}
     own = {"luxrender": "luxcore", "mitsuba": "mitsuba"}.get(format_of(source))
     jobs = [(f"{own}, as it is", own, source)] if own else []
@@ -101,7 +109,42 @@ def _pictures(
         out = folder / f"{name.replace(', ', '-').replace(' ', '-')}-{seed}.npy"
         return rendered(program, file, out, size, options.samples, options.limit_s, seed)
 
-    return {job[0]: picture(*job, 0) for job in jobs}, picture(*jobs[0], 1), lost
+    return scene, {job[0]: picture(*job, 0) for job in jobs}, picture(*jobs[0], 1), lost
+
+
+def _size(options: CheckOptions, scene: Scene) -> tuple[int, int]:
+    return options.width_px, max(1, round(options.width_px * scene.film.height_px / scene.film.width_px))
+
+
+def plain(scene: Scene) -> Scene:
+    """The scene with every surface matte, of the colour that it has most of."""
+    from scenes.canonical import ConstantTexture, Matte
+    from scenes.formats.pbrt_surfaces import mean_of
+
+    def matte(instance: Instance) -> Instance:
+        material: Any = instance.material
+        while hasattr(material, "base"):
+            material = material.base
+        texture = getattr(material, "reflectance", None) or getattr(material, "diffuse", None)
+        color = (0.5, 0.5, 0.5) if texture is None else mean_of(texture)
+        return dataclasses.replace(instance, material=Matte(ConstantTexture(color)))
+
+    return dataclasses.replace(scene, instances=tuple(matte(one) for one in scene.instances), materials={})
+
+
+def _plain_row(options: CheckOptions, name: str, scene: Scene, folder: Path) -> dict[str, Any]:
+    from scenes.formats.conversion import save_scene_file
+
+    made, size = plain(scene), _size(options, scene)
+    pictures: dict[str, Picture | str] = {}
+    for program, kind, file in (("mitsuba", "mitsuba3", "plain.xml"), ("luxcore", "luxrender", "plain.lxs")):
+        save_scene_file(made, folder / file, kind)  # type: ignore[arg-type]
+        out = folder / f"plain-{program}.npy"
+        pictures[program] = rendered(program, folder / file, out, size, options.samples, options.limit_s)
+    again = rendered(
+        "mitsuba", folder / "plain.xml", folder / "plain-again.npy", size, options.samples, options.limit_s, 1
+    )
+    return _row(f"{name}, matte", ("mitsuba", "luxcore"), pictures, again, {"": []})
 
 
 def _row(

@@ -9,17 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.conversion_check import plain
 from analysis.conversion_markers import MARKERS, SIZES, SOURCES, expected_px, farthest_px, marker_offsets
 from analysis.peer_renderers import rendered
 from renderer.frames import render_image
 from renderer.sampling import SamplePlan
 from renderer.trace import Renderer
 from scenes.canonical import (
+    Bumped,
     ConstantTexture,
     Film,
+    Glossy,
     Instance,
     Integrator,
+    Masked,
     Matte,
+    Metal,
     PerspectiveCamera,
     Rectangle,
     Scene,
@@ -52,6 +57,15 @@ def test_the_box_is_the_same_in_both_renderers(tmp_path: Path, monkeypatch, caps
         assert row["mean_r"] == pytest.approx(1.0, abs=0.01 if same else 0.05)
     assert rows[2]["flip"] == 0.0  # the importer and the tree alone make the same scene for Mitsuba
     assert (tmp_path / "pictures.jpg").stat().st_size > 1000
+
+
+def test_a_plain_scene_has_the_shapes_lights_and_colours(tmp_path: Path) -> None:
+    green, grey = ConstantTexture((0.1, 0.6, 0.1)), ConstantTexture((0.5, 0.5, 0.5))
+    materials = (Masked(Bumped(Glossy(green, grey), grey), grey), Metal((1.0,) * 3, (2.0,) * 3), Matte(green, 20.0))
+    scene = Scene(PerspectiveCamera(), tuple(Instance(Rectangle(), material) for material in materials))
+    found = plain(scene).instances
+    assert [one.material for one in found] == [Matte(green), Matte(grey), Matte(green)]
+    assert all(one.shape == Rectangle() for one in found)
 
 
 @pytest.mark.parametrize("source", ["pbrt", pytest.param("all", marks=pytest.mark.slow)])
