@@ -329,7 +329,8 @@ class LuxReader(PbrtReader):
         name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place)
         depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
         parameters.whole("lightdepth", depth, 0, 1 << 20)
-        self.integrator = Integrator(name, depth)  # type: ignore[arg-type]
+        # edges of a path, as measured with LuxCore
+        self.integrator = Integrator(name, max(depth - 1, 0))  # type: ignore[arg-type]
         self.left_over(parameters, f"integrator {kind!r}")
 
     # --- lights --------------------------------------------------------------------------------------------------

@@ -91,9 +91,10 @@ class LuxWriter(PbrtWriter):
             self.report.add("integrator", "paths without a limit", "1000 bounces")
         if integrator.kind in ("whitted", "metropolis"):
             self.report.add("integrator", integrator.kind, kind)
-        limit = f'"integer eyedepth" [ {depth} ] "integer lightdepth" [ {depth} ]'
+        edges = depth + 1  # LuxCore counts the edges of a path
+        limit = f'"integer eyedepth" [ {edges} ] "integer lightdepth" [ {edges} ]'
         if kind != "bidirectional":
-            limit = f'"integer maxdepth" [ {depth} ]'
+            limit = f'"integer maxdepth" [ {edges} ]'
         self.lines.append('Renderer "sampler"')
         self.lines.append(f'SurfaceIntegrator "{kind}" {limit}')
         if sampler.kind in ("halton", "hammersley", "stratified"):
