@@ -161,7 +161,13 @@ class MitsubaSurfaceWriter:
             return made
         if isinstance(material, MixMaterial):
             made = self.plugin("bsdf", "blendbsdf")
-            self.texture(made, material.amount, "weight")
+            amount = material.amount
+            if isinstance(amount, ConstantTexture):  # a number: Mitsuba 0.5 takes no colour here
+                if len(set(amount.value)) > 1:
+                    self.report.add(where, "a mixture of each colour by itself", "by their mean")
+                self.put(made, "float", "weight", number(float(np.mean(amount.value))))
+            else:
+                self.texture(made, amount, "weight")
             for part in (material.first, material.second):
                 made.append(self.bsdf(self._blunt(part, where) if self.modern else part, where))
             return made
