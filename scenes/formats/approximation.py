@@ -47,7 +47,7 @@ from scenes.canonical import (
 from scenes.daylight import sky_map, sun_light
 from scenes.formats.folding import folded
 from scenes.formats.losses import LossReport
-from scenes.formats.luxrender import reflectance_of_index
+from scenes.formats.luxrender_surfaces import reflectance_of_index
 from scenes.formats.meshed import as_mesh, depends_on_uv
 from scenes.formats.pbrt_surfaces import mean_of
 from scenes.formats.spectra import rgb

@@ -49,7 +49,7 @@ from scenes.formats.pbrt_surfaces import Surfaces
 from scenes.formats.recognition import shape_of
 from scenes.formats.scene_files import SceneFiles
 from scenes.formats.spectra import grey, rgb
-from scenes.formats.transform_stack import inverse, moved_by, rigid_motion, track_times
+from scenes.formats.transform_stack import inverse, motion, moved_by, track_times
 from scenes.values import Matrix
 
 FORWARD = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -316,13 +316,7 @@ class PbrtReader(DirectiveReader):
         (self.instances if self._object is None else self._object).append(instance)
 
     def _motion(self, keys: Sequence[Matrix], where: str) -> RigidTrack | None:
-        """The motion through keys, outside the first of them; None where nothing moves."""
-        if all(np.array_equal(keys[0], key) for key in keys[1:]):
-            return None
-        track = rigid_motion(keys, self.transforms.times_s)
-        if track is None:
-            self.report.add(where, "a motion that is not rigid", "its place at the start")
-        return track
+        return motion(keys, self.transforms.times_s, where, self.report)
 
     def _read_shape(self, directive: Directive) -> None:
         kind, parameters = typed(directive)

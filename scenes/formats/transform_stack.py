@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from scenes.animation import continuous_quaternions, pose_at
+from scenes.formats.losses import LossReport
 from scenes.values import Matrix, RigidTrack
 
 KEYS_MAX = 1024
@@ -84,6 +85,16 @@ def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack
     if quaternions[0, 3] < 0.0:
         quaternions = -quaternions
     return RigidTrack(float(times_s[0]), interval, shifts, continuous_quaternions(quaternions))
+
+
+def motion(keys: Sequence[Matrix], times_s: Sequence[float], where: str, report: LossReport) -> RigidTrack | None:
+    """The motion through keys, outside the first of them; None where nothing moves, or not rigidly, reported."""
+    if all(np.array_equal(keys[0], key) for key in keys[1:]):
+        return None
+    track = rigid_motion(keys, times_s)
+    if track is None:
+        report.add(where, "a motion that is not rigid", "its place at the start")
+    return track
 
 
 def track_times(track: RigidTrack) -> list[float]:
