@@ -14,12 +14,16 @@ from scenes.canonical import (
     ConstantTexture,
     Cube,
     Disk,
+    Glossy,
     ImageTexture,
     Instance,
+    Integrator,
     Masked,
     Material,
     Matte,
     Metal,
+    Mirror,
+    MixMaterial,
     MixTexture,
     PerspectiveCamera,
     Rectangle,
@@ -34,6 +38,7 @@ from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.folding import folded
 from scenes.formats.losses import LossReport
 from scenes.formats.meshed import FLIPPED, as_mesh
+from scenes.formats.mitsuba_surface_export import BLUNT
 from scenes.formats.ply_files import read_ply
 from scenes.formats.revolution import area, lamp_sphere
 from scenes.formats.spectra import METALS
@@ -235,3 +240,37 @@ def test_a_mirrored_textured_sphere_is_a_mesh_with_its_outside_out_for_luxrender
     (found,) = load_scene_file(tmp_path / "a.lxs").instances
     assert isinstance(found.shape, Sphere)
     np.testing.assert_allclose(found.to_world, FLIPPED, atol=1e-5)
+
+
+@pytest.mark.parametrize(("ending", "written"), [(".pbrt", "[ 4 ]"), (".lxs", "[ 5 ]"), (".xml", 'value="5"')])
+def test_depths_count_bounces_or_edges(ending: str, written: str, tmp_path: Path) -> None:
+    """PBRT counts bounces; Mitsuba and, as measured, LuxCore count the edges of a path, one more."""
+    save_scene_file(Scene(PerspectiveCamera(), (), integrator=Integrator("path", 4)), tmp_path / f"a{ending}")
+    line = next(line for line in (tmp_path / f"a{ending}").read_text().splitlines() if "maxdepth" in line.lower())
+    assert written in line and load_scene_file(tmp_path / f"a{ending}").integrator.depth == 4
+
+
+def modern(material: Material, path: Path) -> tuple[str, str]:
+    """A material as written for Mitsuba 3, and what was lost."""
+    report = LossReport()
+    save_scene_file(Scene(PerspectiveCamera(), (Instance(Rectangle(), material),)), path, "mitsuba3", report)
+    return path.read_text(), report.text()
+
+
+def test_mirrors_in_mixtures_are_blunt_for_mitsuba_3(tmp_path: Path) -> None:
+    """Its blend of a sharp one loses light: half a mirror of 0.85 and half a grey of 0.5 show 0.633, not 0.675."""
+    mixed = MixMaterial(Mirror(RED), Matte(RED), HALF)
+    text, lost = modern(mixed, tmp_path / "a.xml")
+    assert 'type="roughconductor"' in text and f"alpha {BLUNT:g}" in lost and 'name="weight" value="0.5"' in text
+    alone, lost = modern(Mirror(RED), tmp_path / "b.xml")
+    assert 'type="conductor"' in alone and "alpha" not in lost
+
+
+@pytest.mark.parametrize(("specular", "index"), [(0.04, 1.5), (0.06, 1.6488), (0.25, 3.0)])
+def test_a_coat_has_the_index_that_reflects_as_much(specular: float, index: float, tmp_path: Path) -> None:
+    coat = ConstantTexture((specular, 0.5 * specular, specular))
+    text, _ = modern(Glossy(RED, coat, (0.1, 0.1)), tmp_path / "a.xml")
+    found = float(text.split('name="int_ior" value="')[1].split('"')[0])
+    assert found == pytest.approx(index, abs=1e-3)
+    assert ((found - 1.0) / (found + 1.0)) ** 2 == pytest.approx(specular, rel=1e-4)
+    assert 'name="specular_reflectance" value="1, 0.5, 1"' in text
