@@ -46,8 +46,7 @@ from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
 from scenes.formats.meshed import as_mesh
 from scenes.formats.spectra import METALS
-from tests.scenes.formats.test_conversion import DATA, REAL, needs_data
-from tests.scenes.formats.test_mitsuba import MITSUBA
+from tests.scenes.formats.files import DATA, MITSUBA, REAL, needs_data
 
 GREY, WHITE = ConstantTexture((0.5, 0.5, 0.5)), ConstantTexture((1.0, 1.0, 1.0))
 
