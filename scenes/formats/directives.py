@@ -230,8 +230,9 @@ def parameters_of(directive: Directive, skip: int) -> Parameters:
     for at in range(0, len(rest), 2):
         head = rest[at]
         if not isinstance(head, tuple) or len(head) != 1 or len(head[0].split()) != 2:
+            got = " ".join(str(head).split())[:40]
             raise SceneError(
-                f'{directive.place}: {directive.name}: expected a parameter such as "float fov", got {head}'
+                f'{directive.place}: {directive.name}: expected a parameter such as "float fov", got {got}'
             )
         kind, name = head[0].split()
         if at + 1 >= len(rest):

@@ -79,6 +79,7 @@ def test_compressed_meshes_are_read_and_bombs_are_not(tmp_path: Path) -> None:
         ("Scale 1 0 1", "expected a matrix that can be inverted"),
         ("LookAt 0 0 0 0 0 1 0 0 1", "expected an upward direction across the line of sight"),
         ('NamedMaterial "x"', "expected a material made before, got 'x'"),
+        ('Shape "sphere" [' + "1 " * 90 + "]", "expected a parameter such as .float fov., got .1. 1. 1."),
         ('ObjectInstance "x"', "expected an object made before, got 'x'"),
         ('Shape "sphere" "float radius" 0', "radius: expected a positive number, got 0"),
         (
@@ -91,8 +92,9 @@ def test_compressed_meshes_are_read_and_bombs_are_not(tmp_path: Path) -> None:
     ],
 )
 def test_faults_of_scenes(body: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=message):
+    with pytest.raises(SceneError, match=message) as error:
         pbrt(tmp_path, body)
+    assert "\n" not in str(error.value)
 
 
 def test_a_loss_is_an_error_where_none_is_wanted_and_nothing_is_left(tmp_path: Path) -> None:
