@@ -22,6 +22,7 @@ FORBIDDEN = {
 # these wire packages together: what they may import beside the above
 WIRING = {
     "analysis/accelerators.py": ("renderer", "scenes"),
+    "analysis/bench_conversion.py": ("scenes",),
     "analysis/bench_cycles.py": ("renderer", "tsar"),
     "analysis/bench_features.py": ("renderer", "scenes"),
     "analysis/bench_mitsuba.py": ("scenes",),
@@ -33,6 +34,7 @@ WIRING = {
     "analysis/bench_shading.py": ("renderer", "scenes"),
     "analysis/bench_threads.py": ("renderer", "scenes"),
     "analysis/conversion_check.py": ("renderer", "scenes"),
+    "analysis/conversion_markers.py": ("renderer", "scenes"),
     "analysis/cost_measurement.py": ("renderer", "scenes", "tsar"),
     "analysis/estimate_check.py": ("tsar",),
     "analysis/evaluation.py": ("renderer", "scenes", "tsar"),
