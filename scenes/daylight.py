@@ -2,14 +2,14 @@
 
 Source: L. Hošek and A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Trans. Graph. 31 (4), 2012
 (the sky, eq. 8 and its published coefficients); "Adding a Solar-Radiance Function to the Hošek–Wilkie Skylight Model",
-IEEE CG&A 33 (3), 2013 (the sun, as Mitsuba 3.9 evaluates it); M. Blanco-Muriel et al., "Computing the solar vector",
-Solar Energy 70 (5), 2001.
+IEEE CG&A 33 (3), 2013 (the sun, as Mitsuba 3.9 evaluates it).
 """
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from datetime import UTC, datetime, timedelta
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +118,7 @@ def facing_up(up: tuple[float, float, float], axis: int = 1) -> Matrix:
 def sun_at(
     date: tuple[int, int, int], hour: float, latitude_deg: float, longitude_deg: float, timezone: float
 ) -> tuple[float, float, float]:
-    """Where the sun stands, within a hundredth of a degree for the years 1999 to 2015 (Blanco-Muriel et al. 2001).
+    """Where the sun stands, without the air's refraction.
 
     Args:
         date: year, month, day.
@@ -127,39 +127,15 @@ def sun_at(
         timezone: hours ahead of Greenwich.
 
     Returns:
-        Direction towards it: east, north, up.
+        Unit direction towards it: east, north, up.
+
+    Raises:
+        ValueError, OverflowError: there is no such date or time.
     """
-    year, month, day = date
-    late = (month - 14) // 12 + (1 if (month - 14) % 12 and month < 14 else 0)  # division towards zero
-    days = (
-        (1461 * (year + 4800 + late)) // 4
-        + (367 * (month - 2 - 12 * late)) // 12
-        - (3 * ((year + 4900 + late) // 100)) // 4
-        + day
-        - 32075
-    )
-    utc = hour - timezone
-    elapsed = days - 0.5 + utc / 24.0 - 2451545.0
-    omega = 2.1429 - 0.0010394594 * elapsed
-    mean_longitude = 4.8950630 + 0.017202791698 * elapsed
-    anomaly = 6.2400600 + 0.0172019699 * elapsed
-    longitude = (
-        mean_longitude
-        + 0.03341607 * math.sin(anomaly)
-        + 0.00034894 * math.sin(2.0 * anomaly)
-        - 0.0001134
-        - 0.0000203 * math.sin(omega)
-    )
-    obliquity = 0.4090928 - 6.2140e-9 * elapsed + 0.0000396 * math.cos(omega)
-    ascension = math.atan2(math.cos(obliquity) * math.sin(longitude), math.cos(longitude))
-    declination = math.asin(math.sin(obliquity) * math.sin(longitude))
-    sidereal = math.radians((6.6974243242 + 0.0657098283 * elapsed + utc) * 15.0 + longitude_deg)
-    angle, latitude = sidereal - ascension, math.radians(latitude_deg)
-    east = -math.cos(declination) * math.sin(angle)
-    north = math.cos(latitude) * math.sin(declination) - math.sin(latitude) * math.cos(declination) * math.cos(angle)
-    height = math.sin(latitude) * math.sin(declination) + math.cos(latitude) * math.cos(declination) * math.cos(angle)
-    parallax = 6371.01 / 149597890.0 * math.sqrt(max(1.0 - height * height, 0.0))
-    zenith = math.acos(min(max(height, -1.0), 1.0)) + parallax
-    flat = math.hypot(east, north)
-    sine = math.sin(zenith) / flat if flat > 0.0 else 0.0
-    return east * sine, north * sine, math.cos(zenith)
+    from astral import Observer
+    from astral.sun import azimuth, elevation
+
+    time = datetime(*date, tzinfo=UTC) + timedelta(hours=hour - timezone)
+    place = Observer(latitude_deg, longitude_deg)
+    around, height = (math.radians(f(place, time)) for f in (azimuth, partial(elevation, with_refraction=False)))
+    return math.cos(height) * math.sin(around), math.cos(height) * math.cos(around), math.sin(height)

@@ -50,9 +50,8 @@ _NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
 _MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
 SKY_UNIT, SUN_UNIT = 72_922.0, 66_000.0
 """Radiance of LuxCore 2.10's sky2 and sun at a gain of 1 over that of Mitsuba 3 at a scale of 1. The sky is the same
-model and agrees to 0.1 % (683 lm/W times the integral of the luminous efficiency); the sun is another: for turbidities
-of 2 to 3 it is within 6 % in red and green and up to 24 % bluer, at 5 and 45 degrees a fifth and at 8 and 20 degrees
-two thirds dimmer."""
+model, in luminous units (683 lm/W); the sun is another, and dimmer in haze. Held to 1 % and 15 % at a turbidity of 3 in
+``tests/scripts/test_conversion_check.py``."""
 _TRANSFORMS = (
     "Identity",
     "Translate",

@@ -15,7 +15,6 @@ from scenes.canonical import (
     Camera,
     Cube,
     DirectionalLight,
-    Emissive,
     EnvironmentLight,
     Instance,
     Light,
@@ -44,7 +43,7 @@ from scenes.formats.pbrt_export import (
     written_matrix,
 )
 from scenes.formats.pbrt_surface_export import listed, number
-from scenes.formats.placing import motion_keys, part_key, shines
+from scenes.formats.placing import motion_keys, part_key, radiance_of, shines
 from scenes.formats.revolution import lamp_sphere
 from scenes.formats.spot_profiles import reshaped
 from scenes.formats.transform_stack import inverse
@@ -182,11 +181,8 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
         self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
 
     def _part(self, instance: Instance) -> list[str]:
-        material, where = instance.material, instance.name or "shape"
-        if isinstance(material, Emissive):
-            self.report.add(where, "a surface that shines on both sides", "on its front")
-        emission = material.radiance if isinstance(material, Emissive) else instance.emission
-        lines = [f'NamedMaterial "{self.material(material)}"']
+        emission = radiance_of(instance, self.report)
+        lines = [f'NamedMaterial "{self.material(instance.material)}"']
         if emission is not None:
             off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'
             lines.append(f'AreaLightSource "area" "color L" {listed(emission)} {off}')

@@ -35,7 +35,7 @@ from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba_properties import Properties
 from scenes.formats.mitsuba_shapes import MitsubaShapes
 from scenes.formats.mitsuba_surfaces import MitsubaSurfaces
-from scenes.formats.pbrt import duration_s
+from scenes.formats.pbrt import FAR, duration_s
 from scenes.formats.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.spectra import grey, rgb
 from scenes.formats.transform_stack import motion
@@ -55,7 +55,6 @@ INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "dir
                "photonmapper": "photonmap", "ppm": "photonmap", "sppm": "photonmap", "ptracer": "path",
                "adaptive": "path", "irrcache": "path", "vpl": "path"}  # fmt: skip
 _TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
-FAR = 1e6
 
 
 class MitsubaReader:
@@ -294,11 +293,12 @@ class MitsubaReader:
         """Towards the sun, by date and place; east is x, north -z."""
         names = zip(_TIME_AND_PLACE, (2010, 7, 10, 15, 0, 0, 35.6894, 139.6917, 9), strict=True)
         values = {name: properties.number(name, default) for name, default in names}
-        if not (1 <= values["month"] <= 12 and 1 <= values["day"] <= 31 and abs(values["year"]) < 1e4):
-            raise SceneError(f"{properties.where}: expected a date")
         hour = values["hour"] + values["minute"] / 60.0 + values["second"] / 3600.0
         date = int(values["year"]), int(values["month"]), int(values["day"])
-        east, north, up = sun_at(date, hour, values["latitude"], values["longitude"], values["timezone"])
+        try:
+            east, north, up = sun_at(date, hour, values["latitude"], values["longitude"], values["timezone"])
+        except (ValueError, OverflowError) as error:
+            raise SceneError(f"{properties.where}: expected a date and time, got {error}") from None
         self.report.add(properties.where, "the sun's place by time and latitude", "its direction, x to the east")
         return np.array([east, up, -north])
 

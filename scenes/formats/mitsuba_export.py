@@ -16,7 +16,6 @@ from scenes.canonical import (
     Cube,
     DirectionalLight,
     Disk,
-    Emissive,
     EnvironmentCamera,
     Instance,
     Light,
@@ -37,7 +36,7 @@ from scenes.formats.mitsuba import FAR, FILTERS, FORWARD
 from scenes.formats.mitsuba_surface_export import Element, MitsubaSurfaceWriter
 from scenes.formats.output import Output
 from scenes.formats.pbrt_surface_export import number
-from scenes.formats.placing import PartKey, motion_keys, part_key, shared_parts, shines
+from scenes.formats.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.spectra import grey, rgb
 from scenes.formats.spot_profiles import reshaped
 
@@ -265,9 +264,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         elif isinstance(shape, Disk):
             local = np.diag([shape.radius, shape.radius, 1.0, 1.0])
         ElementTree.SubElement(made, "ref", {"id": label})
-        emission = material.radiance if isinstance(material, Emissive) else instance.emission
-        if isinstance(material, Emissive):
-            self.report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
+        emission = radiance_of(instance, self.report)
         if emission is not None:
             self.color(self.plugin("emitter", "area", made), "radiance", emission)
         return made, local

@@ -67,7 +67,7 @@ INTEGRATORS = {"path": "path", "volpath": "path", "bdpt": "bidirectional", "dire
                "ambientocclusion": "direct"}  # fmt: skip
 _DEPTH = 5
 FAR = 1e6
-"""Focal distance of a PBRT camera that says none."""
+"""Focal distance of a camera that says none."""
 
 _DEFAULT = Matte(ConstantTexture((0.5, 0.5, 0.5)))
 _SHAPE_MAX = 1 << 20

@@ -16,7 +16,6 @@ from scenes.canonical import (
     ConstantTexture,
     DirectionalLight,
     Disk,
-    Emissive,
     EnvironmentCamera,
     EnvironmentLight,
     Film,
@@ -28,7 +27,6 @@ from scenes.canonical import (
     PerspectiveCamera,
     PointLight,
     RealisticCamera,
-    Rgb,
     RigidTrack,
     Scene,
     Sphere,
@@ -41,7 +39,7 @@ from scenes.formats.meshed import as_mesh
 from scenes.formats.output import Output
 from scenes.formats.pbrt import FAR, FILTERS, FORWARD, INTEGRATORS, MAP_AXES, SAMPLERS
 from scenes.formats.pbrt_surface_export import PICTURES, PbrtSurfaceWriter, listed, number
-from scenes.formats.placing import PartKey, motion_keys, part_key, shared_parts, tracks_of
+from scenes.formats.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, tracks_of
 from scenes.formats.spot_profiles import reshaped
 from scenes.formats.transform_stack import inverse, track_times
 from scenes.values import Matrix
@@ -249,9 +247,7 @@ class PbrtWriter(PbrtSurfaceWriter):
     def _part(self, instance: Instance) -> list[str]:
         """Lines of a shape and what it is made of, without its place."""
         material = instance.material
-        if isinstance(material, Emissive):
-            self.report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
-        emission: Rgb | None = material.radiance if isinstance(material, Emissive) else instance.emission
+        emission = radiance_of(instance, self.report)
         named = self.material(material.base if isinstance(material, Masked) else material)
         alpha = f" {self._alpha(material)}" if isinstance(material, Masked) else ""
         lines = [f'NamedMaterial "{named}"']

@@ -6,8 +6,9 @@ from collections import Counter
 
 from scenes.animation import pose_at
 from scenes.canonical import Emissive, Instance, Mesh, Scene
+from scenes.formats.losses import LossReport
 from scenes.formats.transform_stack import track_times
-from scenes.values import Matrix, RigidTrack
+from scenes.values import Matrix, Rgb, RigidTrack
 
 PartKey = tuple[int, int]
 
@@ -26,6 +27,14 @@ def shared_parts(scene: Scene) -> frozenset[PartKey]:
 def shines(instance: Instance) -> bool:
     """Whether a shape is a lamp."""
     return instance.emission is not None or isinstance(instance.material, Emissive)
+
+
+def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
+    """What a lamp gives off on its front, None for other shapes; one that shines on both sides is reported."""
+    if isinstance(instance.material, Emissive):
+        report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
+        return instance.material.radiance
+    return instance.emission
 
 
 def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix], list[float]]:
