@@ -8,24 +8,28 @@ from __future__ import annotations
 
 from weakref import WeakKeyDictionary
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from renderer import control_kernels as kernels
 from renderer import device as devices
 from renderer import display_kernels
+from renderer.control_cache import CacheView
 from renderer.control_estimate import ErrorPlan
 from renderer.control_response import COLUMNS, ResponsePlan
 from renderer.display import Display
 from renderer.launching import Command, address, require_same
 from tsar.accounting import FAST_REFRESH, Account
 from tsar.cache import FrameletCache
+from tsar.clock import StageTimer
 from tsar.config import StagesName, TsarConfig
-from tsar.error import RADIANCE_MAX, Estimate, replace_nonfinite, template_power
+from tsar.error import RADIANCE_MAX, replace_nonfinite, template_power
 from tsar.haar import octave_count, state_size
 from tsar.morton import deinterleave
+from tsar.observation import Observation
 from tsar.response import respond as reference_respond
-from tsar.selection import cell_centres
+from tsar.selection import Request, cell_centres
 from tsar.stages import REFERENCE, Stages
 from tsar.tiling import split_bounds, tie_order
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
@@ -48,10 +52,8 @@ def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
     control, display = Control(config), Display(config, threads)
     compiled_solver = config.response.solver == "waterfill"
     return Stages(
-        select=control.select,
-        make_batch=control.make_batch,
-        estimate=control.estimate,
-        insert=control.insert,
+        request=control.request,
+        observe=control.observe,
         respond=control.respond if compiled_solver else reference_respond,
         build=control.build,
         reconstruct=display.reconstruct,
@@ -71,78 +73,70 @@ class Control:
         self.config = config
         self._elements = config.sdf_side**2
         self._most_tiles = 4**config.level_min + 3 * split_bounds(config)[1]
-        self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
-        self._scratch = kernels.Scratch()
-        self._scratch.value, self._scratch.key = map(address, self._ranks)
-        self._centres = cell_centres(config.framelet_side)
-        self._select = Command(kernels.select_tiles, self._scratch, config.batch_size, config.field_level)
-        self._make_batch = Command(kernels.make_batch, config.samples, address(self._centres))
-        self._of_cache: WeakKeyDictionary[FrameletCache, tuple[Command, Command]] = WeakKeyDictionary()
-        self._error_plan = _error_plan(config)
-        self._fields = torch.empty(3, 1024)
-        self._bad, self._tile_count = torch.zeros(2, 1, dtype=torch.int32)
-        self._surplus, self._sums = torch.zeros(1, dtype=torch.float64), torch.zeros(2, dtype=torch.float64)
+        self._prepare_selection()
+        self._prepare_observation()
         self._prepare_response()
         self._prepare_tiling()
         self._parts = _part_of_element(config)
-        fixed = self._elements, FAST_REFRESH, address(self._parts), address(self._sums)
+        self._sums = np.zeros(2)
+        fixed = self._elements, FAST_REFRESH, address(self._parts), self._sums.ctypes.data
         self._account = Command(kernels.take_account, *fixed)
 
-    def select(
-        self, tiling: Tiling, temporal_density: Tensor, history: Tensor, config: TsarConfig
-    ) -> tuple[Tensor, Tensor]:
-        """As :func:`tsar.selection.select`."""
+    def request(
+        self,
+        tiling: Tiling,
+        temporal_density: Tensor,
+        history: Tensor,
+        time_s: float,
+        cycle: int,
+        config: TsarConfig,
+    ) -> Request:
+        """As :func:`tsar.selection.request`."""
         require_same(config, self.config)
-        selected = torch.empty(config.batch_size, dtype=torch.int64)
-        credit = torch.empty_like(history)
-        given = tiling.level, tiling.index, temporal_density, history
-        self._select(tiling.tile_count, *map(address, (*given, selected, credit)))
-        return selected, credit
+        count, samples = config.batch_size, config.samples
+        selected, level, index = (torch.empty(count, dtype=torch.int64) for _ in range(3))
+        credit, position = torch.empty(self._elements, dtype=torch.float64), torch.empty(count, samples, 2)
+        times = torch.empty_strided((count, samples), (0, 0))  # one number in memory
+        given = tiling.level, tiling.index, temporal_density, history, credit, selected, level, index, position
+        self._request(tiling.tile_count, time_s, *map(address, given), times.data_ptr())
+        return Request(selected, credit, FrameletBatch(level, index, position, times, cycle=cycle, seed=config.seed))
 
-    def make_batch(
-        self, tiling: Tiling, selected: Tensor, time_s: float, cycle: int, config: TsarConfig
-    ) -> FrameletBatch:
-        """As :func:`tsar.selection.make_batch`."""
-        count, samples = selected.shape[0], config.samples
-        level, index = torch.empty(2, count, dtype=torch.int64).unbind(0)
-        position, times = torch.empty(count, samples, 2), torch.empty(count, samples)
-        given = tiling.level, tiling.index, selected
-        self._make_batch(time_s, count, *map(address, (*given, level, index, position, times)))
-        return FrameletBatch(level, index, position, times, cycle=cycle, seed=config.seed)
+    def observe(
+        self, batch: FrameletBatch, color: Tensor, cache: FrameletCache, config: TsarConfig, stage: StageTimer
+    ) -> Observation:
+        """As :func:`tsar.observation.observe`; framelets with samples that are not finite are repaired and observed
+        after the others.
 
-    def estimate(self, batch: FrameletBatch, color: Tensor, cache: FrameletCache, config: TsarConfig) -> Estimate:
-        """As :func:`tsar.error.estimate`; a batch with samples that are not finite is repaired and estimated again."""
-        if color.dtype != torch.float32 or not color.is_contiguous():
-            color = color.to(torch.float32).contiguous()
-        count, nonfinite = batch.level.shape[0], 0
-        coefficients = torch.empty(count, self._error_plan.state)
-        spatial, temporal = torch.zeros(2, self._elements, dtype=torch.float64).unbind(0)
-        launch, _ = self._commands(cache)
-        launch(count, *map(address, (batch.level, batch.index, color, coefficients, spatial, temporal)))
-        if self._bad.item():
-            color, nonfinite = replace_nonfinite(color, config.framelet_side)
-            launch(count, *map(address, (batch.level, batch.index, color, coefficients, spatial, temporal)))
-        return Estimate(Errors(spatial, temporal), color, coefficients, nonfinite)
-
-    def insert(self, cache: FrameletCache, batch: FrameletBatch, color: Tensor, coefficients: Tensor) -> Tensor:
-        """As :meth:`tsar.cache.FrameletCache.insert`."""
-        slot = torch.empty_like(batch.level)
-        given = slot, batch.level, batch.index, batch.time_s, color, coefficients
-        self._commands(cache)[1](slot.shape[0], *map(address, given))
-        return slot
+        The slots are chosen first, so that colours and wavelet states can go straight there.
+        """
+        with stage("cache"):
+            claim, observe = self._commands(cache)
+            slot = self._claim(batch, claim)
+        with stage("error"):
+            if color.dtype != torch.float32 or not color.is_contiguous():
+                color = color.to(torch.float32).contiguous()
+            spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
+            count, nonfinite = slot.shape[0], 0
+            given = list(map(address, (batch.level, batch.index, slot, spatial, temporal)))
+            observe(0, count, address(color), *given)
+            if self._left[0]:
+                color, nonfinite = replace_nonfinite(color, config.framelet_side)
+                observe(1, count, address(color), *given)
+        return Observation(Errors(spatial, temporal), nonfinite)
 
     def respond(self, densities: Densities, errors: Errors, config: TsarConfig) -> Densities:
         """As :func:`tsar.response.respond`."""
-        spatial, temporal = torch.empty(2, self._elements, dtype=torch.float64).unbind(0)
-        given = densities.spatial, densities.temporal, errors.spatial, errors.temporal, spatial, temporal
+        spatial, temporal = (torch.empty(self._elements, dtype=torch.float64) for _ in range(2))
+        signed = _single(errors.spatial), _single(errors.temporal)
+        given = densities.spatial, densities.temporal, *signed, spatial, temporal
         self._respond(densities.surplus, *map(address, given))
-        return Densities(spatial, temporal, self._surplus.item())
+        return Densities(spatial, temporal, float(self._surplus[0]))
 
     def build(self, spatial_density: Tensor, config: TsarConfig) -> Tiling:
         """As :func:`tsar.tiling.build`."""
-        level, index = torch.empty(2, self._most_tiles, dtype=torch.int64).unbind(0)
+        level, index = (torch.empty(self._most_tiles, dtype=torch.int64) for _ in range(2))
         self._build(*map(address, (spatial_density, level, index)))
-        count = self._tile_count.item()
+        count = int(self._tile_count[0])
         if count == 0:
             raise ValueError("tiling.build: expected finite, non-negative densities")
         return Tiling(level[:count], index[:count])
@@ -152,26 +146,63 @@ class Control:
         self._account(*map(address, (densities.spatial, densities.temporal, newest_s)))
         return Account(*self._sums.tolist())
 
+    def _claim(self, batch: FrameletBatch, claim: Command) -> Tensor:
+        """Slots for a batch, which are its from now on."""
+        count, time_s = batch.level.shape[0], batch.time_s
+        if count > self.config.batch_size or time_s.dtype != torch.float32:
+            raise ValueError(
+                f"batch: expected at most {self.config.batch_size} framelets with times in float32, got {count} with "
+                f"{time_s.dtype}"
+            )
+        slot = torch.empty(count, dtype=torch.int64)
+        tiles = address(batch.level), address(batch.index)
+        claim(count, *tiles, time_s.data_ptr(), time_s.stride(0), address(slot))
+        return slot
+
     def _commands(self, cache: FrameletCache) -> tuple[Command, Command]:
-        """Launches of estimate and insertion that know where a cache lies."""
+        """Launches that know where a cache lies: one claims slots, one observes a batch."""
         found = self._of_cache.get(cache)
         if found is None:
             view = _cache_view(cache, self.config)
-            fixed = self._error_plan, view, address(self._fields), address(self._bad)
-            found = Command(kernels.estimate_batch, *fixed), Command(kernels.insert_batch, view, self._scratch)
+            past, *memory = map(address, (self._past, self._spare, self._marks))
+            found = (
+                Command(kernels.claim_slots, view, self._scratch, past, *memory),
+                Command(kernels.observe_batch, self._error_plan, view, past, *self._progress),
+            )
             self._of_cache[cache] = found
         return found
 
+    def _prepare_selection(self) -> None:
+        config = self.config
+        self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
+        self._scratch = kernels.Scratch()
+        self._scratch.value, self._scratch.key = map(address, self._ranks)
+        self._centres = cell_centres(config.framelet_side)
+        sizes = config.batch_size, config.field_level, config.samples
+        self._request = Command(kernels.request_batch, self._scratch, *sizes, address(self._centres))
+
+    def _prepare_observation(self) -> None:
+        config = self.config
+        self._of_cache: WeakKeyDictionary[FrameletCache, tuple[Command, Command]] = WeakKeyDictionary()
+        self._error_plan = _error_plan(config)
+        self._spare = torch.empty(config.batch_size, state_size(config.samples))
+        self._marks = torch.zeros(config.cache_slots, dtype=torch.bool)
+        self._past = torch.empty(config.batch_size, dtype=torch.int64)
+        self._pending, self._left = np.zeros(config.batch_size, np.uint8), np.zeros(1, np.int32)
+        self._progress = self._pending.ctypes.data, self._left.ctypes.data
+
     def _prepare_response(self) -> None:
-        self._active = torch.empty(self._elements + 1, dtype=torch.int32)
+        self._surplus = np.zeros(1)
+        self._active = torch.empty(self._elements, dtype=torch.int32)
         self._columns = torch.empty(COLUMNS, self._elements, dtype=torch.float64)
-        fixed = address(self._active), address(self._columns), address(self._surplus)
+        fixed = address(self._active), address(self._columns), self._surplus.ctypes.data
         self._respond = Command(kernels.respond, _response_plan(self.config), *fixed)
 
     def _prepare_tiling(self) -> None:
         config, plan = self.config, kernels.TilingPlan()
         low, high = config.level_min, config.level_max
         nodes = 4**config.field_level
+        self._tile_count = np.zeros(1, np.int32)
         self._order = tie_order(low, high) if high > low else torch.empty(0, dtype=torch.int64)
         self._nodes, self._node_keys = torch.empty(2, nodes, dtype=torch.float64)
         self._split = torch.empty(nodes, dtype=torch.uint8)
@@ -180,7 +211,11 @@ class Control:
         plan.threshold = config.tiling.threshold_samples
         plan.order, plan.sums = address(self._order), address(self._nodes)
         plan.key, plan.split = address(self._node_keys), address(self._split)
-        self._build = Command(kernels.build_tiling, plan, address(self._tile_count))
+        self._build = Command(kernels.build_tiling, plan, self._tile_count.ctypes.data)
+
+
+def _single(field: Tensor) -> Tensor:
+    return field if field.dtype == torch.float32 else field.to(torch.float32)
 
 
 def _error_plan(config: TsarConfig) -> ErrorPlan:
@@ -208,8 +243,8 @@ def _response_plan(config: TsarConfig) -> ResponsePlan:
     return plan
 
 
-def _cache_view(cache: FrameletCache, config: TsarConfig) -> kernels.CacheView:
-    view = kernels.CacheView()
+def _cache_view(cache: FrameletCache, config: TsarConfig) -> CacheView:
+    view = CacheView()
     view.slots, view.samples, view.state = cache.level.shape[0], config.samples, state_size(config.samples)
     for name in ("level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"):
         setattr(view, name, address(getattr(cache, name)))

@@ -1,49 +1,22 @@
 """Kernel entry points of the control stages: one launch a stage, each the recipe of its stage in ``tsar``.
 
-They run on the CPU, where a launch is one call on one thread; the passes they call are in C.
+They run on the CPU, where a launch is one call on one thread; the passes they call are in C and C++.
 """
 
 from __future__ import annotations
 
 import warp as wp
 
-from renderer.control_estimate import ErrorPlan, estimate_framelet, fetch_ahead
+from renderer.control_cache import CacheView, choose_victims, sign_over
+from renderer.control_estimate import ErrorPlan, observe_framelets, start_observing
 from renderer.control_ranking import count_above, kth_greatest, rank_keys
-from renderer.control_response import (
-    ResponsePlan,
-    constrain_active,
-    gather_active,
-    mix_active,
-    water_levels,
-    write_densities,
-)
-from renderer.control_selection import (
-    forget_slots,
-    gather_credit,
-    list_victims,
-    place_samples,
-    rank_slots,
-    refresh_due,
-    store_framelet,
-)
+from renderer.control_response import ResponsePlan, decide
+from renderer.control_selection import gather_credit, place_framelets, refresh_due
 from renderer.control_tiling import count_exceeding, emit_tiles, mark_splits, sum_account, sum_nodes
 from renderer.launching import Address
+from renderer.native_code import module_options
 
-
-@wp.struct
-class CacheView:
-    """Addresses of a framelet cache's tensors."""
-
-    slots: wp.int32
-    samples: wp.int32
-    state: wp.int32
-    level: wp.uint64
-    index: wp.uint64
-    time_s: wp.uint64
-    dead: wp.uint64
-    color: wp.uint64
-    coefficients: wp.uint64
-    slot_of_node: wp.uint64
+wp.set_module_options(module_options("framelets.h", "response.h", "selection.h"))
 
 
 @wp.struct
@@ -73,123 +46,85 @@ class TilingPlan:
     split: wp.uint64
 
 
-@wp.kernel(enable_backward=False)
-def select_tiles(
+@wp.kernel
+def request_batch(
     scratch: Scratch,
     batch: wp.int32,
     field_level: wp.int32,
+    samples: wp.int32,
+    centre: Address,
     tiles: wp.int32,
+    now_s: wp.float32,
     level: Address,
     index: Address,
     temporal: Address,
     history: Address,
-    selected: Address,
     credit: Address,
-):
-    """The most overdue tiles, and the credit that is left."""
-    gather_credit(tiles, field_level, level, index, temporal, history, scratch.value, credit)
-    rank_keys(scratch.value, tiles, scratch.key)
-    threshold = kth_greatest(scratch.key, tiles, batch)
-    ties = batch - count_above(scratch.key, tiles, threshold)
-    refresh_due(tiles, field_level, level, index, scratch.value, scratch.key, threshold, ties, selected, credit)
-
-
-@wp.kernel(enable_backward=False)
-def make_batch(
-    samples: wp.int32,
-    centre: Address,
-    now_s: wp.float32,
-    count: wp.int32,
-    level: Address,
-    index: Address,
     selected: Address,
     level_out: Address,
     index_out: Address,
     position: Address,
     time_s: Address,
 ):
-    """The request to the renderer."""
-    for row in range(count):
-        place_samples(row, samples, now_s, centre, level, index, selected, level_out, index_out, position, time_s)
+    """The most overdue tiles, the credit that is left, and the request to the renderer."""
+    times = wp.array(ptr=time_s, shape=(1,), dtype=wp.float32)
+    times[0] = now_s
+    gather_credit(tiles, field_level, level, index, temporal, history, scratch.value, credit)
+    rank_keys(scratch.value, tiles, scratch.key)
+    threshold = kth_greatest(scratch.key, tiles, batch)
+    ties = batch - count_above(scratch.key, tiles, threshold)
+    refresh_due(tiles, field_level, level, index, scratch.value, scratch.key, threshold, ties, selected, credit)
+    place_framelets(batch, samples, centre, level, index, selected, level_out, index_out, position)
 
 
-@wp.func
-def slot_of(cache: CacheView, level: wp.int64, index: wp.int64) -> wp.int64:
-    """Slot of the newest framelet of a tile, -1 where there is none."""
-    slots = wp.array(ptr=cache.slot_of_node, shape=(1,), dtype=wp.int64)
-    one = wp.int64(1)
-    return slots[wp.int32(((one << (wp.int64(2) * level)) - one) / wp.int64(3) + index)]
-
-
-@wp.kernel(enable_backward=False)
-def estimate_batch(
-    plan: ErrorPlan,
-    cache: CacheView,
-    scratch: Address,
-    bad: Address,
-    count: wp.int32,
-    level: Address,
-    index: Address,
-    color: Address,
-    coefficients: Address,
-    errors_spatial: Address,
-    errors_temporal: Address,
-):
-    """Errors and wavelet states of a batch; ``bad`` receives how many framelets hold a sample that is not finite."""
-    levels = wp.array(ptr=level, shape=(count,), dtype=wp.int64)
-    indices = wp.array(ptr=index, shape=(count,), dtype=wp.int64)
-    found = wp.int32(0)
-    slot = slot_of(cache, levels[0], indices[0])
-    for row in range(count):
-        following = wp.min(row + 1, count - 1)
-        next_slot = slot_of(cache, levels[following], indices[following])
-        fetch_ahead(plan, next_slot, cache.coefficients)
-        found += estimate_framelet(
-            row,
-            plan,
-            levels[row],
-            indices[row],
-            slot,
-            color,
-            cache.coefficients,
-            coefficients,
-            errors_spatial,
-            errors_temporal,
-            scratch,
-        )
-        slot = next_slot
-    result = wp.array(ptr=bad, shape=(1,), dtype=wp.int32)
-    result[0] = found
-
-
-@wp.kernel(enable_backward=False)
-def insert_batch(
+@wp.kernel
+def claim_slots(
     cache: CacheView,
     scratch: Scratch,
+    past: Address,
+    spare: Address,
+    marks: Address,
     count: wp.int32,
-    slot: Address,
     level: Address,
     index: Address,
     time_s: Address,
-    color: Address,
-    coefficients: Address,
+    time_stride: wp.int32,
+    slot: Address,
 ):
-    """A batch over the slots that are worth least: the dead, oldest first, then the oldest of the rest."""
-    with_dead = rank_slots(cache.slots, count, cache.time_s, cache.dead, scratch.value)
-    wanted = count - with_dead
-    rank_keys(scratch.value, cache.slots, scratch.key)
-    threshold = kth_greatest(scratch.key, cache.slots, wanted)
-    ties = wanted - count_above(scratch.key, cache.slots, threshold)
-    list_victims(cache.slots, scratch.key, threshold, ties, with_dead, cache.dead, slot)
-    forget_slots(count, slot, cache.level, cache.index, cache.slot_of_node)
-    for row in range(count):
-        store_framelet(
-            row, cache.samples, cache.state, slot, level, index, time_s, color, coefficients,
-            cache.level, cache.index, cache.time_s, cache.color, cache.coefficients, cache.dead, cache.slot_of_node,
-        )  # fmt: skip
+    """Gives a batch its slots: of the dead framelets, oldest first, then of the oldest of the rest."""
+    choose_victims(cache, scratch.value, scratch.key, count, slot)
+    sign_over(cache, count, level, index, time_s, time_stride, slot, past, spare, marks)
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
+def observe_batch(
+    plan: ErrorPlan,
+    cache: CacheView,
+    past: Address,
+    pending: Address,
+    result: Address,
+    again: wp.int32,
+    count: wp.int32,
+    color: Address,
+    level: Address,
+    index: Address,
+    slot: Address,
+    errors_spatial: Address,
+    errors_temporal: Address,
+):
+    """Errors of a batch, and the batch into its slots; ``again`` does what was left the last time.
+
+    ``result`` receives how many framelets hold a sample that is not finite, and are still pending.
+    """
+    if again == 0:
+        start_observing(plan, count, pending, errors_spatial, errors_temporal)
+    left = wp.array(ptr=result, shape=(1,), dtype=wp.int32)
+    left[0] = observe_framelets(
+        plan, cache, count, level, index, color, slot, past, pending, errors_spatial, errors_temporal
+    )
+
+
+@wp.kernel
 def respond(
     plan: ResponsePlan,
     active: Address,
@@ -204,16 +139,13 @@ def respond(
     temporal_after: Address,
 ):
     """One control decision over the whole field; ``result`` receives the new surplus."""
-    count = gather_active(plan, spatial, temporal, error_spatial, error_temporal, active, columns)
-    constrain_active(plan, count, columns)
-    levels = water_levels(plan, count, columns, surplus / (plan.spatial_high * plan.temporal_high))
-    mix_active(plan, count, columns, levels[0], levels[1])
-    freed = write_densities(plan, count, active, columns, spatial, temporal, spatial_after, temporal_after)
     surplus_after = wp.array(ptr=result, shape=(1,), dtype=wp.float64)
-    surplus_after[0] = wp.max(surplus + freed, wp.float64(0.0))
+    surplus_after[0] = decide(
+        plan, surplus, spatial, temporal, error_spatial, error_temporal, spatial_after, temporal_after, columns, active
+    )
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
 def build_tiling(plan: TilingPlan, result: Address, density: Address, level: Address, index: Address):
     """The tiling of a density field; ``result`` receives the number of tiles, 0 where the field is not a density."""
     tiles = wp.array(ptr=result, shape=(1,), dtype=wp.int32)
@@ -233,7 +165,7 @@ def build_tiling(plan: TilingPlan, result: Address, density: Address, level: Add
     tiles[0] = emit_tiles(plan.level_low, plan.level_high, plan.split, level, index)
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
 def take_account(
     elements: wp.int32,
     fast: wp.float64,

@@ -1,8 +1,9 @@
 """The greatest of many, without sorting: what selection, cache and tiling have in common.
 
 Each ranks by a float64 and takes the ``k`` first. A float64 becomes an unsigned key of the same order, and the key of
-the ``k``-th is found bit by bit from the top: 64 passes that count, each a handful of vector instructions for the some
-hundred values there are. All above it are taken, and of those equal to it as many as are missing, in a stated order.
+the ``k``-th is found bit by bit from the top: passes that count, each a handful of vector instructions for the some
+hundred values there are, until as many lie above as are wanted. All above it are taken, and of those equal to it as
+many as are missing, in a stated order.
 
 Addresses are passed as numbers: a launch then costs less, for no array has to be described.
 """
@@ -32,17 +33,25 @@ def rank_keys(value: Address, count: wp.int32, key: Address):
 
 @wp.func_native("""
     const unsigned long long* k = (const unsigned long long*)key;
-    unsigned long long found = 0;
-    for (int bit = 63; bit >= 0; --bit) {
+    if (count < wanted) return 0;
+    unsigned long long all = ~0ull, any = 0;
+    for (int i = 0; i < count; ++i) all &= k[i], any |= k[i];
+    if (all == any) return all;
+    const int top = 63 - __builtin_clzll(all ^ any);  // above it all keys are alike
+    unsigned long long found = top == 63 ? 0 : all >> (top + 1) << (top + 1);
+    for (int bit = top; bit >= 0; --bit) {
         const unsigned long long trial = found | (1ull << bit);
-        int at_least = 0;
+        long long at_least = 0;
         for (int i = 0; i < count; ++i) at_least += k[i] >= trial;
         if (at_least >= wanted) found = trial;
+        if (at_least == wanted) break;
     }
     return found;
 """)
 def kth_greatest(key: Address, count: wp.int32, wanted: wp.int32) -> wp.uint64:
-    """The greatest key that at least ``wanted`` keys reach; 0 where there are not so many."""
+    """A bound that the ``wanted`` greatest keys reach, and of the others only those equal to the least of them: keys
+    above the bound are all taken. 0 where there are not so many keys.
+    """
     ...
 
 

@@ -5,6 +5,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import struct
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import warp as wp
@@ -48,22 +52,51 @@ class Command:
 
     Its first arguments stay as they are, the others are plain numbers: values, or addresses of tensors, which the
     caller keeps alive and contiguous during the launch.
+
+    Attributes:
+        launch: runs the kernel with the arguments set last.
     """
 
     def __init__(self, kernel: Any, *fixed: Any, size: int = 1) -> None:
         """Records a launch of ``kernel`` over ``size`` threads whose first arguments are ``fixed``."""
         varying = len(kernel.adj.args) - len(fixed)
-        self._launch = wp.launch(kernel, size, inputs=[*fixed, *[0] * varying], device="cpu", record_cmd=True)
-        # Plain C numbers, which may be set in place; the first parameter is the size of the launch.
-        self._varying = self._launch.params[1 + len(fixed) :]
-        self.launch = self._launch.launch
+        self._record = wp.launch(kernel, size, inputs=[*fixed, *[0] * varying], device="cpu", record_cmd=True)
+        bounds, *values = self._record.params
+        # What Warp makes of these at each launch, made once: a structure of all arguments, by name.
+        names = (argument.label for argument in kernel.adj.args)
+        layout = [(name, type(value)) for name, value in zip(names, values, strict=True)]
+        arguments = type("Arguments", (ctypes.Structure,), {"_fields_": layout})(*values)
+        self._set = partial(_packer(type(arguments), len(fixed)), arguments)
+        self.launch = partial(self._record.hooks.forward, ctypes.byref(bounds), ctypes.byref(arguments))
 
     def set(self, *arguments: float) -> None:
         """Sets the last arguments."""
-        for parameter, value in zip(self._varying, arguments, strict=True):
-            parameter.value = value
+        self._set(*arguments)
 
     def __call__(self, *arguments: float) -> None:
         """Launches with these last arguments."""
-        self.set(*arguments)
+        self._set(*arguments)
         self.launch()
+
+
+def _packer(structure: type[ctypes.Structure], first: int) -> Callable[..., None]:
+    """A function of such a structure and of numbers, which writes these into its fields from number ``first`` on."""
+    layout, end = "=", 0
+    for number, (name, kind) in enumerate(structure._fields_):
+        offset = getattr(structure, name).offset
+        if number >= first:
+            layout += "x" * (offset - end if number > first else 0) + _CODES[kind]
+        end = offset + ctypes.sizeof(kind)
+    start = getattr(structure, structure._fields_[first][0]).offset if first < len(structure._fields_) else 0
+    pack = struct.Struct(layout).pack_into
+    return lambda target, *numbers: pack(target, start, *numbers)
+
+
+_CODES = {
+    ctypes.c_int32: "i",
+    ctypes.c_int64: "q",
+    ctypes.c_uint64: "Q",
+    ctypes.c_float: "f",
+    ctypes.c_double: "d",
+}
+"""Kinds of numbers that a launch takes, as :mod:`struct` names them."""

@@ -8,12 +8,11 @@ runs and what tests compare with.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import warp as wp
 
 from renderer.features import PACKETS, Feature
 from renderer.launching import Address
+from renderer.native_code import module_options
 from renderer.structs import SceneData, ViewData
 
 LANES = wp.constant(16)
@@ -43,17 +42,7 @@ def suffice_for(features: Feature) -> bool:
     return features | PACKETS == PACKETS
 
 
-_NATIVE = Path(__file__).resolve().parent / "native"
-_HEADERS = sorted(_NATIVE.glob("*.h"))
-
-BUILD_OPTIONS = wp.ModuleBuildOptions(
-    extra_cpu_include_dirs=[str(_NATIVE)],
-    extra_cpu_preamble="".join(f'#include "{header.name}"\n' for header in _HEADERS),
-    extra_build_dependencies=[str(header) for header in _HEADERS],
-)
-"""What a module of kernels needs to call what is in ``native/``."""
-
-MODULE_OPTIONS = {"enable_backward": False, "extra_build_options": BUILD_OPTIONS}
+MODULE_OPTIONS = module_options("queries.h", "samples.h")
 wp.set_module_options(MODULE_OPTIONS)
 
 

@@ -283,6 +283,8 @@ class Renderer:
 
 
 def _bounds(time_s: Tensor) -> tuple[float, float]:
+    if not any(time_s.stride()):  # one number for all
+        time_s = time_s.flatten()[:1] if time_s.dim() < 2 else time_s[:1, :1]
     values = time_s.numpy() if time_s.device.type == "cpu" else time_s
     return float(values.min()), float(values.max())
 

@@ -80,16 +80,6 @@ class FrameletCache:
         self.slot_of_node[node[self.slot_of_node[node] == used]] = EMPTY
 
 
-def insert(
-    cache: FrameletCache,
-    batch: FrameletBatch,
-    color: Float[Tensor, "n samples 3"],
-    coefficients: Float[Tensor, "n state"],
-) -> Int64[Tensor, " n"]:
-    """:meth:`FrameletCache.insert` as a stage."""
-    return cache.insert(batch, color, coefficients)
-
-
 def _node_id(level, index):
     """Dense number of a quadtree node: nodes of coarser levels first."""
     return (4**level - 1) // 3 + index

@@ -135,12 +135,12 @@ def signed_error(
 
 
 def scatter_to_field(values: Float[Tensor, "k n p"], batch: FrameletBatch, config: TsarConfig) -> Float[Tensor, "k e"]:
-    """Write per-position values of each framelet into the field elements it covers (float64), zero elsewhere.
+    """Write per-position values of each framelet into the field elements it covers, zero elsewhere.
 
     Where an element covers several positions it gets their mean, where a position covers several elements each gets
     its value. One pass a level; tiles of a batch never overlap, so the order cannot matter.
     """
-    field = torch.zeros(values.shape[0], config.sdf_side**2, dtype=torch.float64)
+    field = torch.zeros(values.shape[0], config.sdf_side**2)
     first, _ = tile_interval(batch.level, batch.index, config.field_level)
     positions = values.shape[2]
     for level in range(config.level_min, config.level_max + 1):
@@ -154,5 +154,5 @@ def scatter_to_field(values: Float[Tensor, "k n p"], batch: FrameletBatch, confi
         else:
             local = local.repeat_interleave(elements // positions, dim=2)
         where = first[rows, None] + torch.arange(elements)
-        field[:, where] = local.to(torch.float64)
+        field[:, where] = local
     return field

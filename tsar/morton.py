@@ -109,6 +109,21 @@ def tile_integral(
     return prefix[last] - prefix[first]
 
 
+def tile_mean(
+    field: Float[Tensor, " e"], level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], field_level: int
+) -> Float[Tensor, " n"]:
+    """Mean of the field over each tile, by way of the means of all nodes of the quadtree: tiles of equal elements come
+    out as equal, which differences of a prefix sum would not be. One pass a level.
+    """
+    found = torch.empty(level.shape, dtype=field.dtype)
+    for node_level in range(field_level, -1, -1):
+        rows = level == node_level
+        found[rows] = field[index[rows]]
+        four = field.reshape(-1, 4) if node_level else field.expand(1, 4)
+        field = ((four[:, 0] + four[:, 1]) + (four[:, 2] + four[:, 3])) * 0.25
+    return found
+
+
 def total(field: Float[Tensor, " e"]) -> float:
     """Sum of a field, the same bits for any number of threads: a scan has one order, a parallel sum has not."""
     return float(torch.cumsum(field, 0)[-1]) if field.numel() else 0.0

@@ -68,22 +68,18 @@ def step(
     """One cycle at animation time ``time_s``; ``cycle_s`` is the length of the last cycle, the unit of age."""
     stage = StageTimer()
     with stage("selection"):
-        selected, history = stages.select(state.tiling, state.densities.temporal, state.history, config)
-        batch = stages.make_batch(state.tiling, selected, time_s, cycle, config)
+        due = stages.request(state.tiling, state.densities.temporal, state.history, time_s, cycle, config)
     with stage("tracing"):
-        samples = trace(batch)
-    with stage("error"):
-        estimated = stages.estimate(batch, samples.color, state.cache, config)
-    with stage("cache"):
-        stages.insert(state.cache, batch, estimated.color, estimated.coefficients)
+        samples = trace(due.batch)
+    observed = stages.observe(due.batch, samples.color, state.cache, config, stage)
     with stage("response"):
-        densities = stages.respond(state.densities, estimated.errors, config)
+        densities = stages.respond(state.densities, observed.errors, config)
     with stage("tiling"):
         tiling = stages.build(densities.spatial, config)
     with stage("reconstruction"):
         image = stages.reconstruct(state.cache, config, cycle_s)
-    after = State(tiling, densities, history, state.cache)
-    return after, Outcome(selected, samples, estimated.errors, estimated.nonfinite, image, stage)
+    after = State(tiling, densities, due.history, state.cache)
+    return after, Outcome(due.selected, samples, observed.errors, observed.nonfinite, image, stage)
 
 
 def run(

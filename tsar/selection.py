@@ -5,6 +5,7 @@ Source: Stephens 2011, sec. 3.4.4.1.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import torch
@@ -12,9 +13,18 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from tsar.config import TsarConfig
-from tsar.morton import deinterleave, prefix_sum, tile_integral
+from tsar.morton import deinterleave, tile_mean
 from tsar.tiling import tile_of_element
 from tsar.types import FrameletBatch, Tiling
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be rendered: tiles by their number in the tiling, the credit left on the field, and the batch."""
+
+    selected: Int64[Tensor, " b"]
+    history: Float[Tensor, " e"]
+    batch: FrameletBatch
 
 
 def initial_history(config: TsarConfig) -> Float[Tensor, " e"]:
@@ -40,8 +50,7 @@ def select(
         Indices into the tiling in Morton order, and the history for the next cycle. Ties go to the earlier tile.
     """
     credit = history + temporal_density
-    covered = 4.0 ** (config.field_level - tiling.level.to(torch.float64))
-    overdue = tile_integral(prefix_sum(credit), tiling.level, tiling.index, config.field_level) / covered
+    overdue = tile_mean(credit, tiling.level, tiling.index, config.field_level)
     order = torch.sort(overdue, descending=True, stable=True).indices
     selected = torch.sort(order[: config.batch_size]).values
     left = torch.full_like(overdue, torch.nan)
@@ -74,5 +83,22 @@ def make_batch(
     """The request to the renderer: every sample of the batch at one animation time."""
     level, index = tiling.level[selected], tiling.index[selected]
     position = sample_positions(level, index, config.framelet_side)
-    time = torch.full(position.shape[:2], time_s, dtype=torch.float32)
-    return FrameletBatch(level, index, position, time, cycle=cycle, seed=config.seed)
+    return FrameletBatch(level, index, position, one_time(time_s, position), cycle=cycle, seed=config.seed)
+
+
+def one_time(time_s: float, position: Float[Tensor, "n samples 2"]) -> Float[Tensor, "n samples"]:
+    """The same time for all samples: one number in memory, however many they are."""
+    return torch.full((1, 1), time_s).expand(position.shape[:2])
+
+
+def request(
+    tiling: Tiling,
+    temporal_density: Float[Tensor, " e"],
+    history: Float[Tensor, " e"],
+    time_s: float,
+    cycle: int,
+    config: TsarConfig,
+) -> Request:
+    """The most overdue tiles as a request to the renderer: :func:`select` and :func:`make_batch`."""
+    selected, credit = select(tiling, temporal_density, history, config)
+    return Request(selected, credit, make_batch(tiling, selected, time_s, cycle, config))

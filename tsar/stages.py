@@ -9,16 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from jaxtyping import Float, Int64
+from jaxtyping import Float
 from torch import Tensor
 
 from tsar.accounting import Account, account
-from tsar.cache import FrameletCache, insert
+from tsar.cache import FrameletCache
+from tsar.clock import StageTimer
 from tsar.config import TsarConfig
-from tsar.error import Estimate, estimate
+from tsar.observation import Observation, observe
 from tsar.reconstruction import Reconstruction, reconstruct
 from tsar.response import respond
-from tsar.selection import make_batch, select
+from tsar.selection import Request, request
 from tsar.tiling import build
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
 
@@ -30,20 +31,16 @@ class Stages:
     """One function a stage; arguments and results are those of the reference, which is the default.
 
     Attributes:
-        select: which tiles are due, and what is left of their credit.
-        make_batch: the request to the renderer.
-        estimate: errors, repaired colours, wavelet state.
-        insert: the batch into the cache, in place.
+        request: which tiles are due, and the request to the renderer.
+        observe: errors of a batch; its colours and wavelet states into the cache, in place.
         respond: new densities.
         build: new tiling.
         reconstruct: image; flags dead framelets in the cache, in place.
         account: sums for the record of the cycle.
     """
 
-    select: Callable[[Tiling, Field, Field, TsarConfig], tuple[Int64[Tensor, " b"], Field]] = select
-    make_batch: Callable[[Tiling, Int64[Tensor, " b"], float, int, TsarConfig], FrameletBatch] = make_batch
-    estimate: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig], Estimate] = estimate
-    insert: Callable[[FrameletCache, FrameletBatch, Tensor, Tensor], object] = insert
+    request: Callable[[Tiling, Field, Field, float, int, TsarConfig], Request] = request
+    observe: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig, StageTimer], Observation] = observe
     respond: Callable[[Densities, Errors, TsarConfig], Densities] = respond
     build: Callable[[Field, TsarConfig], Tiling] = build
     reconstruct: Callable[[FrameletCache, TsarConfig, float], Reconstruction] = reconstruct

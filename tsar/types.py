@@ -90,7 +90,8 @@ class Densities:
 
 @dataclass(frozen=True)
 class Errors:
-    """Signed sample-rate errors over the elements in [-1, 1]; positive is undersampled, zero outside the batch."""
+    """Signed sample-rate errors over the elements in [-1, 1], float32; positive is undersampled, zero outside the
+    batch."""
 
     spatial: Float[Tensor, " e"]
     temporal: Float[Tensor, " e"]

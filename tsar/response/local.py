@@ -79,8 +79,8 @@ def _drop_outward(a: Field, phi: Field, low: float) -> Field:
 
 def constrain(a_s: Field, a_t: Field, errors: Errors, box: Box, gain: float) -> LocalConstraints:
     """Desired and greatest change (eq. 6.8–6.22) for normalised densities inside the box."""
-    phi_s = _drop_outward(a_s, errors.spatial, box.spatial_min)
-    phi_t = _drop_outward(a_t, errors.temporal, box.temporal_min)
+    phi_s = _drop_outward(a_s, errors.spatial.to(a_s.dtype), box.spatial_min)
+    phi_t = _drop_outward(a_t, errors.temporal.to(a_t.dtype), box.temporal_min)
     # Not hypot: its vectorised and its scalar form differ in the last bit, and which one runs depends on the threads.
     length = torch.sqrt(phi_s * phi_s + phi_t * phi_t)
     unit = torch.where(length > 0, length, 1.0)

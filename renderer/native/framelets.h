@@ -1,0 +1,228 @@
+// Framelets: where their samples lie, and from their colours to signed errors, sixteen samples side by side: compressed luminance, streaming Haar
+// transform, levelwise norms, signed errors on the field. Definitions in `tsar/error.py` and `tsar/haar.py`.
+//
+// The first-level cache holds all that lies between; colours and wavelet state go straight into the framelet cache.
+// A framelet has 4^k samples on the Morton curve, so four neighbours of any octave follow one another.
+#pragma once
+#include "functions.h"
+#include "lanes.h"
+
+namespace framelets {
+
+using namespace packets;
+
+constexpr int MOST_SAMPLES = 1024, MOST_POSITIONS = MOST_SAMPLES / 4, MOST_OCTAVE_POSITIONS = 341;
+
+// sqrt(y / (1 + y)) as y / sqrt(y (1 + y)): the root's reciprocal by Newton's method, from a first guess good to 0.2 %
+// that halves the exponent, where a division and a root would take four times as long. Three steps reach the last
+// digit. From 1e18 on the answer is 1.
+inline f16 compressed(f16 y) {
+    y = clamped(y, 0.0f, 1.0e18f);
+    const f16 z = y * (1.0f + y), half = 0.5f * z;
+    f16 root = __builtin_bit_cast(f16, 0x5f375a86 - (__builtin_bit_cast(i16, z) >> 1));
+    for (int step = 0; step < 3; ++step) root = root * (1.5f - half * root * root);
+    return y * root;
+}
+
+// Luminance of sixteen samples, which are copied too; lanes of `good` go out where a sample is not a number that counts.
+inline f16 luminance_of(const float* rgb, float* copy, float most, i16& good) {
+    const f16 p = load<f16>(rgb), q = load<f16>(rgb + 16), w = load<f16>(rgb + 32);
+    store(copy, p), store(copy + 16, q), store(copy + 32, w);
+    good &= (vabs(p) <= most) & (vabs(q) <= most) & (vabs(w) <= most);
+    const f16 pq_r = __builtin_shufflevector(p, q, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, -1, -1, -1, -1, -1);
+    const f16 pq_g = __builtin_shufflevector(p, q, 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, -1, -1, -1, -1, -1);
+    const f16 pq_b = __builtin_shufflevector(p, q, 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, -1, -1, -1, -1, -1, -1);
+    const f16 r = __builtin_shufflevector(pq_r, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+    const f16 g = __builtin_shufflevector(pq_g, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+    const f16 b = __builtin_shufflevector(pq_b, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+    return 0.2126f * r + 0.7152f * g + 0.0722f * b;
+}
+
+// The four below each of several positions.
+template <class F> struct Four {
+    F a, b, c, d;
+};
+template <class F> inline Four<F> fours(const float* in);
+template <> inline Four<f16> fours<f16>(const float* in) {
+    const f16 p = load<f16>(in), q = load<f16>(in + 16), r = load<f16>(in + 32), s = load<f16>(in + 48);
+    const f16 ab_p = __builtin_shufflevector(p, q, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+    const f16 cd_p = __builtin_shufflevector(p, q, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    const f16 ab_r = __builtin_shufflevector(r, s, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+    const f16 cd_r = __builtin_shufflevector(r, s, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    return {__builtin_shufflevector(ab_p, ab_r, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23),
+            __builtin_shufflevector(ab_p, ab_r, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31),
+            __builtin_shufflevector(cd_p, cd_r, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23),
+            __builtin_shufflevector(cd_p, cd_r, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31)};
+}
+template <> inline Four<f4> fours<f4>(const float* in) {
+    const f16 v = load<f16>(in);
+    return {__builtin_shufflevector(v, v, 0, 4, 8, 12), __builtin_shufflevector(v, v, 1, 5, 9, 13),
+            __builtin_shufflevector(v, v, 2, 6, 10, 14), __builtin_shufflevector(v, v, 3, 7, 11, 15)};
+}
+template <> inline Four<float> fours<float>(const float* in) { return {in[0], in[1], in[2], in[3]}; }
+
+// Calls `body` for all of `count` positions, a power of four: with a vector of sixteen, or of four, or one number.
+template <class Body> inline void by_lanes(int count, Body body) {
+    if (count >= 16)
+        for (int i = 0; i < count; i += 16) body(i, f16());
+    else if (count == 4)
+        body(0, f4());
+    else
+        body(0, 0.0f);
+}
+
+// One octave at some positions: the spatial transform, and along time the mean with the last update and the change
+// since; without a past there is none.
+template <class F, class Plan>
+inline void transform_some(const Plan& plan, const Four<F>& in, const float* past, float* kept, int count, float* field,
+                           float* power_s, float* power_t) {
+    const F h_upper = (in.a + in.b) * 0.5f, h_lower = (in.c + in.d) * 0.5f, g_upper = in.a - in.b, g_lower = in.c - in.d;
+    const F hh = (h_upper + h_lower) * 0.5f, hg = h_upper - h_lower, gh = (g_upper + g_lower) * 0.5f;
+    const F gg = g_upper - g_lower;
+    const F hh_past = past ? load<F>(past) : hh, hg_past = past ? load<F>(past + count) : hg;
+    const F gh_past = past ? load<F>(past + 2 * count) : gh, gg_past = past ? load<F>(past + 3 * count) : gg;
+    store(kept, hh), store(kept + count, hg), store(kept + 2 * count, gh), store(kept + 3 * count, gg);
+    store(field, (hh + hh_past) * 0.5f);
+    const F hgh = (hg + hg_past) * 0.5f, ghh = (gh + gh_past) * 0.5f, ggh = (gg + gg_past) * 0.5f;
+    const F hhg = hh - hh_past, hgg = hg - hg_past, ghg = gh - gh_past;
+    const F s0 = ghh * ghh, s1 = hgh * hgh, s2 = ggh * ggh, t0 = hhg * hhg, t1 = hgg * hgg, t2 = ghg * ghg;
+    store(power_s, plan.linf ? vmax(vmax(s0, s1), s2) : s0 + s1 + s2);
+    store(power_t, plan.linf ? vmax(vmax(t0, t1), t2) : t0 + t1 + t2);
+}
+
+// A coefficient spreads over the four below it, in equal shares or whole.
+inline void spread(const float* coarse, float* fine, int count, float share) {
+    if (count == 4)
+        store(fine, load<f4>(fine) + share * coarse[0]);
+    else
+        for (int i = 0; i < count; i += 16) {
+            const f4 four = load<f4>(coarse + i / 4);
+            const f16 below = __builtin_shufflevector(four, four, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+            store(fine + i, load<f16>(fine + i) + share * below);
+        }
+}
+
+// All octaves: the wavelet state to keep, and in the first entries of `power_*` the sums at each finest position.
+template <class Plan>
+inline void transform(const Plan& plan, const float* luminance, const float* past, float* kept, float* power_s,
+                      float* power_t) {
+    const int positions = plan.samples / 4;
+    float fields[2][MOST_POSITIONS];
+    const float* in = luminance;
+    for (int octave = 0, begin = 0; octave < plan.octaves; ++octave) {
+        const int count = positions >> (2 * octave);
+        float* field = fields[octave & 1];
+        by_lanes(count, [&](int i, auto lanes) {
+            transform_some(plan, fours<decltype(lanes)>(in + 4 * i), past ? past + i : nullptr, kept + i, count,
+                           field + i, power_s + begin + i, power_t + begin + i);
+        });
+        in = field, kept += 4 * count, begin += count;
+        past = past ? past + 4 * count : nullptr;
+    }
+    const float share = plan.linf ? 1.0f : 0.25f;
+    for (int coarse = 1, begin = plan.octave_positions - 1; coarse < positions; begin -= coarse) {
+        const int fine = 4 * coarse;
+        spread(power_s + begin, power_s + begin - fine, fine, share);
+        spread(power_t + begin, power_t + begin - fine, fine, share);
+        coarse = fine;
+    }
+}
+
+// Signed errors from powers, into the elements that the tile covers: a mean over positions, or a position's value in
+// each of its elements.
+template <class Plan> inline void scatter(const Plan& plan, const float* power, float tolerated, float* out, int elements) {
+    constexpr float LEAST = 1.17549435e-38f;
+    float phi[MOST_POSITIONS];
+    int count = plan.samples / 4;
+    if (plan.difference) {
+        const f16 octaves_tolerated = vlog2((f16)(tolerated > LEAST ? tolerated : LEAST));
+        for (int i = 0; i < count; i += 16) {
+            const f16 octaves = vlog2(vmax(load<f16>(power + i), (f16)LEAST)) - octaves_tolerated;
+            store(phi + i, clamped(octaves * 0.125f, -1.0f, 1.0f));
+        }
+    } else
+        for (int i = 0; i < count; i += 16) {
+            const f16 p = load<f16>(power + i);
+            store(phi + i, (p - tolerated) / (p + tolerated));
+        }
+    for (; count > elements; count /= 4)
+        by_lanes(count / 4, [&](int i, auto lanes) {
+            const auto four = fours<decltype(lanes)>(phi + 4 * i);
+            store(phi + i, ((four.a + four.b) + (four.c + four.d)) * 0.25f);
+        });
+    const int repeat = elements / count;
+    if (repeat == 1)
+        __builtin_memcpy(out, phi, sizeof(float) * count);
+    else
+        for (int i = 0; i < count; ++i) {
+            for (int k = 0; k < repeat; k += 4) store(out + i * repeat + k, (f4)phi[i]);
+        }
+}
+
+// One framelet. Its past state must not be where the new one goes.
+//
+// Returns whether all samples are numbers that count; otherwise nothing but the colours has been written.
+template <class Plan>
+inline bool observe(const Plan& plan, const float* color, const float* past, float* kept_color, float* kept_state,
+                    float* errors_s, float* errors_t, int elements) {
+    float luminance[MOST_SAMPLES], power_s[MOST_OCTAVE_POSITIONS + 15], power_t[MOST_OCTAVE_POSITIONS + 15];
+    i16 good = ~(i16)0;
+    for (int i = 0; i < plan.samples; i += 16)
+        store(luminance + i, compressed(luminance_of(color + 3 * i, kept_color + 3 * i, plan.radiance_max, good)));
+    if (bits(good) != ALL) return false;
+    transform(plan, luminance, past, kept_state, power_s, power_t);
+    scatter(plan, power_s, plan.template_spatial, errors_s, elements);
+    if (past) scatter(plan, power_t, plan.template_temporal, errors_t, elements);
+    return true;
+}
+
+// Positions of the samples of a tile: its corner and the offsets `centre`, in tile widths, turned into image widths.
+inline void place(long long level, long long index, int samples, const float* centre, float* position) {
+    long long x = 0, y = 0;
+    for (int bit = 0; bit < level; ++bit) {
+        x |= ((index >> (2 * bit)) & 1) << bit;
+        y |= ((index >> (2 * bit + 1)) & 1) << bit;
+    }
+    const f4 corner = {(float)x, (float)y, (float)x, (float)y};
+    const f16 corners = __builtin_shufflevector(corner, corner, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
+    const float width = 1.0f / (float)(1ll << level);
+    for (int i = 0; i < 2 * samples; i += 16) store(position + i, (corners + load<f16>(centre + i)) * width);
+}
+
+inline void fetch_ahead(const void* from, int bytes) {
+    for (int at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)from + at);
+}
+inline void own_ahead(const void* to, int bytes) {
+    for (int at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)to + at, 1);
+}
+
+// A batch of framelets. Rows marked in `pending` are done, unless a sample is not a number that counts: these stay
+// marked. Returns how many.
+//
+// The cache is larger than the processor's: what a row reads and writes there is asked for while the row before is
+// computed.
+template <class Plan, class Cache>
+inline int observe_batch(const Plan& plan, const Cache& cache, int count, const long long* level, const long long* index,
+                         const float* color, const long long* slot, const float* const* past, unsigned char* pending,
+                         float* errors_s, float* errors_t) {
+    const long long samples = plan.samples, state = plan.state;
+    float *cached_color = (float*)cache.color, *cached_state = (float*)cache.coefficients;
+    int left = 0;
+    for (int row = 0; row < count; ++row) {
+        if (row + 1 < count) {
+            if (past[row + 1]) fetch_ahead(past[row + 1], 4 * (int)state);
+            own_ahead(cached_state + state * slot[row + 1], 4 * (int)state);
+            own_ahead(cached_color + 3 * samples * slot[row + 1], 12 * (int)samples);
+        }
+        if (!pending[row]) continue;
+        const int shift = 2 * (plan.field_level - (int)level[row]);
+        const long long first = index[row] << shift;
+        const bool done = observe(plan, color + 3 * samples * row, past[row], cached_color + 3 * samples * slot[row],
+                                  cached_state + state * slot[row], errors_s + first, errors_t + first, 1 << shift);
+        pending[row] = !done;
+        left += !done;
+    }
+    return left;
+}
+
+}  // namespace framelets

@@ -1,0 +1,20 @@
+"""What a module of kernels needs to call the C++ in ``native/``, which Warp's own compiler builds with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+_NATIVE = Path(__file__).resolve().parent / "native"
+
+
+def module_options(*headers: str) -> dict[str, Any]:
+    """Options of a Warp module whose kernels call functions of these headers."""
+    build = wp.ModuleBuildOptions(
+        extra_cpu_include_dirs=[str(_NATIVE)],
+        extra_cpu_preamble="".join(f'#include "{header}"\n' for header in headers),
+        extra_build_dependencies=[str(header) for header in sorted(_NATIVE.glob("*.h"))],
+    )
+    return {"enable_backward": False, "extra_build_options": build}

@@ -1,0 +1,41 @@
+"""What a rendered batch tells: its errors; its colours and wavelet states go into the cache."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.cache import FrameletCache
+from tsar.clock import StageTimer
+from tsar.config import TsarConfig
+from tsar.error import estimate
+from tsar.types import Errors, FrameletBatch
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Errors on the field, and how many samples were not finite."""
+
+    errors: Errors
+    nonfinite: int
+
+
+def observe(
+    batch: FrameletBatch,
+    color: Float[Tensor, "n samples 3"],
+    cache: FrameletCache,
+    config: TsarConfig,
+    stage: StageTimer,
+) -> Observation:
+    """Errors of a batch by :func:`tsar.error.estimate`, and the batch into the cache, in place.
+
+    Args:
+        stage: takes the times of ``error`` and ``cache``.
+    """
+    with stage("error"):
+        found = estimate(batch, color, cache, config)
+    with stage("cache"):
+        cache.insert(batch, found.color, found.coefficients)
+    return Observation(found.errors, found.nonfinite)
