@@ -67,6 +67,6 @@ class Turns:
 
 def synthetic_trace(batch: FrameletBatch) -> SampleBatch:
     """Ripples that run over the picture: enough for densities to move, at next to no cost."""
-    phase = 40.0 * batch.position[..., 0] * batch.position[..., 1] + 6.0 * batch.time_s.to(torch.float32)
+    phase = 40.0 * batch.position[..., 0] * batch.position[..., 1] + 6.0 * batch.times.to(torch.float32)
     value = 0.5 + 0.5 * torch.sin(phase)
     return SampleBatch(value[..., None].expand(*value.shape, 3), {"primary_rays": value.numel()})

@@ -102,21 +102,17 @@ def morton_batches(options: BenchOptions, duration_s: float) -> list[FrameletBat
         index = torch.arange(number, 4**level, number_of)
         corner = torch.stack(deinterleave(index), dim=1)
         position = ((corner[:, None, :] + offset) * 0.5**level).to(torch.float32)
-        time_s = torch.full(position.shape[:2], duration_s * (number + 0.5) / number_of, dtype=torch.float64)
+        time_s = duration_s * (number + 0.5) / number_of
         batches.append(FrameletBatch(torch.full_like(index, level), index, position, time_s))
     return batches
 
 
 def in_rows(batch: FrameletBatch) -> FrameletBatch:
-    """The same samples in the order of reading: row by row across all tiles of the batch."""
+    """The same samples, of one time, in the order of reading: row by row across all tiles of the batch."""
     flat = batch.position.reshape(-1, 2)
     order = torch.argsort(flat[:, 0], stable=True)
     order = order[torch.argsort(flat[order, 1], stable=True)]
-    return replace(
-        batch,
-        position=flat[order].reshape(batch.position.shape),
-        time_s=batch.time_s.reshape(-1)[order].reshape(batch.time_s.shape),
-    )
+    return replace(batch, position=flat[order].reshape(batch.position.shape))
 
 
 def camera_rays(batch: FrameletBatch) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -26,7 +26,7 @@ def _tracing(trace: Trace, batches: list[FrameletBatch]) -> Callable[[], object]
 
 
 def _samples(batches: list[FrameletBatch]) -> float:
-    return sum(batch.time_s.numel() for batch in batches) / 1e6
+    return sum(batch.times.numel() for batch in batches) / 1e6
 
 
 def cores(options: BenchOptions, bars: Bars) -> Iterator[Row]:

@@ -41,24 +41,23 @@ class PacketBatches:
         self._threads, self._pool, self._lock = threads, pool, threading.Lock()
         self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
 
-    def shade(self, position: Tensor, time_s: Tensor, single_time_s: float | None) -> tuple[Tensor, int, int]:
+    def shade(self, position: Tensor, time_s: Tensor | float) -> tuple[Tensor, int, int]:
         """Colours ``(k, 3)`` float32, and how many shadow rays and reflections they took.
 
         Args:
             position: ``(k, 2)`` float32 on the image plane.
-            time_s: ``(k,)`` animation times.
-            single_time_s: the time of all samples, where they have but one.
+            time_s: ``(k,)`` animation times, or one for all samples.
         """
         color = torch.empty(len(position), 3)
         with self._lock:
             self._taken[:], self._rays[:] = 0, 0
             command, times = self._moving, 0
-            if single_time_s is None:
+            if isinstance(time_s, Tensor):
                 time_s = time_s.to(torch.float64).contiguous()
                 times = address(time_s)
             else:
                 command = self._still
-                self._pose(single_time_s)
+                self._pose(time_s)
             arrays = address(position), times, address(color), self._rays.ctypes.data
             command.set(self._taken.ctypes.data, len(position), *arrays)
             others = [self._pool.submit(command.launch) for _ in range(self._threads - 1)] if self._pool else []

@@ -6,6 +6,7 @@ they hand the work to those: solvers other than ``waterfill``, and batches with 
 
 from __future__ import annotations
 
+import time
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,20 +16,22 @@ from torch import Tensor
 from renderer import control_kernels as kernels
 from renderer import device as devices
 from renderer import display_kernels
-from renderer.control_cache import CacheView
+from renderer.control_cache import CacheView, ClaimMemory
 from renderer.control_estimate import ErrorPlan
 from renderer.control_response import COLUMNS, ResponsePlan
+from renderer.control_selection import SelectionPlan
 from renderer.display import Display
 from renderer.launching import Command, address, require_same
 from tsar.accounting import FAST_REFRESH, Account
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import StagesName, TsarConfig
+from tsar.decision import Decision
 from tsar.error import RADIANCE_MAX, replace_nonfinite, template_power
 from tsar.haar import octave_count, state_size
 from tsar.morton import deinterleave
 from tsar.observation import Observation
-from tsar.response import respond as reference_respond
+from tsar.response import respond
 from tsar.selection import Request, cell_centres
 from tsar.stages import REFERENCE, Stages
 from tsar.tiling import split_bounds, tie_order
@@ -50,12 +53,9 @@ def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
     """Kernels throughout, but for the response where its solver is not compiled."""
     devices.load_kernels((kernels, display_kernels), "cpu")
     control, display = Control(config), Display(config, threads)
-    compiled_solver = config.response.solver == "waterfill"
     return Stages(
-        request=control.request,
         observe=control.observe,
-        respond=control.respond if compiled_solver else reference_respond,
-        build=control.build,
+        decide=control.decide,
         reconstruct=display.reconstruct,
         account=control.account,
     )
@@ -73,33 +73,15 @@ class Control:
         self.config = config
         self._elements = config.sdf_side**2
         self._most_tiles = 4**config.level_min + 3 * split_bounds(config)[1]
-        self._prepare_selection()
+        self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
+        self._scratch = kernels.Scratch()
+        self._scratch.value, self._scratch.key = map(address, self._ranks)
         self._prepare_observation()
-        self._prepare_response()
-        self._prepare_tiling()
+        self._prepare_decision()
         self._parts = _part_of_element(config)
         self._sums = np.zeros(2)
         fixed = self._elements, FAST_REFRESH, address(self._parts), self._sums.ctypes.data
         self._account = Command(kernels.take_account, *fixed)
-
-    def request(
-        self,
-        tiling: Tiling,
-        temporal_density: Tensor,
-        history: Tensor,
-        time_s: float,
-        cycle: int,
-        config: TsarConfig,
-    ) -> Request:
-        """As :func:`tsar.selection.request`."""
-        require_same(config, self.config)
-        count, samples = config.batch_size, config.samples
-        selected, level, index = (torch.empty(count, dtype=torch.int64) for _ in range(3))
-        credit, position = torch.empty(self._elements, dtype=torch.float64), torch.empty(count, samples, 2)
-        times = torch.empty_strided((count, samples), (0, 0))  # one number in memory
-        given = tiling.level, tiling.index, temporal_density, history, credit, selected, level, index, position
-        self._request(tiling.tile_count, time_s, *map(address, given), times.data_ptr())
-        return Request(selected, credit, FrameletBatch(level, index, position, times, cycle=cycle, seed=config.seed))
 
     def observe(
         self, batch: FrameletBatch, color: Tensor, cache: FrameletCache, config: TsarConfig, stage: StageTimer
@@ -108,101 +90,114 @@ class Control:
         after the others.
 
         The slots are chosen first, so that colours and wavelet states can go straight there.
+
+        Raises:
+            ValueError: if the batch is larger than the configuration's.
         """
-        with stage("cache"):
-            claim, observe = self._commands(cache)
-            slot = self._claim(batch, claim)
-        with stage("error"):
-            if color.dtype != torch.float32 or not color.is_contiguous():
-                color = color.to(torch.float32).contiguous()
-            spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
-            count, nonfinite = slot.shape[0], 0
-            given = list(map(address, (batch.level, batch.index, slot, spatial, temporal)))
-            observe(0, count, address(color), *given)
-            if self._left[0]:
-                color, nonfinite = replace_nonfinite(color, config.framelet_side)
-                observe(1, count, address(color), *given)
+        require_same(config, self.config)
+        start = time.perf_counter()
+        count, nonfinite = batch.level.shape[0], 0
+        if count > config.batch_size:
+            raise ValueError(f"batch: expected at most {config.batch_size} framelets, got {count}")
+        times = self._times_of(batch)
+        if color.dtype != torch.float32 or not color.is_contiguous():
+            color = color.to(torch.float32).contiguous()
+        launch = self._observing(cache)
+        spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
+        tiles = address(batch.level), address(batch.index), times
+        fields = address(spatial), address(temporal)
+        launch(0, count, *tiles, address(color), *fields)
+        if self._left[0]:
+            color, nonfinite = replace_nonfinite(color, config.framelet_side)
+            launch(1, count, *tiles, address(color), *fields)
+        begun, claimed, done = self._observed.tolist()
+        stage.divide(time.perf_counter() - start, {"error": done - claimed, "cache": claimed - begun})
         return Observation(Errors(spatial, temporal), nonfinite)
 
-    def respond(self, densities: Densities, errors: Errors, config: TsarConfig) -> Densities:
-        """As :func:`tsar.response.respond`."""
-        spatial, temporal = (torch.empty(self._elements, dtype=torch.float64) for _ in range(2))
-        signed = _single(errors.spatial), _single(errors.temporal)
-        given = densities.spatial, densities.temporal, *signed, spatial, temporal
-        self._respond(densities.surplus, *map(address, given))
-        return Densities(spatial, temporal, float(self._surplus[0]))
-
-    def build(self, spatial_density: Tensor, config: TsarConfig) -> Tiling:
-        """As :func:`tsar.tiling.build`."""
+    def decide(
+        self, densities: Densities, errors: Errors, history: Tensor, config: TsarConfig, stage: StageTimer
+    ) -> Decision:
+        """As :func:`tsar.decision.decide`; responses by other solvers than ``waterfill`` are the reference's."""
+        require_same(config, self.config)
+        compiled = config.response.solver == "waterfill"
+        if not compiled:
+            with stage("response"):
+                densities = respond(densities, errors, config)
+        start = time.perf_counter()
+        count, samples = config.batch_size, config.samples
+        spatial, temporal, surplus = densities.spatial, densities.temporal, densities.surplus
+        if compiled:
+            spatial, temporal = (torch.empty(self._elements, dtype=torch.float64) for _ in range(2))
         level, index = (torch.empty(self._most_tiles, dtype=torch.int64) for _ in range(2))
-        self._build(*map(address, (spatial_density, level, index)))
-        count = int(self._tile_count[0])
-        if count == 0:
-            raise ValueError("tiling.build: expected finite, non-negative densities")
-        return Tiling(level[:count], index[:count])
+        selected, due_level, due_index = (torch.empty(count, dtype=torch.int64) for _ in range(3))
+        credit, position = torch.empty(self._elements, dtype=torch.float64), torch.empty(count, samples, 2)
+        signed = _single(errors.spatial), _single(errors.temporal)
+        given = densities.spatial, densities.temporal, *signed, spatial, temporal, level, index, history
+        due = selected, credit, due_level, due_index, position
+        self._decide(int(compiled), surplus, *map(address, (*given, *due)))
+        tiles = int(self._tile_count[0])
+        if tiles == 0:
+            raise ValueError("tiling: expected finite, non-negative densities")
+        if compiled:
+            surplus = float(self._surplus[0])
+        tiling = Tiling(level.resize_(tiles), index.resize_(tiles))
+        request = Request(selected, credit, due_level, due_index, position)
+        begun, responded, tiled, done = self._decided.tolist()
+        shares = {"response": responded - begun, "tiling": tiled - responded, "selection": done - tiled}
+        stage.divide(time.perf_counter() - start, shares)
+        return Decision(Densities(spatial, temporal, surplus), tiling, request)
 
     def account(self, densities: Densities, newest_s: Tensor, config: TsarConfig) -> Account:
         """As :func:`tsar.accounting.account`."""
         self._account(*map(address, (densities.spatial, densities.temporal, newest_s)))
         return Account(*self._sums.tolist())
 
-    def _claim(self, batch: FrameletBatch, claim: Command) -> Tensor:
-        """Slots for a batch, which are its from now on."""
-        count, time_s = batch.level.shape[0], batch.time_s
-        if count > self.config.batch_size or time_s.dtype != torch.float32:
-            raise ValueError(
-                f"batch: expected at most {self.config.batch_size} framelets with times in float32, got {count} with "
-                f"{time_s.dtype}"
-            )
-        slot = torch.empty(count, dtype=torch.int64)
-        tiles = address(batch.level), address(batch.index)
-        claim(count, *tiles, time_s.data_ptr(), time_s.stride(0), address(slot))
-        return slot
+    def _times_of(self, batch: FrameletBatch) -> int:
+        """Address of the time of each framelet, that of its first sample."""
+        time_s = batch.time_s
+        self._times[: len(batch.level)] = time_s if isinstance(time_s, float) else batch.times[:, 0].numpy()
+        return self._times_address
 
-    def _commands(self, cache: FrameletCache) -> tuple[Command, Command]:
-        """Launches that know where a cache lies: one claims slots, one observes a batch."""
+    def _observing(self, cache: FrameletCache) -> Command:
+        """The launch that knows where a cache lies."""
         found = self._of_cache.get(cache)
         if found is None:
-            view = _cache_view(cache, self.config)
-            past, *memory = map(address, (self._past, self._spare, self._marks))
-            found = (
-                Command(kernels.claim_slots, view, self._scratch, past, *memory),
-                Command(kernels.observe_batch, self._error_plan, view, past, *self._progress),
-            )
-            self._of_cache[cache] = found
+            fixed = self._error_plan, _cache_view(cache, self.config), self._claim, self._scratch
+            found = self._of_cache[cache] = Command(kernels.observe_batch, *fixed, *self._progress)
         return found
 
-    def _prepare_selection(self) -> None:
-        config = self.config
-        self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
-        self._scratch = kernels.Scratch()
-        self._scratch.value, self._scratch.key = map(address, self._ranks)
-        self._centres = cell_centres(config.framelet_side)
-        sizes = config.batch_size, config.field_level, config.samples
-        self._request = Command(kernels.request_batch, self._scratch, *sizes, address(self._centres))
-
     def _prepare_observation(self) -> None:
-        config = self.config
-        self._of_cache: WeakKeyDictionary[FrameletCache, tuple[Command, Command]] = WeakKeyDictionary()
+        config, claim = self.config, ClaimMemory()
+        self._of_cache: WeakKeyDictionary[FrameletCache, Command] = WeakKeyDictionary()
         self._error_plan = _error_plan(config)
+        self._places = torch.empty(2, config.batch_size, dtype=torch.int64)
         self._spare = torch.empty(config.batch_size, state_size(config.samples))
         self._marks = torch.zeros(config.cache_slots, dtype=torch.bool)
-        self._past = torch.empty(config.batch_size, dtype=torch.int64)
+        claim.slot, claim.past = map(address, self._places)
+        claim.spare, claim.marks = address(self._spare), address(self._marks)
+        self._claim = claim
         self._pending, self._left = np.zeros(config.batch_size, np.uint8), np.zeros(1, np.int32)
-        self._progress = self._pending.ctypes.data, self._left.ctypes.data
+        self._times, self._observed = np.zeros(config.batch_size), np.zeros(3, np.int64)
+        self._times_address = self._times.ctypes.data
+        self._progress = tuple(array.ctypes.data for array in (self._pending, self._left, self._observed))
 
-    def _prepare_response(self) -> None:
-        self._surplus = np.zeros(1)
+    def _prepare_decision(self) -> None:
+        self._surplus, self._tile_count, self._decided = np.zeros(1), np.zeros(1, np.int32), np.zeros(4, np.int64)
+        results = (array.ctypes.data for array in (self._surplus, self._tile_count, self._decided))
+        plans = self._make_response_plan(), self._make_tiling_plan(), self._make_selection_plan()
+        self._decide = Command(kernels.decide_next, *plans, self._scratch, *results)
+
+    def _make_response_plan(self) -> ResponsePlan:
+        plan = _response_plan(self.config)
         self._active = torch.empty(self._elements, dtype=torch.int32)
         self._columns = torch.empty(COLUMNS, self._elements, dtype=torch.float64)
-        fixed = address(self._active), address(self._columns), self._surplus.ctypes.data
-        self._respond = Command(kernels.respond, _response_plan(self.config), *fixed)
+        plan.active, plan.columns = address(self._active), address(self._columns)
+        return plan
 
-    def _prepare_tiling(self) -> None:
+    def _make_tiling_plan(self) -> kernels.TilingPlan:
         config, plan = self.config, kernels.TilingPlan()
         low, high = config.level_min, config.level_max
         nodes = 4**config.field_level
-        self._tile_count = np.zeros(1, np.int32)
         self._order = tie_order(low, high) if high > low else torch.empty(0, dtype=torch.int64)
         self._nodes, self._node_keys = torch.empty(2, nodes, dtype=torch.float64)
         self._split = torch.empty(nodes, dtype=torch.uint8)
@@ -211,7 +206,14 @@ class Control:
         plan.threshold = config.tiling.threshold_samples
         plan.order, plan.sums = address(self._order), address(self._nodes)
         plan.key, plan.split = address(self._node_keys), address(self._split)
-        self._build = Command(kernels.build_tiling, plan, self._tile_count.ctypes.data)
+        return plan
+
+    def _make_selection_plan(self) -> SelectionPlan:
+        config, plan = self.config, SelectionPlan()
+        self._centres = cell_centres(config.framelet_side)
+        plan.batch, plan.field_level, plan.samples = config.batch_size, config.field_level, config.samples
+        plan.centre = address(self._centres)
+        return plan
 
 
 def _single(field: Tensor) -> Tensor:

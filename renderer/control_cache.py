@@ -24,6 +24,20 @@ class CacheView:
     slot_of_node: wp.uint64
 
 
+@wp.struct
+class ClaimMemory:
+    """Addresses of what a batch got in the cache, and of working memory."""
+
+    slot: wp.uint64
+    """Where each framelet goes."""
+    past: wp.uint64
+    """Address of the wavelet state of each tile's last framelet, 0 where there is none."""
+    spare: wp.uint64
+    """Room for the wavelet states of a batch: those whose slots are taken are saved there."""
+    marks: wp.uint64
+    """uint8, one a slot, all 0 between calls."""
+
+
 @wp.func_native("""
     const double* t = (const double*)cache.time_s;
     const unsigned char* gone = (const unsigned char*)cache.dead;
@@ -61,21 +75,21 @@ def list_victims(
 
 
 @wp.func_native("""
-    const long long *slots = (const long long*)slot, *l = (const long long*)level, *at = (const long long*)index;
+    const long long *slots = (const long long*)memory.slot, *l = (const long long*)level, *at = (const long long*)index;
     long long *cached_level = (long long*)cache.level, *cached_index = (long long*)cache.index;
     long long* newest = (long long*)cache.slot_of_node;
     const long long bytes = 4ll * cache.state;
-    unsigned char* taken = (unsigned char*)marks;  // all 0 between calls
+    unsigned char* taken = (unsigned char*)memory.marks;
     for (int row = 0; row < count; ++row) taken[slots[row]] = 1;
     for (int row = 0; row < count; ++row) {
         const long long last = newest[((1ll << (2 * l[row])) - 1) / 3 + at[row]];
         char* state = last < 0 ? nullptr : (char*)cache.coefficients + bytes * last;
         if (state && taken[last]) {  // another framelet's state is about to be written there
-            char* aside = (char*)spare + bytes * row;
+            char* aside = (char*)memory.spare + bytes * row;
             memcpy(aside, state, bytes);
             state = aside;
         }
-        ((char**)past)[row] = state;
+        ((char**)memory.past)[row] = state;
     }
     for (int row = 0; row < count; ++row) {
         taken[slots[row]] = 0;
@@ -86,31 +100,20 @@ def list_victims(
     for (int row = 0; row < count; ++row) {
         cached_level[slots[row]] = l[row];
         cached_index[slots[row]] = at[row];
-        ((double*)cache.time_s)[slots[row]] = (double)((const float*)time_s)[time_stride * row];
+        ((double*)cache.time_s)[slots[row]] = ((const double*)time_s)[row];
         ((unsigned char*)cache.dead)[slots[row]] = 0;
         newest[((1ll << (2 * l[row])) - 1) / 3 + at[row]] = slots[row];
     }
 """)
 def sign_over(
     cache: CacheView,
+    memory: ClaimMemory,
     count: wp.int32,
     level: Address,
     index: Address,
     time_s: Address,
-    time_stride: wp.int32,
-    slot: Address,
-    past: Address,
-    spare: Address,
-    marks: Address,
 ):
-    """Hands slots over to the tiles of a batch, and finds the wavelet state of each tile's last framelet.
-
-    Args:
-        time_s: of the first sample of the first framelet; ``time_stride`` is the distance to that of the next.
-        past: receives addresses of wavelet states, 0 where there is none.
-        spare: room for the states of a batch: those whose slots are taken are saved there.
-        marks: uint8, one a slot, all 0.
-    """
+    """Hands slots over to the tiles of a batch, and finds the wavelet state of each tile's last framelet."""
     ...
 
 

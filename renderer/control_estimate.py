@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.control_cache import CacheView
+from renderer.control_cache import CacheView, ClaimMemory
 from renderer.launching import Address
 
 
@@ -45,18 +45,18 @@ def start_observing(
 
 @wp.func_native("""
     return framelets::observe_batch(plan, cache, count, (const long long*)level, (const long long*)index,
-                                    (const float*)color, (const long long*)slot, (const float* const*)past,
-                                    (unsigned char*)pending, (float*)errors_spatial, (float*)errors_temporal);
+                                    (const float*)color, (const long long*)memory.slot,
+                                    (const float* const*)memory.past, (unsigned char*)pending,
+                                    (float*)errors_spatial, (float*)errors_temporal);
 """)
 def observe_framelets(
     plan: ErrorPlan,
     cache: CacheView,
+    memory: ClaimMemory,
     count: wp.int32,
     level: Address,
     index: Address,
     color: Address,
-    slot: Address,
-    past: Address,
     pending: Address,
     errors_spatial: Address,
     errors_temporal: Address,
@@ -64,7 +64,6 @@ def observe_framelets(
     """Errors of the framelets that are pending, and colours and wavelet states into their slots.
 
     Args:
-        past: where the wavelet state of each tile's last framelet lies, 0 where there is none.
         pending: uint8 flags; what remains set holds a sample that is not finite. Returns how many do.
     """
     ...

@@ -1,4 +1,4 @@
-"""Kernel entry points of the control stages: one launch a stage, each the recipe of its stage in ``tsar``.
+"""Kernel entry points of the control stages: two launches a cycle, each the recipe of its stages in ``tsar``.
 
 They run on the CPU, where a launch is one call on one thread; the passes they call are in C and C++.
 """
@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.control_cache import CacheView, choose_victims, sign_over
+from renderer.control_cache import CacheView, ClaimMemory, choose_victims, sign_over
 from renderer.control_estimate import ErrorPlan, observe_framelets, start_observing
 from renderer.control_ranking import count_above, kth_greatest, rank_keys
 from renderer.control_response import ResponsePlan, decide
-from renderer.control_selection import gather_credit, place_framelets, refresh_due
+from renderer.control_selection import Due, SelectionPlan, gather_credit, place_framelets, refresh_due
 from renderer.control_tiling import count_exceeding, emit_tiles, mark_splits, sum_account, sum_nodes
 from renderer.launching import Address
 from renderer.native_code import module_options
 
-wp.set_module_options(module_options("framelets.h", "response.h", "selection.h"))
+wp.set_module_options(module_options("framelets.h", "response.h", "selection.h", "ticks.h"))
 
 
 @wp.struct
@@ -46,112 +46,68 @@ class TilingPlan:
     split: wp.uint64
 
 
-@wp.kernel
-def request_batch(
-    scratch: Scratch,
-    batch: wp.int32,
-    field_level: wp.int32,
-    samples: wp.int32,
-    centre: Address,
-    tiles: wp.int32,
-    now_s: wp.float32,
-    level: Address,
-    index: Address,
-    temporal: Address,
-    history: Address,
-    credit: Address,
-    selected: Address,
-    level_out: Address,
-    index_out: Address,
-    position: Address,
-    time_s: Address,
-):
-    """The most overdue tiles, the credit that is left, and the request to the renderer."""
-    times = wp.array(ptr=time_s, shape=(1,), dtype=wp.float32)
-    times[0] = now_s
-    gather_credit(tiles, field_level, level, index, temporal, history, scratch.value, credit)
-    rank_keys(scratch.value, tiles, scratch.key)
-    threshold = kth_greatest(scratch.key, tiles, batch)
-    ties = batch - count_above(scratch.key, tiles, threshold)
-    refresh_due(tiles, field_level, level, index, scratch.value, scratch.key, threshold, ties, selected, credit)
-    place_framelets(batch, samples, centre, level, index, selected, level_out, index_out, position)
+@wp.func_native("return ticks::now();")
+def ticks() -> wp.int64:
+    """A count that grows with time."""
+    ...
 
 
-@wp.kernel
+@wp.func
 def claim_slots(
     cache: CacheView,
+    memory: ClaimMemory,
     scratch: Scratch,
-    past: Address,
-    spare: Address,
-    marks: Address,
     count: wp.int32,
     level: Address,
     index: Address,
     time_s: Address,
-    time_stride: wp.int32,
-    slot: Address,
 ):
     """Gives a batch its slots: of the dead framelets, oldest first, then of the oldest of the rest."""
-    choose_victims(cache, scratch.value, scratch.key, count, slot)
-    sign_over(cache, count, level, index, time_s, time_stride, slot, past, spare, marks)
+    choose_victims(cache, scratch.value, scratch.key, count, memory.slot)
+    sign_over(cache, memory, count, level, index, time_s)
 
 
 @wp.kernel
 def observe_batch(
     plan: ErrorPlan,
     cache: CacheView,
-    past: Address,
+    memory: ClaimMemory,
+    scratch: Scratch,
     pending: Address,
-    result: Address,
+    left: Address,
+    times: Address,
     again: wp.int32,
     count: wp.int32,
-    color: Address,
     level: Address,
     index: Address,
-    slot: Address,
+    time_s: Address,
+    color: Address,
     errors_spatial: Address,
     errors_temporal: Address,
 ):
-    """Errors of a batch, and the batch into its slots; ``again`` does what was left the last time.
+    """The batch into the cache, and its errors; ``again`` does what was left the last time.
 
-    ``result`` receives how many framelets hold a sample that is not finite, and are still pending.
+    ``left`` receives how many framelets hold a sample that is not finite and are still pending, ``times`` the ticks at
+    the start, after the slots were claimed, and at the end.
     """
+    clock = wp.array(ptr=times, shape=(3,), dtype=wp.int64)
+    clock[0] = ticks()
     if again == 0:
+        claim_slots(cache, memory, scratch, count, level, index, time_s)
         start_observing(plan, count, pending, errors_spatial, errors_temporal)
-    left = wp.array(ptr=result, shape=(1,), dtype=wp.int32)
-    left[0] = observe_framelets(
-        plan, cache, count, level, index, color, slot, past, pending, errors_spatial, errors_temporal
+    clock[1] = ticks()
+    result = wp.array(ptr=left, shape=(1,), dtype=wp.int32)
+    result[0] = observe_framelets(
+        plan, cache, memory, count, level, index, color, pending, errors_spatial, errors_temporal
     )
+    clock[2] = ticks()
 
 
-@wp.kernel
-def respond(
-    plan: ResponsePlan,
-    active: Address,
-    columns: Address,
-    result: Address,
-    surplus: wp.float64,
-    spatial: Address,
-    temporal: Address,
-    error_spatial: Address,
-    error_temporal: Address,
-    spatial_after: Address,
-    temporal_after: Address,
-):
-    """One control decision over the whole field; ``result`` receives the new surplus."""
-    surplus_after = wp.array(ptr=result, shape=(1,), dtype=wp.float64)
-    surplus_after[0] = decide(
-        plan, surplus, spatial, temporal, error_spatial, error_temporal, spatial_after, temporal_after, columns, active
-    )
-
-
-@wp.kernel
-def build_tiling(plan: TilingPlan, result: Address, density: Address, level: Address, index: Address):
-    """The tiling of a density field; ``result`` receives the number of tiles, 0 where the field is not a density."""
-    tiles = wp.array(ptr=result, shape=(1,), dtype=wp.int32)
-    tiles[0] = 0
+@wp.func
+def build_tiling(plan: TilingPlan, density: Address, level: Address, index: Address) -> wp.int32:
+    """The tiling of a density field. Returns the number of tiles, 0 where the field is not a density."""
     if sum_nodes(plan.field_level, plan.level_low, density, plan.sums) == 0:
-        return
+        return 0
     base, end = (wp.int32(1) << (2 * plan.level_low)) / 3, (wp.int32(1) << (2 * plan.level_high)) / 3
     nodes, values = end - base, plan.sums + Address(8 * base)
     splits = wp.max(count_exceeding(values, nodes, plan.threshold), plan.splits_least)
@@ -162,7 +118,76 @@ def build_tiling(plan: TilingPlan, result: Address, density: Address, level: Add
     if splits == 0:
         threshold = ~Address(0)
     mark_splits(nodes, plan.key, plan.order, threshold, ties, plan.split)
-    tiles[0] = emit_tiles(plan.level_low, plan.level_high, plan.split, level, index)
+    return emit_tiles(plan.level_low, plan.level_high, plan.split, level, index)
+
+
+@wp.func
+def request_batch(
+    plan: SelectionPlan,
+    scratch: Scratch,
+    tiles: wp.int32,
+    level: Address,
+    index: Address,
+    temporal: Address,
+    history: Address,
+    due: Due,
+):
+    """The most overdue tiles, the credit that is left, and where the samples lie."""
+    gather_credit(tiles, plan.field_level, level, index, temporal, history, scratch.value, due.history)
+    rank_keys(scratch.value, tiles, scratch.key)
+    threshold = kth_greatest(scratch.key, tiles, plan.batch)
+    ties = plan.batch - count_above(scratch.key, tiles, threshold)
+    refresh_due(tiles, plan.field_level, level, index, scratch.value, scratch.key, threshold, ties, due)
+    place_framelets(plan, level, index, due)
+
+
+@wp.kernel
+def decide_next(
+    response: ResponsePlan,
+    tiling: TilingPlan,
+    selection: SelectionPlan,
+    scratch: Scratch,
+    surplus_after: Address,
+    tile_count: Address,
+    times: Address,
+    responds: wp.int32,
+    surplus: wp.float64,
+    spatial_before: Address,
+    temporal_before: Address,
+    error_spatial: Address,
+    error_temporal: Address,
+    spatial: Address,
+    temporal: Address,
+    level: Address,
+    index: Address,
+    history: Address,
+    due_selected: Address,
+    due_history: Address,
+    due_level: Address,
+    due_index: Address,
+    due_position: Address,
+):
+    """New densities, unless they have been decided elsewhere, their tiling, and what is due in it.
+
+    ``surplus_after`` and ``tile_count`` receive what they say, the count 0 where the densities are not densities, and
+    ``times`` the ticks at the start and after each of the three.
+    """
+    clock = wp.array(ptr=times, shape=(4,), dtype=wp.int64)
+    clock[0] = ticks()
+    if responds == 1:
+        surplus_out = wp.array(ptr=surplus_after, shape=(1,), dtype=wp.float64)
+        surplus_out[0] = decide(
+            response, surplus, spatial_before, temporal_before, error_spatial, error_temporal, spatial, temporal
+        )
+    clock[1] = ticks()
+    count_out = wp.array(ptr=tile_count, shape=(1,), dtype=wp.int32)
+    tiles = build_tiling(tiling, spatial, level, index)
+    count_out[0] = tiles
+    clock[2] = ticks()
+    if tiles > 0:
+        due = Due(due_selected, due_history, due_level, due_index, due_position)
+        request_batch(selection, scratch, tiles, level, index, temporal, history, due)
+    clock[3] = ticks()
 
 
 @wp.kernel

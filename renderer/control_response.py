@@ -21,6 +21,10 @@ class ResponsePlan:
     """Normalised as combined density is."""
     shift: wp.float64
     """Factor by which a decision slides towards space: 2 to the bias."""
+    columns: wp.uint64
+    """Working memory: float64, ``COLUMNS`` for each element."""
+    active: wp.uint64
+    """Working memory: int32, one for each element."""
 
 
 COLUMNS = 8
@@ -30,7 +34,7 @@ COLUMNS = 8
 @wp.func_native("""
     return response::respond(plan, surplus, (const double*)spatial, (const double*)temporal,
                              (const float*)error_spatial, (const float*)error_temporal, (double*)spatial_after,
-                             (double*)temporal_after, (double*)columns, (int*)active);
+                             (double*)temporal_after, (double*)plan.columns, (int*)plan.active);
 """)
 def decide(
     plan: ResponsePlan,
@@ -41,8 +45,6 @@ def decide(
     error_temporal: Address,
     spatial_after: Address,
     temporal_after: Address,
-    columns: Address,
-    active: Address,
 ) -> wp.float64:
     """One control decision over the whole field. Returns the new surplus."""
     ...

@@ -8,6 +8,28 @@ import warp as wp
 from renderer.launching import Address
 
 
+@wp.struct
+class SelectionPlan:
+    """What of the configuration the selection depends on."""
+
+    batch: wp.int32
+    field_level: wp.int32
+    samples: wp.int32
+    centre: wp.uint64
+    """Address of the offsets of a tile's samples, in tile widths."""
+
+
+@wp.struct
+class Due:
+    """Addresses of a request's tensors."""
+
+    selected: wp.uint64
+    history: wp.uint64
+    level: wp.uint64
+    index: wp.uint64
+    position: wp.uint64
+
+
 @wp.func_native("""
     const long long *l = (const long long*)level, *at = (const long long*)index;
     for (int tile = 0; tile < tiles; ++tile) {
@@ -35,8 +57,8 @@ def gather_credit(
     const long long *l = (const long long*)level, *at = (const long long*)index;
     const unsigned long long* k = (const unsigned long long*)key;
     const double* mean = (const double*)overdue;
-    long long* chosen = (long long*)selected;
-    double* now = (double*)credit;
+    long long* chosen = (long long*)due.selected;
+    double* now = (double*)due.history;
     for (int tile = 0, out = 0; tile < tiles; ++tile) {
         if (k[tile] < threshold || (k[tile] == threshold && ties-- <= 0)) continue;
         chosen[out++] = tile;
@@ -54,33 +76,23 @@ def refresh_due(
     key: Address,
     threshold: wp.uint64,
     ties: wp.int32,
-    selected: Address,
-    credit: Address,
+    due: Due,
 ):
     """Tiles above the threshold, and the ``ties`` first of those at it; a refresh is taken off their credit."""
     ...
 
 
 @wp.func_native("""
-    const long long *chosen = (const long long*)selected, *l = (const long long*)level, *at = (const long long*)index;
-    long long *batch_level = (long long*)level_out, *batch_index = (long long*)index_out;
-    for (int row = 0; row < count; ++row) {
-        batch_level[row] = l[chosen[row]];
-        batch_index[row] = at[chosen[row]];
-        framelets::place(batch_level[row], batch_index[row], samples, (const float*)centre,
-                         (float*)position + 2ll * samples * row);
+    const long long *l = (const long long*)level, *at = (const long long*)index;
+    const long long* chosen = (const long long*)due.selected;
+    long long *due_level = (long long*)due.level, *due_index = (long long*)due.index;
+    for (int row = 0; row < plan.batch; ++row) {
+        due_level[row] = l[chosen[row]];
+        due_index[row] = at[chosen[row]];
+        framelets::place(due_level[row], due_index[row], plan.samples, (const float*)plan.centre,
+                         (float*)due.position + 2ll * plan.samples * row);
     }
 """)
-def place_framelets(
-    count: wp.int32,
-    samples: wp.int32,
-    centre: Address,
-    level: Address,
-    index: Address,
-    selected: Address,
-    level_out: Address,
-    index_out: Address,
-    position: Address,
-):
+def place_framelets(plan: SelectionPlan, level: Address, index: Address, due: Due):
     """The tiles of a batch, and the positions of its samples."""
     ...

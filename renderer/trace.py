@@ -123,7 +123,7 @@ class Renderer:
         """Shades the samples of a batch; those of one row are a group, over which secondary rays are spread.
 
         Args:
-            batch: positions ``(n, samples, 2)`` and times ``(n, samples)``.
+            batch: positions ``(n, samples, 2)``, and times ``(n, samples)`` or one for all.
             aspect: width over height of the image.
             footprint_px: pixels along its shorter axis that textures are filtered for, by default
                 ``footprint_resolution_px``.
@@ -135,16 +135,19 @@ class Renderer:
             ValueError: if the shapes do not fit or a time is not finite.
         """
         shape = tuple(batch.position.shape)
-        if len(shape) != 3 or shape[2] != 2 or tuple(batch.time_s.shape) != shape[:2]:
-            raise ValueError(
-                f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and "
-                f"{tuple(batch.time_s.shape)}"
-            )
+        time_s = batch.time_s
+        times = tuple(time_s.shape) if isinstance(time_s, Tensor) else shape[:2]
+        if len(shape) != 3 or shape[2] != 2 or times != shape[:2]:
+            raise ValueError(f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and {times}")
         if not 0.0 < aspect < math.inf:
             raise ValueError(f"aspect: expected a positive number, got {aspect}")
         footprint_px = footprint_px or self.footprint_resolution_px
         color, counters = self._shade(
-            batch.position.reshape(-1, 2), batch.time_s.reshape(-1), shape[1], aspect, footprint_px
+            batch.position.reshape(-1, 2),
+            time_s.reshape(-1) if isinstance(time_s, Tensor) else time_s,
+            shape[1],
+            aspect,
+            footprint_px,
         )
         return SampleBatch(color.reshape(*shape[:2], 3), counters)
 
@@ -187,7 +190,7 @@ class Renderer:
             self._pool.shutdown()
 
     def _shade(
-        self, position: Tensor, time_s: Tensor, group_size: int, aspect: float, footprint_px: float
+        self, position: Tensor, time_s: Tensor | float, group_size: int, aspect: float, footprint_px: float
     ) -> tuple[Tensor, dict[str, int]]:
         """Colours ``(k, 3)`` and ray counts of flat lists of samples, in groups of ``group_size``."""
         count, home = position.shape[0], position.device
@@ -198,17 +201,19 @@ class Renderer:
         earliest, latest = _bounds(time_s)
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
-        single_time_s = earliest if earliest == latest else None
+        if earliest == latest:
+            time_s = earliest
         if self.packets:
             batches = self._packet_batches(aspect, footprint_px)
-            color, shadow, reflection = batches.shade(position, time_s, single_time_s)
+            color, shadow, reflection = batches.shade(position, time_s)
             totals = [shadow, reflection, 0]
         else:
             color = torch.empty(count, 3, device=target)
             rays = torch.empty(count, 3, dtype=torch.int32, device=target)
             view = self._view(aspect, footprint_px)
-            if single_time_s is not None:
-                self._pose(view, single_time_s)
+            if not isinstance(time_s, Tensor):
+                self._pose(view, time_s)
+                time_s = torch.full((count,), time_s, dtype=torch.float64)
             shared = (
                 group_size,
                 wp.from_torch(position, dtype=wp.vec2),
@@ -282,9 +287,9 @@ class Renderer:
 # On the host by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours.
 
 
-def _bounds(time_s: Tensor) -> tuple[float, float]:
-    if not any(time_s.stride()):  # one number for all
-        time_s = time_s.flatten()[:1] if time_s.dim() < 2 else time_s[:1, :1]
+def _bounds(time_s: Tensor | float) -> tuple[float, float]:
+    if not isinstance(time_s, Tensor):
+        return time_s, time_s
     values = time_s.numpy() if time_s.device.type == "cpu" else time_s
     return float(values.min()), float(values.max())
 

@@ -68,7 +68,7 @@ class FrameletCache:
         self.coefficients[slot] = coefficients
         self.level[slot] = batch.level
         self.index[slot] = batch.index
-        self.time_s[slot] = batch.time_s[:, 0].to(torch.float64)
+        self.time_s[slot] = batch.times[:, 0].to(torch.float64)
         self.dead[slot] = False
         self.slot_of_node[_node_id(batch.level, batch.index)] = slot
         return slot

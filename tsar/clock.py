@@ -50,6 +50,12 @@ class StageTimer:
         finally:
             self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
 
+    def divide(self, seconds: float, shares: Mapping[str, float]) -> None:
+        """Adds a span that stages have in common, to each its share; the shares need not add up to one."""
+        whole = sum(shares.values()) or 1.0
+        for stage, share in shares.items():
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + seconds * share / whole
+
     @property
     def total(self) -> float:
         return sum(self.seconds.values())

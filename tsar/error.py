@@ -77,7 +77,9 @@ def compressed_luminance(color: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n"]:
     The shoulder keeps one very bright sample from saturating a whole tile; the root spreads dark tones about as a
     display's encoding does. Negative luminance counts as black.
     """
-    luminance = (color @ torch.tensor(_REC709, dtype=color.dtype)).clamp(min=0.0)
+    # no matrix product: some libraries round it differently by the number of threads
+    red, green, blue = (share * part for share, part in zip(_REC709, color.unbind(-1), strict=True))
+    luminance = (red + green + blue).clamp(min=0.0)
     return torch.sqrt(luminance / (1.0 + luminance))
 
 

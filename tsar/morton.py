@@ -112,8 +112,10 @@ def tile_integral(
 def tile_mean(
     field: Float[Tensor, " e"], level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], field_level: int
 ) -> Float[Tensor, " n"]:
-    """Mean of the field over each tile, by way of the means of all nodes of the quadtree: tiles of equal elements come
-    out as equal, which differences of a prefix sum would not be. One pass a level.
+    """Mean of the field over each tile, by way of the means of all nodes of the quadtree, one pass a level.
+
+    Deviation: not from a prefix sum, as sec. 4.1.5 has it. Tiles of equal elements come out as equal, which differences
+    of a prefix sum do not, and the sums of several nodes can be made side by side.
     """
     found = torch.empty(level.shape, dtype=field.dtype)
     for node_level in range(field_level, -1, -1):

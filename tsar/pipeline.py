@@ -1,4 +1,4 @@
-"""The pipeline as a recipe: select, render, estimate, cache, respond, re-tile, reconstruct.
+"""The pipeline as a recipe: render, estimate, cache, respond, re-tile, select, reconstruct.
 
 Contains no mathematics; every stage is a function of its own module.
 
@@ -10,16 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from jaxtyping import Float, Int64
-from torch import Tensor
-
 from tsar.accounting import Account
 from tsar.cache import FrameletCache
 from tsar.clock import CycleSeconds, StageTimer, checked
 from tsar.config import TsarConfig
 from tsar.reconstruction import Reconstruction
 from tsar.response import initial_densities
-from tsar.selection import initial_history
+from tsar.selection import Request, initial_history, request
 from tsar.stages import REFERENCE, Stages
 from tsar.tiling import build
 from tsar.types import Densities, Display, Errors, SampleBatch, StepRecord, Tiling, Trace
@@ -32,9 +29,9 @@ LATENCY_CYCLES = 3
 class State:
     """What one cycle hands to the next. Frozen, but the cache within changes in place."""
 
-    tiling: Tiling
     densities: Densities
-    history: Float[Tensor, " e"]
+    tiling: Tiling
+    due: Request
     cache: FrameletCache
 
 
@@ -42,7 +39,6 @@ class State:
 class Outcome:
     """What one cycle produced, beside the next state."""
 
-    selected: Int64[Tensor, " b"]
     samples: SampleBatch
     errors: Errors
     nonfinite: int
@@ -51,9 +47,11 @@ class Outcome:
 
 
 def initial_state(config: TsarConfig) -> State:
-    """A uniform field, its tiling and an empty cache."""
+    """A uniform field, its tiling, what is due at first, and an empty cache."""
     densities = initial_densities(config)
-    return State(build(densities.spatial, config), densities, initial_history(config), FrameletCache(config))
+    tiling = build(densities.spatial, config)
+    due = request(tiling, densities.temporal, initial_history(config), config)
+    return State(densities, tiling, due, FrameletCache(config))
 
 
 def step(
@@ -68,18 +66,15 @@ def step(
     """One cycle at animation time ``time_s``; ``cycle_s`` is the length of the last cycle, the unit of age."""
     stage = StageTimer()
     with stage("selection"):
-        due = stages.request(state.tiling, state.densities.temporal, state.history, time_s, cycle, config)
+        batch = state.due.at(time_s, cycle, config)
     with stage("tracing"):
-        samples = trace(due.batch)
-    observed = stages.observe(due.batch, samples.color, state.cache, config, stage)
-    with stage("response"):
-        densities = stages.respond(state.densities, observed.errors, config)
-    with stage("tiling"):
-        tiling = stages.build(densities.spatial, config)
+        samples = trace(batch)
+    observed = stages.observe(batch, samples.color, state.cache, config, stage)
+    decided = stages.decide(state.densities, observed.errors, state.due.history, config, stage)
     with stage("reconstruction"):
         image = stages.reconstruct(state.cache, config, cycle_s)
-    after = State(tiling, densities, due.history, state.cache)
-    return after, Outcome(due.selected, samples, observed.errors, observed.nonfinite, image, stage)
+    after = State(decided.densities, decided.tiling, decided.due, state.cache)
+    return after, Outcome(samples, observed.errors, observed.nonfinite, image, stage)
 
 
 def run(
@@ -140,7 +135,7 @@ def _record(
         sim_time_s=time_s,
         cost_s=cycle_s,
         tiling=before.tiling,
-        selected=outcome.selected,
+        selected=before.due.selected,
         densities=after.densities,
         errors=outcome.errors,
         surplus=surplus,

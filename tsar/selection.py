@@ -20,11 +20,23 @@ from tsar.types import FrameletBatch, Tiling
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be rendered: tiles by their number in the tiling, the credit left on the field, and the batch."""
+    """What is to be rendered next.
+
+    Attributes:
+        selected: tiles by their number in the tiling.
+        history: credit that is left on the field.
+        level, index, position: as in :class:`tsar.types.FrameletBatch`.
+    """
 
     selected: Int64[Tensor, " b"]
     history: Float[Tensor, " e"]
-    batch: FrameletBatch
+    level: Int64[Tensor, " b"]
+    index: Int64[Tensor, " b"]
+    position: Float[Tensor, "b samples 2"]
+
+    def at(self, time_s: float, cycle: int, config: TsarConfig) -> FrameletBatch:
+        """The request to the renderer: every sample of the batch at one animation time."""
+        return FrameletBatch(self.level, self.index, self.position, time_s, cycle=cycle, seed=config.seed)
 
 
 def initial_history(config: TsarConfig) -> Float[Tensor, " e"]:
@@ -77,28 +89,10 @@ def sample_positions(level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], sid
     return (corner[:, None, :] + cell_centres(side)) * width[:, None, None]
 
 
-def make_batch(
-    tiling: Tiling, selected: Int64[Tensor, " b"], time_s: float, cycle: int, config: TsarConfig
-) -> FrameletBatch:
-    """The request to the renderer: every sample of the batch at one animation time."""
-    level, index = tiling.level[selected], tiling.index[selected]
-    position = sample_positions(level, index, config.framelet_side)
-    return FrameletBatch(level, index, position, one_time(time_s, position), cycle=cycle, seed=config.seed)
-
-
-def one_time(time_s: float, position: Float[Tensor, "n samples 2"]) -> Float[Tensor, "n samples"]:
-    """The same time for all samples: one number in memory, however many they are."""
-    return torch.full((1, 1), time_s).expand(position.shape[:2])
-
-
 def request(
-    tiling: Tiling,
-    temporal_density: Float[Tensor, " e"],
-    history: Float[Tensor, " e"],
-    time_s: float,
-    cycle: int,
-    config: TsarConfig,
+    tiling: Tiling, temporal_density: Float[Tensor, " e"], history: Float[Tensor, " e"], config: TsarConfig
 ) -> Request:
-    """The most overdue tiles as a request to the renderer: :func:`select` and :func:`make_batch`."""
+    """The most overdue tiles by :func:`select`, and where their samples lie."""
     selected, credit = select(tiling, temporal_density, history, config)
-    return Request(selected, credit, make_batch(tiling, selected, time_s, cycle, config))
+    level, index = tiling.level[selected], tiling.index[selected]
+    return Request(selected, credit, level, index, sample_positions(level, index, config.framelet_side))

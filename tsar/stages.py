@@ -16,33 +16,27 @@ from tsar.accounting import Account, account
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
+from tsar.decision import Decision, decide
 from tsar.observation import Observation, observe
 from tsar.reconstruction import Reconstruction, reconstruct
-from tsar.response import respond
-from tsar.selection import Request, request
-from tsar.tiling import build
-from tsar.types import Densities, Errors, FrameletBatch, Tiling
+from tsar.types import Densities, Errors, FrameletBatch
 
 Field = Float[Tensor, " e"]
 
 
 @dataclass(frozen=True)
 class Stages:
-    """One function a stage; arguments and results are those of the reference, which is the default.
+    """One function a group of stages; arguments and results are those of the reference, which is the default.
 
     Attributes:
-        request: which tiles are due, and the request to the renderer.
         observe: errors of a batch; its colours and wavelet states into the cache, in place.
-        respond: new densities.
-        build: new tiling.
+        decide: new densities, their tiling, and what is due in it.
         reconstruct: image; flags dead framelets in the cache, in place.
         account: sums for the record of the cycle.
     """
 
-    request: Callable[[Tiling, Field, Field, float, int, TsarConfig], Request] = request
     observe: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig, StageTimer], Observation] = observe
-    respond: Callable[[Densities, Errors, TsarConfig], Densities] = respond
-    build: Callable[[Field, TsarConfig], Tiling] = build
+    decide: Callable[[Densities, Errors, Field, TsarConfig, StageTimer], Decision] = decide
     reconstruct: Callable[[FrameletCache, TsarConfig, float], Reconstruction] = reconstruct
     account: Callable[[Densities, Tensor, TsarConfig], Account] = account
 

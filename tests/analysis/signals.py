@@ -29,5 +29,5 @@ def separable(side: int, frames: int, f_s: int, f_t: int) -> torch.Tensor:
 def disk(batch: FrameletBatch) -> SampleBatch:
     """A disk that crosses the picture to the right, on a gradient."""
     x, y = batch.position.double().unbind(-1)
-    inside = (x - 0.5 * batch.time_s).square() + (y - 0.5).square() < 0.01
+    inside = (x - 0.5 * batch.times).square() + (y - 0.5).square() < 0.01
     return SampleBatch((inside + 0.2 * y).float()[..., None].expand(*x.shape, 3))

@@ -10,7 +10,8 @@ def tracer(picture):
 
     def trace(batch: FrameletBatch) -> SampleBatch:
         x, y = batch.position.unbind(-1)
-        color = picture(x, y, batch.time_s).to(torch.float32)
+        times = batch.times.to(torch.float32).contiguous()
+        color = picture(x, y, times).to(torch.float32)
         return SampleBatch(color, {"primary_rays": int(x.numel())})
 
     return trace

@@ -12,16 +12,19 @@ from hypothesis import strategies as st
 
 from renderer.control import Control, compiled_stages, stages
 from tests.oracles import pictures
+from tests.oracles.batches import make_batch
 from tests.renderer.control_builders import CONFIGS, CYCLE_S, moments, small
 from tsar import response
 from tsar.cache import FrameletCache
-from tsar.clock import fixed_clock
+from tsar.clock import StageTimer, fixed_clock
 from tsar.config import ResponseConfig, TilingConfig, TsarConfig
+from tsar.decision import Decision
 from tsar.pipeline import initial_state, run
 from tsar.response import initial_densities
 from tsar.response.transport import SOLVERS
+from tsar.selection import Request, initial_history, request
 from tsar.stages import REFERENCE
-from tsar.tiling import uniform
+from tsar.tiling import build, uniform
 from tsar.types import Densities, Errors, SampleBatch, Tiling
 
 CACHE_FIELDS = ("level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node")
@@ -38,6 +41,31 @@ def assert_same_densities(ours: Densities, theirs: Densities, config: TsarConfig
     assert abs(ours.surplus - theirs.surplus) <= 1e-12 * config.budget
 
 
+def assert_same_cache(ours: FrameletCache, theirs: FrameletCache) -> None:
+    for field in CACHE_FIELDS:
+        if field == "coefficients":
+            torch.testing.assert_close(ours.coefficients, theirs.coefficients, rtol=0.0, atol=1e-6)
+        else:
+            assert torch.equal(getattr(ours, field), getattr(theirs, field)), field
+
+
+def assert_same_request(ours: Request, theirs: Request) -> None:
+    for field in ("selected", "history", "level", "index", "position"):
+        assert torch.equal(getattr(ours, field), getattr(theirs, field)), field
+
+
+def decided_by_reference(densities: Densities, history: torch.Tensor, config: TsarConfig) -> Decision:
+    """What follows from densities that are given."""
+    tiling = build(densities.spatial, config)
+    return Decision(densities, tiling, request(tiling, densities.temporal, history, config))
+
+
+def decided(densities: Densities, history: torch.Tensor, config: TsarConfig) -> Decision:
+    """The same by the compiled stages: a batch without errors changes no density."""
+    none = Errors(*torch.zeros(2, config.sdf_side**2).unbind(0))
+    return Control(config).decide(densities, none, history, config, StageTimer())
+
+
 @pytest.mark.parametrize("name", CONFIGS)
 def test_every_stage_agrees_with_the_reference_on_the_way(name: str) -> None:
     """Equal inputs: equal choices, tilings and cache; errors and densities within rounding."""
@@ -47,28 +75,22 @@ def test_every_stage_agrees_with_the_reference_on_the_way(name: str) -> None:
     for moment in moments(config, 40, 2):
         state, outcome = moment.before, moment.outcome
         cache = state.cache
-        selected, credit = ours.select(state.tiling, state.densities.temporal, state.history, config)
-        assert torch.equal(selected, outcome.selected) and torch.equal(credit, moment.after.history)
-        batch = ours.make_batch(state.tiling, selected, moment.number * CYCLE_S, moment.number, config)
-        theirs = REFERENCE.make_batch(state.tiling, selected, moment.number * CYCLE_S, moment.number, config)
-        for field in ("level", "index", "position", "time_s"):
-            assert torch.equal(getattr(batch, field), getattr(theirs, field)), field
-        assert (batch.cycle, batch.seed) == (theirs.cycle, theirs.seed)
+        batch = state.due.at(moment.number * CYCLE_S, moment.number, config)
         past += int(cache.previous(batch.level, batch.index)[1].sum())
-        wanted = REFERENCE.estimate(batch, outcome.samples.color, cache, config)
-        found = ours.estimate(batch, outcome.samples.color, cache, config)
+        theirs = copy.deepcopy(cache)
+        found = ours.observe(batch, outcome.samples.color, cache, config, StageTimer())
+        wanted = REFERENCE.observe(batch, outcome.samples.color, theirs, config, StageTimer())
         torch.testing.assert_close(found.errors.spatial, wanted.errors.spatial, rtol=0.0, atol=2e-5)
         torch.testing.assert_close(found.errors.temporal, wanted.errors.temporal, rtol=0.0, atol=2e-5)
-        torch.testing.assert_close(found.coefficients, wanted.coefficients, rtol=0.0, atol=1e-6)
-        assert torch.equal(found.color, wanted.color) and found.nonfinite == 0
-        theirs = copy.deepcopy(cache)
-        slots = ours.insert(cache, batch, wanted.color, wanted.coefficients)
-        assert torch.equal(slots, theirs.insert(batch, wanted.color, wanted.coefficients))
-        for field in CACHE_FIELDS:
-            assert torch.equal(getattr(cache, field), getattr(theirs, field)), field
-        after = ours.respond(state.densities, outcome.errors, config)
-        assert_same_densities(after, moment.after.densities, config)
-        assert same_tiling(ours.build(moment.after.densities.spatial, config), moment.after.tiling)
+        assert found.nonfinite == 0
+        assert_same_cache(cache, theirs)
+        spent = StageTimer()
+        after = ours.decide(state.densities, outcome.errors, state.due.history, config, spent)
+        assert set(spent.seconds) == {"response", "tiling", "selection"} and min(spent.seconds.values()) > 0.0
+        assert_same_densities(after.densities, moment.after.densities, config)
+        follows = decided_by_reference(after.densities, state.due.history, config)
+        assert same_tiling(after.tiling, follows.tiling)
+        assert_same_request(after.due, follows.due)
         newest = outcome.reconstruction.samples.newest_s
         account, expected = (s.account(moment.after.densities, newest, config) for s in (ours, REFERENCE))
         assert account.combined == pytest.approx(expected.combined, rel=1e-12)
@@ -84,12 +106,9 @@ def test_selection_among_equals_and_others(seed: int, steps: int) -> None:
     config = small(batch_size=16)
     g = torch.Generator().manual_seed(seed)
     density = torch.rand(128**2, generator=g, dtype=torch.float64) ** 6 * 16
-    tiling = REFERENCE.build(density, config)
     history = torch.randint(-steps, steps + 1, (128**2,), generator=g).to(torch.float64) / steps
-    temporal = torch.full_like(history, 0.5)
-    ours = Control(config).select(tiling, temporal, history, config)
-    theirs = REFERENCE.select(tiling, temporal, history, config)
-    assert torch.equal(ours[0], theirs[0]) and torch.equal(ours[1], theirs[1])
+    densities = Densities(density, torch.full_like(history, 0.5))
+    assert_same_request(decided(densities, history, config).due, decided_by_reference(densities, history, config).due)
 
 
 @given(seed=st.integers(0, 10_000), power=st.sampled_from([0, 1, 8]), most=st.sampled_from([64, 100, 256]))
@@ -98,40 +117,43 @@ def test_tilings_of_equals_and_others(seed: int, power: int, most: int) -> None:
     g = torch.Generator().manual_seed(seed)
     coarse = torch.randint(0, 4, (4 ** (seed % 8),), generator=g).to(torch.float64) ** power
     density = coarse.repeat_interleave(128**2 // coarse.numel()) * 8
-    assert same_tiling(Control(config).build(density, config), REFERENCE.build(density, config))
+    even = torch.full_like(density, 0.5)
+    assert same_tiling(decided(Densities(density, even), even, config).tiling, build(density, config))
 
 
 @pytest.mark.parametrize("bad", [-1e-300, float("nan"), float("inf")])
 def test_what_is_not_a_density_is_refused(bad: float) -> None:
     config = small()
     field = torch.ones(128**2, dtype=torch.float64)
+    even = field.clone()
     field[777] = bad
     with pytest.raises(ValueError, match="finite, non-negative densities"):
-        Control(config).build(field, config)
+        decided(Densities(field, even), even, config)
 
 
 @settings(max_examples=30)
 @given(seed=st.integers(0, 10_000), dead=st.sampled_from([0.0, 0.02, 0.5, 1.0]), times=st.sampled_from([1, 3, 1000]))
 def test_the_cache_gives_up_the_same_slots(seed: int, dead: float, times: int) -> None:
     config = small(resolution_px=64, batch_size=8, cache_size=96, tiling=TilingConfig(1, 2, 16))
-    control, g = Control(config), torch.Generator().manual_seed(seed)
+    observe, g = compiled_stages(config).observe, torch.Generator().manual_seed(seed)
     ours, theirs = FrameletCache(config), FrameletCache(config)
     slots = ours.level.shape[0]
     for _ in range(2 * slots // 8):
         selected = torch.randperm(16, generator=g)[:8].sort().values
         now = float(torch.randint(0, times, (), generator=g))
-        batch = REFERENCE.make_batch(uniform(2), selected, now, 0, config)
-        color, state = torch.rand(8, 256, 3, generator=g), torch.rand(8, 340, generator=g)
-        assert torch.equal(control.insert(ours, batch, color, state), theirs.insert(batch, color, state))
+        batch = make_batch(uniform(2), selected, now, 0, config)
+        color = torch.rand(8, 256, 3, generator=g)
+        found = observe(batch, color, ours, config, StageTimer())
+        wanted = REFERENCE.observe(batch, color, theirs, config, StageTimer())
+        torch.testing.assert_close(found.errors.temporal, wanted.errors.temporal, rtol=0.0, atol=2e-5)
         flags = torch.rand(slots, generator=g) < dead
         for cache in (ours, theirs):
             cache.dead |= flags
-    for field in CACHE_FIELDS:
-        assert torch.equal(getattr(ours, field), getattr(theirs, field)), field
+    assert_same_cache(ours, theirs)
 
 
 def errors_of(kind: str, g: torch.Generator, elements: int) -> Errors:
-    noise = 2 * torch.rand(2, elements, generator=g, dtype=torch.float64) - 1
+    noise = 2 * torch.rand(2, elements, generator=g) - 1
     noise[:, torch.rand(elements, generator=g) < 0.6] = 0.0
     if kind == "all ask":
         noise = noise.abs()
@@ -155,10 +177,11 @@ def test_decisions_agree(seed: int, kind: str, surplus_max: float, bias: float) 
     """From states that decisions before them made, some at the walls, with much or no surplus."""
     config = small(sdf_side=32, resolution_px=128, response=ResponseConfig(surplus_max=surplus_max, bias=bias))
     control, g = Control(config), torch.Generator().manual_seed(seed)
-    densities = initial_densities(config)
+    densities, history = initial_densities(config), initial_history(config)
     for turn in range(4):
         errors = errors_of(kind if turn else "mixed", g, 32**2)
-        ours, densities = control.respond(densities, errors, config), response.respond(densities, errors, config)
+        ours = control.decide(densities, errors, history, config, StageTimer()).densities
+        densities = response.respond(densities, errors, config)
         assert_same_densities(ours, densities, config)
     if kind == "none":
         assert torch.equal(ours.spatial, densities.spatial) and ours.surplus == densities.surplus
@@ -168,13 +191,14 @@ def test_five_thousand_decisions_do_not_drift(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
     config = TsarConfig(sdf_side=16, resolution_px=128, batch_size=16)
     control, g = Control(config), torch.Generator().manual_seed(11)
-    densities = initial_densities(config)
+    densities, history = initial_densities(config), initial_history(config)
     (low_s, high_s), (low_t, high_t) = config.spatial_bounds, config.temporal_bounds
     for cycle in range(5000):
-        noise = torch.rand(3, 256, generator=g, dtype=torch.float64)
+        noise = torch.rand(3, 256, generator=g)
         drift = 0.3 * torch.sin(torch.tensor(cycle / 500.0))
         field = torch.where(noise[2] < 0.4, (2 * noise[:2] - 1 + drift).clamp(-1, 1), 0.0)
-        densities = control.respond(densities, Errors(field[0], field[1]), config)
+        decision = control.decide(densities, Errors(field[0], field[1]), history, config, StageTimer())
+        densities, history = decision.densities, decision.due.history
         assert 0.0 <= densities.surplus <= config.response.surplus_max * config.budget * (1 + 1e-9)
     assert abs(float(densities.combined().sum()) + densities.surplus - config.budget) <= 1e-9 * config.budget
     assert low_s * (1 - 1e-12) <= densities.spatial.min() and densities.spatial.max() <= high_s * (1 + 1e-12)
@@ -224,12 +248,14 @@ def test_runs_give_the_same_bits_on_any_number_of_threads() -> None:
 def test_samples_that_are_not_finite_are_counted_and_repaired(value: float) -> None:
     config = small()
     ours, state = compiled_stages(config), initial_state(config)
-    selected, _ = ours.select(state.tiling, state.densities.temporal, state.history, config)
-    batch = ours.make_batch(state.tiling, selected, 0.0, 0, config)
+    batch = state.due.at(0.0, 0, config)
     color = pictures.tracer(pictures.textured_motion)(batch).color
     color[5, 17, 1] = color[31, 255, 2] = value
-    found, wanted = (s.estimate(batch, color, state.cache, config) for s in (ours, REFERENCE))
-    assert found.nonfinite == wanted.nonfinite == 2 and torch.equal(found.color, wanted.color)
+    theirs = FrameletCache(config)
+    found = ours.observe(batch, color, state.cache, config, StageTimer())
+    wanted = REFERENCE.observe(batch, color, theirs, config, StageTimer())
+    assert found.nonfinite == wanted.nonfinite == 2
+    assert_same_cache(state.cache, theirs)
     torch.testing.assert_close(found.errors.spatial, wanted.errors.spatial, rtol=0.0, atol=2e-5)
     for record, display in run(
         config, lambda batch: SampleBatch(color), fixed_clock(CYCLE_S), 0.0, 0.05, compiled_stages(config)
@@ -240,32 +266,51 @@ def test_samples_that_are_not_finite_are_counted_and_repaired(value: float) -> N
 def test_colours_may_come_in_any_layout_and_precision() -> None:
     config = small()
     ours, state = compiled_stages(config), initial_state(config)
-    batch = ours.make_batch(state.tiling, torch.arange(32), 0.0, 0, config)
+    batch = state.due.at(0.0, 0, config)
     grey = torch.rand(32, 256, 1, dtype=torch.float64, generator=torch.Generator().manual_seed(0)).expand(-1, -1, 3)
     plain = grey.to(torch.float32).contiguous()
-    found, wanted = (ours.estimate(batch, color, state.cache, config) for color in (grey, plain))
-    assert torch.equal(found.errors.spatial, wanted.errors.spatial) and torch.equal(found.color, plain)
+    caches = FrameletCache(config), FrameletCache(config)
+    found, wanted = (
+        ours.observe(batch, color, cache, config, StageTimer())
+        for color, cache in zip((grey, plain), caches, strict=True)
+    )
+    assert torch.equal(found.errors.spatial, wanted.errors.spatial)
+    assert_same_cache(*caches)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_other_solvers_are_left_to_the_reference(solver: str) -> None:
-    found = compiled_stages(small(response=ResponseConfig(solver=solver)))
-    assert (found.respond is response.respond) == (solver != "waterfill")
+    config = small(response=ResponseConfig(solver=solver))
+    state, g = initial_state(config), torch.Generator().manual_seed(5)
+    errors, history = errors_of("mixed", g, config.sdf_side**2), state.due.history
+    found = Control(config).decide(state.densities, errors, history, config, StageTimer())
+    wanted = REFERENCE.decide(state.densities, errors, history, config, StageTimer())
+    assert_same_densities(found.densities, wanted.densities, config)
+    assert same_tiling(found.tiling, wanted.tiling) or solver == "waterfill"
+    assert torch.equal(found.densities.spatial, wanted.densities.spatial) or solver == "waterfill"
 
 
 def test_the_stages_are_chosen_by_name() -> None:
     assert stages(small(), "reference") is REFERENCE
-    assert stages(small()).build != REFERENCE.build
+    assert stages(small()).decide != REFERENCE.decide
 
 
 def test_stages_refuse_another_configuration_than_theirs() -> None:
     ours, state = compiled_stages(small()), initial_state(small())
-    other = small(seed=1)
+    other, none = small(seed=1), Errors(*torch.zeros(2, 128**2).unbind(0))
     with pytest.raises(ValueError, match="expected the configuration that they were made for"):
-        ours.select(state.tiling, state.densities.temporal, state.history, other)
+        ours.decide(state.densities, none, state.due.history, other, StageTimer())
     with pytest.raises(ValueError, match="expected the configuration that they were made for"):
         ours.reconstruct(state.cache, other, CYCLE_S)
-    assert ours.select(state.tiling, state.densities.temporal, state.history, small())[0].numel() == 32
+    again = ours.decide(state.densities, none, state.due.history, small(), StageTimer())
+    assert again.due.selected.numel() == 32
+
+
+def test_larger_batches_than_the_configuration_says_are_refused() -> None:
+    config = small()
+    batch = make_batch(uniform(3), torch.arange(33), 0.0, 0, config)
+    with pytest.raises(ValueError, match="expected at most 32 framelets, got 33"):
+        compiled_stages(config).observe(batch, torch.zeros(33, 256, 3), FrameletCache(config), config, StageTimer())
 
 
 def test_a_set_of_stages_serves_several_runs_at_once() -> None:

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from renderer.display import Display
 from tests.oracles import pictures
+from tests.oracles.batches import make_batch
 from tests.oracles.reconstruction_slow import slow_reconstruct
 from tests.renderer.control_builders import CONFIGS, CYCLE_S, moments, small
 from tsar.cache import FrameletCache
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig
 from tsar.reconstruction import Reconstruction, reconstruct
-from tsar.selection import make_batch
 from tsar.tiling import build, uniform
 
 TOLERANCE = 1e-5

@@ -7,7 +7,8 @@ import pytest
 import torch
 import warp as wp
 
-from renderer import device, packets
+from renderer import device
+from renderer.native_code import module_options
 from renderer.trace import Renderer
 from scenes import catalog
 from scenes.canonical import (
@@ -131,7 +132,7 @@ def test_lists_of_any_length_are_shaded_to_the_end() -> None:
         assert part.counters["primary_rays"] == count
 
 
-wp.set_module_options({"extra_build_options": packets.BUILD_OPTIONS, "enable_backward": False})
+wp.set_module_options(module_options("functions.h"))
 
 
 @wp.func_native(

@@ -2,9 +2,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.oracles.batches import make_batch
 from tsar.cache import FrameletCache
 from tsar.config import TilingConfig, TsarConfig
-from tsar.selection import make_batch
 from tsar.tiling import uniform
 
 CONFIG = TsarConfig(batch_size=64, cache_size=2048)

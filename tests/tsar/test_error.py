@@ -2,6 +2,7 @@ import pytest
 import torch
 
 from tests.oracles import pictures
+from tests.oracles.batches import make_batch
 from tsar import haar
 from tsar.cache import FrameletCache
 from tsar.config import ErrorConfig, TsarConfig
@@ -15,7 +16,6 @@ from tsar.error import (
     template_power,
 )
 from tsar.morton import interleave
-from tsar.selection import make_batch
 from tsar.tiling import uniform
 
 CONFIG = TsarConfig(batch_size=64)

@@ -97,6 +97,16 @@ def test_integrals_over_a_field_that_spans_twelve_decades():
     assert lost.any()
 
 
+def test_means_of_tiles_agree_with_their_integrals_and_are_exact_among_equals():
+    generator = torch.Generator().manual_seed(4)
+    field = 10.0 ** (torch.rand(64 * 64, generator=generator, dtype=torch.float64) * 12 - 6)
+    level = torch.tensor([0, 1, 1, 3, 4, 6, 6])
+    index = torch.tensor([0, 0, 3, 17, 255, 0, 4095])
+    wanted = [float(field.reshape(4**at, -1)[i].mean()) for at, i in zip(level.tolist(), index.tolist(), strict=True)]
+    assert morton.tile_mean(field, level, index, 6).tolist() == pytest.approx(wanted, rel=1e-14)
+    assert bool((morton.tile_mean(torch.full((64 * 64,), 0.1).double(), level, index, 6) == torch.tensor(0.1)).all())
+
+
 def test_integral_example_of_the_thesis():
     """Quad tile 0 of level 1, kd tile 4, covers the fine tiles 64..79 of level 3: the first sixteen elements."""
     first, last = morton.tile_interval(tensor(1), tensor(4 - 2**2), 3)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles import pictures
+from tests.oracles.batches import make_batch
 from tsar import pipeline
 from tsar.baselines import oracle
 from tsar.cache import FrameletCache
@@ -17,7 +18,6 @@ from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
 from tsar.haar import state_size
 from tsar.reconstruction import reconstruct
-from tsar.selection import make_batch
 from tsar.tiling import uniform
 from tsar.types import Display, SampleBatch
 
@@ -215,8 +215,8 @@ def test_batches_are_disjoint_new_and_no_larger_than_paid_for(monkeypatch):
         ]
         assert 0 < sum(taken[level].numel() for level in levels) == size_of(taken) <= CONFIG.batch_size
         assert int(painted(taken).max()) == 1
-        now_s = torch.tensor(shown.sample_time_s, dtype=torch.float32)
-        assert all(bool((b.time_s == now_s).all()) for b in batches[cycle])
+        now_s = shown.sample_time_s
+        assert all(b.time_s == now_s for b in batches[cycle])
         share = sum(taken[level].numel() * 0.25**level for level in levels)
         assert float((newest_of(shown) == now_s).double().mean()) == share
 

@@ -4,11 +4,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles import pictures
+from tests.oracles.batches import make_batch
 from tests.oracles.reconstruction_slow import slow_reconstruct
 from tsar.cache import FrameletCache
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig
 from tsar.reconstruction import newest_samples, reconstruct, round_bits, smooth_age, spatial_weights
-from tsar.selection import make_batch
 from tsar.tiling import build, uniform
 
 

@@ -3,9 +3,10 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.oracles.batches import make_batch
 from tsar.config import TilingConfig, TsarConfig
 from tsar.morton import interleave, prefix_sum, tile_integral
-from tsar.selection import initial_history, make_batch, sample_positions, select
+from tsar.selection import initial_history, sample_positions, select
 from tsar.tiling import build, tile_of_element, uniform
 
 
@@ -117,4 +118,4 @@ def test_positions_are_exact_grid_centres_in_morton_order():
 def test_a_batch_is_all_at_one_time():
     tiling = uniform(3)
     batch = make_batch(tiling, torch.tensor([1, 5]), 1.25, 9, TsarConfig())
-    assert batch.position.shape == (2, 256, 2) and bool((batch.time_s == 1.25).all()) and batch.cycle == 9
+    assert batch.position.shape == (2, 256, 2) and bool((batch.times == 1.25).all()) and batch.cycle == 9

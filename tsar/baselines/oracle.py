@@ -55,7 +55,7 @@ def run(
             _benefit(color, level, shown, wanted, config) for level, (_, color) in zip(levels, frames, strict=True)
         ]
         for (batch, color), index in zip(frames, choose(benefit, config.batch_size), strict=True):
-            kept = FrameletBatch(batch.level[index], index, batch.position[index], batch.time_s[index], cycle)
+            kept = FrameletBatch(batch.level[index], index, batch.position[index], batch.time_s, cycle)
             cache.insert(kept, color[index], torch.zeros(index.numel(), state_size(config.samples)))
         result = reconstruct(cache, config, cycle_s)
         cycle_s = checked(cycle_seconds, counters, time.perf_counter() - began)
@@ -74,8 +74,7 @@ def _counters(config: TsarConfig, trace: Trace, time_s: float) -> dict[str, int]
     count = min(config.batch_size, 4**level)
     index = torch.arange(count) * (4**level // count)
     position = sample_positions(torch.full_like(index, level), index, config.framelet_side)
-    times = torch.full(position.shape[:2], time_s, dtype=torch.float32)
-    return trace(FrameletBatch(torch.full_like(index, level), index, position, times)).counters
+    return trace(FrameletBatch(torch.full_like(index, level), index, position, time_s)).counters
 
 
 def _traced(
@@ -84,8 +83,7 @@ def _traced(
     """Every tile of a level at one time, and its colours."""
     tiling = uniform(level)
     position = sample_positions(tiling.level, tiling.index, config.framelet_side)
-    times = torch.full(position.shape[:2], time_s, dtype=torch.float32)
-    batch = FrameletBatch(tiling.level, tiling.index, position, times, seed=config.seed)
+    batch = FrameletBatch(tiling.level, tiling.index, position, time_s, seed=config.seed)
     return batch, replace_nonfinite(trace(batch).color, config.framelet_side)[0]
 
 

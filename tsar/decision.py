@@ -1,0 +1,41 @@
+"""What follows from a batch's errors: new densities, their tiling, and which of its tiles are rendered next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.clock import StageTimer
+from tsar.config import TsarConfig
+from tsar.response import respond
+from tsar.selection import Request, request
+from tsar.tiling import build
+from tsar.types import Densities, Errors, Tiling
+
+
+@dataclass(frozen=True)
+class Decision:
+    """New densities, the tiling they ask for, and the tiles that are due in it."""
+
+    densities: Densities
+    tiling: Tiling
+    due: Request
+
+
+def decide(
+    densities: Densities, errors: Errors, history: Float[Tensor, " e"], config: TsarConfig, stage: StageTimer
+) -> Decision:
+    """The response to the errors, the tiling and the selection, one after the other.
+
+    Args:
+        stage: takes the times of ``response``, ``tiling`` and ``selection``.
+    """
+    with stage("response"):
+        densities = respond(densities, errors, config)
+    with stage("tiling"):
+        tiling = build(densities.spatial, config)
+    with stage("selection"):
+        due = request(tiling, densities.temporal, history, config)
+    return Decision(densities, tiling, due)
