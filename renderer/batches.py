@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Executor
 
 import numpy as np
 import torch
@@ -14,21 +13,19 @@ from renderer import kernels, packets
 from renderer.buffers import SceneBuffers
 from renderer.launching import Command, address
 from renderer.structs import ViewData
+from renderer.team import TEAM
 
 
 class PacketBatches:
     """Shades lists of samples for one camera and one footprint, on the CPU. Calls from several threads take turns."""
 
-    def __init__(
-        self, buffers: SceneBuffers, still: ViewData, moving: ViewData, threads: int, pool: Executor | None
-    ) -> None:
+    def __init__(self, buffers: SceneBuffers, still: ViewData, moving: ViewData, threads: int) -> None:
         """Records the launches.
 
         Args:
             buffers: the scene.
             still, moving: two records of the camera, for samples of one time and of many; ``still`` is changed here.
             threads: host threads that share a batch, the caller's among them.
-            pool: where the others run.
         """
         count = len(buffers.tracks.tracks)
         still.pose_translation = wp.empty(count, wp.vec3, "cpu")
@@ -38,7 +35,7 @@ class PacketBatches:
         self._pose = Command(kernels.pose_tracks, buffers.data, moving, *poses, size=count)
         self._still, self._moving = (Command(packets.shade_samples, buffers.data, view) for view in (still, moving))
         self._keep = buffers, still, moving  # launches know their arrays by address only
-        self._threads, self._pool, self._lock = threads, pool, threading.Lock()
+        self._threads, self._lock = threads, threading.Lock()
         self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
 
     def shade(self, position: Tensor, time_s: Tensor | float) -> tuple[Tensor, int, int]:
@@ -60,9 +57,6 @@ class PacketBatches:
                 self._pose(time_s)
             arrays = address(position), times, address(color), self._rays.ctypes.data
             command.set(self._taken.ctypes.data, len(position), *arrays)
-            others = [self._pool.submit(command.launch) for _ in range(self._threads - 1)] if self._pool else []
-            command.launch()
-            for other in others:
-                other.result()
+            TEAM.run([command] * self._threads)
             shadow, reflection = self._rays.tolist()
         return color, shadow, reflection

@@ -3,7 +3,6 @@ rows that threads share."""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -15,6 +14,7 @@ from renderer import display_kernels as kernels
 from renderer.display_age import DisplayPlan
 from renderer.display_bands import PLANES
 from renderer.launching import Command, address, require_same
+from renderer.team import TEAM
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton
@@ -50,7 +50,7 @@ class Display:
         threads = min(threads, config.resolution_px // self._plan.band)
         self._holes = torch.zeros(threads, dtype=torch.int32)
         self._workers = [self._make_worker(number) for number in range(threads)]
-        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
+        self._taken = torch.zeros(1, dtype=torch.int32)
         self._of_cache: WeakKeyDictionary[FrameletCache, _Launches] = WeakKeyDictionary()
 
     def reconstruct(self, cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
@@ -61,14 +61,10 @@ class Display:
         level = torch.empty(self._cells, self._cells, dtype=torch.int64)
         image = torch.empty(config.resolution_px, config.resolution_px, 3)
         launches.find(cycle_s, address(newest_s), address(level))
-        arguments = self._count.item(), address(image)
-        if self._pool is None:
-            launches.paint[0](*arguments)
-        else:
-            others = [self._pool.submit(paint, *arguments) for paint in launches.paint[1:]]
-            launches.paint[0](*arguments)
-            for other in others:
-                other.result()
+        self._taken[0] = 0
+        for paint in launches.paint:
+            paint.set(self._count.item(), address(image))
+        TEAM.run(launches.paint)
         if any(self._holes.tolist()):
             return reconstruct(cache, config, cycle_s)
         launches.bury()
@@ -82,8 +78,7 @@ class Display:
             for name in ("level", "index", "time_s", "dead", "color"):
                 setattr(view, name, address(getattr(cache, name)))
             paint = [
-                Command(kernels.paint_bands, self._plan, view, worker, number, len(self._workers))
-                for number, worker in enumerate(self._workers)
+                Command(kernels.paint_bands, self._plan, view, worker, address(self._taken)) for worker in self._workers
             ]
             found = _Launches(
                 Command(kernels.find_candidates, self._plan, view, address(self._count)),

@@ -50,18 +50,23 @@ def find_candidates(
     count[0] = list_candidates(plan, reference, cycle_s, cache.slots, cache.level, cache.index, cache.time_s)
 
 
+@wp.func_native("return __atomic_fetch_add((int*)counter, 1, __ATOMIC_RELAXED);")
+def take(counter: Address) -> wp.int32:
+    """The next number, each to one thread only."""
+    ...
+
+
 @wp.kernel(enable_backward=False)
 def paint_bands(
     plan: DisplayPlan,
     cache: CachedFramelets,
     worker: Worker,
-    first: wp.int32,
-    step: wp.int32,
+    taken: Address,
     candidates: wp.int32,
     image: Address,
 ):
-    """Every ``step``-th band from ``first`` on. A pixel adds up its framelets in the order of their slots, so its bits
-    do not depend on how bands are shared out."""
+    """Bands that no other thread has taken. A pixel adds up its framelets in the order of their slots, so its bits do
+    not depend on how bands are shared out."""
     slots = wp.array(ptr=plan.candidate, shape=(candidates,), dtype=wp.int32)
     levels = wp.array(ptr=cache.level, shape=(cache.slots,), dtype=wp.int64)
     indices = wp.array(ptr=cache.index, shape=(cache.slots,), dtype=wp.int64)
@@ -69,7 +74,8 @@ def paint_bands(
     seen = wp.array(ptr=plan.seen, shape=(cache.slots,), dtype=wp.int32)
     holes = wp.array(ptr=worker.result, shape=(1,), dtype=wp.int32)
     holes[0] = 0
-    for band in range(first, plan.resolution / plan.band, step):
+    band = take(taken)
+    while band < plan.resolution / plan.band:
         top = band * plan.band
         bottom = top + plan.band
         begin_band(plan, top, bottom, worker.planes, worker.box, worker.ages)
@@ -83,6 +89,7 @@ def paint_bands(
                 expand_rows(plan, slot, level, y, top, bottom, cache.color, worker.rows)
                 blend_rows(plan, level, x, y, ages[slot], top, bottom, worker.rows, worker.planes)
         holes[0] = holes[0] | finish_band(plan, top, bottom, worker.planes, image)
+        band = take(taken)
 
 
 @wp.kernel(enable_backward=False)

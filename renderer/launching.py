@@ -55,6 +55,7 @@ class Command:
 
     Attributes:
         launch: runs the kernel with the arguments set last.
+        entry: addresses of the compiled kernel and of its two parameters, to launch it from elsewhere.
     """
 
     def __init__(self, kernel: Any, *fixed: Any, size: int = 1) -> None:
@@ -67,7 +68,10 @@ class Command:
         layout = [(name, type(value)) for name, value in zip(names, values, strict=True)]
         arguments = type("Arguments", (ctypes.Structure,), {"_fields_": layout})(*values)
         self._set = partial(_packer(type(arguments), len(fixed)), arguments)
-        self.launch = partial(self._record.hooks.forward, ctypes.byref(bounds), ctypes.byref(arguments))
+        forward = self._record.hooks.forward
+        self.launch = partial(forward, ctypes.byref(bounds), ctypes.byref(arguments))
+        function = ctypes.cast(forward, ctypes.c_void_p).value
+        self.entry = function, ctypes.addressof(bounds), ctypes.addressof(arguments)
 
     def set(self, *arguments: float) -> None:
         """Sets the last arguments."""

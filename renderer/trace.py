@@ -235,7 +235,7 @@ class Renderer:
         key = aspect, footprint_px
         if key not in self._batches:
             still, moving = (self._view(*key) for _ in range(2))
-            self._batches[key] = PacketBatches(self._buffers, still, moving, self.threads, self._pool)
+            self._batches[key] = PacketBatches(self._buffers, still, moving, self.threads)
         return self._batches[key]
 
     def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int) -> None:
@@ -248,10 +248,7 @@ class Renderer:
             taken = wp.zeros(1, dtype=wp.int32, device="cpu")
             inputs = [self._buffers.data, view, taken, *shared]
             command = wp.launch(kernel, dim=1, inputs=inputs, device="cpu", record_cmd=True)
-            others = [self._pool.submit(command.launch) for _ in range(self.threads - 1)] if self._pool else []
-            command.launch()
-            for other in others:
-                other.result()
+            list((map if self._pool is None else self._pool.map)(lambda _: command.launch(), range(self.threads)))
             return
 
         def run(first: int, dim: int) -> None:
