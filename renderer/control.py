@@ -22,6 +22,7 @@ from renderer.control_response import COLUMNS, ResponsePlan
 from renderer.control_selection import SelectionPlan
 from renderer.display import Display
 from renderer.launching import Command, address, require_same
+from renderer.team import TEAM
 from tsar.accounting import FAST_REFRESH, Account
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
@@ -44,7 +45,7 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
     Args:
         config: of the run; the compiled stages serve no other.
         name: ``compiled``, or ``reference`` for the tensor operations of ``tsar``.
-        threads: host threads that share a reconstruction. No result depends on it.
+        threads: host threads that share a batch's observation and a reconstruction. No result depends on it.
     """
     return compiled_stages(config, threads) if name == "compiled" else REFERENCE
 
@@ -52,7 +53,7 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
     """Kernels throughout, but for the response where its solver is not compiled."""
     devices.load_kernels((kernels, display_kernels), "cpu")
-    control, display = Control(config), Display(config, threads)
+    control, display = Control(config, threads), Display(config, threads)
     return Stages(
         observe=control.observe,
         decide=control.decide,
@@ -68,9 +69,9 @@ class Control:
     the same for the same arguments.
     """
 
-    def __init__(self, config: TsarConfig) -> None:
-        """Prepares the launches of a configuration."""
-        self.config = config
+    def __init__(self, config: TsarConfig, threads: int = 1) -> None:
+        """Prepares the launches of a configuration; ``threads`` share what is large."""
+        self.config, self._threads = config, threads
         self._elements = config.sdf_side**2
         self._most_tiles = 4**config.level_min + 3 * split_bounds(config)[1]
         self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
@@ -95,23 +96,22 @@ class Control:
             ValueError: if the batch is larger than the configuration's.
         """
         require_same(config, self.config)
-        start = time.perf_counter()
         count, nonfinite = batch.level.shape[0], 0
         if count > config.batch_size:
             raise ValueError(f"batch: expected at most {config.batch_size} framelets, got {count}")
-        times = self._times_of(batch)
-        if color.dtype != torch.float32 or not color.is_contiguous():
-            color = color.to(torch.float32).contiguous()
-        launch = self._observing(cache)
-        spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
-        tiles = address(batch.level), address(batch.index), times
-        fields = address(spatial), address(temporal)
-        launch(0, count, *tiles, address(color), *fields)
-        if self._left[0]:
-            color, nonfinite = replace_nonfinite(color, config.framelet_side)
-            launch(1, count, *tiles, address(color), *fields)
-        begun, claimed, done = self._observed.tolist()
-        stage.divide(time.perf_counter() - start, {"error": done - claimed, "cache": claimed - begun})
+        with stage("cache"):
+            claim, observe = self._commands(cache)
+            spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
+            fields = address(spatial), address(temporal)
+            tiles = count, address(batch.level), address(batch.index)
+            claim(*tiles, self._times_of(batch), *fields)
+        with stage("error"):
+            if color.dtype != torch.float32 or not color.is_contiguous():
+                color = color.to(torch.float32).contiguous()
+            self._run(observe, *tiles, address(color), *fields)
+            if self._progress[1]:
+                color, nonfinite = replace_nonfinite(color, config.framelet_side)
+                self._run(observe, *tiles, address(color), *fields)
         return Observation(Errors(spatial, temporal), nonfinite)
 
     def decide(
@@ -158,17 +158,27 @@ class Control:
         self._times[: len(batch.level)] = time_s if isinstance(time_s, float) else batch.times[:, 0].numpy()
         return self._times_address
 
-    def _observing(self, cache: FrameletCache) -> Command:
-        """The launch that knows where a cache lies."""
+    def _run(self, observe: Command, *arguments: int) -> None:
+        """All threads take rows of a batch."""
+        self._progress[:] = 0
+        observe.set(*arguments)
+        TEAM.run([observe] * self._threads)
+
+    def _commands(self, cache: FrameletCache) -> tuple[Command, Command]:
+        """Launches that know where a cache lies: one claims slots, one observes a batch."""
         found = self._of_cache.get(cache)
         if found is None:
-            fixed = self._error_plan, _cache_view(cache, self.config), self._claim, self._scratch
-            found = self._of_cache[cache] = Command(kernels.observe_batch, *fixed, *self._progress)
+            fixed = self._error_plan, _cache_view(cache, self.config), self._claim, self._pending.ctypes.data
+            found = (
+                Command(kernels.claim_slots, *fixed, self._scratch),
+                Command(kernels.observe_batch, *fixed, self._progress.ctypes.data),
+            )
+            self._of_cache[cache] = found
         return found
 
     def _prepare_observation(self) -> None:
         config, claim = self.config, ClaimMemory()
-        self._of_cache: WeakKeyDictionary[FrameletCache, Command] = WeakKeyDictionary()
+        self._of_cache: WeakKeyDictionary[FrameletCache, tuple[Command, Command]] = WeakKeyDictionary()
         self._error_plan = _error_plan(config)
         self._places = torch.empty(2, config.batch_size, dtype=torch.int64)
         self._spare = torch.empty(config.batch_size, state_size(config.samples))
@@ -176,10 +186,9 @@ class Control:
         claim.slot, claim.past = map(address, self._places)
         claim.spare, claim.marks = address(self._spare), address(self._marks)
         self._claim = claim
-        self._pending, self._left = np.zeros(config.batch_size, np.uint8), np.zeros(1, np.int32)
-        self._times, self._observed = np.zeros(config.batch_size), np.zeros(3, np.int64)
+        self._pending, self._progress = np.zeros(config.batch_size, np.uint8), np.zeros(2, np.int32)
+        self._times = np.zeros(config.batch_size)
         self._times_address = self._times.ctypes.data
-        self._progress = tuple(array.ctypes.data for array in (self._pending, self._left, self._observed))
 
     def _prepare_decision(self) -> None:
         self._surplus, self._tile_count, self._decided = np.zeros(1), np.zeros(1, np.int32), np.zeros(4, np.int64)

@@ -44,26 +44,27 @@ def start_observing(
 
 
 @wp.func_native("""
-    return framelets::observe_batch(plan, cache, count, (const long long*)level, (const long long*)index,
-                                    (const float*)color, (const long long*)memory.slot,
-                                    (const float* const*)memory.past, (unsigned char*)pending,
-                                    (float*)errors_spatial, (float*)errors_temporal);
+    framelets::observe_rows(plan, cache, count, (const long long*)level, (const long long*)index, (const float*)color,
+                            (const long long*)memory.slot, (const float* const*)memory.past, (unsigned char*)pending,
+                            (framelets::Progress*)progress, (float*)errors_spatial, (float*)errors_temporal);
 """)
 def observe_framelets(
     plan: ErrorPlan,
     cache: CacheView,
     memory: ClaimMemory,
+    pending: Address,
+    progress: Address,
     count: wp.int32,
     level: Address,
     index: Address,
     color: Address,
-    pending: Address,
     errors_spatial: Address,
     errors_temporal: Address,
-) -> wp.int32:
-    """Errors of the framelets that are pending, and colours and wavelet states into their slots.
+):
+    """Errors of framelets that are pending, and colours and wavelet states into their slots; threads share them.
 
     Args:
-        pending: uint8 flags; what remains set holds a sample that is not finite. Returns how many do.
+        pending: uint8 flags; what remains set holds a sample that is not finite.
+        progress: int32, how many are taken, and how many remain.
     """
     ...

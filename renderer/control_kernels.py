@@ -1,6 +1,7 @@
-"""Kernel entry points of the control stages: two launches a cycle, each the recipe of its stages in ``tsar``.
+"""Kernel entry points of the control stages: each the recipe of its stages in ``tsar``.
 
-They run on the CPU, where a launch is one call on one thread; the passes they call are in C and C++.
+They run on the CPU, where a launch is one call on one thread, and threads share what is large; the passes they call are
+in C and C++.
 """
 
 from __future__ import annotations
@@ -52,19 +53,24 @@ def ticks() -> wp.int64:
     ...
 
 
-@wp.func
+@wp.kernel
 def claim_slots(
+    plan: ErrorPlan,
     cache: CacheView,
     memory: ClaimMemory,
+    pending: Address,
     scratch: Scratch,
     count: wp.int32,
     level: Address,
     index: Address,
     time_s: Address,
+    errors_spatial: Address,
+    errors_temporal: Address,
 ):
     """Gives a batch its slots: of the dead framelets, oldest first, then of the oldest of the rest."""
     choose_victims(cache, scratch.value, scratch.key, count, memory.slot)
     sign_over(cache, memory, count, level, index, time_s)
+    start_observing(plan, count, pending, errors_spatial, errors_temporal)
 
 
 @wp.kernel
@@ -72,35 +78,19 @@ def observe_batch(
     plan: ErrorPlan,
     cache: CacheView,
     memory: ClaimMemory,
-    scratch: Scratch,
     pending: Address,
-    left: Address,
-    times: Address,
-    again: wp.int32,
+    progress: Address,
     count: wp.int32,
     level: Address,
     index: Address,
-    time_s: Address,
     color: Address,
     errors_spatial: Address,
     errors_temporal: Address,
 ):
-    """The batch into the cache, and its errors; ``again`` does what was left the last time.
-
-    ``left`` receives how many framelets hold a sample that is not finite and are still pending, ``times`` the ticks at
-    the start, after the slots were claimed, and at the end.
-    """
-    clock = wp.array(ptr=times, shape=(3,), dtype=wp.int64)
-    clock[0] = ticks()
-    if again == 0:
-        claim_slots(cache, memory, scratch, count, level, index, time_s)
-        start_observing(plan, count, pending, errors_spatial, errors_temporal)
-    clock[1] = ticks()
-    result = wp.array(ptr=left, shape=(1,), dtype=wp.int32)
-    result[0] = observe_framelets(
-        plan, cache, memory, count, level, index, color, pending, errors_spatial, errors_temporal
+    """The batch into its slots, and its errors; threads share it."""
+    observe_framelets(
+        plan, cache, memory, pending, progress, count, level, index, color, errors_spatial, errors_temporal
     )
-    clock[2] = ticks()
 
 
 @wp.func

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -45,12 +46,10 @@ class Display:
         self._cells = 2**config.level_max
         self._memory: dict[str, Tensor] = {}
         self._plan = self._make_plan()
-        self._count = torch.zeros(1, dtype=torch.int32)
-        self._overdraw = torch.zeros(1, dtype=torch.float64)
+        self._count, self._taken, self._overdraw = np.zeros(1, np.int32), np.zeros(1, np.int32), np.zeros(1)
         threads = min(threads, config.resolution_px // self._plan.band)
-        self._holes = torch.zeros(threads, dtype=torch.int32)
+        self._holes = np.zeros(threads, np.int32)
         self._workers = [self._make_worker(number) for number in range(threads)]
-        self._taken = torch.zeros(1, dtype=torch.int32)
         self._of_cache: WeakKeyDictionary[FrameletCache, _Launches] = WeakKeyDictionary()
 
     def reconstruct(self, cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
@@ -63,12 +62,12 @@ class Display:
         launches.find(cycle_s, address(newest_s), address(level))
         self._taken[0] = 0
         for paint in launches.paint:
-            paint.set(self._count.item(), address(image))
+            paint.set(self._count[0], address(image))
         TEAM.run(launches.paint)
-        if any(self._holes.tolist()):
+        if self._holes.any():
             return reconstruct(cache, config, cycle_s)
         launches.bury()
-        return Reconstruction(image, SampleMap(newest_s, level), self._overdraw.item())
+        return Reconstruction(image, SampleMap(newest_s, level), float(self._overdraw[0]))
 
     def _launches(self, cache: FrameletCache) -> _Launches:
         found = self._of_cache.get(cache)
@@ -78,12 +77,13 @@ class Display:
             for name in ("level", "index", "time_s", "dead", "color"):
                 setattr(view, name, address(getattr(cache, name)))
             paint = [
-                Command(kernels.paint_bands, self._plan, view, worker, address(self._taken)) for worker in self._workers
+                Command(kernels.paint_bands, self._plan, view, worker, self._taken.ctypes.data)
+                for worker in self._workers
             ]
             found = _Launches(
-                Command(kernels.find_candidates, self._plan, view, address(self._count)),
+                Command(kernels.find_candidates, self._plan, view, self._count.ctypes.data),
                 paint,
-                Command(kernels.bury_dead, self._plan, view, address(self._overdraw)),
+                Command(kernels.bury_dead, self._plan, view, self._overdraw.ctypes.data),
             )
             self._of_cache[cache] = found
         return found
@@ -115,6 +115,8 @@ class Display:
         plan.node_level = self._keep("node_level", torch.empty(nodes, dtype=torch.int32))
         plan.cell_age = self._keep("cell_age", torch.empty(cells**2))
         plan.cell_least = self._keep("cell_least", torch.empty(2, cells**2))
+        pixels = resolution + 2 * plan.half + 1
+        plan.row_integral = self._keep("row_integral", torch.empty(pixels, dtype=torch.float64))
         plan.row_sum = self._keep("row_sum", torch.empty(cells, resolution, dtype=torch.float64))
         plan.slot_age = self._keep("slot_age", torch.empty(slots))
         plan.candidate = self._keep("candidate", torch.empty(slots, dtype=torch.int32))
@@ -129,7 +131,7 @@ class Display:
         worker.rows = self._keep(f"rows {number}", torch.empty(side, 3, widest))
         worker.box = self._keep(f"box {number}", torch.empty(resolution, dtype=torch.float64))
         worker.ages = self._keep(f"ages {number}", torch.empty(resolution))
-        worker.result = address(self._holes[number : number + 1])
+        worker.result = self._holes[number:].ctypes.data
         return worker
 
 

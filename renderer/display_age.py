@@ -50,6 +50,8 @@ class DisplayPlan:
     """float32, per cell, and as much again to work in."""
     row_sum: wp.uint64
     """float64, per row of cells the sums of ages over a box of pixels around each column."""
+    row_integral: wp.uint64
+    """float64, working memory: one for each pixel of a row that smoothing reaches, and one more."""
     slot_age: wp.uint64
     """float32, per slot."""
     candidate: wp.uint64
@@ -110,28 +112,22 @@ def map_newest(
 
 @wp.func_native("""
     const double* map = (const double*)newest_s;
-    const int side = 1 << plan.level_high, shift = 31 - __builtin_clz(plan.resolution >> plan.level_high);
-    const double width = 1 << shift;  // of a cell, pixels
+    const int side = 1 << plan.level_high, n = plan.resolution, width = n >> plan.level_high, half = plan.half;
     float* age = (float*)plan.cell_age;
     for (int i = 0; i < side * side; ++i) age[i] = (float)wp::max((map[i] - reference) / cycle_s, -1e6);
+    double* __restrict__ upto = (double*)plan.row_integral;  // the integral up to each pixel, borders repeated
     for (int row = 0; row < side; ++row) {
-        // Whole numbers of 1 / 65536 cycles, which float64 adds without rounding, in any order.
-        double before[513];
-        before[0] = 0.0;
-        const float* cell = age + row * side;
-        for (int i = 0; i < side; ++i) before[i + 1] = before[i] + __builtin_rint((double)cell[i] * 65536.0);
-        double* out = (double*)plan.row_sum + (long long)row * plan.resolution;
-        const double leftmost = before[1], rightmost = before[side] - before[side - 1];
-        for (int x = 0; x < plan.resolution; ++x) {
-            // Sum over the pixels from x - half to x + half, borders repeated: a difference of two integrals.
-            const int low = x - plan.half, high = x + plan.half + 1;
-            const int a = wp::max(low, 0), b = wp::min(high, plan.resolution);
-            const int cell_a = wp::min(a >> shift, side - 1), cell_b = wp::min(b >> shift, side - 1);
-            const int past_a = a - (cell_a << shift), past_b = b - (cell_b << shift);
-            const double upto_a = before[cell_a] * width + (before[cell_a + 1] - before[cell_a]) * past_a;
-            const double upto_b = before[cell_b] * width + (before[cell_b + 1] - before[cell_b]) * past_b;
-            out[x] = upto_b - upto_a + leftmost * (a - low) + rightmost * (high - b);
+        double sum = 0.0, here = 0.0;
+        int at = 0;
+        for (int cell = -1; cell <= side; ++cell) {
+            // Whole numbers of 1 / 65536 cycles, which float64 adds without rounding, in any order.
+            here = __builtin_rint((double)age[row * side + wp::min(wp::max(cell, 0), side - 1)] * 65536.0);
+            const int pixels = cell < 0 ? half : cell < side ? width : half + 1;
+            for (int i = 0; i < pixels; ++i) upto[at + i] = sum + here * i;
+            sum += here * pixels, at += pixels;
         }
+        double* __restrict__ out = (double*)plan.row_sum + (long long)row * n;
+        for (int x = 0; x < n; ++x) out[x] = upto[x + 2 * half + 1] - upto[x];
     }
 """)
 def smooth_rows(plan: DisplayPlan, reference: wp.float64, cycle_s: wp.float64, newest_s: Address):
@@ -142,14 +138,13 @@ def smooth_rows(plan: DisplayPlan, reference: wp.float64, cycle_s: wp.float64, n
 @wp.func_native("""
     const int side = 1 << plan.level_high;
     const float* age = (const float*)plan.cell_age;
-    float *least = (float*)plan.cell_least, *across = least + side * side;
-    for (int y = 0; y < side; ++y)
-        for (int x = 0; x < side; ++x) {
-            float low = 0.0f;
-            for (int i = wp::max(x - plan.reach, 0); i <= wp::min(x + plan.reach, side - 1); ++i)
-                low = wp::min(low, age[y * side + i]);
-            across[y * side + x] = low;
-        }
+    float *least = (float*)plan.cell_least, *__restrict__ across = least + side * side;
+    for (int y = 0; y < side; ++y) {
+        for (int x = 0; x < side; ++x) across[y * side + x] = 0.0f;
+        for (int by = -plan.reach; by <= plan.reach; ++by)
+            for (int x = wp::max(-by, 0); x < wp::min(side - by, side); ++x)
+                across[y * side + x] = wp::min(across[y * side + x], age[y * side + x + by]);
+    }
     for (int y = 0; y < side; ++y) {
         for (int x = 0; x < side; ++x) least[y * side + x] = 0.0f;
         for (int i = wp::max(y - plan.reach, 0); i <= wp::min(y + plan.reach, side - 1); ++i)

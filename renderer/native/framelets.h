@@ -192,37 +192,37 @@ inline void place(long long level, long long index, int samples, const float* ce
 inline void fetch_ahead(const void* from, int bytes) {
     for (int at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)from + at);
 }
-inline void own_ahead(const void* to, int bytes) {
-    for (int at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)to + at, 1);
-}
 
-// A batch of framelets. Rows marked in `pending` are done, unless a sample is not a number that counts: these stay
-// marked. Returns how many.
+// What threads that share a batch have in common: how many rows are taken, and how many were left as they are.
+struct Progress {
+    int taken, left;
+};
+constexpr int ROWS_AT_ONCE = 8;
+
+// Rows of a batch that no other thread has taken. Those marked in `pending` are done, unless a sample is not a number
+// that counts: these stay marked and are counted.
 //
-// The cache is larger than the processor's: what a row reads and writes there is asked for while the row before is
-// computed.
+// The cache is larger than the processor's: a row's past is asked for while the row before is computed.
 template <class Plan, class Cache>
-inline int observe_batch(const Plan& plan, const Cache& cache, int count, const long long* level, const long long* index,
+inline void observe_rows(const Plan& plan, const Cache& cache, int count, const long long* level, const long long* index,
                          const float* color, const long long* slot, const float* const* past, unsigned char* pending,
-                         float* errors_s, float* errors_t) {
+                         Progress* progress, float* errors_s, float* errors_t) {
     const long long samples = plan.samples, state = plan.state;
     float *cached_color = (float*)cache.color, *cached_state = (float*)cache.coefficients;
-    int left = 0;
-    for (int row = 0; row < count; ++row) {
-        if (row + 1 < count) {
-            if (past[row + 1]) fetch_ahead(past[row + 1], 4 * (int)state);
-            own_ahead(cached_state + state * slot[row + 1], 4 * (int)state);
-            own_ahead(cached_color + 3 * samples * slot[row + 1], 12 * (int)samples);
+    int row, end = 0, left = 0;
+    while ((row = __atomic_fetch_add(&progress->taken, ROWS_AT_ONCE, __ATOMIC_RELAXED)) < count) {
+        for (end = row + ROWS_AT_ONCE < count ? row + ROWS_AT_ONCE : count; row < end; ++row) {
+            if (row + 1 < end && past[row + 1]) fetch_ahead(past[row + 1], 4 * (int)state);
+            if (!pending[row]) continue;
+            const int shift = 2 * (plan.field_level - (int)level[row]);
+            const long long first = index[row] << shift;
+            const bool done = observe(plan, color + 3 * samples * row, past[row], cached_color + 3 * samples * slot[row],
+                                      cached_state + state * slot[row], errors_s + first, errors_t + first, 1 << shift);
+            pending[row] = !done;
+            left += !done;
         }
-        if (!pending[row]) continue;
-        const int shift = 2 * (plan.field_level - (int)level[row]);
-        const long long first = index[row] << shift;
-        const bool done = observe(plan, color + 3 * samples * row, past[row], cached_color + 3 * samples * slot[row],
-                                  cached_state + state * slot[row], errors_s + first, errors_t + first, 1 << shift);
-        pending[row] = !done;
-        left += !done;
     }
-    return left;
+    if (left) __atomic_fetch_add(&progress->left, left, __ATOMIC_RELAXED);
 }
 
 }  // namespace framelets
