@@ -7,8 +7,7 @@ the work a cycle did to seconds, so the pipeline does not know which it has.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 
 CycleSeconds = Callable[[Mapping[str, int], float], float]
 """``(counters, wall_s) -> seconds``: what one cycle or frame costs on the chosen clock."""
@@ -36,19 +35,30 @@ def checked(clock: CycleSeconds, counters: Mapping[str, int], wall_s: float) -> 
     return seconds
 
 
+class Timed:
+    """A context that adds its length to an entry of a table, however it ends."""
+
+    __slots__ = ("_seconds", "_stage", "_start")
+
+    def __init__(self, seconds: dict[str, float], stage: str) -> None:
+        self._seconds, self._stage = seconds, stage
+
+    def __enter__(self) -> None:
+        self._start = time.perf_counter()
+
+    def __exit__(self, *fault: object) -> None:
+        self._seconds[self._stage] = self._seconds.get(self._stage, 0.0) + time.perf_counter() - self._start
+
+
 class StageTimer:
     """Wall seconds per named stage of one cycle."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+    def __call__(self, stage: str) -> Timed:
+        """A context whose length counts for a stage."""
+        return Timed(self.seconds, stage)
 
     def divide(self, seconds: float, shares: Mapping[str, float]) -> None:
         """Adds a span that stages have in common, to each its share; the shares need not add up to one."""
