@@ -334,8 +334,18 @@ inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& alo
     return changed;
 }
 
-// A packet from the root. Returns the lanes that found a hit; `any` idles a lane (by a negative `hit.t`) at its first.
-template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, PacketHit& hit) {
+// A packet against a leaf: by triangles, or by rays where few of these come that far.
+template <bool any>
+inline unsigned visit_leaf(const Tree& tree, int child, const Packet& rays, unsigned lanes, PacketHit& hit) {
+    const Block* leaf = tree.blocks + leaf_block(child);
+    const int triangles = leaf_triangles(child);
+    const bool alone = __builtin_popcount(lanes) * ((triangles + BLOCK_WIDTH - 1) / BLOCK_WIDTH) < triangles;
+    return alone ? meet_leaf_alone<any>(leaf, triangles, rays, lanes, hit)
+                 : meet_leaf<any>(leaf, triangles, rays, lanes, hit);
+}
+
+// A packet from the root to the nearest hits. Returns the lanes that found one.
+inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hit) {
     struct Entry {
         float near;
         int child;
@@ -352,14 +362,7 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
         // Now by each ray, and only as far as its own hit.
         const unsigned active = entry.parent ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
         if (!active) continue;
-        unsigned changed;
-        if (entry.child < 0) {
-            const Block* leaf = tree.blocks + leaf_block(entry.child);
-            const int triangles = leaf_triangles(entry.child);
-            const bool alone = __builtin_popcount(active) * ((triangles + BLOCK_WIDTH - 1) / BLOCK_WIDTH) < triangles;
-            changed = alone ? meet_leaf_alone<any>(leaf, triangles, rays, active, hit)
-                            : meet_leaf<any>(leaf, triangles, rays, active, hit);
-        } else {
+        if (entry.child >= 0) {
             const Node& node = tree.nodes[entry.child];
             const int base = size;
             f8 near;
@@ -373,10 +376,45 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
             }
             continue;
         }
+        const unsigned changed = visit_leaf<false>(tree, entry.child, rays, active, hit);
         if (!changed) continue;
         found |= changed;
         reach = greatest(hit.t);
-        if (any && reach < 0.0f) break;
+    }
+    return found;
+}
+
+// A packet from the root to any hits, which idle their lanes by a negative `hit.t`. Returns the lanes that found one.
+//
+// No order is kept, for the first hit ends a ray, and most of the rays that are asked about have none. Without hits that
+// come nearer, a box is tested by each ray as soon as it is found.
+inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
+    struct Entry {
+        int child;
+        unsigned lanes;
+    } stack[STACK];
+    int size = 0;
+    unsigned busy = bits(hit.t >= 0.0f), found = 0;
+    const float reach = greatest(hit.t);
+    stack[size++] = {0, ALL};
+    while (size) {
+        const Entry entry = stack[--size];
+        const unsigned active = entry.lanes & busy;
+        if (!active) continue;
+        if (entry.child >= 0) {
+            const Node& node = tree.nodes[entry.child];
+            f8 near;
+            for (unsigned met = children_met(node, rays, hit, reach, near); met; met &= met - 1) {
+                const int lane = first_bit(met);
+                const unsigned passing = rays.passing(node, lane, hit.t);
+                stack[size] = {node.child[lane], passing};
+                size += passing != 0;
+                prefetch(tree, node.child[lane]);
+            }
+            continue;
+        }
+        const unsigned changed = visit_leaf<true>(tree, entry.child, rays, active, hit);
+        found |= changed, busy &= ~changed;
     }
     return found;
 }
@@ -384,7 +422,7 @@ template <bool any> inline unsigned walk(const Tree& tree, const Packet& rays, P
 // The busy lanes of sixteen rays, together or one by one. Returns those that found a hit.
 template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, const Vec16& along, PacketHit& hit) {
     Packet rays(from, along);
-    if (rays.together) return walk<any>(tree, rays, hit);
+    if (rays.together) return any ? walk_any(tree, rays, hit) : walk_nearest(tree, rays, hit);
     return walk_alone<any>(tree, from, along, bits(hit.t >= 0.0f), hit);
 }
 
