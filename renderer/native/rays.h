@@ -100,28 +100,42 @@ inline void prefetch(const Tree& tree, int child) {
     for (int line = 0; line < lines; ++line) __builtin_prefetch(at + 64 * line);
 }
 
-// One ray against a leaf, four triangles at a time. Keeps the nearest hit, of equally near ones the face with the lower
-// number; whether there is a new one.
-inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, const Vec<f4>& shear, int kx, int ky,
-                      int kz, RayHit& hit) {
+// A coordinate of the corners of four triangles, or of the eight of two blocks.
+template <class F> inline F corners_of(const Block* block, int corner, int axis);
+template <> inline f4 corners_of<f4>(const Block* block, int corner, int axis) {
+    return load<f4>(block->corner[corner][axis]);
+}
+template <> inline f8 corners_of<f8>(const Block* block, int corner, int axis) {
+    return __builtin_shufflevector(corners_of<f4>(block, corner, axis), corners_of<f4>(block + 1, corner, axis), 0, 1,
+                                   2, 3, 4, 5, 6, 7);
+}
+
+// One ray against a leaf, all of its triangles at once. Keeps the nearest hit, of equally near ones the face with the
+// lower number; whether there is a new one.
+template <class F>
+inline bool meet_blocks(const Block* block, const Vec<f4>& from, const Vec<f4>& along, int kx, int ky, int kz,
+                        RayHit& hit) {
+    const Vec<F> origin = {(F)from.x[0], (F)from.y[0], (F)from.z[0]}, shear = {(F)along.x[0], (F)along.y[0], (F)along.z[0]};
+    Vec<F> corner[3];
+    for (int i = 0; i < 3; ++i)
+        corner[i] = Vec<F>{corners_of<F>(block, i, kx), corners_of<F>(block, i, ky), corners_of<F>(block, i, kz)} - origin;
+    F t, u, v;
+    const auto inside = meets_triangle(corner[0], corner[1], corner[2], shear, t, u, v);
+    if (!bits(inside)) return false;
     bool found = false;
-    for (; triangles > 0; triangles -= BLOCK_WIDTH, ++block) {
-        Vec<f4> corner[3];
-        for (int i = 0; i < 3; ++i)
-            corner[i] = Vec<f4>{load<f4>(block->corner[i][kx]), load<f4>(block->corner[i][ky]),
-                                load<f4>(block->corner[i][kz])} - origin;
-        f4 t, u, v;
-        const i4 inside = meets_triangle(corner[0], corner[1], corner[2], shear, t, u, v);
-        if (!bits(inside)) continue;
-        for (unsigned in = bits(inside & (t <= hit.t)); in; in &= in - 1) {
-            const int lane = first_bit(in);
-            if (t[lane] < hit.t || (t[lane] == hit.t && block->face[lane] < hit.face)) {
-                hit = {t[lane], u[lane], v[lane], block->face[lane]};
-                found = true;
-            }
+    for (unsigned in = bits(inside & (t <= hit.t)); in; in &= in - 1) {
+        const int lane = first_bit(in), face = block[lane / BLOCK_WIDTH].face[lane % BLOCK_WIDTH];
+        if (t[lane] < hit.t || (t[lane] == hit.t && face < hit.face)) {
+            hit = {t[lane], u[lane], v[lane], face};
+            found = true;
         }
     }
     return found;
+}
+inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, const Vec<f4>& shear, int kx, int ky,
+                      int kz, RayHit& hit) {
+    return triangles > BLOCK_WIDTH ? meet_blocks<f8>(block, origin, shear, kx, ky, kz, hit)
+                                   : meet_blocks<f4>(block, origin, shear, kx, ky, kz, hit);
 }
 
 // Takes no notice of what a walk does; see structures.h for one that does.
@@ -339,7 +353,7 @@ template <bool any>
 inline unsigned visit_leaf(const Tree& tree, int child, const Packet& rays, unsigned lanes, PacketHit& hit) {
     const Block* leaf = tree.blocks + leaf_block(child);
     const int triangles = leaf_triangles(child);
-    const bool alone = __builtin_popcount(lanes) * ((triangles + BLOCK_WIDTH - 1) / BLOCK_WIDTH) < triangles;
+    const bool alone = __builtin_popcount(lanes) < triangles;
     return alone ? meet_leaf_alone<any>(leaf, triangles, rays, lanes, hit)
                  : meet_leaf<any>(leaf, triangles, rays, lanes, hit);
 }
