@@ -62,6 +62,7 @@ inline int fastest_axis(float x, float y, float z) {
 // One ray, ready to be walked.
 struct Single {
     float origin[3], inverse[3];
+    float inverse_far[3];  // for sides that are left, rounded up
     float near_origin[3], far_origin[3];  // moved by the padding, outwards
     float shear[3];
     int kx, ky, kz;
@@ -79,6 +80,7 @@ struct Single {
         pad *= PADDING;
         for (int axis = 0; axis < 3; ++axis) {
             origin[axis] = from[axis], inverse[axis] = reciprocal(along[axis]);
+            inverse_far[axis] = inverse[axis] * ROUNDING_UP;
             const bool backwards = inverse[axis] < 0.0f;
             near_origin[axis] = backwards ? from[axis] - pad : from[axis] + pad;
             far_origin[axis] = backwards ? from[axis] + pad : from[axis] - pad;
@@ -110,8 +112,8 @@ template <> inline f8 corners_of<f8>(const Block* block, int corner, int axis) {
                                    2, 3, 4, 5, 6, 7);
 }
 
-// One ray against a leaf, all of its triangles at once. Keeps the nearest hit, of equally near ones the face with the
-// lower number; whether there is a new one.
+// One ray against one or two blocks at once. Keeps the nearest hit, of equally near ones the face with the lower number;
+// whether there is a new one.
 template <class F>
 inline bool meet_blocks(const Block* block, const Vec<f4>& from, const Vec<f4>& along, int kx, int ky, int kz,
                         RayHit& hit) {
@@ -132,10 +134,15 @@ inline bool meet_blocks(const Block* block, const Vec<f4>& from, const Vec<f4>& 
     }
     return found;
 }
+
+// One ray against a leaf, or any number of triangles that follow one another.
 inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, const Vec<f4>& shear, int kx, int ky,
                       int kz, RayHit& hit) {
-    return triangles > BLOCK_WIDTH ? meet_blocks<f8>(block, origin, shear, kx, ky, kz, hit)
-                                   : meet_blocks<f4>(block, origin, shear, kx, ky, kz, hit);
+    bool found = false;
+    for (; triangles > BLOCK_WIDTH; triangles -= 2 * BLOCK_WIDTH, block += 2)
+        found |= meet_blocks<f8>(block, origin, shear, kx, ky, kz, hit);
+    if (triangles > 0) found |= meet_blocks<f4>(block, origin, shear, kx, ky, kz, hit);
+    return found;
 }
 
 // Takes no notice of what a walk does; see structures.h for one that does.
@@ -152,20 +159,21 @@ template <bool any, class Count> inline bool walk(const Tree& tree, const Single
     } stack[STACK];
     int size = 0, current = 0;
     bool found = false;
+    float reach = hit.t * ROUNDING_UP;
     const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
     const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
     while (true) {
         if (current >= 0) {
             const Node& node = tree.nodes[current];
             count.visit();
-            f8 near = 0.0f, far = hit.t;
+            f8 near = 0.0f, far = reach;
             for (int axis = 0; axis < 3; ++axis) {
                 const f8 close = load<f8>(node.lower[0] + ray.near_side[axis]);
                 const f8 away = load<f8>(node.lower[0] + ray.far_side[axis]);
                 near = vmax(near, (close - ray.near_origin[axis]) * ray.inverse[axis]);
-                far = vmin(far, (away - ray.far_origin[axis]) * ray.inverse[axis]);
+                far = vmin(far, (away - ray.far_origin[axis]) * ray.inverse_far[axis]);
             }
-            unsigned met = bits(near <= far * ROUNDING_UP);
+            unsigned met = bits(near <= far);
             if (met) {
                 int lane = first_bit(met);
                 met &= met - 1;
@@ -192,6 +200,7 @@ template <bool any, class Count> inline bool walk(const Tree& tree, const Single
             count.test(leaf_triangles(current));
             found |= meet_leaf(leaf, leaf_triangles(current), from, shear, ray.kx, ray.ky, ray.kz, hit);
             if (any && found) return true;
+            reach = hit.t * ROUNDING_UP;
         }
         do {
             if (!size) return found;
