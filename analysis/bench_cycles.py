@@ -9,14 +9,15 @@ from itertools import islice
 
 import torch
 
-from tsar.clock import fixed_clock
+from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TsarConfig
 from tsar.pipeline import run
 from tsar.stages import Stages
-from tsar.types import FrameletBatch, SampleBatch, StepRecord, Trace
+from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, StepRecord, Trace
 
 CYCLE_S = 0.02
 """Animation time that a cycle takes, seconds: about what the cost model gives at the defaults."""
+_TILINGS_PER_CALL = 20
 
 
 def steady(config: TsarConfig) -> TsarConfig:
@@ -63,6 +64,26 @@ class Turns:
         """Stage seconds by turn, without the first, which is not counted."""
         width = self.cycles_per_turn
         return [self.stage_s[first : first + width] for first in range(width, len(self.stage_s), width)]
+
+
+class Tilings:
+    """Decisions over one density field without errors, which keep it; each call notes what its tilings took.
+
+    Attributes:
+        seconds: of a tiling, one entry a call.
+    """
+
+    def __init__(self, config: TsarConfig, field: torch.Tensor) -> None:
+        self.seconds: list[float] = []
+        self._config, self._decide = config, default_stages(config).decide
+        self._densities = Densities(field, torch.full_like(field, 0.5))
+        self._errors = Errors(*torch.zeros(2, field.numel()).unbind(0))
+
+    def __call__(self) -> None:
+        stage = StageTimer()
+        for _ in range(_TILINGS_PER_CALL):
+            self._decide(self._densities, self._errors, self._densities.temporal, self._config, stage)
+        self.seconds.append(stage.seconds["tiling"] / _TILINGS_PER_CALL)
 
 
 def synthetic_trace(batch: FrameletBatch) -> SampleBatch:

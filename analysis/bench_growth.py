@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from itertools import islice
 from multiprocessing import get_context
 from statistics import median
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 import torch
 
 from analysis.bench import BenchOptions, Row, counted, limit_row, limited_row, take_turns
-from analysis.bench_cycles import Turns, cycles, default_stages, steady, synthetic_trace
+from analysis.bench_cycles import Tilings, Turns, cycles, steady, synthetic_trace
 from analysis.bench_scenes import driving_scenes, renderer_of
 from analysis.cli import InputError
 from tsar.config import TilingConfig, TsarConfig
@@ -109,20 +108,10 @@ def tiling_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
     # more is asked for than any bound allows, so that every bound is reached
     field *= 4.0 * max(TILE_BOUNDS) * config.samples / field.sum()
     configs = [TsarConfig(resolution_px=2048, tiling=TilingConfig(tile_count_max=bound)) for bound in TILE_BOUNDS]
-    cases = {
-        str(found.tile_count_max): partial(_repeat, default_stages(found).build, field, found) for found in configs
-    }
-    seconds = take_turns(cases, options.repetitions, tick)
-    rounds = [[taken / _CALLS for taken in seconds[str(bound)]] for bound in TILE_BOUNDS]
+    cases = {str(found.tile_count_max): Tilings(found, field) for found in configs}
+    take_turns(cases, options.repetitions, tick)
+    rounds = [case.seconds[1:] for case in cases.values()]
     return exponent_row("tiling over log n against its bound n", TILE_BOUNDS, rounds, math.log)
-
-
-_CALLS = 20
-
-
-def _repeat(call: Callable[..., object], *arguments: object) -> None:
-    for _ in range(_CALLS):
-        call(*arguments)
 
 
 def memory_rows(options: BenchOptions, show: Callable[[int], None]) -> Iterator[Row]:

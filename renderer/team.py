@@ -6,7 +6,9 @@ work, so a helper waits actively for a while before it sleeps.
 
 from __future__ import annotations
 
+import atexit
 import threading
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,7 +20,8 @@ from renderer.launching import Command
 PATIENCE_US = 1000
 """How long a helper waits actively: longer than any pause between the launches of one cycle."""
 
-_ANSWER = 4  # place in a mailbox, as in ``native/team.h``
+_STATE, _ANSWER, _REST = 0, 4, 5  # places in a mailbox, as in ``native/team.h``
+_PARKED = 3
 
 
 class _Helper:
@@ -26,7 +29,7 @@ class _Helper:
 
     def __init__(self, patience_us: int) -> None:
         self._mail = np.zeros(16, np.int64)
-        self._mail[0] = 3  # parked
+        self._mail[_STATE] = _PARKED
         where = self._mail.ctypes.data
         self._serve = Command(kernels.serve, where, patience_us)
         self._post, self._join = Command(kernels.post, where), Command(kernels.join, where)
@@ -49,6 +52,13 @@ class _Helper:
         self._join.launch()
         if self._mail[_ANSWER]:
             command.launch()
+
+    def rest(self) -> None:
+        """Parks; returns when the thread has left the kernel."""
+        self._mail[_REST] = 1
+        while self._mail[_STATE] != _PARKED:
+            time.sleep(1e-4)
+        self._mail[_REST] = 0
 
 
 class Team:
@@ -77,6 +87,12 @@ class Team:
                 helper.finish(command)
             self._busy.release()
 
+    def rest(self) -> None:
+        """Parks all helpers: before the interpreter ends, for kernels are unloaded then."""
+        with self._busy:
+            for helper in self._helpers:
+                helper.rest()
+
     def _helper(self, number: int) -> _Helper:
         if number == len(self._helpers):
             devices.load_kernels(kernels, "cpu")
@@ -87,3 +103,5 @@ class Team:
 
 TEAM = Team()
 """That of this process."""
+
+atexit.register(TEAM.rest)

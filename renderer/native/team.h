@@ -13,6 +13,7 @@ struct Mailbox {
     long long state;
     long long function, bounds, arguments;  // a launch as Warp makes it: a compiled kernel and its two parameters
     long long answer;                       // of `post` and `join`
+    long long rest;                         // set from outside: park without waiting
 };
 
 inline long long load(Mailbox& box) { return __atomic_load_n(&box.state, __ATOMIC_ACQUIRE); }
@@ -35,7 +36,8 @@ inline void serve(Mailbox& box, long long patience_us) {
         const long long since = ticks::now();
         for (int turn = 0; load(box) != POSTED; ++turn) {
             // `IDLE` to `PARKED` fails where work has come meanwhile; then it is done first.
-            if (ticks::now() - since > patience && swap(box, IDLE, PARKED)) return;
+            const bool waits = ticks::now() - since <= patience && !__atomic_load_n(&box.rest, __ATOMIC_RELAXED);
+            if (!waits && swap(box, IDLE, PARKED)) return;
             pause();
             if (turn % 64 == 63) sched_yield();  // somebody else may need this core
         }

@@ -7,7 +7,15 @@ import pytest
 
 from analysis.bench import BenchOptions
 from analysis.bench_cycles import Turns, steady, synthetic_trace
-from analysis.bench_growth import EXPONENT_LIMIT, exponent, exponent_row, memory_rows, tiling_row, watched
+from analysis.bench_growth import (
+    EXPONENT_LIMIT,
+    TILE_BOUNDS,
+    exponent,
+    exponent_row,
+    memory_rows,
+    tiling_row,
+    watched,
+)
 from tsar.config import TsarConfig
 from tsar.stages import Stages
 
@@ -45,23 +53,23 @@ def test_turns_go_on_past_the_warm_up() -> None:
 
 
 def test_tilings_reach_every_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    from analysis import bench_growth
+    from analysis import bench_cycles
 
-    built, made = set(), bench_growth.default_stages
+    built, made = set(), bench_cycles.default_stages
 
     def counting(config: TsarConfig) -> Stages:
         stages = made(config)
 
-        def build(field, config):
-            tiling = stages.build(field, config)
-            built.add((config.tile_count_max, tiling.tile_count))
-            return tiling
+        def decide(*arguments):
+            decision = stages.decide(*arguments)
+            built.add((config.tile_count_max, decision.tiling.tile_count))
+            return decision
 
-        return replace(stages, build=build)
+        return replace(stages, decide=decide)
 
-    monkeypatch.setattr(bench_growth, "default_stages", counting)
+    monkeypatch.setattr(bench_cycles, "default_stages", counting)
     row = tiling_row(BenchOptions(), lambda *_: None)
-    assert sorted(bound for bound, _ in built) == list(bench_growth.TILE_BOUNDS)
+    assert sorted(bound for bound, _ in built) == sorted(TILE_BOUNDS)
     assert all(bound - 3 <= tiles <= bound for bound, tiles in built)
     assert row.repetitions == BenchOptions().repetitions
 
