@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import torch
 
 from analysis.bench import BenchOptions, Row, counted, limit_row, limited_row, take_turns
-from analysis.bench_cycles import Tilings, Turns, cycles, steady, synthetic_trace
+from analysis.bench_cycles import Tilings, Turns, cycles, default_stages, steady, synthetic_trace
 from analysis.bench_scenes import driving_scenes, renderer_of
 from analysis.cli import InputError
 from tsar.config import TilingConfig, TsarConfig
