@@ -39,6 +39,7 @@ from scenes.formats.pbrt_surface_export import number
 from scenes.formats.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.spectra import grey, rgb
 from scenes.formats.spot_profiles import reshaped
+from scenes.values import Matrix
 
 _FILTERS = first_of(FILTERS)
 _SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "halton": "halton",
