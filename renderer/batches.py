@@ -37,15 +37,17 @@ class PacketBatches:
         self._keep = buffers, still, moving  # launches know their arrays by address only
         self._threads, self._lock = threads, threading.Lock()
         self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
+        self._counters = self._taken.ctypes.data, self._rays.ctypes.data
 
     def shade(self, position: Tensor, time_s: Tensor | float) -> tuple[Tensor, int, int]:
-        """Colours ``(k, 3)`` float32, and how many shadow rays and reflections they took.
+        """Colours ``(n, s, 3)`` float32, and how many shadow rays and reflections they took.
 
         Args:
-            position: ``(k, 2)`` float32 on the image plane.
-            time_s: ``(k,)`` animation times, or one for all samples.
+            position: ``(n, s, 2)`` float32 on the image plane.
+            time_s: ``(n, s)`` animation times, or one for all samples.
         """
-        color = torch.empty(len(position), 3)
+        groups, group_size, _ = position.shape
+        color = torch.empty(groups, group_size, 3)
         with self._lock:
             self._taken[:], self._rays[:] = 0, 0
             command, times = self._moving, 0
@@ -55,8 +57,8 @@ class PacketBatches:
             else:
                 command = self._still
                 self._pose(time_s)
-            arrays = address(position), times, address(color), self._rays.ctypes.data
-            command.set(self._taken.ctypes.data, len(position), *arrays)
+            taken, rays = self._counters
+            command.set(taken, groups * group_size, address(position), times, address(color), rays)
             TEAM.run([command] * self._threads)
             shadow, reflection = self._rays.tolist()
         return color, shadow, reflection

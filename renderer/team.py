@@ -54,9 +54,10 @@ class _Helper:
             command.launch()
 
     def rest(self) -> None:
-        """Parks; returns when the thread has left the kernel."""
+        """Parks; returns when the thread has left the kernel, or does not within a second."""
         self._mail[_REST] = 1
-        while self._mail[_STATE] != _PARKED:
+        until = time.monotonic() + 1.0
+        while self._mail[_STATE] != _PARKED and time.monotonic() < until:
             time.sleep(1e-4)
         self._mail[_REST] = 0
 

@@ -142,14 +142,7 @@ class Renderer:
         if not 0.0 < aspect < math.inf:
             raise ValueError(f"aspect: expected a positive number, got {aspect}")
         footprint_px = footprint_px or self.footprint_resolution_px
-        color, counters = self._shade(
-            batch.position.reshape(-1, 2),
-            time_s.reshape(-1) if isinstance(time_s, Tensor) else time_s,
-            shape[1],
-            aspect,
-            footprint_px,
-        )
-        return SampleBatch(color.reshape(*shape[:2], 3), counters)
+        return SampleBatch(*self._shade(batch.position, time_s, aspect, footprint_px))
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
         """Renders a whole picture: a batch of framelets of all its pixels.
@@ -190,25 +183,27 @@ class Renderer:
             self._pool.shutdown()
 
     def _shade(
-        self, position: Tensor, time_s: Tensor | float, group_size: int, aspect: float, footprint_px: float
+        self, position: Tensor, time_s: Tensor | float, aspect: float, footprint_px: float
     ) -> tuple[Tensor, dict[str, int]]:
-        """Colours ``(k, 3)`` and ray counts of flat lists of samples, in groups of ``group_size``."""
-        count, home = position.shape[0], position.device
+        """Colours ``(n, s, 3)`` and ray counts of groups of samples."""
+        groups, group_size, _ = position.shape
+        count = groups * group_size
         if count == 0:
-            return torch.zeros(0, 3, device=home), dict.fromkeys(("primary_rays", *_SECONDARY[:2]), 0)
-        target = torch.device(self.device)
-        position = position.to(target, torch.float32).contiguous()
+            return position.new_zeros(groups, group_size, 3), dict.fromkeys(("primary_rays", *_SECONDARY[:2]), 0)
         earliest, latest = _bounds(time_s)
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
         if earliest == latest:
             time_s = earliest
         if self.packets:
-            batches = self._packet_batches(aspect, footprint_px)
-            color, shadow, reflection = batches.shade(position, time_s)
+            if position.dtype != torch.float32 or position.is_cuda or not position.is_contiguous():
+                position = position.to("cpu", torch.float32).contiguous()
+            color, shadow, reflection = self._packet_batches(aspect, footprint_px).shade(position, time_s)
             totals = [shadow, reflection, 0]
         else:
-            color = torch.empty(count, 3, device=target)
+            target, home = torch.device(self.device), position.device
+            placed = position.to(target, torch.float32).contiguous()
+            color = torch.empty(groups, group_size, 3, device=target)
             rays = torch.empty(count, 3, dtype=torch.int32, device=target)
             view = self._view(aspect, footprint_px)
             if not isinstance(time_s, Tensor):
@@ -216,19 +211,20 @@ class Renderer:
                 time_s = torch.full((count,), time_s, dtype=torch.float64)
             shared = (
                 group_size,
-                wp.from_torch(position, dtype=wp.vec2),
-                wp.from_torch(time_s.to(target, torch.float64).contiguous(), dtype=wp.float64),
-                wp.from_torch(color, dtype=wp.vec3),
+                wp.from_torch(placed.reshape(-1, 2), dtype=wp.vec2),
+                wp.from_torch(time_s.to(target, torch.float64).reshape(-1).contiguous(), dtype=wp.float64),
+                wp.from_torch(color.view(-1, 3), dtype=wp.vec3),
                 wp.from_torch(rays, dtype=wp.vec3i),
             )
             self._launch(self._kernels.shade_samples, view, shared, count)
             totals = _totals(rays)
+            color = color.to(home)
         kinds = _SECONDARY if Feature.GLASS in self.features else _SECONDARY[:2]
         counters = {"primary_rays": count, **dict(zip(kinds, totals, strict=False))}
         if self._work is not None:
             counters |= dict(zip(("node_visits", "triangle_tests"), self._work.tolist(), strict=True))
             self._work[:] = 0
-        return color.to(home), counters
+        return color, counters
 
     def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:
         """Recorded launches for pictures of one shape."""
