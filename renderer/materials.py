@@ -91,7 +91,7 @@ class MaterialTable:
     def upload_texels(self) -> wp.array:
         """All texels on a device; one black one where there are none."""
         table = np.concatenate(self.texels) if self.texels else np.zeros((1, 3), np.float32)
-        return wp.array(table, dtype=wp.vec3, device=self.device)
+        return wp.array(table, dtype=wp.vec3, device=self.device, copy=self.device != "cpu")
 
     def add_texture(self, texture: Texture, where: str) -> int:
         """Index of a texture; the same object is stored once."""
