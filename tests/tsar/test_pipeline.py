@@ -5,7 +5,7 @@ import torch
 
 from tests.oracles import pictures
 from tsar.baselines.framed import run as run_framed
-from tsar.clock import fixed_clock, wall_clock
+from tsar.clock import StageTimer, fixed_clock, wall_clock
 from tsar.config import ConfigError, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
 from tsar.pipeline import run
@@ -235,3 +235,13 @@ def test_other_sizes_and_solvers_run_and_conserve(config):
     for record, display in play(config, pictures.textured_motion, 6):
         assert record.conservation_residual <= 1e-9 and bool(torch.isfinite(display.image).all())
         assert record.selected.numel() == config.batch_size
+
+
+def test_stages_that_share_a_span_divide_it():
+    stage = StageTimer()
+    stage.divide(2.0, {"response": 3, "tiling": 1})
+    stage.divide(1.0, {"tiling": 0, "selection": 0})  # a clock too coarse to tell
+    assert stage.seconds == {"response": 1.5, "tiling": 0.5, "selection": 0.0}
+    with pytest.raises(KeyError), stage("tiling"):
+        raise KeyError
+    assert stage.seconds["tiling"] > 0.5 and stage.total == sum(stage.seconds.values())
