@@ -187,9 +187,9 @@ class Renderer:
     ) -> tuple[Tensor, dict[str, int]]:
         """Colours ``(n, s, 3)`` and ray counts of groups of samples."""
         groups, group_size, _ = position.shape
-        count = groups * group_size
+        count, home = groups * group_size, position.device
         if count == 0:
-            return position.new_zeros(groups, group_size, 3), dict.fromkeys(("primary_rays", *_SECONDARY[:2]), 0)
+            return torch.zeros(groups, group_size, 3, device=home), dict.fromkeys(("primary_rays", *_SECONDARY[:2]), 0)
         earliest, latest = _bounds(time_s)
         if not (math.isfinite(earliest) and math.isfinite(latest)):
             raise ValueError("time_s: expected finite times")
@@ -201,7 +201,7 @@ class Renderer:
             color, shadow, reflection = self._packet_batches(aspect, footprint_px).shade(position, time_s)
             totals = [shadow, reflection, 0]
         else:
-            target, home = torch.device(self.device), position.device
+            target = torch.device(self.device)
             placed = position.to(target, torch.float32).contiguous()
             color = torch.empty(groups, group_size, 3, device=target)
             rays = torch.empty(count, 3, dtype=torch.int32, device=target)
@@ -218,13 +218,12 @@ class Renderer:
             )
             self._launch(self._kernels.shade_samples, view, shared, count)
             totals = _totals(rays)
-            color = color.to(home)
         kinds = _SECONDARY if Feature.GLASS in self.features else _SECONDARY[:2]
         counters = {"primary_rays": count, **dict(zip(kinds, totals, strict=False))}
         if self._work is not None:
             counters |= dict(zip(("node_visits", "triangle_tests"), self._work.tolist(), strict=True))
             self._work[:] = 0
-        return color, counters
+        return color if color.device == home else color.to(home), counters
 
     def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:
         """Recorded launches for pictures of one shape."""
