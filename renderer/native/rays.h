@@ -181,18 +181,19 @@ template <bool any, class Count> inline bool walk(const Tree& tree, const Single
                     current = node.child[lane];
                     continue;
                 }
-                // Nearest last, so that it is taken first.
-                int base = size;
-                stack[size++] = {near[lane], node.child[lane]};
+                // The nearest is next, the others in any order.
+                float least = near[lane];
+                int next = node.child[lane];
                 for (; met; met &= met - 1) {
                     lane = first_bit(met);
-                    prefetch(tree, node.child[lane]);
-                    float at = near[lane];
-                    int slot = size++;
-                    for (; slot > base && stack[slot - 1].near < at; --slot) stack[slot] = stack[slot - 1];
-                    stack[slot] = {at, node.child[lane]};
+                    const float at = near[lane];
+                    const int child = node.child[lane];
+                    const bool nearer = at < least;
+                    stack[size++] = {nearer ? least : at, nearer ? next : child};
+                    prefetch(tree, stack[size - 1].child);
+                    least = nearer ? at : least, next = nearer ? child : next;
                 }
-                current = stack[--size].child;
+                current = next;
                 continue;
             }
         } else {
