@@ -117,7 +117,11 @@ class Control:
     def decide(
         self, densities: Densities, errors: Errors, history: Tensor, config: TsarConfig, stage: StageTimer
     ) -> Decision:
-        """As :func:`tsar.decision.decide`; responses by other solvers than ``waterfill`` are the reference's."""
+        """As :func:`tsar.decision.decide`; responses by other solvers than ``waterfill`` are the reference's.
+
+        Raises:
+            ValueError: if a density is negative or not finite.
+        """
         require_same(config, self.config)
         compiled = config.response.solver == "waterfill"
         if not compiled:

@@ -1,5 +1,5 @@
-// Work handed from one thread to another that waits for it: by one word of memory while the other is awake, which takes
-// a fraction of a microsecond where waking a sleeping thread takes some fifty.
+// Work handed from one thread to another that waits for it: by one word of memory while the other is awake, for
+// waking a sleeping thread takes longer than some of this work.
 #pragma once
 #include "ticks.h"
 
