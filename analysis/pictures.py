@@ -7,7 +7,6 @@ import math
 from functools import lru_cache
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import torch
 from jaxtyping import Float
@@ -30,6 +29,8 @@ NEVER = (176, 48, 48)
 @lru_cache(maxsize=8)
 def font(size_px: int) -> ImageFont.FreeTypeFont:
     """DejaVu Sans as matplotlib ships it, so that no font of the system is needed."""
+    import matplotlib
+
     path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
     return ImageFont.truetype(str(path), size_px)
 
@@ -37,6 +38,8 @@ def font(size_px: int) -> ImageFont.FreeTypeFont:
 @lru_cache(maxsize=4)
 def palette(name: str) -> Pixels:
     """``(256, 3)`` colours of a map whose lightness only rises or only falls."""
+    import matplotlib
+
     return (matplotlib.colormaps[name](np.arange(256))[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
 

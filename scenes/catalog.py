@@ -8,7 +8,6 @@ from scenes import effects, report
 from scenes.canonical import Scene, SceneError
 from scenes.driving import ANIMATIONS
 from scenes.driving import load as load_driving
-from scenes.formats.blocks import load_blocks
 from scenes.loading import asset
 
 NAMES: tuple[str, ...] = tuple(ANIMATIONS)
@@ -88,5 +87,7 @@ def load(name: str, phase: float = 0.0) -> Scene:
     if phase != 0.0:
         raise SceneError(f"phase: expected 0 for the scene {found}, which has no phases, got {phase}")
     if found in BLUR_SCENES:
+        from scenes.formats.blocks import load_blocks
+
         return load_blocks(blur_scene_file(found))[0]
     return report.load(found) if found in report.IMAGES else effects.load(found)

@@ -31,11 +31,11 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
     lone = below[crossed] == (below[crossed].sum(axis=1) == 1)[:, None]
     shift = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(crossed, shift, axis=1).T  # a is alone on its side
-    both = np.sort(np.concatenate([np.stack([a, b], -1), np.stack([a, c], -1)]), axis=1)
-    edges, which = np.unique(both, axis=0, return_inverse=True)
-    low, high = edges.T
+    low, high = np.sort([np.tile(a, 2), np.concatenate([b, c])], axis=0)
+    edges, which = np.unique(low * len(value) + high, return_inverse=True)
+    low, high = np.divmod(edges, len(value))
     share = (value[low] / (value[low] - value[high]))[:, None]
-    fresh = which.reshape(-1) + len(surface.vertices)
+    fresh = which + len(surface.vertices)
     ab, ac = fresh[: len(a)], fresh[len(a) :]
 
     def blend(array: Array) -> Array:

@@ -50,8 +50,10 @@ class Surface:
 
     def compact(self) -> Surface:
         """The surface without vertices of no triangle."""
-        used, faces = np.unique(self.faces, return_inverse=True)
-        return Surface(self.vertices[used], faces.reshape(-1, 3), self.normals[used], self.uvs[used])
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces] = True
+        faces = (np.cumsum(used) - 1)[self.faces]
+        return Surface(self.vertices[used], faces, self.normals[used], self.uvs[used])
 
 
 def unit(vectors: Array) -> Array:

@@ -64,16 +64,20 @@ def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.
         small = resize(planes, (height, width), "bilinear", antialias=True)[0]
     finally:
         torch.set_num_threads(threads)
-    return np.ascontiguousarray(small.permute(1, 2, 0).numpy())
+    return small.permute(1, 2, 0).numpy()
 
 
 @lru_cache(maxsize=1)
 def sky() -> EnvironmentLight:
     """Sky with a strip of hills, whose upper edge fades into the haze."""
     height, width = _SKY_PX
-    image = _resized(clamp_radiance(read_image(asset("sky.exr")), SKY_LIMIT), height, width)
     horizon, tall = height // 2, round(_HORIZON_DEG / 180.0 * height)
-    hills = _resized(read_image(asset("landscape_band.jpg"))[:190], tall, width // 2)
+    picture = read_image(asset("sky.exr"))
+    scale = height // len(picture)
+    above = clamp_radiance(picture[: horizon // scale + 1], SKY_LIMIT)  # what the last row above the horizon is made of
+    image = np.empty((height, width, 3), np.float32)
+    image[:horizon] = _resized(above, scale * len(above), width)[:horizon]
+    hills = np.ascontiguousarray(_resized(read_image(asset("landscape_band.jpg"))[:190], tall, width // 2))
     strip = np.roll(np.concatenate([hills, hills[:, ::-1]], axis=1), _SEAM_PX, axis=1)
     fade = np.linspace(0.0, 1.0, tall)[:, None, None] ** 0.45
     haze = image[horizon - tall : horizon].mean(axis=(0, 1))
