@@ -62,6 +62,23 @@ inline float least(f16 a) {
     return d.x < d.y ? d.x : d.y;
 }
 inline float greatest(f16 a) { return -least(-a); }
+// The least lane of each of eight, in half the steps that eight by themselves take.
+inline f8 least_of_each(const f16* a) {
+    f8 halves[8], quarters[4], eighths[2];
+    for (int i = 0; i < 8; ++i) halves[i] = vmin((f8)a[i].lo, (f8)a[i].hi);
+    for (int i = 0; i < 4; ++i) {
+        const f8 p = halves[2 * i], q = halves[2 * i + 1];
+        quarters[i] = vmin((f8)__builtin_shufflevector(p, q, 0, 1, 2, 3, 8, 9, 10, 11),
+                           (f8)__builtin_shufflevector(p, q, 4, 5, 6, 7, 12, 13, 14, 15));
+    }
+    for (int i = 0; i < 2; ++i) {
+        const f8 p = quarters[2 * i], q = quarters[2 * i + 1];
+        eighths[i] = vmin((f8)__builtin_shufflevector(p, q, 0, 1, 4, 5, 8, 9, 12, 13),
+                          (f8)__builtin_shufflevector(p, q, 2, 3, 6, 7, 10, 11, 14, 15));
+    }
+    return vmin((f8)__builtin_shufflevector(eighths[0], eighths[1], 0, 2, 4, 6, 8, 10, 12, 14),
+                (f8)__builtin_shufflevector(eighths[0], eighths[1], 1, 3, 5, 7, 9, 11, 13, 15));
+}
 inline float added(f16 a) {
     f8 b = a.lo + a.hi;
     f4 c = b.lo + b.hi;

@@ -16,8 +16,12 @@ constexpr float ROUNDING_UP = 1.0000005f;
 // A triangle's corners are rounded when they are moved to the ray's origin. Boxes are wider by as much, so that a ray
 // that the test of a triangle would let pass is not lost at its box, however far away it starts.
 constexpr float PADDING = 4.0e-7f;
+// In paddings, by how much the rectangle of a triangle is wider: three roundings more than at a box.
+constexpr float CORNER_SLACK = 5.0f;
 // Packets whose directions differ by more than this along an axis are walked ray by ray.
 constexpr float SPREAD_MAX = 0.25f;
+// Of so few children a packet of shadow rays walks into all, without a test by each ray.
+constexpr int FEW = 2;
 
 template <class F> inline F reciprocal(F x) { return 1.0f / (vabs(x) > TINY ? x : (F)TINY); }
 inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TINY); }
@@ -220,40 +224,68 @@ struct Packet {
     int kx, ky, kz;
     bool backwards[3];
     float near_origin[3], far_origin[3], inverse_least[3], inverse_most[3];
+    // Where the rays pass a plane across their fastest axis, and how far they lean: a middle and half the difference.
+    float plane, low[2], high[2], lean[2], lean_half[2];
     bool together;  // worth walking as one
     bool same_signs;
 
     Packet(const Vec16& from, const Vec16& along) : origin(from) {
-        f16 x = vabs(along.x), y = vabs(along.y), z = vabs(along.z);
-        unsigned by_x = bits((x >= y) & (x >= z)), by_y = bits(y >= z) & ~by_x;
+        const f16 x = vabs(along.x), y = vabs(along.y), z = vabs(along.z);
+        const unsigned by_x = bits((x >= y) & (x >= z)), by_y = bits(y >= z) & ~by_x;
         kz = by_x & 1u ? 0 : by_y & 1u ? 1 : 2, kx = (kz + 1) % 3, ky = (kz + 2) % 3;
-        unsigned agree = kz == 0 ? by_x : kz == 1 ? by_y : ALL & ~(by_x | by_y);
-        float longest = greatest(vabs(along[kz]));
+        const unsigned agree = kz == 0 ? by_x : kz == 1 ? by_y : ALL & ~(by_x | by_y);
+        const f16 directions[8] = {along.x, along.y, along.z, -along.x, -along.y, -along.z};
+        const f8 bound = least_of_each(directions);
         float spread = 0.0f;
-        for (int axis = 0; axis < 3; ++axis) {
-            float width = greatest(along[axis]) - least(along[axis]);
-            spread = width > spread ? width : spread;
-        }
+        for (int axis = 0; axis < 3; ++axis) spread = vmax(spread, -bound[3 + axis] - bound[axis]);
+        const float longest = vmax(-bound[kz], -bound[3 + kz]);
         // What is not finite would spoil the bounds of the others.
         const f16 sum = from.x + from.y + from.z + along.x + along.y + along.z;
-        together = agree == ALL && bits(sum - sum == 0.0f) == ALL && spread <= SPREAD_MAX * longest;
+        together = agree == ALL && bits(sum - sum == 0.0f) == ALL && spread <= SPREAD_MAX * longest &&
+                   longest > 2.0f * TINY;
         if (!together) return;
         inverse = {reciprocal(along.x), reciprocal(along.y), reciprocal(along.z)};
-        f16 fast = 1.0f / along[kz];
+        const f16& fast = inverse[kz];
         shear = {along[kx] * fast, along[ky] * fast, fast};
-        f16 pad = PADDING * vmax(vmax(vmax(vabs(from.x), vabs(from.y)), vabs(from.z)), (f16)1.0f);
+        const f16 pad = PADDING * vmax(vmax(vmax(vabs(from.x), vabs(from.y)), vabs(from.z)), (f16)1.0f);
         low_origin = {from.x + pad, from.y + pad, from.z + pad};
         high_origin = {from.x - pad, from.y - pad, from.z - pad};
+        const f16 origins[8] = {-low_origin.x, -low_origin.y, -low_origin.z, high_origin.x,
+                                high_origin.y, high_origin.z,  -pad};
+        const f8 outermost = least_of_each(origins);
         same_signs = true;
         for (int axis = 0; axis < 3; ++axis) {
-            unsigned negative = bits(inverse[axis] < 0.0f);
-            same_signs = same_signs && (negative == 0 || negative == ALL);
-            backwards[axis] = negative != 0;
-            near_origin[axis] = backwards[axis] ? least(high_origin[axis]) : greatest(low_origin[axis]);
-            far_origin[axis] = backwards[axis] ? greatest(low_origin[axis]) : least(high_origin[axis]);
-            inverse_least[axis] = least(inverse[axis]);
-            inverse_most[axis] = greatest(inverse[axis]);
+            const float slowest = bound[axis], fastest = -bound[3 + axis];
+            backwards[axis] = fastest < -TINY;
+            same_signs = same_signs && (backwards[axis] || slowest >= -TINY);
+            const float low = -outermost[axis], high = outermost[3 + axis];
+            near_origin[axis] = backwards[axis] ? high : low, far_origin[axis] = backwards[axis] ? low : high;
+            inverse_least[axis] = reciprocal(fastest), inverse_most[axis] = reciprocal(slowest);
         }
+        plane = from[kz][0];
+        const f16 behind = from[kz] - plane;
+        const f16 at_x = from[kx] - shear.x * behind, at_y = from[ky] - shear.y * behind;
+        const f16 leaning[8] = {shear.x, shear.y, -shear.x, -shear.y, at_x, at_y, -at_x, -at_y};
+        const f8 edge = least_of_each(leaning);
+        const float slack = -CORNER_SLACK * outermost[6];
+        for (int i = 0; i < 2; ++i) {
+            low[i] = edge[4 + i] - slack, high[i] = -edge[6 + i] + slack;
+            lean[i] = 0.5f * (edge[i] - edge[2 + i]), lean_half[i] = -0.5f * (edge[2 + i] + edge[i]);
+        }
+    }
+
+    // Which triangles of one or two blocks some ray may meet. Moved to the plane along every ray of the packet, corners
+    // span a rectangle; where it does not reach the rays there, none of them is within the triangle.
+    template <class F> unsigned near_to(const Block* block) const {
+        F left[2] = {(F)FAR, (F)FAR}, right[2] = {(F)-FAR, (F)-FAR};
+        for (int k = 0; k < 3; ++k) {
+            const F depth = corners_of<F>(block, k, kz) - plane, size = vabs(depth);
+            for (int i = 0; i < 2; ++i) {
+                const F at = corners_of<F>(block, k, i ? ky : kx) - lean[i] * depth, half = lean_half[i] * size;
+                left[i] = vmin(left[i], at - half), right[i] = vmax(right[i], at + half);
+            }
+        }
+        return bits((left[0] <= high[0]) & (right[0] >= low[0]) & (left[1] <= high[1]) & (right[1] >= low[1]));
     }
 
     // Which lanes pass a child's box before their `reach`.
@@ -298,10 +330,11 @@ inline unsigned children_met(const Node& node, const Packet& rays, const PacketH
 
 // Lanes of a packet against a leaf, triangle by triangle. Returns the lanes with a new hit; `any` idles them.
 template <bool any>
-inline unsigned meet_leaf(const Block* leaf, int triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
+inline unsigned meet_leaf(const Block* leaf, unsigned triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
     unsigned changed = 0;
     const i16 passing = lanes_of(lanes);  // others must not hit what they would not have met alone
-    for (int number = 0; number < triangles; ++number) {
+    for (; triangles; triangles &= triangles - 1) {
+        const int number = first_bit(triangles);
         const Block& block = leaf[number / BLOCK_WIDTH];
         const int lane = number % BLOCK_WIDTH;
         Vec16 corner[3];
@@ -358,14 +391,17 @@ inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& alo
     return changed;
 }
 
-// A packet against a leaf: by triangles, or by rays where few of these come that far.
+// A packet against a leaf: by triangles that are near to it, or by rays where few of these come that far.
 template <bool any>
 inline unsigned visit_leaf(const Tree& tree, int child, const Packet& rays, unsigned lanes, PacketHit& hit) {
     const Block* leaf = tree.blocks + leaf_block(child);
     const int triangles = leaf_triangles(child);
-    const bool alone = __builtin_popcount(lanes) < triangles;
+    const unsigned near = triangles > BLOCK_WIDTH ? rays.near_to<f8>(leaf) : rays.near_to<f4>(leaf);
+    const unsigned some = near & ((1u << triangles) - 1);
+    if (!some) return 0;
+    const bool alone = __builtin_popcount(lanes) < __builtin_popcount(some);
     return alone ? meet_leaf_alone<any>(leaf, triangles, rays, lanes, hit)
-                 : meet_leaf<any>(leaf, triangles, rays, lanes, hit);
+                 : meet_leaf<any>(leaf, some, rays, lanes, hit);
 }
 
 // A packet from the root to the nearest hits. Returns the lanes that found one.
@@ -384,7 +420,7 @@ inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hi
         const Entry entry = stack[--size];
         if (entry.near > reach) continue;
         // Now by each ray, and only as far as its own hit.
-        const unsigned active = entry.parent ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
+        const unsigned active = entry.child < 0 ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
         if (!active) continue;
         if (entry.child >= 0) {
             const Node& node = tree.nodes[entry.child];
@@ -411,7 +447,7 @@ inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hi
 // A packet from the root to any hits, which idle their lanes by a negative `hit.t`. Returns the lanes that found one.
 //
 // No order is kept, for the first hit ends a ray, and most of the rays that are asked about have none. Without hits that
-// come nearer, a box is tested by each ray as soon as it is found.
+// come nearer, a leaf's box is tested by each ray as soon as it is found, and a node's where many are.
 inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
     struct Entry {
         int child;
@@ -428,10 +464,13 @@ inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
         if (entry.child >= 0) {
             const Node& node = tree.nodes[entry.child];
             f8 near;
-            for (unsigned met = children_met(node, rays, hit, reach, near); met; met &= met - 1) {
+            unsigned met = children_met(node, rays, hit, reach, near);
+            const bool few = __builtin_popcount(met) <= FEW;
+            for (; met; met &= met - 1) {
                 const int lane = first_bit(met);
-                const unsigned passing = rays.passing(node, lane, hit.t);
-                stack[size] = {node.child[lane], passing};
+                const int child = node.child[lane];
+                const unsigned passing = child >= 0 && few ? ALL : rays.passing(node, lane, hit.t);
+                stack[size] = {child, passing};
                 size += passing != 0;
                 prefetch(tree, node.child[lane]);
             }

@@ -125,6 +125,7 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
         weight = pick(on_surface, weight * material.mirror, weight);
         const i16 bright = vmax(vmax(weight.x, weight.y), weight.z) > scene.throughput_cutoff;
         busy = met & bits((bounces < scene.depth) & bright);
+        if (!busy) break;
         bounces -= lanes_of(busy);
         start = surface.position + surface.geometric_normal * surface.offset;
         towards = mirror_direction(surface, towards);

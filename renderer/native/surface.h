@@ -21,52 +21,49 @@ struct Surface {
     i16 material;
 };
 
-// Elements of an array of vectors at lane-wise indices.
-template <class V> inline Vec16 gather3(const V* base, i16 index) {
-    Vec16 v;
-    for (int lane = 0; lane < LANES; ++lane) {
-        const V& value = base[index[lane]];
-        v.x[lane] = value[0], v.y[lane] = value[1], v.z[lane] = value[2];
-    }
-    return v;
+// A value of each of a face's corners, lane by lane.
+struct Corners {
+    Vec16 a, b, c;
+
+    Vec16 weighted(f16 u, f16 v, f16 w) const { return a * u + b * v + c * w; }
+};
+
+// A value that all lanes of a mask share.
+template <class V> inline void put(Vec16& into, const V& value, i16 lanes) {
+    into.x = lanes ? (f16)value[0] : into.x, into.y = lanes ? (f16)value[1] : into.y;
+    into.z = lanes ? (f16)value[2] : into.z;
 }
 
-inline Vec16 weighted(const Vec16& a, const Vec16& b, const Vec16& c, f16 u, f16 v, f16 w) {
-    return a * u + b * v + c * w;
-}
-
-template <class Scene, class Mesh> inline LocalSurface mesh_surface(const Scene& scene, const Mesh& mesh, const PacketHit& hit) {
-    LocalSurface local;
-    i16 first, second, third;
-    for (int lane = 0; lane < LANES; ++lane) {
-        const auto& face = scene.faces.data[mesh.first_face + hit.face[lane]];
-        first[lane] = face[0], second[lane] = face[1], third[lane] = face[2];
-    }
-    const f16 w = 1.0f - hit.u - hit.v;
+// Neighbouring rays meet few faces, so what belongs to one is read once for all the lanes that met it.
+template <class Scene, class Mesh>
+inline LocalSurface mesh_surface(const Scene& scene, const Mesh& mesh, const PacketHit& hit, unsigned mask) {
     const auto* vertices = scene.vertices.data + mesh.first_vertex;
-    const Vec16 a = gather3(vertices, first), b = gather3(vertices, second), c = gather3(vertices, third);
-    local.position = weighted(a, b, c, hit.u, hit.v, w);
-    local.tangent_u = b - a, local.tangent_v = c - a;
+    const auto* normals = scene.normals.data + mesh.first_normal;
+    const auto* uvs = scene.uvs.data + mesh.first_uv;
+    const bool smooth = mesh.first_normal >= 0, mapped = mesh.first_uv >= 0;
+    Corners place = {}, normal = {};
+    f16 ua = 0.0f, va = 0.0f, ub = 0.0f, vb = 0.0f, uc = 0.0f, vc = 0.0f;
+    each_distinct(hit.face, mask, [&](int number, unsigned same) {
+        const auto& face = scene.faces.data[mesh.first_face + number];
+        const int first = face[0], second = face[1], third = face[2];
+        const i16 lanes = lanes_of(same);
+        put(place.a, vertices[first], lanes), put(place.b, vertices[second], lanes), put(place.c, vertices[third], lanes);
+        if (smooth)
+            put(normal.a, normals[first], lanes), put(normal.b, normals[second], lanes), put(normal.c, normals[third], lanes);
+        if (!mapped) return;
+        ua = lanes ? (f16)uvs[first][0] : ua, va = lanes ? (f16)uvs[first][1] : va;
+        ub = lanes ? (f16)uvs[second][0] : ub, vb = lanes ? (f16)uvs[second][1] : vb;
+        uc = lanes ? (f16)uvs[third][0] : uc, vc = lanes ? (f16)uvs[third][1] : vc;
+    });
+    const f16 w = 1.0f - hit.u - hit.v;
+    LocalSurface local;
+    local.position = place.weighted(hit.u, hit.v, w);
+    local.tangent_u = place.b - place.a, local.tangent_v = place.c - place.a;
     local.geometric_normal = unit(cross(local.tangent_u, local.tangent_v));
-    local.normal = local.geometric_normal;
-    if (mesh.first_normal >= 0) {
-        const auto* normals = scene.normals.data + mesh.first_normal;
-        const Vec16 smooth =
-            weighted(gather3(normals, first), gather3(normals, second), gather3(normals, third), hit.u, hit.v, w);
-        local.normal = pick(dot(smooth, smooth) > 1.0e-12f, smooth, local.normal);
-    }
-    local.u = local.v = local.uv_area = 0.0f;
-    if (mesh.first_uv >= 0) {
-        const auto* uvs = scene.uvs.data + mesh.first_uv;
-        f16 ua, va, ub, vb, uc, vc;
-        for (int lane = 0; lane < LANES; ++lane) {
-            ua[lane] = uvs[first[lane]][0], va[lane] = uvs[first[lane]][1];
-            ub[lane] = uvs[second[lane]][0], vb[lane] = uvs[second[lane]][1];
-            uc[lane] = uvs[third[lane]][0], vc[lane] = uvs[third[lane]][1];
-        }
-        local.u = ua * hit.u + ub * hit.v + uc * w, local.v = va * hit.u + vb * hit.v + vc * w;
-        local.uv_area = vabs((ub - ua) * (vc - va) - (vb - va) * (uc - ua));
-    }
+    const Vec16 between = normal.weighted(hit.u, hit.v, w);  // zero where the mesh has no normals
+    local.normal = pick(dot(between, between) > 1.0e-12f, between, local.geometric_normal);
+    local.u = ua * hit.u + ub * hit.v + uc * w, local.v = va * hit.u + vb * hit.v + vc * w;
+    local.uv_area = vabs((ub - ua) * (vc - va) - (vb - va) * (uc - ua));
     return local;
 }
 
@@ -99,8 +96,8 @@ inline LocalSurface flat_surface(const Vec16& point, i16 axis, f16 side) {
 }
 
 template <class Scene, class Record>
-inline LocalSurface local_surface(const Scene& scene, const Record& record, const PacketHit& hit, Vec16 point) {
-    if (record.shape == SHAPE_MESH) return mesh_surface(scene, scene.meshes.data[record.mesh], hit);
+inline LocalSurface local_surface(const Scene& scene, const Record& record, const PacketHit& hit, unsigned mask, Vec16 point) {
+    if (record.shape == SHAPE_MESH) return mesh_surface(scene, scene.meshes.data[record.mesh], hit, mask);
     if (record.shape == SHAPE_SPHERE) return sphere_surface(point);
     if (record.shape == SHAPE_CUBE) {
         const i16 axis = hit.face % 3;
@@ -126,11 +123,9 @@ inline Surface surface_of(const Stage<Scene, View>& stage, int instance, unsigne
         point = pose.to_track(point - pose.translation);
     }
     const Vec16 at = transformed(record.to_local, point) + spread(record.to_local_offset);
-    const LocalSurface local = local_surface(scene, record, hit, at);
+    const LocalSurface local = local_surface(scene, record, hit, mask, at);
     Vec16 geometric = transformed_by_transpose(record.to_local, local.geometric_normal);
     Vec16 normal = transformed_by_transpose(record.to_local, local.normal);
-    const f16 patch = length(
-        cross(transformed(record.from_local, local.tangent_u), transformed(record.from_local, local.tangent_v)));
     Surface surface;
     surface.position = transformed(record.from_local, local.position) + spread(record.from_local_offset);
     f16 magnitude = record.extent;
@@ -144,9 +139,16 @@ inline Surface surface_of(const Stage<Scene, View>& stage, int instance, unsigne
     normal = pick(dot(normal, geometric) < 0.0f, -normal, normal);
     const f16 away = dot(normal, direction);
     surface.geometric_normal = geometric;
-    surface.normal = pick(away > -1.0e-3f, unit(normal - direction * (away + 1.0e-3f)), normal);
+    surface.normal = normal;
+    if (bits(away > -1.0e-3f))
+        surface.normal = pick(away > -1.0e-3f, unit(normal - direction * (away + 1.0e-3f)), normal);
     surface.u = local.u, surface.v = local.v;
-    surface.uv_density = vsqrt(local.uv_area / vmax(patch, (f16)1.0e-30f));
+    surface.uv_density = 0.0f;
+    if (bits(local.uv_area > 0.0f)) {
+        const f16 patch = length(
+            cross(transformed(record.from_local, local.tangent_u), transformed(record.from_local, local.tangent_v)));
+        surface.uv_density = vsqrt(local.uv_area / vmax(patch, (f16)1.0e-30f));
+    }
     surface.offset = (magnitude + greatest_component(surface.position)) * OFFSET;
     surface.material = record.material;
     if (record.material < 0)

@@ -83,6 +83,29 @@ def test_a_ray_does_not_depend_on_its_company() -> None:
     assert np.array_equal(blocked[order], queries.blocked(origin[order], direction[order], reach[order]))
 
 
+@pytest.mark.parametrize("distance", [0.3, 3.0, 1e2, 1e4])
+@pytest.mark.parametrize("width", [0.0, 1e-6, 1e-2])
+def test_neighbours_at_an_edge_meet_what_each_meets_alone(distance: float, width: float) -> None:
+    vertices, faces = bumpy(4)
+    rng = np.random.default_rng(5)
+    middle = vertices[faces[:, :2]].mean(axis=1).astype(np.float64)
+    outwards = rng.normal(size=middle.shape)
+    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+    at, start = (np.repeat(points, 16, axis=0) for points in (middle, middle + distance * outwards))
+    at += width * rng.normal(size=at.shape)
+    start += width * distance * rng.normal(size=at.shape)
+    origin, direction = start.astype(np.float32), (at - start).astype(np.float32)
+    order = rng.permutation(len(at))  # the directions of a packet then have nothing in common
+    queries = RayQueries(vertices, faces)
+    together, alone = queries.closest(origin, direction), queries.closest(origin[order], direction[order])
+    for name in ("face", "t", "u", "v"):
+        assert np.array_equal(getattr(together, name)[order], getattr(alone, name)), name
+    near = np.full(len(at), 1.0 - 1e-3, np.float32)
+    blocked = queries.blocked(origin, direction, near)
+    assert np.array_equal(blocked[order], queries.blocked(origin[order], direction[order], near))
+    assert (together.face >= 0).mean() > 0.9
+
+
 @pytest.mark.parametrize("spoilt", ["origin", "direction", "reach"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_what_is_no_number_spoils_no_other_ray(spoilt: str, value: float) -> None:
