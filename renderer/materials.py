@@ -89,8 +89,8 @@ class MaterialTable:
         return self._image_index[key]
 
     def upload_texels(self) -> wp.array:
-        """All texels on a device; one black one where there are none."""
-        table = np.concatenate(self.texels) if self.texels else np.zeros((1, 3), np.float32)
+        """All texels on a device, and a black one at the end, so that the last one can be read as four floats."""
+        table = np.concatenate([*self.texels, np.zeros((1, 3), np.float32)])
         return wp.array(table, dtype=wp.vec3, device=self.device, copy=self.device != "cpu")
 
     def add_texture(self, texture: Texture, where: str) -> int:

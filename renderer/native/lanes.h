@@ -97,6 +97,17 @@ inline i16 gather(const int* base, i16 index) {
     return value;
 }
 
+// The 4 x 4 floats of each quarter turned over their diagonal; the fourth rows are left out.
+inline void transpose_quarters(const f16* row, f16* column) {
+    const f16 a = __builtin_shufflevector(row[0], row[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const f16 b = __builtin_shufflevector(row[2], row[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const f16 c = __builtin_shufflevector(row[0], row[1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const f16 d = __builtin_shufflevector(row[2], row[3], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    column[0] = __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+    column[1] = __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
+    column[2] = __builtin_shufflevector(c, d, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+}
+
 template <class F> struct Vec {
     F x, y, z;
     const F& operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
@@ -114,6 +125,19 @@ template <class F> inline Vec<F> cross(Vec<F> a, Vec<F> b) {
 }
 inline Vec16 pick(i16 condition, Vec16 a, Vec16 b) {
     return {condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z};
+}
+// Elements of an array of vectors at lane-wise places, each read together with the float that follows it.
+inline Vec16 gather3(const float* base, i16 index) {
+    f16 row[4], column[3];
+    for (int i = 0; i < 4; ++i) {
+        f4 part[4];
+        for (int quarter = 0; quarter < 4; ++quarter) part[quarter] = load<f4>(base + 3ll * index[4 * quarter + i]);
+        const f8 low = __builtin_shufflevector(part[0], part[1], 0, 1, 2, 3, 4, 5, 6, 7);
+        const f8 high = __builtin_shufflevector(part[2], part[3], 0, 1, 2, 3, 4, 5, 6, 7);
+        row[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    }
+    transpose_quarters(row, column);
+    return {column[0], column[1], column[2]};
 }
 inline f16 length(Vec16 a) { return vsqrt(dot(a, a)); }
 // The zero vector stays as it is, as in Warp.

@@ -419,7 +419,7 @@ inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hi
     while (size) {
         const Entry entry = stack[--size];
         if (entry.near > reach) continue;
-        // Now by each ray, and only as far as its own hit.
+        // A leaf by each ray, and only as far as its own hit; who passes its box passes all boxes around it.
         const unsigned active = entry.child < 0 ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
         if (!active) continue;
         if (entry.child >= 0) {

@@ -24,25 +24,27 @@ struct Level {
     i16 first_texel, width, height;
 };
 
+template <class Scene> inline Level level_of(const Scene& scene, int index) {
+    const auto& record = scene.levels.data[index];
+    return {(i16)record.first_texel, (i16)record.width, (i16)record.height};
+}
+
+// Neighbours look at few levels.
 template <class Scene> inline Level level_of(const Scene& scene, i16 index) {
-    Level level;
-    for (int lane = 0; lane < LANES; ++lane) {
-        const auto& record = scene.levels.data[index[lane]];
-        level.first_texel[lane] = record.first_texel;
-        level.width[lane] = record.width, level.height[lane] = record.height;
-    }
+    Level level = {};
+    each_distinct(index, ALL, [&](int number, unsigned same) {
+        const Level one = level_of(scene, number);
+        const i16 lanes = lanes_of(same);
+        level.first_texel = lanes ? one.first_texel : level.first_texel;
+        level.width = lanes ? one.width : level.width, level.height = lanes ? one.height : level.height;
+    });
     return level;
 }
 
 template <class Scene> inline Vec16 texel(const Scene& scene, const Level& level, i16 x, i16 y) {
     const i16 black = (x < 0) | (y < 0);
     const i16 at = black ? (i16)0 : level.first_texel + y * level.width + x;
-    Vec16 color;
-    for (int lane = 0; lane < LANES; ++lane) {
-        const auto& value = scene.texels.data[at[lane]];
-        color.x[lane] = value[0], color.y[lane] = value[1], color.z[lane] = value[2];
-    }
-    return pick(black, {(f16)0.0f, (f16)0.0f, (f16)0.0f}, color);
+    return pick(black, {(f16)0.0f, (f16)0.0f, (f16)0.0f}, gather3((const float*)scene.texels.data, at));
 }
 
 template <class Scene>
@@ -73,7 +75,7 @@ inline Vec16 image_lookup(const Scene& scene, const Record& record, f16 u, f16 v
     else
         u = clamped(u, -8.0f, 9.0f), v = clamped(v, -8.0f, 9.0f);
     if (record.filter == FILTER_NEAREST) {
-        const Level level = level_of(scene, (i16)record.first_level);
+        const Level level = level_of(scene, record.first_level);
         const i16 column = wrapped(to_int(vfloor(u * to_float(level.width))), level.width, record.wrap);
         const i16 row = wrapped(to_int(vfloor((1.0f - v) * to_float(level.height))), level.height, record.wrap);
         return texel(scene, level, column, row);
@@ -119,7 +121,7 @@ template <class Scene> inline Vec16 environment_radiance(const Scene& scene, con
     if (scene.environment_level < 0) return {(f16)0.0f, (f16)0.0f, (f16)0.0f};
     const Vec16 local = unit(transformed(scene.environment_to_map, direction));
     const f16 u = vatan2(local.x, -local.z) * (0.5f / PI), v = vacos(local.y) * (1.0f / PI);
-    const Level level = level_of(scene, (i16)scene.environment_level);
+    const Level level = level_of(scene, scene.environment_level);
     return bilinear(scene, level, (u - vfloor(u)) * to_float(level.width), v * to_float(level.height), WRAP_REPEAT,
                     WRAP_CLAMP) *
            (f16)scene.environment_scale;
