@@ -25,6 +25,8 @@ from tsar.types import SampleMap
 _BAND_PIXELS = 1 << 15
 """About as many pixels to a band, 20 bytes each, as a second-level cache holds beside the framelets."""
 _BAND_ROWS_LEAST = 8
+_SPARE = 16
+"""Elements behind arrays that are read or written sixteen at a time."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class Display:
         plan.band = min(max(_BAND_PIXELS // resolution, _BAND_ROWS_LEAST), resolution)
         axes = [_axis(side, resolution >> level) for level in range(low, high + 1)]
         for place, name in enumerate(("left", "right", "share_left", "share_right", "weight")):
-            setattr(plan, name, self._keep(name, torch.cat([axis[place] for axis in axes])))
+            setattr(plan, name, self._keep(name, torch.cat([*(axis[place] for axis in axes), axes[0][place][:_SPARE]])))
         lengths = torch.tensor([0, *(axis[0].numel() for axis in axes)], dtype=torch.int32)
         plan.first = self._keep("first", torch.cumsum(lengths, 0, dtype=torch.int32))
         margins = [(axis[0].numel() - (resolution >> level)) // 2 for level, axis in enumerate(axes, low)]
@@ -127,8 +129,10 @@ class Display:
         config, worker = self.config, kernels.Worker()
         resolution, side = config.resolution_px, config.framelet_side
         widest = max(2 * side, 2 * (resolution >> config.level_min))
-        worker.planes = self._keep(f"planes {number}", torch.empty(PLANES, self._plan.band, resolution))
-        worker.rows = self._keep(f"rows {number}", torch.empty(side, 3, widest))
+        planes, rows = PLANES * self._plan.band * resolution, 3 * side * widest
+        worker.planes = self._keep(f"planes {number}", torch.zeros(planes + _SPARE))
+        worker.rows = self._keep(f"rows {number}", torch.zeros(rows + _SPARE))
+        worker.samples = self._keep(f"samples {number}", torch.zeros(3 * side**2))
         worker.box = self._keep(f"box {number}", torch.empty(resolution, dtype=torch.float64))
         worker.ages = self._keep(f"ages {number}", torch.empty(resolution))
         worker.result = self._holes[number:].ctypes.data

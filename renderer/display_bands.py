@@ -82,49 +82,9 @@ def passes(
     ...
 
 
-@wp.func_native("""
-    const int place = level - plan.level_low, n = plan.resolution, width = n >> level, side = plan.side;
-    const int margin = ((const int*)plan.margin)[place], begin = ((const int*)plan.first)[place];
-    const int *left = (const int*)plan.left + begin, *right = (const int*)plan.right + begin;
-    const float* __restrict__ share_left = (const float*)plan.share_left + begin;
-    const float* __restrict__ share_right = (const float*)plan.share_right + begin;
-    const int reach = width + 2 * margin, order_stride = width >= side ? 1 : side / width;
-    const int samples = side / order_stride, each = order_stride * order_stride;
-    const int spacing = width / samples, edge = margin + spacing / 2;
-    // Only the rows of samples between which the band's rows of pixels lie.
-    const int first = left[wp::max(top - (y - margin), 0)], last = right[wp::min(bottom - (y - margin), reach) - 1];
-    const float* __restrict__ c = (const float*)color + 3ll * side * side * slot;
-    for (int j = first; j <= last; ++j) {
-        const int* order = (const int*)plan.order + j * order_stride * side;
-        float spread[3][32], *line[3] = {spread[0], spread[1], spread[2]};
-        if (spacing == 1) {  // samples are pixels, and the row is done
-            float* to = (float*)rows + 3ll * j * reach;
-            line[0] = to, line[1] = to + reach, line[2] = to + 2 * reach;
-        }
-        for (int i = 0; i < samples; ++i) {
-            const float* from = c + 3 * order[i * order_stride];
-            if (each == 1) {
-                line[0][i] = from[0], line[1][i] = from[1], line[2][i] = from[2];
-                continue;
-            }
-            // A pixel of a finer tile is the mean of a square of samples, which is a run in Morton order.
-            float r = 0.0f, g = 0.0f, b = 0.0f;
-            for (int k = 0; k < each; ++k) r += from[3 * k], g += from[3 * k + 1], b += from[3 * k + 2];
-            line[0][i] = r / each, line[1][i] = g / each, line[2][i] = b / each;
-        }
-        for (int channel = 0; channel < 3 && spacing > 1; ++channel) {
-            float* __restrict__ to = (float*)rows + ((long long)3 * j + channel) * reach;
-            const float* __restrict__ from = line[channel];
-            // Pixels outside the outermost samples have those alone; between samples lie ``spacing`` pixels, and pixels
-            // of one phase have the same shares of their two neighbours.
-            for (int i = 0; i < edge; ++i) to[i] = from[0], to[reach - 1 - i] = from[samples - 1];
-            for (int phase = 0; phase < spacing; ++phase) {
-                const float p = share_left[edge + phase], q = share_right[edge + phase];
-                for (int i = 0; i < samples - 1; ++i) to[edge + i * spacing + phase] = p * from[i] + q * from[i + 1];
-            }
-        }
-    }
-""")
+@wp.func_native(
+    "display::expand_rows(plan, slot, level, y, top, bottom, (const float*)color, (float*)samples, (float*)rows);"
+)
 def expand_rows(
     plan: DisplayPlan,
     slot: wp.int32,
@@ -133,50 +93,14 @@ def expand_rows(
     top: wp.int32,
     bottom: wp.int32,
     color: Address,
+    samples: Address,
     rows: Address,
 ):
     """Rows of a framelet's samples, as many as the band needs, interpolated to pixels; per row red, green, blue."""
     ...
 
 
-@wp.func_native("""
-    const int place = level - plan.level_low, n = plan.resolution, width = n >> level;
-    const int margin = ((const int*)plan.margin)[place], begin = ((const int*)plan.first)[place];
-    const int *above = (const int*)plan.left + begin, *below = (const int*)plan.right + begin;
-    const float* share_above = (const float*)plan.share_left + begin;
-    const float* share_below = (const float*)plan.share_right + begin;
-    const float* weight = (const float*)plan.weight + begin;
-    const int reach = width + 2 * margin, skipped = wp::max(margin - x, 0);
-    const int left = wp::max(x - margin, 0), count = wp::min(x + width + margin, n) - left;
-    const long long plane = (long long)plan.band * n;
-    for (int row = wp::max(y - margin, top); row < wp::min(y + width + margin, bottom); ++row) {
-        const int v = row - (y - margin);
-        const float *__restrict__ upper = (const float*)rows + 3ll * reach * above[v] + skipped;
-        const float *__restrict__ lower = (const float*)rows + 3ll * reach * below[v] + skipped;
-        const float *__restrict__ across = weight + skipped;
-        const float* __restrict__ threshold = (const float*)planes + (long long)(row - top) * n + left;
-        float *__restrict__ sum = (float*)planes + plane + (long long)(row - top) * n + left;
-        float *__restrict__ red = sum + plane, *__restrict__ green = red + plane, *__restrict__ blue = green + plane;
-        const float p = share_above[v], q = share_below[v], down = weight[v];
-        if (q == 0.0f) {  // on a row of samples
-            for (int i = 0; i < count; ++i) {
-                const float newer = age - threshold[i];
-                const float w = newer >= 0.0f ? (newer + 0.5f) * (down * across[i]) : 0.0f;
-                sum[i] += w, red[i] += w * upper[i];
-                green[i] += w * upper[reach + i], blue[i] += w * upper[2 * reach + i];
-            }
-            continue;
-        }
-        for (int i = 0; i < count; ++i) {
-            const float newer = age - threshold[i];
-            const float w = newer >= 0.0f ? (newer + 0.5f) * (down * across[i]) : 0.0f;
-            sum[i] += w;
-            red[i] += w * (p * upper[i] + q * lower[i]);
-            green[i] += w * (p * upper[reach + i] + q * lower[reach + i]);
-            blue[i] += w * (p * upper[2 * reach + i] + q * lower[2 * reach + i]);
-        }
-    }
-""")
+@wp.func_native("display::blend_rows(plan, level, x, y, age, top, bottom, (const float*)rows, (float*)planes);")
 def blend_rows(
     plan: DisplayPlan,
     level: wp.int32,

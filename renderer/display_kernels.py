@@ -7,6 +7,9 @@ import warp as wp
 from renderer.display_age import DisplayPlan, list_candidates, map_newest, smooth_rows
 from renderer.display_bands import begin_band, blend_rows, bury, corner, expand_rows, finish_band, passes
 from renderer.launching import Address
+from renderer.native_code import module_options
+
+wp.set_module_options(module_options("display.h"))
 
 
 @wp.struct
@@ -26,6 +29,7 @@ class Worker:
     """Addresses of the working memory of one thread."""
 
     planes: wp.uint64
+    samples: wp.uint64
     rows: wp.uint64
     box: wp.uint64
     ages: wp.uint64
@@ -33,7 +37,7 @@ class Worker:
     """int32, whether there is a hole."""
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
 def find_candidates(
     plan: DisplayPlan,
     cache: CachedFramelets,
@@ -56,7 +60,7 @@ def take(counter: Address) -> wp.int32:
     ...
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
 def paint_bands(
     plan: DisplayPlan,
     cache: CachedFramelets,
@@ -86,13 +90,13 @@ def paint_bands(
             x = corner(plan, level, indices[slot], 0)
             if passes(plan, level, x, y, ages[slot], top, bottom, worker.planes) != 0:
                 seen[slot] = 1
-                expand_rows(plan, slot, level, y, top, bottom, cache.color, worker.rows)
+                expand_rows(plan, slot, level, y, top, bottom, cache.color, worker.samples, worker.rows)
                 blend_rows(plan, level, x, y, ages[slot], top, bottom, worker.rows, worker.planes)
         holes[0] = holes[0] | finish_band(plan, top, bottom, worker.planes, image)
         band = take(taken)
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
 def bury_dead(plan: DisplayPlan, cache: CachedFramelets, result: Address):
     """Flags the framelets that were not seen; ``result`` receives the area of the others."""
     overdraw = wp.array(ptr=result, shape=(1,), dtype=wp.float64)

@@ -28,13 +28,8 @@ inline f16 luminance_of(const float* rgb, float* copy, float most, i16& good) {
     const f16 p = load<f16>(rgb), q = load<f16>(rgb + 16), w = load<f16>(rgb + 32);
     store(copy, p), store(copy + 16, q), store(copy + 32, w);
     good &= (vabs(p) <= most) & (vabs(q) <= most) & (vabs(w) <= most);
-    const f16 pq_r = __builtin_shufflevector(p, q, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, -1, -1, -1, -1, -1);
-    const f16 pq_g = __builtin_shufflevector(p, q, 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, -1, -1, -1, -1, -1);
-    const f16 pq_b = __builtin_shufflevector(p, q, 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, -1, -1, -1, -1, -1, -1);
-    const f16 r = __builtin_shufflevector(pq_r, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
-    const f16 g = __builtin_shufflevector(pq_g, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
-    const f16 b = __builtin_shufflevector(pq_b, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
-    return 0.2126f * r + 0.7152f * g + 0.0722f * b;
+    const Vec16 color = separated(rgb);
+    return 0.2126f * color.x + 0.7152f * color.y + 0.0722f * color.z;
 }
 
 // The four below each of several positions.

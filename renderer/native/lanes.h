@@ -126,6 +126,16 @@ template <class F> inline Vec<F> cross(Vec<F> a, Vec<F> b) {
 inline Vec16 pick(i16 condition, Vec16 a, Vec16 b) {
     return {condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z};
 }
+// Sixteen vectors that follow one another.
+inline Vec16 separated(const float* xyz) {
+    const f16 p = load<f16>(xyz), q = load<f16>(xyz + 16), w = load<f16>(xyz + 32);
+    const f16 pq_x = __builtin_shufflevector(p, q, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, -1, -1, -1, -1, -1);
+    const f16 pq_y = __builtin_shufflevector(p, q, 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, -1, -1, -1, -1, -1);
+    const f16 pq_z = __builtin_shufflevector(p, q, 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, -1, -1, -1, -1, -1, -1);
+    return {__builtin_shufflevector(pq_x, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29),
+            __builtin_shufflevector(pq_y, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30),
+            __builtin_shufflevector(pq_z, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31)};
+}
 // Elements of an array of vectors at lane-wise places, each read together with the float that follows it.
 inline Vec16 gather3(const float* base, i16 index) {
     f16 row[4], column[3];
