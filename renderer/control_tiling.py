@@ -11,16 +11,13 @@ from renderer.launching import Address
 
 
 @wp.func_native("""
-    const double* leaf = (const double*)density;
     double* node = (double*)sums;
-    const double most = 1.7976931348623157e308;
-    bool good = true;
-    for (int i = 0; i < 1 << (2 * field_level); ++i) good &= leaf[i] >= 0.0 && leaf[i] <= most;
+    const double* below = (const double*)density;
+    const bool good = selection::all_densities(below, 1 << (2 * field_level));
     for (int level = field_level - 1; level >= level_low; --level) {
-        const double* below = level == field_level - 1 ? leaf : node + ((1ll << (2 * level + 2)) - 1) / 3;
         double* here = node + ((1ll << (2 * level)) - 1) / 3;
-        for (int i = 0; i < 1 << (2 * level); ++i)
-            here[i] = ((below[4 * i] + below[4 * i + 1]) + below[4 * i + 2]) + below[4 * i + 3];
+        selection::sum_children(below, here, 1 << (2 * level));
+        below = here;
     }
     return good;
 """)
@@ -60,7 +57,8 @@ def mark_splits(count: wp.int32, key: Address, order: Address, threshold: wp.uin
     int tiles = 0;
     // Along the curve: from each place the coarsest node that begins there, one level down while it is split.
     for (long long place = 0; place < 1ll << (2 * level_high);) {
-        int here = level_low;
+        const int up = place ? __builtin_ctzll(place) / 2 : level_high;
+        int here = wp::max(level_low, level_high - up);
         long long node = place >> (2 * (level_high - here));
         while (here < level_high && divided[((1ll << (2 * here)) - 1) / 3 + node - base]) {
             ++here;

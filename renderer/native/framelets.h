@@ -183,8 +183,9 @@ inline void place(long long level, long long index, int samples, const float* ce
     for (int i = 0; i < 2 * samples; i += 16) store(position + i, (corners + load<f16>(centre + i)) * width);
 }
 
-inline void fetch_ahead(const void* from, int bytes) {
-    for (int at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)from + at);
+// Asks the caches for what is read, or written, later.
+template <bool WRITTEN = false> inline void fetch_ahead(const void* from, long long bytes) {
+    for (long long at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)from + at, WRITTEN);
 }
 
 // What threads that share a batch have in common: how many rows are taken, and how many were left as they are.
@@ -196,7 +197,7 @@ constexpr int ROWS_AT_ONCE = 8;
 // Rows of a batch that no other thread has taken. Those marked in `pending` are done, unless a sample is not a number
 // that counts: these stay marked and are counted.
 //
-// The cache is larger than the processor's: a row's past is asked for while the row before is computed.
+// The cache is larger than the processor's: a row's past and its slot are asked for while the row before is computed.
 template <class Plan, class Cache>
 inline void observe_rows(const Plan& plan, const Cache& cache, int count, const long long* level, const long long* index,
                          const float* color, const long long* slot, const float* const* past, unsigned char* pending,
@@ -206,7 +207,11 @@ inline void observe_rows(const Plan& plan, const Cache& cache, int count, const 
     int row, end = 0, left = 0;
     while ((row = __atomic_fetch_add(&progress->taken, ROWS_AT_ONCE, __ATOMIC_RELAXED)) < count) {
         for (end = row + ROWS_AT_ONCE < count ? row + ROWS_AT_ONCE : count; row < end; ++row) {
-            if (row + 1 < end && past[row + 1]) fetch_ahead(past[row + 1], 4 * (int)state);
+            if (row + 1 < end) {
+                if (past[row + 1]) fetch_ahead(past[row + 1], 4 * state);
+                fetch_ahead<true>(cached_state + state * slot[row + 1], 4 * state);
+                fetch_ahead<true>(cached_color + 3 * samples * slot[row + 1], 12 * samples);
+            }
             if (!pending[row]) continue;
             const int shift = 2 * (plan.field_level - (int)level[row]);
             const long long first = index[row] << shift;
