@@ -16,6 +16,7 @@ from tsar import haar
 from tsar.cache import FrameletCache
 from tsar.config import ErrorConfig, TsarConfig
 from tsar.morton import morton_to_raster, raster_to_morton, tile_interval
+from tsar.roots import square_root
 from tsar.types import Errors, FrameletBatch
 
 _REC709 = (0.2126, 0.7152, 0.0722)
@@ -80,7 +81,7 @@ def compressed_luminance(color: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n"]:
     # no matrix product: some libraries round it differently by the number of threads
     red, green, blue = (share * part for share, part in zip(_REC709, color.unbind(-1), strict=True))
     luminance = (red + green + blue).clamp(min=0.0)
-    return torch.sqrt(luminance / (1.0 + luminance))
+    return square_root(luminance / (1.0 + luminance))
 
 
 def levelwise_power(
@@ -133,7 +134,9 @@ def signed_error(
     if config.form == "contrast":
         return (signal - template) / (signal + template)
     floor = torch.finfo(signal.dtype).tiny
-    return (torch.log2(signal.clamp(min=floor) / template.clamp(min=floor)) / _OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)
+    # float64, for the last digit of a logarithm depends on the processor
+    octaves = torch.log2((signal.clamp(min=floor) / template.clamp(min=floor)).to(torch.float64)).to(signal.dtype)
+    return (octaves / _OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)
 
 
 def scatter_to_field(values: Float[Tensor, "k n p"], batch: FrameletBatch, config: TsarConfig) -> Float[Tensor, "k e"]:

@@ -57,7 +57,7 @@ inline void unpack_samples(const float* color, const int* order, int side, int s
 }
 
 // A row of samples to a row of pixels. Pixels outside the outermost samples have those alone; between samples lie
-// `spacing` pixels, and pixels of one phase have the same shares of their two neighbours.
+// `spacing` pixels, a power of two, and pixels of one phase have the same shares of their two neighbours.
 inline void interpolate(const float* from, int samples, int spacing, const Axis& axis, float* to) {
     const int edge = axis.margin + spacing / 2;
     const float *p = axis.share_left + edge, *q = axis.share_right + edge;

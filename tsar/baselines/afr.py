@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import exp
 
 import torch
 from jaxtyping import Bool, Float, Int64
@@ -90,7 +91,7 @@ def draw(
 
 def observe(tree: Tree, node: Int64[Tensor, " samples"], luminance: Float[Tensor, " samples"]) -> Tree:
     """Fade the moments of all leaves by one cycle and add the new samples."""
-    moments = tree.moments * torch.exp(torch.tensor(-1.0 / _MEMORY_CYCLES))
+    moments = tree.moments * exp(-1.0 / _MEMORY_CYCLES)
     for row, value in enumerate((torch.ones_like(luminance), luminance, luminance.square())):
         moments[row].index_add_(0, node, value)
     return replace(tree, moments=moments)

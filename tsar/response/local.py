@@ -21,6 +21,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from tsar.roots import square_root
 from tsar.types import Errors
 
 Field = Float[Tensor, " e"]
@@ -82,7 +83,7 @@ def constrain(a_s: Field, a_t: Field, errors: Errors, box: Box, gain: float) -> 
     phi_s = _drop_outward(a_s, errors.spatial.to(a_s.dtype), box.spatial_min)
     phi_t = _drop_outward(a_t, errors.temporal.to(a_t.dtype), box.temporal_min)
     # Not hypot: its vectorised and its scalar form differ in the last bit, and which one runs depends on the threads.
-    length = torch.sqrt(phi_s * phi_s + phi_t * phi_t)
+    length = square_root(phi_s * phi_s + phi_t * phi_t)
     unit = torch.where(length > 0, length, 1.0)
     m_s, m_t = phi_s / unit, phi_t / unit
     k_max = torch.minimum(exit_distance(a_s, m_s, box.spatial_min, 1.0), exit_distance(a_t, m_t, box.temporal_min, 1.0))

@@ -11,11 +11,12 @@ from __future__ import annotations
 import torch
 
 from tsar.response.local import Box, Field, LocalConstraints
+from tsar.roots import square_root
 
 
 def smallest_root(a: Field, b: Field, d: Field) -> Field:
     """Smallest non-negative ``k`` with ``a k² + b k + d = 0``, 0 where there is none; discriminant clamped at 0."""
-    q = -0.5 * (b + torch.where(b < 0, -1.0, 1.0) * torch.sqrt((b * b - 4.0 * a * d).clamp(min=0.0)))
+    q = -0.5 * (b + torch.where(b < 0, -1.0, 1.0) * square_root((b * b - 4.0 * a * d).clamp(min=0.0)))
     first = torch.where(a != 0, q / torch.where(a != 0, a, 1.0), torch.inf)
     second = torch.where(q != 0, d / torch.where(q != 0, q, 1.0), torch.inf)
     root = torch.minimum(torch.where(first >= 0, first, torch.inf), torch.where(second >= 0, second, torch.inf))
@@ -49,7 +50,7 @@ def mix(local: LocalConstraints, change: Field, box: Box, bias: float) -> tuple[
     redistribute = (product < 0) & (change.abs() <= local.desired_change.abs())
     after = a_s * a_t + change
     ratio = (a_s + local.k_min * m_s) / (a_t + local.k_min * m_t)
-    slid = torch.minimum(torch.maximum(torch.sqrt(after * ratio), after), after / box.temporal_min)
+    slid = torch.minimum(torch.maximum(square_root(after * ratio), after), after / box.temporal_min)
     slid = slid.clamp(box.spatial_min, 1.0)
     b_s = torch.where(redistribute, slid, b_s).clamp(box.spatial_min, 1.0)
     b_t = torch.where(redistribute, after / slid, b_t).clamp(box.temporal_min, 1.0)
