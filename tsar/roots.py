@@ -11,7 +11,7 @@ from torch import Tensor
 def square_root(value: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
     """Square roots on the CPU, correctly rounded as IEEE 754 demands; NaN below zero.
 
-    Not ``torch.sqrt``: the library behind it may miss the last bit, of one root in five on an AMD EPYC, and where it does
+    Not ``torch.sqrt``: the library behind it misses the last bit of some roots, one in five on an AMD EPYC, and which ones
     is up to the processor.
     """
     with np.errstate(invalid="ignore"):
