@@ -20,8 +20,8 @@ constexpr float PADDING = 4.0e-7f;
 constexpr float CORNER_SLACK = 5.0f;
 // Packets whose directions differ by more than this along an axis are walked ray by ray.
 constexpr float SPREAD_MAX = 0.25f;
-// Of so few children a packet of shadow rays walks into all, without a test by each ray.
-constexpr int FEW = 2;
+// So few rays of a packet meet a leaf one by one.
+constexpr int FEW = 3;
 
 template <class F> inline F reciprocal(F x) { return 1.0f / (vabs(x) > TINY ? x : (F)TINY); }
 inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TINY); }
@@ -396,12 +396,13 @@ template <bool any>
 inline unsigned visit_leaf(const Tree& tree, int child, const Packet& rays, unsigned lanes, PacketHit& hit) {
     const Block* leaf = tree.blocks + leaf_block(child);
     const int triangles = leaf_triangles(child);
+    const int rays_left = __builtin_popcount(lanes);
+    if (rays_left <= FEW) return meet_leaf_alone<any>(leaf, triangles, rays, lanes, hit);
     const unsigned near = triangles > BLOCK_WIDTH ? rays.near_to<f8>(leaf) : rays.near_to<f4>(leaf);
     const unsigned some = near & ((1u << triangles) - 1);
     if (!some) return 0;
-    const bool alone = __builtin_popcount(lanes) < __builtin_popcount(some);
-    return alone ? meet_leaf_alone<any>(leaf, triangles, rays, lanes, hit)
-                 : meet_leaf<any>(leaf, some, rays, lanes, hit);
+    return rays_left < __builtin_popcount(some) ? meet_leaf_alone<any>(leaf, triangles, rays, lanes, hit)
+                                                : meet_leaf<any>(leaf, some, rays, lanes, hit);
 }
 
 // A packet from the root to the nearest hits. Returns the lanes that found one.
@@ -447,7 +448,7 @@ inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hi
 // A packet from the root to any hits, which idle their lanes by a negative `hit.t`. Returns the lanes that found one.
 //
 // No order is kept, for the first hit ends a ray, and most of the rays that are asked about have none. Without hits that
-// come nearer, a leaf's box is tested by each ray as soon as it is found, and a node's where many are.
+// come nearer, a box is tested by each ray as soon as it is found.
 inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
     struct Entry {
         int child;
@@ -464,13 +465,10 @@ inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
         if (entry.child >= 0) {
             const Node& node = tree.nodes[entry.child];
             f8 near;
-            unsigned met = children_met(node, rays, hit, reach, near);
-            const bool few = __builtin_popcount(met) <= FEW;
-            for (; met; met &= met - 1) {
+            for (unsigned met = children_met(node, rays, hit, reach, near); met; met &= met - 1) {
                 const int lane = first_bit(met);
-                const int child = node.child[lane];
-                const unsigned passing = child >= 0 && few ? ALL : rays.passing(node, lane, hit.t);
-                stack[size] = {child, passing};
+                const unsigned passing = rays.passing(node, lane, hit.t);
+                stack[size] = {node.child[lane], passing};
                 size += passing != 0;
                 prefetch(tree, node.child[lane]);
             }
