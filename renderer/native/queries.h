@@ -6,7 +6,8 @@ namespace packets {
 
 // Traces rays `first` to `first + 15` of a list, as far as there are so many.
 template <bool any, class Queries> inline void trace_packet(const Queries& list, int first) {
-    const Tree tree = {(const Node*)list.nodes.data, (const Block*)list.blocks.data};
+    const int blocks = list.blocks.shape[0] / (int)(sizeof(Block) / sizeof(float));
+    const Tree tree(list.nodes.data, list.blocks.data, blocks * BLOCK_WIDTH);
     const int count = list.origin.shape[0], used = count - first < LANES ? count - first : LANES;
     Vec16 from, along;
     PacketHit hit;

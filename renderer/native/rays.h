@@ -20,6 +20,12 @@ constexpr float PADDING = 4.0e-7f;
 constexpr float CORNER_SLACK = 5.0f;
 // Packets whose directions differ by more than this along an axis are walked ray by ray.
 constexpr float SPREAD_MAX = 0.25f;
+// Rays whose directions differ by more than this share of the longest part of one have no way in common.
+constexpr float SCATTERED = 1.0f;
+// A tree of more triangles is larger, at about 100 bytes each, than most second-level caches.
+constexpr int LARGE = 40000;
+// Rays that are on their way at a time through a tree like that.
+constexpr int TURNS = 2;
 // So few rays of a packet meet a leaf one by one.
 constexpr int FEW = 3;
 
@@ -29,6 +35,10 @@ inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TI
 struct Tree {
     const Node* nodes;
     const Block* blocks;
+    bool large;  // for a second-level cache
+
+    Tree(const void* first_node, const void* first_block, int triangles)
+        : nodes((const Node*)first_node), blocks((const Block*)first_block), large(triangles > LARGE) {}
 };
 
 // Ray against triangle after Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": in a frame whose z
@@ -72,6 +82,7 @@ struct Single {
     int kx, ky, kz;
     int near_side[3], far_side[3];  // where a node holds the sides that are met first and last
 
+    Single() = default;
     Single(const float* from, const float* along) {
         kz = fastest_axis(along[0], along[1], along[2]), kx = (kz + 1) % 3, ky = (kz + 2) % 3;
         float fast = 1.0f / along[kz];
@@ -155,64 +166,81 @@ struct Uncounted {
     void test(int) {}
 };
 
-// One ray from the root. `any` ends at the first hit; `hit.t` holds how far to look.
-template <bool any, class Count> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit, Count& count) {
-    struct Entry {
-        float near;
-        int child;
-    } stack[STACK];
-    int size = 0, current = 0;
-    bool found = false;
-    float reach = hit.t * ROUNDING_UP;
-    const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
-    const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
-    while (true) {
-        if (current >= 0) {
-            const Node& node = tree.nodes[current];
-            count.visit();
-            f8 near = 0.0f, far = reach;
-            for (int axis = 0; axis < 3; ++axis) {
-                const f8 close = load<f8>(node.lower[0] + ray.near_side[axis]);
-                const f8 away = load<f8>(node.lower[0] + ray.far_side[axis]);
-                near = vmax(near, (close - ray.near_origin[axis]) * ray.inverse[axis]);
-                far = vmin(far, (away - ray.far_origin[axis]) * ray.inverse_far[axis]);
-            }
-            unsigned met = bits(near <= far);
-            if (met) {
-                int lane = first_bit(met);
-                met &= met - 1;
-                if (!met) {
-                    current = node.child[lane];
-                    continue;
-                }
-                // The nearest is next, the others in any order.
-                float least = near[lane];
-                int next = node.child[lane];
-                for (; met; met &= met - 1) {
-                    lane = first_bit(met);
-                    const float at = near[lane];
-                    const int child = node.child[lane];
-                    const bool nearer = at < least;
-                    stack[size++] = {nearer ? least : at, nearer ? next : child};
-                    prefetch(tree, stack[size - 1].child);
-                    least = nearer ? at : least, next = nearer ? child : next;
-                }
-                current = next;
-                continue;
-            }
-        } else {
-            const Block* leaf = tree.blocks + leaf_block(current);
-            count.test(leaf_triangles(current));
-            found |= meet_leaf(leaf, leaf_triangles(current), from, shear, ray.kx, ray.ky, ray.kz, hit);
-            if (any && found) return true;
-            reach = hit.t * ROUNDING_UP;
+// Where a ray is on its way through a tree.
+struct Way {
+    RayHit hit;  // `t` holds how far to look
+    float reach;
+    int size, current;  // of the stack; the node or leaf that is next
+    bool found;
+
+    explicit Way(const RayHit& none) : hit(none), reach(none.t * ROUNDING_UP), size(0), current(0), found(false) {}
+    Way() = default;
+};
+struct Entry {
+    float near;
+    int child;
+};
+
+// One node or leaf on. `any` ends at the first hit. Returns whether there is more.
+template <bool any, class Count>
+inline bool step(const Tree& tree, const Single& ray, Entry* stack, Way& way, Count& count) {
+    if (way.current >= 0) {
+        const Node& node = tree.nodes[way.current];
+        count.visit();
+        f8 near = 0.0f, far = way.reach;
+        for (int axis = 0; axis < 3; ++axis) {
+            const f8 close = load<f8>(node.lower[0] + ray.near_side[axis]);
+            const f8 away = load<f8>(node.lower[0] + ray.far_side[axis]);
+            near = vmax(near, (close - ray.near_origin[axis]) * ray.inverse[axis]);
+            far = vmin(far, (away - ray.far_origin[axis]) * ray.inverse_far[axis]);
         }
-        do {
-            if (!size) return found;
-            --size;
-        } while (stack[size].near > hit.t);
-        current = stack[size].child;
+        unsigned met = bits(near <= far);
+        if (met) {
+            int lane = first_bit(met);
+            met &= met - 1;
+            if (!met) {
+                way.current = node.child[lane];
+                return true;
+            }
+            // The nearest is next, the others in any order.
+            float least = near[lane];
+            int next = node.child[lane];
+            for (; met; met &= met - 1) {
+                lane = first_bit(met);
+                const float at = near[lane];
+                const int child = node.child[lane];
+                const bool nearer = at < least;
+                stack[way.size++] = {nearer ? least : at, nearer ? next : child};
+                prefetch(tree, stack[way.size - 1].child);
+                least = nearer ? at : least, next = nearer ? child : next;
+            }
+            way.current = next;
+            return true;
+        }
+    } else {
+        const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
+        const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
+        count.test(leaf_triangles(way.current));
+        way.found |= meet_leaf(tree.blocks + leaf_block(way.current), leaf_triangles(way.current), from, shear, ray.kx,
+                               ray.ky, ray.kz, way.hit);
+        if (any && way.found) return false;
+        way.reach = way.hit.t * ROUNDING_UP;
     }
+    do {
+        if (!way.size) return false;
+        --way.size;
+    } while (stack[way.size].near > way.hit.t);
+    way.current = stack[way.size].child;
+    return true;
+}
+
+// One ray from the root.
+template <bool any, class Count> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit, Count& count) {
+    Entry stack[STACK];
+    Way way(hit);
+    while (step<any>(tree, ray, stack, way, count)) {}
+    hit = way.hit;
+    return way.found;
 }
 
 // Sixteen rays. A lane with a negative `t` in its hit is idle; unless it holds the ray of a busy one it may keep the
@@ -226,7 +254,7 @@ struct Packet {
     float near_origin[3], far_origin[3], inverse_least[3], inverse_most[3];
     // Where the rays pass a plane across their fastest axis, and how far they lean: a middle and half the difference.
     float plane, low[2], high[2], lean[2], lean_half[2];
-    bool together;  // worth walking as one
+    bool together, scattered;  // worth walking as one, or without a way in common
     bool same_signs;
 
     Packet(const Vec16& from, const Vec16& along) : origin(from) {
@@ -241,6 +269,7 @@ struct Packet {
         const float longest = vmax(-bound[kz], -bound[3 + kz]);
         // What is not finite would spoil the bounds of the others.
         const f16 sum = from.x + from.y + from.z + along.x + along.y + along.z;
+        scattered = !(spread <= SCATTERED * longest);
         together = agree == ALL && bits(sum - sum == 0.0f) == ALL && spread <= SPREAD_MAX * longest &&
                    longest > 2.0f * TINY;
         if (!together) return;
@@ -374,6 +403,48 @@ inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& 
     return changed;
 }
 
+// Lanes by themselves, in turns: while one waits for memory the others go on. Returns those that found a hit; `any`
+// idles them.
+template <bool any>
+inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
+    struct Walker {
+        Single ray;
+        Way way;
+        int lane;
+        Entry stack[STACK];
+    } walkers[TURNS];
+    unsigned changed = 0, busy = 0;
+    Uncounted none;
+    const auto start = [&](int number) {
+        busy &= ~(1u << number);
+        if (!lanes) return;
+        const int lane = first_bit(lanes);
+        const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
+        const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
+        Walker& one = walkers[number];
+        one.ray = Single(origin, direction), one.way = Way({hit.t[lane], 0.0f, 0.0f, hit.face[lane]}), one.lane = lane;
+        lanes &= lanes - 1, busy |= 1u << number;
+    };
+    for (int number = 0; number < TURNS; ++number) start(number);
+    while (busy)
+        for (int number = 0; number < TURNS; ++number) {
+            Walker& one = walkers[number];
+            if (!(busy >> number & 1u)) continue;
+            if (step<any>(tree, one.ray, one.stack, one.way, none)) {
+                prefetch(tree, one.way.current);
+                continue;
+            }
+            if (one.way.found) {
+                const int lane = one.lane;
+                const RayHit& met = one.way.hit;
+                changed |= 1u << lane;
+                hit.t[lane] = any ? -1.0f : met.t, hit.u[lane] = met.u, hit.v[lane] = met.v, hit.face[lane] = met.face;
+            }
+            start(number);
+        }
+    return changed;
+}
+
 // Lanes one by one, from the root. Returns those that found a hit; `any` idles them.
 template <bool any>
 inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
@@ -484,7 +555,10 @@ inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
 template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, const Vec16& along, PacketHit& hit) {
     Packet rays(from, along);
     if (rays.together) return any ? walk_any(tree, rays, hit) : walk_nearest(tree, rays, hit);
-    return walk_alone<any>(tree, from, along, bits(hit.t >= 0.0f), hit);
+    const unsigned busy = bits(hit.t >= 0.0f);
+    // What one of several rays has read the next one finds in the cache, unless they go apart.
+    return tree.large && rays.scattered ? walk_by_turns<any>(tree, from, along, busy, hit)
+                                        : walk_alone<any>(tree, from, along, busy, hit);
 }
 
 }  // namespace packets

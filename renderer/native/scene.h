@@ -154,8 +154,8 @@ inline unsigned meet_instance(const Scene& scene, const Record& record, const Ve
     const Vec16 towards = transformed(record.to_local, direction);
     if (record.shape == SHAPE_MESH) {
         const auto& mesh = scene.meshes.data[record.mesh];
-        const Tree tree = {(const Node*)scene.tree_nodes.data + mesh.first_node,
-                           (const Block*)scene.tree_blocks.data + mesh.first_block};
+        const Tree tree((const Node*)scene.tree_nodes.data + mesh.first_node,
+                        (const Block*)scene.tree_blocks.data + mesh.first_block, mesh.face_count);
         PacketHit local = hit;
         local.face = -1;
         local.t = lanes_of(busy) ? hit.t : (f16)-1.0f;

@@ -88,7 +88,7 @@ template <bool any, class Scene, class Record, class Count>
 inline bool meet_mesh(const Scene& scene, const Record& mesh, const Single& ray, RayHit& hit, Count& count) {
     const Block* blocks = (const Block*)scene.tree_blocks.data + mesh.first_block;
     if (scene.structure == STRUCTURE_BVH) {
-        const Tree tree = {(const Node*)scene.tree_nodes.data + mesh.first_node, blocks};
+        const Tree tree((const Node*)scene.tree_nodes.data + mesh.first_node, blocks, mesh.face_count);
         return walk<any>(tree, ray, hit, count);
     }
     if (scene.structure == STRUCTURE_KDTREE) {

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from renderer.queries import RayQueries
+from renderer.single_rays import SingleRays
 from tests.oracles.ray_triangles import nearest_hits
 
 
@@ -67,16 +68,21 @@ def test_blocked_says_whether_there_is_a_hit_before_the_end(kind: str) -> None:
     assert not (queries.closest(origin, direction, 1e-6).face >= 0).any()
 
 
-def test_a_ray_does_not_depend_on_its_company() -> None:
-    vertices, faces = bumpy(5)
+@pytest.mark.parametrize("subdivisions", [5, 6])  # the second is large enough for rays to take turns
+def test_a_ray_does_not_depend_on_its_company(subdivisions: int) -> None:
+    vertices, faces = bumpy(subdivisions)
     queries = RayQueries(vertices, faces)
     origin, direction = (np.concatenate(parts) for parts in zip(*RAYS.values(), strict=True))
     order = np.random.default_rng(1).permutation(len(origin))
     together, apart = queries.closest(origin, direction), queries.closest(origin[order], direction[order])
     threads = RayQueries(vertices, faces, threads=3).closest(origin, direction)
+    alone = SingleRays(vertices, faces).closest(origin, direction)
     for name in ("face", "t", "u", "v"):
         assert np.array_equal(getattr(together, name)[order], getattr(apart, name)), name
         assert np.array_equal(getattr(together, name), getattr(threads, name)), name
+        met = alone.face >= 0  # of a miss the weights are anything
+        assert np.array_equal(getattr(together, name)[met], getattr(alone, name)[met]), name
+    assert np.array_equal(together.face, alone.face)
     reach = np.random.default_rng(2).uniform(0.0, 4.0, len(origin)).astype(np.float32)
     blocked = queries.blocked(origin, direction, reach)
     assert 0.1 < blocked.mean() < 0.9
