@@ -3,7 +3,7 @@ of ages to finished pixels. Definitions in ``tsar/reconstruction.py``.
 
 A band's working memory holds five planes of its pixels: threshold, sums of weight, red, green, blue. A framelet is
 first expanded along rows to pixels (*rows*, one per row of samples), then every row of pixels is a blend of two of
-these.
+these: ``native/display.h``.
 """
 
 from __future__ import annotations

@@ -86,11 +86,6 @@ inline float added(f16 a) {
 }
 
 // base[index] in every lane; every index must be one that may be read.
-inline f16 gather(const float* base, i16 index) {
-    f16 value;
-    for (int lane = 0; lane < LANES; ++lane) value[lane] = base[index[lane]];
-    return value;
-}
 inline i16 gather(const int* base, i16 index) {
     i16 value;
     for (int lane = 0; lane < LANES; ++lane) value[lane] = base[index[lane]];
