@@ -30,6 +30,7 @@ class Worker:
 
     planes: wp.uint64
     samples: wp.uint64
+    """float32, a framelet's rows before they are interpolated."""
     rows: wp.uint64
     box: wp.uint64
     ages: wp.uint64

@@ -83,7 +83,7 @@ inline void expand_rows(const Plan& plan, int slot, int level, int y, int top, i
     const int first = axis.left[top > begin ? top - begin : 0], last = axis.right[last_pixel - 1];
     const int count = axis.width < side ? axis.width : side, spacing = axis.width / count;
     const int* order = (const int*)plan.order;
-    float* unpacked = spacing == 1 ? rows : samples;  // then samples are pixels, and the rows are done
+    float* unpacked = spacing == 1 ? rows : samples;  // a row of samples is a row of pixels where they are as wide
     color += 3ll * side * side * slot;
     if (count == side && side % 4 == 0)
         unpack_squares(color, order, side, first, last, unpacked);

@@ -386,6 +386,18 @@ inline unsigned meet_leaf(const Block* leaf, unsigned triangles, const Packet& r
     return changed;
 }
 
+// Puts what one lane met into its place; `any` idles the lane.
+template <bool any> inline void take(PacketHit& hit, int lane, const RayHit& met) {
+    hit.t[lane] = any ? -1.0f : met.t, hit.u[lane] = met.u, hit.v[lane] = met.v, hit.face[lane] = met.face;
+}
+// What a lane met last.
+inline RayHit hit_of(const PacketHit& hit, int lane) { return {hit.t[lane], 0.0f, 0.0f, hit.face[lane]}; }
+inline Single single_of(const Vec16& from, const Vec16& along, int lane) {
+    const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
+    const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
+    return Single(origin, direction);
+}
+
 // Few lanes of a packet against a leaf, each with four triangles at once. Returns those with a new hit; `any` idles them.
 template <bool any>
 inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
@@ -393,12 +405,12 @@ inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& 
     const Vec16 from = {rays.origin[rays.kx], rays.origin[rays.ky], rays.origin[rays.kz]};
     for (; lanes; lanes &= lanes - 1) {
         const int lane = first_bit(lanes);
-        RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
+        RayHit one = hit_of(hit, lane);
         const Vec<f4> origin = {(f4)from.x[lane], (f4)from.y[lane], (f4)from.z[lane]};
         const Vec<f4> shear = {(f4)rays.shear.x[lane], (f4)rays.shear.y[lane], (f4)rays.shear.z[lane]};
         if (!meet_leaf(leaf, triangles, origin, shear, rays.kx, rays.ky, rays.kz, one)) continue;
         changed |= 1u << lane;
-        hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
+        take<any>(hit, lane, one);
     }
     return changed;
 }
@@ -419,10 +431,8 @@ inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& 
         busy &= ~(1u << number);
         if (!lanes) return;
         const int lane = first_bit(lanes);
-        const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
-        const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
         Walker& one = walkers[number];
-        one.ray = Single(origin, direction), one.way = Way({hit.t[lane], 0.0f, 0.0f, hit.face[lane]}), one.lane = lane;
+        one.ray = single_of(from, along, lane), one.way = Way(hit_of(hit, lane)), one.lane = lane;
         lanes &= lanes - 1, busy |= 1u << number;
     };
     for (int number = 0; number < TURNS; ++number) start(number);
@@ -435,10 +445,8 @@ inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& 
                 continue;
             }
             if (one.way.found) {
-                const int lane = one.lane;
-                const RayHit& met = one.way.hit;
-                changed |= 1u << lane;
-                hit.t[lane] = any ? -1.0f : met.t, hit.u[lane] = met.u, hit.v[lane] = met.v, hit.face[lane] = met.face;
+                changed |= 1u << one.lane;
+                take<any>(hit, one.lane, one.way.hit);
             }
             start(number);
         }
@@ -451,13 +459,11 @@ inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& alo
     unsigned changed = 0;
     for (; lanes; lanes &= lanes - 1) {
         const int lane = first_bit(lanes);
-        const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
-        const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
-        RayHit one = {hit.t[lane], 0.0f, 0.0f, hit.face[lane]};
+        RayHit one = hit_of(hit, lane);
         Uncounted none;
-        if (!walk<any>(tree, Single(origin, direction), one, none)) continue;
+        if (!walk<any>(tree, single_of(from, along, lane), one, none)) continue;
         changed |= 1u << lane;
-        hit.t[lane] = any ? -1.0f : one.t, hit.u[lane] = one.u, hit.v[lane] = one.v, hit.face[lane] = one.face;
+        take<any>(hit, lane, one);
     }
     return changed;
 }

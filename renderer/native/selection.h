@@ -14,45 +14,35 @@ inline d2 sums_of_four(d8 v) {
     return pairs.even + pairs.odd;
 }
 
-// Values of a level of the quadtree that lie one after the other, eight of each child's place.
-struct Children {
-    d8 a, b, c, d;
-
-    explicit Children(const double* from) {
+// Sums of the four children of each of `count` nodes; children lie one after the other.
+inline void sum_children(const double* below, double* sums, int count) {
+    int i = 0;
+    for (; i + 8 <= count; i += 8) {
         d8 v[4];
-        __builtin_memcpy(v, from, sizeof(v));
+        __builtin_memcpy(v, below + 4 * i, sizeof(v));
         const d8 ab = __builtin_shufflevector(v[0], v[1], 0, 4, 8, 12, 1, 5, 9, 13);
         const d8 cd = __builtin_shufflevector(v[0], v[1], 2, 6, 10, 14, 3, 7, 11, 15);
         const d8 ab_next = __builtin_shufflevector(v[2], v[3], 0, 4, 8, 12, 1, 5, 9, 13);
         const d8 cd_next = __builtin_shufflevector(v[2], v[3], 2, 6, 10, 14, 3, 7, 11, 15);
-        a = __builtin_shufflevector(ab, ab_next, 0, 1, 2, 3, 8, 9, 10, 11);
-        b = __builtin_shufflevector(ab, ab_next, 4, 5, 6, 7, 12, 13, 14, 15);
-        c = __builtin_shufflevector(cd, cd_next, 0, 1, 2, 3, 8, 9, 10, 11);
-        d = __builtin_shufflevector(cd, cd_next, 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-};
-
-// Sums of the four children of each of `count` nodes.
-inline void sum_children(const double* below, double* sums, int count) {
-    int i = 0;
-    for (; i + 8 <= count; i += 8) {
-        const Children v(below + 4 * i);
-        const d8 sum = ((v.a + v.b) + v.c) + v.d;
+        const d8 a = __builtin_shufflevector(ab, ab_next, 0, 1, 2, 3, 8, 9, 10, 11);
+        const d8 b = __builtin_shufflevector(ab, ab_next, 4, 5, 6, 7, 12, 13, 14, 15);
+        const d8 c = __builtin_shufflevector(cd, cd_next, 0, 1, 2, 3, 8, 9, 10, 11);
+        const d8 d = __builtin_shufflevector(cd, cd_next, 4, 5, 6, 7, 12, 13, 14, 15);
+        const d8 sum = ((a + b) + c) + d;
         __builtin_memcpy(sums + i, &sum, sizeof(sum));
     }
     for (; i < count; ++i) sums[i] = ((below[4 * i] + below[4 * i + 1]) + below[4 * i + 2]) + below[4 * i + 3];
 }
 
-// Whether all values are densities, neither negative nor infinite nor no number.
+// Whether all values of a field are densities, neither negative nor infinite nor no number. A field has a multiple of
+// eight elements.
 inline bool all_densities(const double* value, int count) {
     decltype(d8() < d8()) bad = 0;
-    int i = 0;
-    for (; i + 8 <= count; i += 8) {
+    for (int i = 0; i < count; i += 8) {
         d8 v;
         __builtin_memcpy(&v, value + i, sizeof(v));
         bad |= ~((v >= 0.0) & (v <= 1.7976931348623157e308));
     }
-    for (; i < count; ++i) bad[0] |= -!(value[i] >= 0.0 && value[i] <= 1.7976931348623157e308);
     long long any = 0;
     for (int lane = 0; lane < 8; ++lane) any |= bad[lane];
     return !any;
