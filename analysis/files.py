@@ -22,16 +22,28 @@ PARTIAL = ".partial"
 def atomic(path: Path) -> Iterator[Path]:
     """A temporary name beside ``path``, moved there when the block ends well and removed when it does not.
 
-    The folder is created.
+    The folder is created. When the block has ended, content and name are on the disk, not only in memory.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     # the ending stays last: writers choose the format by it
     temporary = path.with_name(f"{path.stem}{PARTIAL}{path.suffix}")
     try:
         yield temporary
+        # in this order: after a power cut the name must not stand for an empty file
+        sync(temporary)
         os.replace(temporary, path)
+        sync(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Has the system put the content of a file, or the names in a folder, on the disk before this returns."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 @contextmanager

@@ -1,0 +1,295 @@
+"""What commands made, on disk: each file is listed with its checksum before it counts, and checked when it is read.
+
+A :class:`Store` is a folder and a key, the hash of everything that decides what its files hold. The folder's list,
+``files.journal``, names every file that was ever made there, with its key, its checksum and facts about it, such as how
+many of its values were not finite. A file counts only where the list has it under the store's key and its content is
+what the list says. One that is missing, was cut off, or comes from another key is not there: make it again. One whose
+content is no longer what was written is named in a line on standard error and is not there either. A process may be
+killed at any moment: what counts is whole, the rest is made again.
+
+A command that keeps files asks, makes what is missing, and reads what was checked::
+
+    store = Store(options.out, config_hash)
+    for number, name in enumerate(names):
+        found = store.find(name)
+        if found is None:
+            with store.make(name) as found:
+                found.facts["nonfinite"] = write_image(found.path, picture(number))
+        nonfinite += found.facts["nonfinite"]
+
+``find`` checks the file and gives its entry, ``read`` gives the checked bytes and ``read_json`` the checked value of a
+JSON file. ``listed`` names the files that commands made in the folder: only those may be deleted, by ``discard``.
+
+JSON that comes from elsewhere goes through :func:`read_json` of this module: what is valid but not what was expected is
+one line of an error, as what is no JSON is.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from analysis.files import atomic, plain, sync
+
+JOURNAL = "files.journal"
+"""Name of a folder's list of files."""
+
+_CHECK_BYTES = 8
+_LINE_CHECK = 2 * _CHECK_BYTES
+
+
+def warn(line: str) -> None:
+    """Says on standard error what is damaged."""
+    print(line, file=sys.stderr, flush=True)
+
+
+class Journal:
+    """Rows that are appended to a file, each on the disk before it counts; a row is a dictionary that JSON can hold.
+
+    Every line begins with its own checksum, so that one that was cut off or has changed is noticed and does not count.
+    Several processes may append to one journal.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._rows: list[dict[str, Any]] = []
+        self._read = 0
+        self._file: tuple[int, int] | None = None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """All rows, oldest first; those that others have appended since are among them."""
+        try:
+            with self.path.open("rb") as file:
+                found = os.fstat(file.fileno())
+                if (found.st_dev, found.st_ino) != self._file or found.st_size < self._read:
+                    self._rows, self._read, self._file = [], 0, (found.st_dev, found.st_ino)
+                file.seek(self._read)
+                fresh = file.read()
+        except FileNotFoundError:
+            self._rows, self._read, self._file = [], 0, None
+            return []
+        # without an end it is being written, or was cut off
+        whole = fresh[: fresh.rfind(b"\n") + 1]
+        for line in whole.split(b"\n"):
+            row = _row(line)
+            if row is not None:
+                self._rows.append(row)
+            elif line:
+                warn(f"{self.path}: holds a damaged line; what it told of is made again")
+        self._read += len(whole)
+        return self._rows
+
+    def append(self, row: Mapping[str, Any]) -> None:
+        """Adds a row; it is on the disk when this returns."""
+        body = json.dumps(plain(row), allow_nan=False).encode()
+        line = _check(body) + b" " + body + b"\n"
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        created = not self.path.exists()
+        with self.path.open("a+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if file.seek(0, os.SEEK_END) and os.pread(file.fileno(), 1, file.tell() - 1) != b"\n":
+                line = b"\n" + line  # behind one that was cut off
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+        if created:
+            sync(self.path.parent)
+
+
+def _check(body: bytes) -> bytes:
+    return hashlib.blake2b(body, digest_size=_CHECK_BYTES).hexdigest().encode()
+
+
+def _row(line: bytes) -> dict[str, Any] | None:
+    body = line[_LINE_CHECK + 1 :]
+    return json.loads(body) if line[: _LINE_CHECK + 1] == _check(body) + b" " else None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file as it was made.
+
+    Attributes:
+        name: path within the folder, with forward slashes.
+        key: of the store that made it.
+        sha256: of its content.
+        facts: about it.
+    """
+
+    name: str
+    key: str
+    sha256: str
+    facts: Mapping[str, Any]
+
+
+@dataclass
+class Making:
+    """A file that is being made: where its content goes, and what is to be known of it. Changes in place."""
+
+    path: Path
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+class Store:
+    """The files of one key in a folder. Processes that may make the same file at once need a lock of their own."""
+
+    def __init__(self, folder: Path, key: str) -> None:
+        """Opens a folder, which need not exist.
+
+        Args:
+            folder: where the files lie.
+            key: hash of everything that decides what they hold.
+        """
+        self.folder, self.key = folder, key
+        self._journal = Journal(folder / JOURNAL)
+        self._rows, self._indexed = self._journal.rows(), 0
+        self._entries: dict[str, list[Entry]] = {}
+        self._warned: set[str] = set()
+
+    @contextmanager
+    def make(self, name: str) -> Iterator[Making]:
+        """Makes a file, or replaces it: the block writes it to ``path`` of what it is handed and may add facts.
+
+        The file appears under its name, and counts, when the block ends well; otherwise all is as before.
+        """
+        with atomic(self.folder / name) as temporary:
+            making = Making(temporary)
+            yield making
+            # listed first: killed here, the file is missing and made again, never someone else's
+            entry = Entry(name, self.key, _digest(temporary), making.facts)
+            self._journal.append(asdict(entry))
+
+    def write_json(self, name: str, value: Any, **facts: Any) -> None:
+        """Makes a JSON file; infinities and NaN as in :func:`analysis.files.plain`."""
+        text = json.dumps(plain(value), indent=1, allow_nan=False)
+        with self.make(name) as making:
+            making.path.write_text(text + "\n", encoding="utf-8")
+            making.facts |= facts
+
+    def find(self, name: str) -> Entry | None:
+        """The entry of a file that is on disk as it was made under this key, or None."""
+        return self._checked(name, _digest)
+
+    def read(self, name: str) -> bytes | None:
+        """The content of a file that is on disk as it was made under this key, or None."""
+        content = b""
+
+        def digest(path: Path) -> str:
+            nonlocal content
+            content = path.read_bytes()
+            return hashlib.sha256(content).hexdigest()
+
+        return None if self._checked(name, digest) is None else content
+
+    def read_json(self, name: str, expected: Any) -> Any:
+        """The value of a JSON file that is on disk as it was made under this key, or None.
+
+        Raises:
+            ValueError: the value is not what was expected; see :func:`read_json`.
+        """
+        content = self.read(name)
+        return None if content is None else parse_json(content, expected, str(self.folder / name))
+
+    def listed(self) -> set[str]:
+        """Names of the files that were made in the folder, under any key, and not discarded since."""
+        return set(self._index())
+
+    def discard(self, names: Iterable[str]) -> list[str]:
+        """Deletes those of the files that are on the list; returns which were."""
+        gone = sorted(self.listed().intersection(names))
+        for name in gone:
+            (self.folder / name).unlink(missing_ok=True)
+            self._journal.append({"name": name, "discarded": True})
+        return gone
+
+    def _index(self) -> dict[str, list[Entry]]:
+        """Entries by name, oldest first."""
+        rows = self._journal.rows()
+        if rows is not self._rows:
+            self._rows, self._indexed, self._entries = rows, 0, {}
+        for row in rows[self._indexed :]:
+            if row.get("discarded"):
+                self._entries.pop(row["name"], None)
+            else:
+                entry = Entry(row["name"], row["key"], row["sha256"], row["facts"])
+                self._entries.setdefault(entry.name, []).append(entry)
+        self._indexed = len(rows)
+        return self._entries
+
+    def _checked(self, name: str, digest_of: Callable[[Path], str]) -> Entry | None:
+        """The newest entry of this key whose content is on disk. Where no key wrote what is there, says so."""
+        entries = self._index().get(name, [])
+        if not any(entry.key == self.key for entry in entries):
+            return None
+        try:
+            digest = digest_of(self.folder / name)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            digest = str(error)
+        same = [entry for entry in entries if entry.sha256 == digest]
+        if not same and name not in self._warned:
+            self._warned.add(name)
+            warn(f"{self.folder / name}: is damaged, or was changed since it was written; it is made again")
+        return next((entry for entry in reversed(same) if entry.key == self.key), None)
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def read_json(path: Path, expected: Any) -> Any:
+    """The value of a JSON file.
+
+    Args:
+        path: of the file.
+        expected: a type, such as ``list[float]``, or a dictionary from keys that must be there to what is expected of
+            each; other keys may be there too.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is no JSON, or not what was expected; the message names the file and the place.
+    """
+    return parse_json(path.read_bytes(), expected, str(path))
+
+
+def parse_json(content: bytes, expected: Any, where: str) -> Any:
+    """The value of a JSON text; arguments and errors as of :func:`read_json`, ``where`` names the text."""
+    try:
+        value = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{where}: expected JSON ({error})") from None
+    _require(value, expected, where)
+    return value
+
+
+def _require(value: Any, expected: Any, where: str) -> None:
+    from typeguard import CollectionCheckStrategy, TypeCheckError, check_type
+
+    if isinstance(expected, Mapping):
+        if not isinstance(value, dict):
+            raise ValueError(f"{where}: expected an object with {', '.join(expected)}, got {_short(value)}")
+        for key, inner in expected.items():
+            if key not in value:
+                raise ValueError(f"{where}: expected {key!r}, got only {_short(list(value))}")
+            _require(value[key], inner, f"{where}: {key}")
+        return
+    try:
+        check_type(value, expected, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
+    except TypeCheckError:
+        name = expected.__name__ if isinstance(expected, type) and not hasattr(expected, "__args__") else expected
+        raise ValueError(f"{where}: expected {name}, got {_short(value)}") from None
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
