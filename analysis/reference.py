@@ -1,7 +1,8 @@
 """Reference images at a high rate in space and time, rendered once and kept on disk.
 
-A reference is named by a hash of everything that decides its content. It is written image by image under a temporary
-name, so that an interrupted rendering goes on where it stopped.
+A reference is named by a hash of everything that decides its content. It is written image by image, each with its
+checksum and the count of its values that were not finite: an interrupted rendering goes on where it stopped, and what
+is damaged is noticed and rendered again.
 """
 
 from __future__ import annotations
@@ -9,19 +10,22 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import importlib.metadata
+import io
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from analysis.files import PARTIAL, locked, write_json
+from analysis.files import atomic, locked
+from analysis.store import Journal, warn
 
 _HALF_MAX = float(np.finfo(np.float16).max)
 
@@ -153,7 +157,7 @@ Render = Callable[[float], Tensor]
 
 
 def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[[int, int], None]) -> Reference:
-    """The reference from disk, or rendered now; a rendering that was interrupted goes on where it stopped.
+    """The reference from disk, where every image is checked; what is missing or damaged is rendered now.
 
     Two processes that want the same reference do not both render it: the second waits.
 
@@ -165,55 +169,113 @@ def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[
 
     Raises:
         ValueError: the disk has no room for it, or the renderer returns another shape.
+        OSError: it cannot be written.
     """
     cache.mkdir(parents=True, exist_ok=True)
-    final, sidecar = cache / f"{spec.key}.npy", cache / f"{spec.key}.json"
-    with locked(cache / f"{spec.key}.lock"):
-        before = spec.count if final.exists() else None
-        if before is None:
-            before = _render_missing(cache, spec, render, progress)
+    stored, rendered = _Images(cache, spec), 0
+    nonfinite = stored.checked(say=lambda line: None)
+    if len(nonfinite) < spec.count:
+        with locked(cache / f"{spec.key}.lock"):
+            nonfinite = stored.checked(say=warn)
+            missing = [number for number in range(spec.count) if number not in nonfinite]
+            with stored.opened(fresh=len(missing) == spec.count) as file:
+                for number in missing:
+                    progress(len(nonfinite), spec.count)
+                    nonfinite[number] = stored.write(file, number, render(spec.start_s + number / spec.rate_hz))
+                    rendered += 1
     progress(spec.count, spec.count)
-    nonfinite = json.loads(sidecar.read_text())["nonfinite"]
-    images = np.load(final, mmap_mode="r")
-    if images.shape != spec.shape:
-        raise ValueError(f"{final}: expected images {spec.shape}, got {images.shape}; delete the file")
-    return Reference(spec, images, nonfinite, spec.count - before)
+    images = np.load(stored.path, mmap_mode="r")
+    return Reference(spec, images, sum(nonfinite.values()), rendered)
 
 
-def _render_missing(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[[int, int], None]) -> int:
-    """Renders what is missing and puts the file into place; returns how many images were already there."""
-    # not the temporary name of the sidecar: writing that would take the state along
-    partial, state = cache / f"{spec.key}{PARTIAL}.npy", cache / f"{spec.key}.state.json"
-    done, nonfinite = _resume(partial, state, spec)
-    if done == 0:
-        free = shutil.disk_usage(cache).free
-        if spec.bytes > free:
-            raise ValueError(f"{cache}: the reference needs {spec.bytes / 1e9:.1f} GB, {free / 1e9:.1f} GB are free")
-        state.unlink(missing_ok=True)  # of a file that is gone or damaged
-        np.lib.format.open_memmap(partial, mode="w+", dtype=np.float16, shape=spec.shape)
-    before, images = done, np.lib.format.open_memmap(partial, mode="r+")
-    for number in range(done, spec.count):
-        progress(number, spec.count)
-        image = np.asarray(render(spec.start_s + number / spec.rate_hz).cpu())
-        if image.shape != spec.shape[1:]:
-            raise ValueError(f"reference: expected images {spec.shape[1:]}, got {image.shape}")
-        nonfinite += int((~np.isfinite(image)).sum())
+class _Images:
+    """The images of a reference in a file, and the journal that says which of them are there.
+
+    The file has its full length from the beginning. An image counts where the journal has a row with its checksum.
+    """
+
+    def __init__(self, cache: Path, spec: ReferenceSpec) -> None:
+        self.path, self._spec = cache / f"{spec.key}.npy", spec
+        self._journal = Journal(cache / f"{spec.key}.journal")
+        header = io.BytesIO()
+        empty = {"descr": np.lib.format.dtype_to_descr(np.dtype(np.float16)), "fortran_order": False}
+        np.lib.format.write_array_header_1_0(header, {**empty, "shape": spec.shape})
+        self._header, self._image_bytes = header.getvalue(), spec.bytes // spec.count
+
+    def checked(self, say: Callable[[str], None]) -> dict[int, int]:
+        """Values that were not finite, of each image that is on disk as it was rendered. Says what is damaged."""
+        rows: dict[int, dict[str, Any]] = {}
+        for row in self._journal.rows():
+            if "image" in row:
+                rows[row["image"]] = row
+            else:
+                rows.clear()  # a new file begins
+        try:
+            with self.path.open("rb") as file:
+                whole = os.fstat(file.fileno()).st_size == len(self._header) + self._spec.bytes
+                if file.read(len(self._header)) != self._header or not whole:
+                    if rows:
+                        say(f"{self.path}: is damaged: expected float16 {self._spec.shape}; it is rendered again")
+                    return {}
+                found = {
+                    number: row["nonfinite"]
+                    for number, row in sorted(rows.items())
+                    if self._digest(number, self._read(file, number)) == row["sha256"]
+                }
+        except FileNotFoundError:
+            return {}
+        damaged = sorted(rows.keys() - found.keys())
+        if damaged:
+            say(f"{self.path}: images {', '.join(map(str, damaged))} are damaged and are rendered again")
+        return found
+
+    @contextmanager
+    def opened(self, fresh: bool) -> Iterator[BinaryIO]:
+        """The file, to write images to; a fresh one has room for them all."""
+        if fresh:
+            self._allocate()
+            self._journal.append({"key": self._spec.key, **dataclasses.asdict(self._spec)})
+        with self.path.open("r+b") as file:
+            yield file
+
+    def write(self, file: BinaryIO, number: int, rendered: Tensor) -> int:
+        """Puts an image on the disk; returns how many of its values were not finite."""
+        image = np.asarray(rendered.cpu())
+        if image.shape != self._spec.shape[1:]:
+            raise ValueError(f"reference: expected images {self._spec.shape[1:]}, got {image.shape}")
+        nonfinite = int((~np.isfinite(image)).sum())
         image = np.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
-        images[number] = np.clip(image, 0.0, _HALF_MAX).astype(np.float16)
-        images.flush()
-        write_json(state, {"done": number + 1, "nonfinite": nonfinite})
-    del images
-    write_json(cache / f"{spec.key}.json", {"nonfinite": nonfinite, **dataclasses.asdict(spec)})
-    os.replace(partial, cache / f"{spec.key}.npy")
-    state.unlink(missing_ok=True)
-    return before
+        content = np.clip(image, 0.0, _HALF_MAX).astype("<f2").tobytes()
+        # not through mapped memory: a full disk would end the process there
+        file.seek(self._offset(number))
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+        self._journal.append({"image": number, "nonfinite": nonfinite, "sha256": self._digest(number, content)})
+        return nonfinite
 
+    def _offset(self, number: int) -> int:
+        return len(self._header) + number * self._image_bytes
 
-def _resume(partial: Path, state: Path, spec: ReferenceSpec) -> tuple[int, int]:
-    """Images done and non-finite values of an interrupted rendering; zeros where there is none that can be used."""
-    try:
-        found = json.loads(state.read_text())
-        shape = np.load(partial, mmap_mode="r").shape
-    except (OSError, ValueError, EOFError):
-        return 0, 0
-    return (found["done"], found["nonfinite"]) if shape == spec.shape else (0, 0)
+    def _read(self, file: BinaryIO, number: int) -> bytes:
+        file.seek(self._offset(number))
+        return file.read(self._image_bytes)
+
+    def _digest(self, number: int, content: bytes) -> str:
+        # an image of another reference, or in another place of this one, is no image of this place
+        digest = hashlib.sha256(f"{self._spec.key} {number} ".encode())
+        digest.update(content)
+        return digest.hexdigest()
+
+    def _allocate(self) -> None:
+        """Makes the file with all its room on the disk."""
+        need = self._spec.bytes + len(self._header)
+        self.path.unlink(missing_ok=True)  # its blocks count as free
+        free = shutil.disk_usage(self.path.parent).free
+        if need > free:
+            where = self.path.parent
+            raise ValueError(f"{where}: the reference needs {need / 1e9:.1f} GB, {free / 1e9:.1f} GB are free")
+        with atomic(self.path) as temporary, temporary.open("wb") as file:
+            file.write(self._header)
+            file.flush()
+            os.posix_fallocate(file.fileno(), 0, need)
