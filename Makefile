@@ -2,16 +2,29 @@
 PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
+INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
+BASE := $(VENV)/.base
 STAMP := $(VENV)/.installed
+DOCS := $(VENV)/.docs
 
-.PHONY: demo test test-slow lint bench study-quick clean
+.PHONY: demo test test-slow lint bench study-quick docs constraints clean
 
-$(STAMP): pyproject.toml
+# the base alone, which is all that the demo needs
+$(BASE): pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	$(INSTALL) .
 	touch $@
 
-demo: $(STAMP)
+# every extra that tests, studies and the benchmark use
+$(STAMP): $(BASE)
+	$(INSTALL) '.[test]'
+	touch $@
+
+$(DOCS): $(BASE)
+	$(INSTALL) '.[docs]'
+	touch $@
+
+demo: $(BASE)
 	$(PY) scripts/run.py fly-by --out out/demo
 
 lint: $(STAMP)
@@ -30,5 +43,13 @@ study-quick: $(STAMP)
 bench: $(STAMP)
 	$(PY) scripts/bench.py --out out/bench
 
+# needs no network once its packages are installed
+docs: $(DOCS)
+	$(PY) -m mkdocs build --strict
+
+# writes down what is installed now
+constraints: $(STAMP) $(DOCS)
+	$(PY) -m pip freeze --all --exclude-editable | grep -v ^pip== | sed 's/+cpu$$//' > constraints.txt
+
 clean:
-	rm -rf out .cache
+	rm -rf out .cache site

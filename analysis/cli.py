@@ -9,7 +9,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 Options = TypeVar("Options")
 
@@ -100,18 +100,30 @@ def _one_line(box: str) -> str:
 def run_cli(main: Callable[[], None]) -> None:
     """Runs a script's main function and ends the process.
 
-    Bad input ends with one line on standard error and status 2, Ctrl-C with one line and status 130.
+    Bad input, and a package of an extra that is not installed, end with one line on standard error and status 2, Ctrl-C
+    with one line and status 130.
     """
     _spin_briefly()
     try:
         main()
     except InputError as error:
-        message = re.sub(r"\s+", " ", str(error)).strip()
-        print(f"error: {message}", file=sys.stderr)
-        sys.exit(EXIT_BAD_INPUT)
+        _refuse(error)
+    except ModuleNotFoundError as error:
+        from analysis.extras import extra_of
+
+        missing = extra_of(error)
+        if missing is None:
+            raise
+        _refuse(missing)
     except KeyboardInterrupt:
         print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
+
+
+def _refuse(error: InputError) -> NoReturn:
+    message = re.sub(r"\s+", " ", str(error)).strip()
+    print(f"error: {message}", file=sys.stderr)
+    sys.exit(EXIT_BAD_INPUT)
 
 
 def _spin_briefly() -> None:

@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from torch import Tensor
 
+from analysis.extras import DISTRIBUTION
 from analysis.files import PARTIAL, plain
 from tsar.types import StepRecord
 
@@ -280,7 +281,7 @@ def provenance(root: Path, config: Any, **extra: Any) -> dict[str, Any]:
     """
     text = json.dumps(plain(config), sort_keys=True)
     versions: dict[str, str | None] = {}
-    for package in ("tsar", "torch", "warp-lang", "numpy"):
+    for package in (DISTRIBUTION, "torch", "warp-lang", "numpy"):
         try:
             versions[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, parse, run_cli
 from analysis.conversion_check import CheckOptions
+from analysis.extras import require_extra
 from analysis.files import atomic, writable_folder, write_json
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -23,6 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def main() -> None:
     """Parses, converts, renders, prints the table."""
     options = parse(CheckOptions, __doc__ or "")
+    require_extra("formats", "peers", "perception")
     with bad_input():
         writable_folder(options.out, "out")
     import pandas as pd

@@ -18,6 +18,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.extras import require_extra
 from analysis.files import writable_folder, write_json
 from analysis.perception.options import (
     AdaptiveOptions,
@@ -29,11 +30,13 @@ from analysis.perception.options import (
 )
 
 ROOT = Path(__file__).resolve().parent.parent
+NEEDS = {SimulateOptions: ("perception",), AdaptiveOptions: ("study", "perception")}
 
 
 def main() -> None:
     """Parses, runs one step of the study, prints what came out."""
     options = parse(Step, __doc__ or "")  # type: ignore[arg-type]
+    require_extra(*NEEDS.get(type(options), ()))
     with bad_input():
         writable_folder(options.out, "out")
     from analysis.perception import steps

@@ -14,6 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.extras import require_extra
 from analysis.files import atomic, writable_folder, write_json
 from analysis.sensitivity import AXES, BEST, SensitivityOptions, optimum_table, runs, setting_table, sweeps
 
@@ -21,6 +22,7 @@ from analysis.sensitivity import AXES, BEST, SensitivityOptions, optimum_table, 
 def main() -> None:
     """Runs what is missing; writes tables and figures; prints what is best, and how flat it is."""
     options = parse(SensitivityOptions, __doc__ or "")
+    require_extra("study", "perception")
     with bad_input():
         writable_folder(options.out, "out")
         writable_folder(options.cache, "cache")

@@ -13,12 +13,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import parse, run_cli
+from analysis.extras import require_extra
 from analysis.suitability import SuitabilityOptions
 
 
 def main() -> None:
     """Runs what is missing; prints the tables."""
     options = parse(SuitabilityOptions, __doc__ or "")
+    require_extra("study", "perception")
     from analysis.suitability_report import study
 
     summary, tables = study(options)

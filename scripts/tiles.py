@@ -15,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.extras import require_extra
 from analysis.farm import FarmOptions, connected
 from analysis.files import writable_folder, write_json
 from analysis.tracer_options import TileOptions
@@ -22,8 +23,8 @@ from analysis.tracer_options import TileOptions
 
 def main() -> None:
     """Parses, renders or measures, prints what it took."""
-
     options = parse(TileOptions, __doc__ or "")
+    require_extra("study")
     from analysis.tiles import chunks_of, picture_of, render_resumed
 
     farm = FarmOptions(workers=max(options.study)) if options.study else options.farm

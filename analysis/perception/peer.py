@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from analysis.cli import InputError
+from analysis.extras import require_extra
 from analysis.perception.psychometrics import THRESHOLD
 
 
@@ -42,10 +43,8 @@ def peer_fit(levels: Sequence[float], correct: Sequence[int], trials: Sequence[i
     Raises:
         InputError: psignifit is not installed, or finds no threshold.
     """
-    try:
-        import psignifit
-    except ImportError:
-        raise InputError("psignifit: expected the package, got none; pip install 'tsar[psignifit]' has it") from None
+    require_extra("psignifit")
+    import psignifit
 
     # it wants functions that rise
     data = np.stack([-np.log2(np.asarray(levels, np.float64)), correct, trials], axis=1)

@@ -117,5 +117,5 @@ def test_psignifit_finds_the_same_threshold(jnd: float, sigma: float) -> None:
 
 def test_without_psignifit_there_is_one_line(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "psignifit", None)
-    with pytest.raises(InputError, match=r"expected the package, got none; pip install"):
+    with pytest.raises(InputError, match=r"expected the package psignifit, found none; the extra 'psignifit'"):
         peer_fit(LEVELS, [10] * 8, [20] * 8)
