@@ -8,13 +8,16 @@ from typing import Any
 import warp as wp
 
 _NATIVE = Path(__file__).resolve().parent / "native"
+_QUIET = '#pragma clang diagnostic ignored "-Wpsabi"\n'
+"""Where registers are narrower than sixteen floats Clang warns, at every function that takes or returns a vector, that
+code compiled for wider ones would call it differently. All of a module is compiled at once, for one processor."""
 
 
 def module_options(*headers: str) -> dict[str, Any]:
     """Options of a Warp module whose kernels call functions of these headers."""
     build = wp.ModuleBuildOptions(
         extra_cpu_include_dirs=[str(_NATIVE)],
-        extra_cpu_preamble="".join(f'#include "{header}"\n' for header in headers),
+        extra_cpu_preamble=_QUIET + "".join(f'#include "{header}"\n' for header in headers),
         extra_build_dependencies=[str(header) for header in sorted(_NATIVE.glob("*.h"))],
     )
     return {"enable_backward": False, "extra_build_options": build}
