@@ -32,8 +32,7 @@ def tile_volume(
     position = sample_positions(level, index, side)
     volume = torch.empty(position.shape[0], len(times_s), side * side)
     for frame, time_s in enumerate(times_s):
-        time = torch.full(position.shape[:2], time_s, dtype=torch.float64)
-        volume[:, frame] = compressed_luminance(trace(FrameletBatch(level, index, position, time)).color)
+        volume[:, frame] = compressed_luminance(trace(FrameletBatch(level, index, position, time_s)).color)
         done()
     return volume
 

@@ -262,8 +262,7 @@ def _framelets(renderer: Renderer, level: int, time_s: float) -> NDArray[np.floa
     found = []
     for index in torch.arange(4**level).split(_LAUNCH_SAMPLES // FRAMELET_SIDE**2):
         position = sample_positions(torch.full_like(index, level), index, FRAMELET_SIDE)
-        time = torch.full(position.shape[:2], time_s, dtype=torch.float64)
-        found.append(renderer.trace(FrameletBatch(torch.full_like(index, level), index, position, time)).color)
+        found.append(renderer.trace(FrameletBatch(torch.full_like(index, level), index, position, time_s)).color)
     return torch.cat(found).numpy()
 
 

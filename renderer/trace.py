@@ -132,13 +132,15 @@ class Renderer:
             Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, and ray counts.
 
         Raises:
-            ValueError: if the shapes do not fit or a time is not finite.
+            ValueError: if the shapes do not fit, times are not float64, or a time is not finite.
         """
         shape = tuple(batch.position.shape)
         time_s = batch.time_s
         times = tuple(time_s.shape) if isinstance(time_s, Tensor) else shape[:2]
         if len(shape) != 3 or shape[2] != 2 or times != shape[:2]:
             raise ValueError(f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and {times}")
+        if isinstance(time_s, Tensor) and time_s.dtype != torch.float64:
+            raise ValueError(f"FrameletBatch: expected time_s of float64, got {time_s.dtype}")
         if not 0.0 < aspect < math.inf:
             raise ValueError(f"aspect: expected a positive number, got {aspect}")
         footprint_px = footprint_px or self.footprint_resolution_px

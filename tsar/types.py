@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Float64, Int64
 from torch import Tensor
 
 
@@ -39,7 +39,8 @@ class FrameletBatch:
         level, index: the tile of each framelet, as in :class:`Tiling`.
         position: sample positions on the image plane, ``(x, y)`` in ``[0, 1)`` from the top left corner, Morton order
             within a framelet. Multiples of ``1 / 65536``, so exact in float32.
-        time_s: animation time of each sample, seconds; one number where they have the same.
+        time_s: animation time of each sample, seconds, float64 (float32 is 4 ms off at 1e5 s); one number where they
+            have the same.
         cycle: pipeline cycle that asked for it.
         seed: of the run that asked for it. What a renderer draws itself it derives from positions and times.
     """
@@ -47,12 +48,12 @@ class FrameletBatch:
     level: Int64[Tensor, " n"]
     index: Int64[Tensor, " n"]
     position: Float[Tensor, "n samples 2"]
-    time_s: Float[Tensor, "n samples"] | float
+    time_s: Float64[Tensor, "n samples"] | float
     cycle: int = 0
     seed: int = 0
 
     @property
-    def times(self) -> Float[Tensor, "n samples"]:
+    def times(self) -> Float64[Tensor, "n samples"]:
         """Animation time of each sample, seconds; one number in memory where they have the same."""
         if isinstance(self.time_s, Tensor):
             return self.time_s

@@ -186,7 +186,7 @@ def test_meter_counts_and_changes_nothing() -> None:
         return next(answers)
 
     zero = torch.zeros(1, dtype=torch.int64)
-    batch = FrameletBatch(zero, zero, torch.zeros(1, 2, 2), torch.zeros(1, 2))
+    batch = FrameletBatch(zero, zero, torch.zeros(1, 2, 2), 0.0)
     meter = Meter(trace)
     assert meter(batch).counters == {"primary_rays": 2} and meter(batch).counters == {"b": 5}
     assert asked[0] is batch and meter.calls == 2 and meter.counters == {"primary_rays": 2, "b": 5}

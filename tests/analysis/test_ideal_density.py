@@ -125,7 +125,7 @@ def test_volumes_hold_compressed_luminance_of_the_tile() -> None:
     volume = tile_volume(disk, level, index, 16, [0.0, 0.5], lambda: calls.append(1))
     assert volume.shape == (2, 2, 256) and len(calls) == 2
     position = sample_positions(level, index, 16)
-    batch = FrameletBatch(level, index, position, torch.full((2, 256), 0.5))
+    batch = FrameletBatch(level, index, position, 0.5)
     torch.testing.assert_close(volume[:, 1], compressed_luminance(disk(batch).color))
     planes = raster(volume)
     assert planes.shape == (2, 2, 16, 16)

@@ -68,7 +68,9 @@ def test_threads_do_not_change_a_bit_of_a_frame(samples: int) -> None:
 
 def test_an_empty_batch_is_answered() -> None:
     answer = Renderer(driving_scene()).trace(
-        FrameletBatch(*(torch.zeros(0, dtype=torch.int64),) * 2, torch.zeros(0, 16, 2), torch.zeros(0, 16))
+        FrameletBatch(
+            *(torch.zeros(0, dtype=torch.int64),) * 2, torch.zeros(0, 16, 2), torch.zeros(0, 16, dtype=torch.float64)
+        )
     )
     assert answer.color.shape == (0, 16, 3) and answer.counters["primary_rays"] == 0
 

@@ -37,7 +37,7 @@ def means(scene: Scene, positions: np.ndarray, samples: int = 1, seed: int = 0) 
     renderer = Renderer(scene, packets=False, specialise=False, throughput_cutoff=0.0, seed=seed)
     position = torch.tensor(positions, dtype=torch.float32)[:, None].expand(-1, samples, -1)
     number = torch.zeros(len(positions), dtype=torch.int64)
-    color = renderer.trace(FrameletBatch(number, number, position.contiguous(), torch.zeros(position.shape[:2]))).color
+    color = renderer.trace(FrameletBatch(number, number, position.contiguous(), 0.0)).color
     renderer.close()
     assert color.isfinite().all()
     return color[..., 0].mean(dim=1).numpy()

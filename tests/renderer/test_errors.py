@@ -148,5 +148,7 @@ def test_odd_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     good = batch(grid(4))
     with pytest.raises(ValueError, match="expected position"):
         renderer.trace(dataclasses.replace(good, position=good.position[..., :1]))
+    with pytest.raises(ValueError, match="time_s of float64"):
+        renderer.trace(dataclasses.replace(good, time_s=good.time_s.to(torch.float32)))
     with pytest.raises(ValueError, match="finite times"):
         renderer.trace(dataclasses.replace(good, time_s=torch.full_like(good.time_s, float("nan"))))

@@ -29,8 +29,7 @@ def frame_batch(config: TsarConfig, time_s: float, frame: int, samples_per_axis:
     """A whole frame as framelets: the uniform tiling with ``samples_per_axis²`` samples a pixel."""
     tiling = uniform(int(log2(config.resolution_px * samples_per_axis / config.framelet_side)))
     position = sample_positions(tiling.level, tiling.index, config.framelet_side)
-    time_field = torch.full(position.shape[:2], time_s, dtype=torch.float32)
-    return FrameletBatch(tiling.level, tiling.index, position, time_field, cycle=frame, seed=config.seed)
+    return FrameletBatch(tiling.level, tiling.index, position, time_s, cycle=frame, seed=config.seed)
 
 
 def frame_image(samples: SampleBatch, config: TsarConfig, samples_per_axis: int) -> Float[Tensor, "h w 3"]:

@@ -54,8 +54,7 @@ def render_pixels(
     position = torch.stack((pixel % resolution, pixel // resolution), dim=1).to(torch.float32).add_(0.5) / resolution
     position = position.reshape(-1, config.samples, 2)
     nothing = torch.zeros(position.shape[0], dtype=torch.int64)
-    time = torch.full(position.shape[:2], time_s, dtype=torch.float32)
-    answer = trace(FrameletBatch(nothing, nothing, position, time, cycle=cycle, seed=config.seed))
+    answer = trace(FrameletBatch(nothing, nothing, position, time_s, cycle=cycle, seed=config.seed))
     color, _ = replace_nonfinite(answer.color, config.framelet_side)
     return color.reshape(-1, 3), answer.counters
 

@@ -1,0 +1,110 @@
+"""Far from time zero everything is as it is near it: times are float64 until they are relative.
+
+The scene and the run begin later by a whole number of seconds. All times are multiples of 1/1024 s, which float64 holds
+exactly up to 1e9 s and beyond, so not a bit may differ.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from analysis.cases import SCALES, Case
+from analysis.causes import Truths
+from analysis.observation import observe
+from renderer.control import stages
+from renderer.frames import render_image
+from renderer.sampling import SamplePlan
+from renderer.trace import Renderer
+from scenes.canonical import Scene
+from tests.renderer.builders import driving_scene
+from tsar import pipeline
+from tsar.baselines import afr, framed, frameless, oracle
+from tsar.clock import fixed_clock
+from tsar.config import TilingConfig, TsarConfig
+
+CYCLE_S, CYCLES, RATE_HZ = 37 / 1024, 6, 32.0
+LATE_S = (1e5, 1e6, 1e9)
+CONFIG = TsarConfig(
+    batch_size=16, resolution_px=64, sdf_side=32, warmup_cycles=8, tiling=TilingConfig(tile_count_max=64)
+)
+
+
+def scene(later_s: float) -> Scene:
+    """The driving scene on tracks of dyadic times that begin later."""
+
+    def moved(thing):
+        if thing.track is None:
+            return thing
+        return dataclasses.replace(thing, track=dataclasses.replace(thing.track, start_s=later_s, interval_s=0.125))
+
+    found = driving_scene()
+    return dataclasses.replace(found, camera=moved(found.camera), instances=tuple(map(moved, found.instances)))
+
+
+@pytest.fixture(scope="module")
+def renderers():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)  # small pictures are done sooner without a second one
+    yield {later: Renderer(scene(later), threads=1) for later in (0.0, *LATE_S)}
+    torch.set_num_threads(before)
+
+
+def truths_of(renderer: Renderer, start_s: float) -> Truths:
+    side = CONFIG.resolution_px
+    return Truths(lambda number: renderer.render_frame(start_s + number / RATE_HZ, side, side, 2), start_s, RATE_HZ, 8)
+
+
+def play(policy: str, renderer: Renderer, start_s: float) -> list:
+    span, clock = (start_s, start_s + CYCLES * CYCLE_S), fixed_clock(CYCLE_S)
+    if policy in ("compiled", "reference"):
+        return list(pipeline.run(CONFIG, renderer.trace, clock, *span, stages(CONFIG, policy, 1)))
+    if policy == "oracle":
+        shown = oracle.run(CONFIG, renderer.trace, clock, *span, truth=truths_of(renderer, start_s).at)
+    elif policy.startswith("framed"):
+        shown = framed.run(CONFIG, renderer.trace, clock, *span, samples_per_axis=int(policy[-1]))
+    else:
+        shown = {"afr": afr, "frameless": frameless}[policy].run(CONFIG, renderer.trace, clock, *span)
+    return [(None, display) for display in shown]
+
+
+@pytest.mark.parametrize("policy", ["compiled", "reference", "framed 1", "framed 2", "frameless", "afr", "oracle"])
+def test_a_run_far_from_time_zero_is_the_run_at_time_zero(renderers, policy: str) -> None:
+    near = play(policy, renderers[0.0], 0.0)
+    assert any(not torch.equal(one[1].image, near[-1][1].image) for one in near[:-1])
+    for later in LATE_S:
+        far = play(policy, renderers[later], later)
+        assert len(far) == len(near)
+        for (record, shown), (expected, image) in zip(far, near, strict=True):
+            assert shown.display_time_s - later == image.display_time_s
+            assert shown.sample_time_s - later == image.sample_time_s
+            assert torch.equal(shown.image, image.image)
+            assert torch.equal(shown.samples.newest_s - later, image.samples.newest_s)
+            if record is not None:
+                assert record.sim_time_s - later == expected.sim_time_s
+                assert record.age_spread_s == expected.age_spread_s
+                assert torch.equal(record.densities.spatial, expected.densities.spatial)
+
+
+@pytest.mark.parametrize("policy", ["tsar", "framed"])
+def test_errors_far_from_time_zero_are_those_at_time_zero(renderers, policy: str) -> None:
+    scale = dataclasses.replace(SCALES["quick"], seconds=0.125, reference_rate_hz=RATE_HZ)
+    found = {}
+    for later in (0.0, *LATE_S):
+        case = Case("chase", policy, CONFIG, scale, start_s=later)
+        shown = play({"tsar": "compiled", "framed": "framed 1"}[policy], renderers[later], later)
+        seen = observe(case, truths_of(renderers[later], later), iter(shown), lambda number, pictures: None)
+        found[later] = [{name: value for name, value in row.items() if name != "time_s"} for row in seen.rows]
+    assert sum(row["mse"] for row in found[0.0]) > 0
+    for later in LATE_S:
+        for far, near in zip(found[later], found[0.0], strict=True):
+            np.testing.assert_equal(far, near)
+
+
+@pytest.mark.parametrize("later", LATE_S)
+def test_a_frame_with_an_open_shutter_far_from_time_zero(renderers, later: float) -> None:
+    plan = SamplePlan(samples_per_pixel=4, point_set="sobol")
+    near, far = (render_image(renderers[start], plan, 48, 32, start + 0.25, (0.0, 0.0625)) for start in (0.0, later))
+    # only times within the shutter are rounded: by 1.2e-7 s at 1e9 s
+    assert (near - far).abs().amax(-1).gt(1e-3).float().mean() < 0.01
