@@ -1,16 +1,16 @@
 """Runs one case of a study and puts its result on disk.
 
-Beside ``experiment.py`` the one module of this package that wires scenes, renderer and pipeline. A result is two files:
-a table over the reference times (Parquet), and what was measured of the whole run (JSON), which is written last: where
-it is, the case is done. Nothing in either depends on the number of threads, processes or machines, except the entry
-``machine`` of the JSON file, which holds measured seconds and memory.
+Beside ``experiment.py`` the one module of this package that wires scenes, renderer and pipeline. A result is a table
+over the reference times (Parquet), stills, and what was measured of the whole run (JSON), which is written last. The
+case is done where all of them are as they were written. Nothing in them depends on the number of threads, processes or
+machines, except the entry ``machine`` of the JSON file, which holds measured seconds and memory.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
-import json
+import io
 import resource
 import time
 from collections.abc import Iterator
@@ -28,13 +28,14 @@ from PIL import Image
 from analysis.cases import Case, Scale
 from analysis.causes import Truths
 from analysis.cost_model import cycle_seconds, frame_seconds
-from analysis.files import atomic, locked, write_json
+from analysis.files import locked
 from analysis.observation import Seen, Shown, observe
 from analysis.perceptual import jod, one_thread
 from analysis.pictures import Pixels
 from analysis.quality import reference_times
 from analysis.records import InvariantCheck, RecordLimits
 from analysis.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash, source_hash
+from analysis.store import Store
 
 if TYPE_CHECKING:
     from renderer.trace import Renderer
@@ -69,6 +70,15 @@ class Place:
         """Picture number ``number`` of ``what``: shown, reference, or tiling."""
         return self.results / "stills" / f"{key}-{number}-{what}.png"
 
+    def store(self, key: str) -> Store:
+        """Where the files of a result are checked."""
+        return _store(self.results).under(key)
+
+
+@lru_cache(maxsize=4)
+def _store(results: Path) -> Store:
+    return Store(results, "")
+
 
 @lru_cache(maxsize=1)
 def source_of_results() -> str:
@@ -81,13 +91,28 @@ def source_of_results() -> str:
 
 
 def finished(key: str, place: Place) -> dict[str, Any] | None:
-    """The summary of a result that is on disk, or None."""
-    files = place.files(key)
-    try:
-        found = json.loads(files["summary"].read_text())
-    except (OSError, ValueError):
-        return None
-    return found if files["times"].exists() else None
+    """The summary of a result whose files are all on disk as they were written, or None. Names those that are damaged.
+
+    Raises:
+        ValueError: the summary is none of a result.
+    """
+    store, files = place.store(key), place.files(key)
+    found = store.read_json(files["summary"].name, {"key": str, "case": dict, "stills": list[str]})
+    names = [files["times"].name, *found["stills"]] if found else []
+    return found if names and all(store.find(name) is not None for name in names) else None
+
+
+def times_of(key: str, place: Place) -> pd.DataFrame:
+    """The table over the reference times of a result that is finished.
+
+    Raises:
+        ValueError: it is not on disk as it was written.
+    """
+    file = place.files(key)["times"]
+    content = place.store(key).read(file.name)
+    if content is None:
+        raise ValueError(f"{file}: expected the table of a finished run, found none or another")
+    return pd.read_parquet(io.BytesIO(content))
 
 
 def evaluate(case: Case, key: str, place: Place) -> str:
@@ -169,17 +194,18 @@ def _run(case: Case, key: str, place: Place) -> None:
     reference = render_reference(case.input, case.phase, case.start_s, case.scale, place)
     truths = _truths(case, reference)
     began_run = time.perf_counter()
-    check = _Check(case)
+    check, store, stills = _Check(case), place.store(key), list[str]()
 
     def keep(number: int, pictures: dict[str, Pixels]) -> None:
         for what, pixels in pictures.items():
-            with atomic(place.still(key, what, number)) as temporary:
-                Image.fromarray(pixels).save(temporary)
+            stills.append(place.still(key, what, number).relative_to(place.results).as_posix())
+            with store.make(stills[-1]) as made:
+                Image.fromarray(pixels).save(made.path)
 
     seen = observe(case, truths, check.passing(_displays(case, place, truths)), keep)
     table = pd.DataFrame(seen.rows)
-    with atomic(place.files(key)["times"]) as temporary:
-        table.to_parquet(temporary)
+    with store.make(place.files(key)["times"].name) as made:
+        table.to_parquet(made.path)
     scored = time.perf_counter()
     found = {
         "key": key,
@@ -189,6 +215,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "reference_nonfinite": reference.nonfinite,
         "jod": _score(case, seen),
         "regions": seen.regions(),
+        "stills": stills,
         **check.result(),
         "machine": {
             "reference_s": began_run - began,
@@ -199,7 +226,7 @@ def _run(case: Case, key: str, place: Place) -> None:
             "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
         },
     }
-    write_json(place.files(key)["summary"], found)
+    store.write_json(place.files(key)["summary"].name, found)
 
 
 def _score(case: Case, seen: Seen) -> float | None:

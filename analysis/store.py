@@ -26,6 +26,7 @@ one line of an error, as what is no JSON is.
 
 from __future__ import annotations
 
+import copy
 import fcntl
 import hashlib
 import json
@@ -130,6 +131,29 @@ class Entry:
     facts: Mapping[str, Any]
 
 
+class _Files:
+    """The entries of a journal by name. Changes in place as the journal grows."""
+
+    def __init__(self, journal: Journal) -> None:
+        self.journal = journal
+        self._rows, self._indexed = journal.rows(), 0
+        self._entries: dict[str, list[Entry]] = {}
+
+    def entries(self) -> dict[str, list[Entry]]:
+        """Of every file, oldest first."""
+        rows = self.journal.rows()
+        if rows is not self._rows:
+            self._rows, self._indexed, self._entries = rows, 0, {}
+        for row in rows[self._indexed :]:
+            if row.get("discarded"):
+                self._entries.pop(row["name"], None)
+            else:
+                entry = Entry(row["name"], row["key"], row["sha256"], row["facts"])
+                self._entries.setdefault(entry.name, []).append(entry)
+        self._indexed = len(rows)
+        return self._entries
+
+
 @dataclass
 class Making:
     """A file that is being made: where its content goes, and what is to be known of it. Changes in place."""
@@ -149,10 +173,14 @@ class Store:
             key: hash of everything that decides what they hold.
         """
         self.folder, self.key = folder, key
-        self._journal = Journal(folder / JOURNAL)
-        self._rows, self._indexed = self._journal.rows(), 0
-        self._entries: dict[str, list[Entry]] = {}
+        self._files = _Files(Journal(folder / JOURNAL))
         self._warned: set[str] = set()
+
+    def under(self, key: str) -> Store:
+        """The same folder under another key; its list is read once for both."""
+        other = copy.copy(self)
+        other.key = key
+        return other
 
     @contextmanager
     def make(self, name: str) -> Iterator[Making]:
@@ -165,7 +193,7 @@ class Store:
             yield making
             # listed first: killed here, the file is missing and made again, never someone else's
             entry = Entry(name, self.key, _digest(temporary), making.facts)
-            self._journal.append(asdict(entry))
+            self._files.journal.append(asdict(entry))
 
     def write_json(self, name: str, value: Any, **facts: Any) -> None:
         """Makes a JSON file; infinities and NaN as in :func:`analysis.files.plain`."""
@@ -200,33 +228,19 @@ class Store:
 
     def listed(self) -> set[str]:
         """Names of the files that were made in the folder, under any key, and not discarded since."""
-        return set(self._index())
+        return set(self._files.entries())
 
     def discard(self, names: Iterable[str]) -> list[str]:
         """Deletes those of the files that are on the list; returns which were."""
         gone = sorted(self.listed().intersection(names))
         for name in gone:
             (self.folder / name).unlink(missing_ok=True)
-            self._journal.append({"name": name, "discarded": True})
+            self._files.journal.append({"name": name, "discarded": True})
         return gone
-
-    def _index(self) -> dict[str, list[Entry]]:
-        """Entries by name, oldest first."""
-        rows = self._journal.rows()
-        if rows is not self._rows:
-            self._rows, self._indexed, self._entries = rows, 0, {}
-        for row in rows[self._indexed :]:
-            if row.get("discarded"):
-                self._entries.pop(row["name"], None)
-            else:
-                entry = Entry(row["name"], row["key"], row["sha256"], row["facts"])
-                self._entries.setdefault(entry.name, []).append(entry)
-        self._indexed = len(rows)
-        return self._entries
 
     def _checked(self, name: str, digest_of: Callable[[Path], str]) -> Entry | None:
         """The newest entry of this key whose content is on disk. Where no key wrote what is there, says so."""
-        entries = self._index().get(name, [])
+        entries = self._files.entries().get(name, [])
         if not any(entry.key == self.key for entry in entries):
             return None
         try:

@@ -13,7 +13,7 @@ import pandas as pd
 from analysis import plots_suitability as plots
 from analysis.cases import ROWS, SCALES, Case
 from analysis.cli import bad_input, full_disk
-from analysis.evaluation import ROOT, Place, finished
+from analysis.evaluation import ROOT, Place, finished, times_of
 from analysis.farm import run_cases
 from analysis.files import atomic, writable_folder, write_json
 from analysis.progress import bars
@@ -80,7 +80,7 @@ def collect(planned: list[Run], keys: Mapping[Case, str], place: Place) -> list[
         key = keys[run.case]
         summary = finished(key, place)
         if summary is not None:
-            found.append(Result(run, summary, pd.read_parquet(place.files(key)["times"])))
+            found.append(Result(run, summary, times_of(key, place)))
     return found
 
 

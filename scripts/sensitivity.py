@@ -29,7 +29,7 @@ def main() -> None:
         planned = runs(options)
     import pandas as pd
 
-    from analysis.evaluation import ROOT, Place, finished
+    from analysis.evaluation import ROOT, Place, finished, times_of
     from analysis.farm import run_cases
     from analysis.plots_sensitivity import write_all
     from analysis.progress import bars
@@ -42,7 +42,7 @@ def main() -> None:
         place.results.mkdir(exist_ok=True)
         keys, failures = run_cases([run.case for run in planned], place, options.farm, show.task("runs", len(planned)))
     done = {run: keys[run.case] for run in planned if finished(keys[run.case], place)}
-    results = {run.place: pd.read_parquet(place.files(key)["times"]) for run, key in done.items()}
+    results = {run.place: times_of(key, place) for run, key in done.items()}
     tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}
     stills = {run.setting: key for run, key in done.items() if run.place == (options.figure_input, run.setting, 0)}
     missing = [run for run in planned if run not in done]

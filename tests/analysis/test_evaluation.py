@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from PIL import Image
 
 import analysis.evaluation as evaluation
 from analysis.cases import Case, Scale, framed_config
-from analysis.evaluation import Place, evaluate, finished, source_of_results
+from analysis.evaluation import Place, evaluate, finished, source_of_results, times_of
 from analysis.farm import FarmOptions, run_cases
 from tsar.config import ConfigError, TsarConfig
 
@@ -31,11 +32,12 @@ def key(one: Case) -> str:
     return one.key(source_of_results())
 
 
-def content(place: Place, name: str) -> tuple[bytes, dict]:
+def content(place: Place, name: str) -> tuple[bytes, list[bytes], dict]:
     """A result without what was measured of the machine."""
     files = place.files(name)
     summary = json.loads(files["summary"].read_text())
-    return files["times"].read_bytes(), {entry: value for entry, value in summary.items() if entry != "machine"}
+    stills = [(place.results / still).read_bytes() for still in summary["stills"]]
+    return files["times"].read_bytes(), stills, {one: value for one, value in summary.items() if one != "machine"}
 
 
 @pytest.fixture(scope="module")
@@ -101,20 +103,48 @@ def test_a_result_on_disk_is_not_made_again(place: Place, monkeypatch: pytest.Mo
     assert content(place, key(one)) == before
 
 
-@pytest.mark.parametrize("lost", ["summary", "times"])
-def test_half_a_result_does_not_count(lost: str, place: Place) -> None:
-    """As after a kill between the two files, or a file that was cut off."""
-    one = case("framed")
-    evaluate(one, key(one), place)
-    before = content(place, key(one))
-    file = place.files(key(one))[lost]
-    if lost == "summary":
-        file.write_text(file.read_text()[:40])
-    else:
-        file.unlink()
-    assert finished(key(one), place) is None
-    evaluate(one, key(one), place)
-    assert content(place, key(one)) == before
+@pytest.fixture(scope="module")
+def made(references: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Place, str]:
+    """A result with stills."""
+    one, place = case("framed", stills_s=(0.1,)), Place(tmp_path_factory.mktemp("made"), references)
+    return place, evaluate(one, key(one), place)
+
+
+@pytest.mark.parametrize("damage", ["lost", "cut", "bit", "exchanged"])
+@pytest.mark.parametrize("part", ["summary", "times", "still"])
+def test_a_damaged_result_is_named_and_made_again(
+    part: str, damage: str, made: tuple[Place, str], place: Place, capsys: pytest.CaptureFixture
+) -> None:
+    """As after a kill between its files, a bit that flipped, or the file of another run in its place."""
+    whole, name = made
+    shutil.copytree(whole.results, place.results)
+    file = place.still(name, "shown", 0) if part == "still" else place.files(name)[part]
+    written = bytearray(file.read_bytes())
+    file.unlink()
+    if damage == "cut":
+        file.write_bytes(written[:40])
+    elif damage == "bit":
+        written[len(written) // 2] ^= 4
+        file.write_bytes(written)
+    elif damage == "exchanged":
+        other = case("framed", phase=0.25, stills_s=(0.1,))
+        evaluate(other, key(other), place)
+        theirs = place.still(key(other), "shown", 0) if part == "still" else place.files(key(other))[part]
+        shutil.copy(theirs, file)
+        assert file.read_bytes() != written
+    assert finished(name, place) is None
+    assert (f"{file}: is damaged" in capsys.readouterr().err) == (damage != "lost")
+    one = case("framed", stills_s=(0.1,))
+    evaluate(one, name, place)
+    assert content(place, name) == content(whole, name) and finished(name, place) is not None
+
+
+def test_a_table_that_is_damaged_is_not_read(made: tuple[Place, str], place: Place) -> None:
+    shutil.copytree(made[0].results, place.results)
+    assert len(times_of(made[1], place)) == TIMES
+    place.files(made[1])["times"].write_bytes(b"")
+    with pytest.raises(ValueError, match="expected the table of a finished run"):
+        times_of(made[1], place)
 
 
 def test_a_run_that_fails_leaves_nothing_that_counts(place: Place) -> None:

@@ -16,7 +16,6 @@ from analysis import cases, farm, sensitivity
 from analysis.cases import Scale
 from analysis.cli import parse
 from analysis.evaluation import Place, finished, source_of_results
-from analysis.files import write_json
 from analysis.sensitivity import Run, SensitivityOptions, Setting, runs
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import TsarConfig
@@ -43,12 +42,14 @@ def fill(out: Path, planned: list[Run]) -> None:
     rng, source = np.random.default_rng(0), source_of_results()
     for run in planned:
         key = run.case.key(source)
-        files = place.files(key)
-        pd.DataFrame({"time_s": [0.0, 0.1], "mse": [error(run)] * 2}).to_parquet(files["times"])
-        write_json(files["summary"], {"key": key, "case": run.case})
-        for what in ("shown", "reference", "tiling"):
-            noise = rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)
-            Image.fromarray(noise).save(place.still(key, what, 0))
+        files, store = place.files(key), place.store(key)
+        with store.make(files["times"].name) as made:
+            pd.DataFrame({"time_s": [0.0, 0.1], "mse": [error(run)] * 2}).to_parquet(made.path)
+        stills = [f"stills/{place.still(key, what, 0).name}" for what in ("shown", "reference", "tiling")]
+        for name in stills:
+            with store.make(name) as made:
+                Image.fromarray(rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)).save(made.path)
+        store.write_json(files["summary"].name, {"key": key, "case": run.case, "stills": stills})
 
 
 def summary(out: Path) -> dict[str, Any]:
