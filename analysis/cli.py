@@ -7,6 +7,7 @@ import io
 import os
 import re
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn, TypeVar
@@ -104,6 +105,7 @@ def run_cli(main: Callable[[], None]) -> None:
     with one line and status 130.
     """
     _spin_briefly()
+    warnings.showwarning = _one_warning
     try:
         main()
     except InputError as error:
@@ -124,6 +126,12 @@ def _refuse(error: InputError) -> NoReturn:
     message = re.sub(r"\s+", " ", str(error)).strip()
     print(f"error: {message}", file=sys.stderr)
     sys.exit(EXIT_BAD_INPUT)
+
+
+def _one_warning(message: Warning | str, *_: object) -> None:
+    """A warning in one line, without the place in the code that a user has nothing of."""
+    text = re.sub(r"\s+", " ", str(message)).strip()
+    print(f"warning: {text}", file=sys.stderr)
 
 
 def _spin_briefly() -> None:

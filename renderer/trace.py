@@ -20,6 +20,7 @@ from renderer.buffers import build_buffers
 from renderer.checks import check_frame_size
 from renderer.features import ALL, PACKETS, Feature, required
 from renderer.launching import shared
+from renderer.origin import near_origin
 from renderer.shading import stack_size
 from renderer.structs import Ray, ViewData
 from renderer.viewing import camera_view, check_camera
@@ -91,8 +92,9 @@ class Renderer:
         self.device = devices.pick(device)
         self.threads = threads or devices.core_count()
         self.footprint_resolution_px = float(footprint_resolution_px)
+        check_camera(scene)
+        self._scene = scene = near_origin(scene)
         self._camera = check_camera(scene)
-        self._scene = scene
         needed = required(scene)
         if structure not in (*STRUCTURES, "warp"):
             raise ValueError(f"structure: expected one of {', '.join(STRUCTURES)}, warp, got {structure!r}")

@@ -108,13 +108,13 @@ class Mesh:
     """An indexed triangle mesh in object space.
 
     Attributes:
-        vertices: ``(v, 3)`` float32.
+        vertices: ``(v, 3)`` float32, or float64 where they are far from their origin.
         faces: ``(f, 3)`` int32, counter-clockwise seen from outside.
         normals: ``(v, 3)`` float32 unit shading normals, or None for face normals.
         uvs: ``(v, 2)`` float32, or None for zero.
     """
 
-    vertices: NDArray[np.float32]
+    vertices: NDArray[np.floating]
     faces: NDArray[np.int32]
     normals: NDArray[np.float32] | None = None
     uvs: NDArray[np.float32] | None = None

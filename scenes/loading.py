@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from scenes.canonical import Mesh, SceneError
+from scenes.values import vertices_of
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -126,7 +127,7 @@ def read_mesh(path: Path) -> Mesh:
     lengths = np.linalg.norm(normals, axis=1)
     normals[lengths < 1e-6] = (0.0, 0.0, 1.0)  # vertices of no triangle
     return Mesh(
-        vertices=np.array(mesh.vertices, np.float32),
+        vertices=vertices_of(np.array(mesh.vertices)),
         faces=faces,
         normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
         uvs=None if uvs is None or len(uvs) != len(mesh.vertices) else np.array(uvs, np.float32),

@@ -23,6 +23,7 @@ from scenes.canonical import (
     Texture,
 )
 from scenes.loading import decode_srgb, one_line
+from scenes.values import vertices_of
 
 MODEL_ENDINGS = (".obj", ".ply", ".stl", ".glb", ".gltf")
 _DEFAULT = Phong(ConstantTexture((0.5, 0.5, 0.5)))
@@ -122,7 +123,7 @@ def _check_obj(path: Path) -> None:
 
 
 def _mesh(geometry: Any, path: Path) -> Mesh:
-    vertices = np.array(geometry.vertices, np.float32)
+    vertices = vertices_of(np.array(geometry.vertices))
     if not np.isfinite(vertices).all():
         raise SceneError(f"model {path}: vertices hold non-finite values")
     normals = np.array(geometry.vertex_normals, np.float32)

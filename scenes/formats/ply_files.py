@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import Mesh, SceneError
+from scenes.values import vertices_of
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -236,7 +237,7 @@ def checked_mesh(
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         unit = np.where(lengths > 1e-20, normals / np.maximum(lengths, 1e-20), (0.0, 0.0, 1.0)).astype(np.float32)
     return Mesh(
-        points.astype(np.float32),
+        vertices_of(points),
         faces.astype(np.int32).reshape(-1, 3),
         unit,
         None if uvs is None else uvs.astype(np.float32),

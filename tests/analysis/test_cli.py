@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,3 +180,10 @@ def test_require_memory_on_this_machine(tmp_path: Path, monkeypatch: pytest.Monk
         require_memory(1, "x")
         with pytest.raises(InputError):
             require_memory(1e18, "x")
+
+
+def test_a_warning_is_one_line_without_its_place_in_the_code(capsys: pytest.CaptureFixture) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        run_cli(lambda: warnings.warn("too\nfar", stacklevel=1))
+    assert capsys.readouterr().err == "warning: too far\n"
