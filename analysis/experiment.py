@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.cli import bad_input, full_disk, require_memory
 from analysis.cost_model import cycle_seconds, frame_seconds
-from analysis.files import writable_folder, write_json
+from analysis.files import writable_folder
 from analysis.run_options import RunOptions
 from analysis.start import first_imports, first_made
+from analysis.store import Store
 
 if TYPE_CHECKING:
     from analysis.compare import Meter, Streams, Totals
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from tsar.types import Display, StepRecord
 
 ROOT = Path(__file__).resolve().parent.parent
+_SUMMARY = "summary.json"
+_FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
 _BYTES_PER_PIXEL = 260  # images, age fields and films in flight at output resolution
 _BYTES_PER_SAMPLE = 64  # positions, times and colours of a framed image
 
@@ -95,7 +98,8 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
         from analysis.summary import Measured
         from renderer.film import FilmError
 
-    (options.out / "summary.json").unlink(missing_ok=True)
+    for name in (_SUMMARY, *_FILES):
+        (options.out / name).unlink(missing_ok=True)  # of an earlier run
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
     with progress.bars() as bars, full_disk(options.out, FilmError):
         limits = RecordLimits(
@@ -114,18 +118,39 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
 
 
 def finished(options: RunOptions) -> dict[str, Any] | None:
-    """The summary of a complete run of these options by this commit, or None."""
-    import json
+    """The summary of a run of these options by this commit, or None where it is not complete.
 
+    It is complete where all of its files are as they were written; those that are damaged are named.
+    """
     from analysis.records import provenance
 
     now = provenance(ROOT, dataclasses.asdict(options))
-    try:
-        found = json.loads((options.out / "summary.json").read_text())
-        same = all(found["provenance"][name] == now[name] for name in ("commit", "config_hash"))
-    except (OSError, ValueError, KeyError, TypeError):
+    if now["uncommitted_changes"]:
         return None
-    return found if same and not now["uncommitted_changes"] else None
+    store = _store(options, now)
+    with bad_input():
+        found = store.read_json(_SUMMARY, {"provenance": dict, "invariants": {"ok": bool}, "files": list[str]})
+    return found if found and all(store.find(name) is not None for name in found["files"]) else None
+
+
+def _store(options: RunOptions, source: Mapping[str, Any]) -> Store:
+    """Where the files of a run from this source are checked."""
+    return Store(options.out, f"{source['commit']} {source['config_hash']}")
+
+
+def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
+    """Lists the files of a run that has ended, and writes its summary last: from then on the run is complete.
+
+    Returns:
+        What is in the summary: what was given, and the files.
+    """
+    store = _store(options, summary["provenance"])
+    files = [name for name in _FILES if (options.out / name).exists()]
+    for name in files:
+        store.add(name)
+    summary = {**summary, "files": files}
+    store.write_json(_SUMMARY, summary)
+    return summary
 
 
 def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:
@@ -208,7 +233,7 @@ def _compare(options: RunOptions, times_s: Any, reference: Reference, streams: S
 
 
 def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: float) -> dict[str, Any]:
-    """Figures, report and summary, the summary last: where it is, the run is complete."""
+    """Figures, report and summary."""
     from analysis import results
     from analysis.records import provenance
     from analysis.summary import summarise
@@ -235,5 +260,4 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
     }
     results.write_figures(options.out, summary, measured)
     results.write_page(options.out, summary, measured)
-    write_json(options.out / "summary.json", summary)
-    return summary
+    return write_summary(options, summary)

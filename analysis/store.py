@@ -195,6 +195,14 @@ class Store:
             entry = Entry(name, self.key, _digest(temporary), making.facts)
             self._files.journal.append(asdict(entry))
 
+    def add(self, name: str, **facts: Any) -> None:
+        """Lists a file that is at its place already, whole and on the disk, as :func:`analysis.files.atomic` leaves it.
+
+        What was there before is lost if the process is killed before this; :meth:`make` is for files that count one by
+        one.
+        """
+        self._files.journal.append(asdict(Entry(name, self.key, _digest(self.folder / name), facts)))
+
     def write_json(self, name: str, value: Any, **facts: Any) -> None:
         """Makes a JSON file; infinities and NaN as in :func:`analysis.files.plain`."""
         text = json.dumps(plain(value), indent=1, allow_nan=False)

@@ -12,8 +12,7 @@ import pytest
 import analysis.records
 import scripts.inputs as script
 from analysis.cases import INPUTS
-from analysis.experiment import ROOT, RunOptions
-from analysis.files import write_json
+from analysis.experiment import ROOT, RunOptions, write_summary
 from analysis.repetitions import InputsOptions, row
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import ConfigError, TsarConfig
@@ -74,7 +73,7 @@ def test_a_row_says_which_run_it_was(tmp_path: Path) -> None:
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Stands in for the experiment: writes a summary and nothing else. Holds the names of the runs that were made."""
+    """Stands in for the experiment: writes records and a summary. Holds the names of the runs that were made."""
     names: list[str] = []
     provenance = analysis.records.provenance
 
@@ -84,7 +83,9 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     def pretend(options: RunOptions) -> dict[str, Any]:
         names.append(options.out.name)
         found = {**FOUND, "provenance": analysis.records.provenance(ROOT, dataclasses.asdict(options))}
-        write_json(options.out / "summary.json", found)
+        options.out.mkdir(exist_ok=True)
+        (options.out / "steps.parquet").write_bytes(b"records of " + options.out.name.encode())
+        write_summary(options, found)
         return found
 
     monkeypatch.setattr(analysis.records, "provenance", committed)
@@ -122,6 +123,33 @@ def test_runs_with_uncommitted_changes_are_repeated(
     for _ in range(2):
         assert call_script("inputs.py", monkeypatch, *arguments) == 0
     assert made == ["fly-by-seed0"] * 2
+
+
+@pytest.mark.parametrize("damage", ["lost", "bit", "exchanged"])
+@pytest.mark.parametrize("name", ["summary.json", "steps.parquet"])
+def test_a_damaged_run_is_named_and_repeated(
+    name: str,
+    damage: str,
+    made: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    arguments = ("fly-by", "--repetitions", "2", "--out", str(tmp_path))
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    shown, file = capsys.readouterr().out, tmp_path / "fly-by-seed1" / name
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    if damage == "bit":
+        file.write_bytes(content)
+    elif damage == "exchanged":
+        file.write_bytes((tmp_path / "fly-by-seed0" / name).read_bytes())
+    else:
+        file.unlink()
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    again = capsys.readouterr()
+    assert made[2:] == ["fly-by-seed1"] and again.out == shown
+    assert (f"{file}: is damaged" in again.err) == (damage != "lost")
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"provenance": {}}', '{"provenance": {"commit": "other"}}'])
