@@ -11,7 +11,7 @@ from typing import Literal, get_args
 from analysis.cost_model import CostParameters, Ledger, nonadaptive_flops, parameters_of
 from analysis.display_model import DisplayModel
 from analysis.files import plain
-from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, require
+from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, require, tiles_at_least
 
 Policy = Literal["tsar", "framed", "framed supersampled", "frameless", "afr", "oracle"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
@@ -54,27 +54,28 @@ class Scale:
         return max(side for _, side in ROWS) // self.divisor
 
     def config(self, row: int, base: TsarConfig) -> TsarConfig:
-        """Configuration of a row of table 7.2: batch and resolution from the row, the rest from ``base``."""
+        """Configuration of a row of table 7.2: batch and resolution from the row, the rest from ``base``.
+
+        A bound on the tiles that is too low for a row's batch is raised to the smallest tiling that holds it.
+        """
         batch, side = ROWS[row]
-        area = self.divisor**2
-        tiles = base.tiling.tile_count_max or max(512, 4 * batch)
-        sized = dataclasses.replace(base, batch_size=batch // area, resolution_px=side // self.divisor)
-        if self.divisor == 1:
-            return sized
-        level_min = max(1, base.tiling.level_min - (self.divisor.bit_length() - 1))
-        support = base.reconstruction.age_support_px // self.divisor
+        area, divisor = self.divisor**2, self.divisor
+        level_min = max(1, base.tiling.level_min - (divisor.bit_length() - 1))
+        support = base.reconstruction.age_support_px // divisor
         small = dataclasses.replace(
-            sized,
-            sdf_side=base.sdf_side // self.divisor,
+            base,
+            batch_size=batch // area,
+            resolution_px=side // divisor,
+            sdf_side=base.sdf_side // divisor,
             cache_size=base.cache_size // area,
             tiling=dataclasses.replace(base.tiling, level_min=level_min, tile_count_max=0),
             reconstruction=ReconstructionConfig(age_support_px=support + 1 - support % 2),
         )
-        cap = min(tiles // area, 4**small.level_max)
-        tiling = TilingConfig(
-            level_min, base.tiling.level_max, max(cap, small.batch_size), base.tiling.threshold_samples
-        )
-        return dataclasses.replace(small, tiling=tiling)
+        if divisor == 1 and not base.tiling.tile_count_max:
+            return small
+        tiles = min((base.tiling.tile_count_max or max(512, 4 * batch)) // area, 4**small.level_max)
+        tiles = max(tiles, tiles_at_least(small.batch_size, level_min))
+        return dataclasses.replace(small, tiling=dataclasses.replace(small.tiling, tile_count_max=tiles))
 
 
 def framed_config(side_px: int) -> TsarConfig:

@@ -49,6 +49,7 @@ class Totals:
     warmup_cycles: int = 0
     simulated_s: float = 0.0
     nonfinite: int = 0
+    nonfinite_fields: int = 0
     age_spread_s: float = 0.0
     stage_s: Counter[str] = field(default_factory=Counter)
     counters: Counter[str] = field(default_factory=Counter)
@@ -60,6 +61,7 @@ class Totals:
         self.cycles += 1
         self.simulated_s += record.cost_s
         self.nonfinite += record.nonfinite
+        self.nonfinite_fields += record.nonfinite_fields
         self.age_spread_s += record.age_spread_s
         self.stage_s.update(record.stage_s)
         self.counters.update(record.counters)

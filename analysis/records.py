@@ -25,6 +25,7 @@ from tsar.types import StepRecord
 _META = b"tsar"
 _CONSERVATION = 1e-5
 _ROUNDING = 1e-6  # densities are stored as float32
+_MUST_BE_FINITE = ("density_spatial", "density_temporal", "error_spatial", "error_temporal")
 
 _FIELDS: dict[str, pa.DataType] = {
     "cycle": pa.int64(),
@@ -33,6 +34,7 @@ _FIELDS: dict[str, pa.DataType] = {
     "surplus": pa.float64(),
     "conservation_residual": pa.float64(),
     "nonfinite": pa.int64(),
+    "nonfinite_fields": pa.int64(),
     "age_spread_s": pa.float64(),
     "tile_count": pa.int32(),
     "tile_level": pa.list_(pa.int8()),
@@ -73,6 +75,8 @@ def _fields(record: StepRecord) -> dict[str, np.ndarray]:
         "selected": _flat(record.selected, np.int32),
         "density_spatial": _flat(record.densities.spatial, np.float32),
         "density_temporal": _flat(record.densities.temporal, np.float32),
+        "error_spatial": _flat(record.errors.spatial, np.float32),
+        "error_temporal": _flat(record.errors.temporal, np.float32),
     }
 
 
@@ -107,11 +111,10 @@ class StepWriter:
             "surplus": record.surplus,
             "conservation_residual": record.conservation_residual,
             "nonfinite": record.nonfinite,
+            "nonfinite_fields": record.nonfinite_fields,
             "age_spread_s": record.age_spread_s,
             "tile_count": record.tiling.tile_count,
             **_fields(record),
-            "error_spatial": _flat(record.errors.spatial, np.float32),
-            "error_temporal": _flat(record.errors.temporal, np.float32),
         }
         row |= {f"stage_{name}_s": seconds for name, seconds in record.stage_s.items()}
         row |= {f"count_{name}": count for name, count in record.counters.items()}
@@ -177,12 +180,12 @@ def check_invariants(path: Path) -> dict[str, Any]:
 
     Returns:
         ``cycles``; the greatest ``conservation_residual``, recorded or recomputed from the stored densities; cycles in
-        which densities were out of bounds, the tiling did not cover the image exactly once, or the batch was not full;
-        and ``ok``.
+        which densities were out of bounds, the tiling did not cover the image exactly once, the batch was not full, or
+        densities or errors were not finite (``nonfinite``); and ``ok``.
     """
     check = InvariantCheck(read_limits(path))
     columns = ["conservation_residual", "surplus", "tile_level", "tile_index", "selected"]
-    columns += ["density_spatial", "density_temporal"]
+    columns += ["density_spatial", "density_temporal", "error_spatial", "error_temporal"]
     for part in pq.ParquetFile(path).iter_batches(batch_size=16, columns=columns):
         values = {name: part.column(name) for name in columns}
         for row in range(part.num_rows):
@@ -195,7 +198,7 @@ def check_invariants(path: Path) -> dict[str, Any]:
 class InvariantCheck:
     """What :func:`check_invariants` finds, from records as they come. Changes in place."""
 
-    _COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full")
+    _COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full", "nonfinite")
 
     def __init__(self, limits: RecordLimits) -> None:
         self._limits = limits
@@ -215,6 +218,7 @@ class InvariantCheck:
         found["densities_out_of_bounds"] += not _within(fields, limits)
         found["tiling_not_a_cover"] += not covers_once(fields["tile_level"], fields["tile_index"])
         found["batch_not_full"] += not _full(fields, limits)
+        found["nonfinite"] += not all(np.isfinite(fields[name]).all() for name in _MUST_BE_FINITE)
 
     def result(self) -> dict[str, Any]:
         """Counts and ``ok``."""

@@ -127,7 +127,12 @@ def summarise(measured: Measured) -> dict[str, Any]:
         "ledgers": ledgers,
         "conclusion_changes_with_ledger": len({entry["advantage"] >= 1 for entry in ledgers.values()}) > 1,
         "invariants": measured.invariants,
-        "nonfinite": {"tsar": totals.nonfinite, "reference": measured.reference_nonfinite, **c.framed_nonfinite},
+        "nonfinite": {
+            "tsar": totals.nonfinite,
+            "tsar_fields": totals.nonfinite_fields,
+            "reference": measured.reference_nonfinite,
+            **c.framed_nonfinite,
+        },
     }
     for name in list(c.framed)[1:]:
         key = name.replace(" ", "_")
@@ -144,6 +149,7 @@ def key_table(measured: Measured, framed_period_s: float) -> Table:
         ("period of the framed renderer", f"{1e3 * framed_period_s:.1f} ms"),
         ("samples per cycle of TSAR", f"{totals.counters.get('primary_rays', 0) / max(totals.cycles, 1):,.0f}"),
         ("non-finite samples replaced", str(totals.nonfinite)),
+        ("non-finite densities and errors", str(totals.nonfinite_fields)),
         ("invariants hold in every cycle", "yes" if measured.invariants["ok"] else f"NO: {dict(measured.invariants)}"),
         ("spread of ages in moving regions", f"{1e3 * totals.age_spread_s / max(totals.cycles, 1):.0f} ms"),
     ]

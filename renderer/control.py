@@ -28,12 +28,12 @@ from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import StagesName, TsarConfig
 from tsar.decision import Decision
-from tsar.error import RADIANCE_MAX, replace_nonfinite, template_power
+from tsar.error import RADIANCE_MAX, replace_nonfinite, tolerated_power
 from tsar.haar import octave_count, state_size
 from tsar.morton import deinterleave
 from tsar.observation import Observation
 from tsar.response import respond
-from tsar.selection import Request, cell_centres
+from tsar.selection import Request, cell_centres, require_full
 from tsar.stages import REFERENCE, Stages
 from tsar.tiling import split_bounds, tie_order
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
@@ -80,7 +80,7 @@ class Control:
         self._prepare_observation()
         self._prepare_decision()
         self._parts = _part_of_element(config)
-        self._sums = np.zeros(2)
+        self._sums = np.zeros(3)
         fixed = self._elements, FAST_REFRESH, address(self._parts), self._sums.ctypes.data
         self._account = Command(kernels.take_account, *fixed)
 
@@ -120,7 +120,7 @@ class Control:
         """As :func:`tsar.decision.decide`; responses by other solvers than ``waterfill`` are the reference's.
 
         Raises:
-            ValueError: if a density is negative or not finite.
+            ValueError: if a density is negative or not finite, or the tiling is too small for a batch.
         """
         require_same(config, self.config)
         compiled = config.response.solver == "waterfill"
@@ -142,6 +142,7 @@ class Control:
         tiles = int(self._tile_count[0])
         if tiles == 0:
             raise ValueError("tiling: expected finite, non-negative densities")
+        require_full(tiles, count)
         if compiled:
             surplus = float(self._surplus[0])
         tiling = Tiling(level.resize_(tiles), index.resize_(tiles))
@@ -151,10 +152,12 @@ class Control:
         stage.divide(time.perf_counter() - start, shares)
         return Decision(Densities(spatial, temporal, surplus), tiling, request)
 
-    def account(self, densities: Densities, newest_s: Tensor, config: TsarConfig) -> Account:
+    def account(self, densities: Densities, errors: Errors, newest_s: Tensor, config: TsarConfig) -> Account:
         """As :func:`tsar.accounting.account`."""
-        self._account(*map(address, (densities.spatial, densities.temporal, newest_s)))
-        return Account(*self._sums.tolist())
+        signed = _single(errors.spatial), _single(errors.temporal)
+        self._account(*map(address, (densities.spatial, densities.temporal, *signed, newest_s)))
+        combined, spread, nonfinite = self._sums.tolist()
+        return Account(combined, spread, int(nonfinite))
 
     def _times_of(self, batch: FrameletBatch) -> int:
         """Address of the time of each framelet, that of its first sample."""
@@ -240,9 +243,9 @@ def _error_plan(config: TsarConfig) -> ErrorPlan:
     plan.octave_positions = plan.state // 4
     plan.field_level = config.field_level
     plan.linf, plan.difference = int(error.norm == "linf"), int(error.form == "difference")
-    spatial = template_power(octaves, error.spatial_offset, error.spatial_slope, error)
-    temporal = template_power(octaves, error.temporal_offset, error.temporal_slope, error)
-    plan.template_spatial, plan.template_temporal = float(spatial.sum()), float(temporal.sum())
+    spatial = tolerated_power(octaves, error.spatial_offset, error.spatial_slope, error)
+    temporal = tolerated_power(octaves, error.temporal_offset, error.temporal_slope, error)
+    plan.template_spatial, plan.template_temporal = spatial, temporal
     plan.radiance_max = RADIANCE_MAX
     return plan
 

@@ -13,7 +13,7 @@ from renderer.control_estimate import ErrorPlan, observe_framelets, start_observ
 from renderer.control_ranking import count_above, kth_greatest, rank_keys
 from renderer.control_response import ResponsePlan, decide
 from renderer.control_selection import Due, SelectionPlan, gather_credit, place_framelets, refresh_due
-from renderer.control_tiling import count_exceeding, emit_tiles, mark_splits, sum_account, sum_nodes
+from renderer.control_tiling import are_densities, count_exceeding, emit_tiles, mark_splits, sum_account, sum_nodes
 from renderer.launching import Address
 from renderer.native_code import module_options
 
@@ -95,9 +95,8 @@ def observe_batch(
 
 @wp.func
 def build_tiling(plan: TilingPlan, density: Address, level: Address, index: Address) -> wp.int32:
-    """The tiling of a density field. Returns the number of tiles, 0 where the field is not a density."""
-    if sum_nodes(plan.field_level, plan.level_low, density, plan.sums) == 0:
-        return 0
+    """The tiling of a density field. Returns the number of tiles."""
+    sum_nodes(plan.field_level, plan.level_low, density, plan.sums)
     base, end = (wp.int32(1) << (2 * plan.level_low)) / 3, (wp.int32(1) << (2 * plan.level_high)) / 3
     nodes, values = end - base, plan.sums + Address(8 * base)
     splits = wp.max(count_exceeding(values, nodes, plan.threshold), plan.splits_least)
@@ -159,8 +158,9 @@ def decide_next(
 ):
     """New densities, unless they have been decided elsewhere, their tiling, and what is due in it.
 
-    ``surplus_after`` and ``tile_count`` receive what they say, the count 0 where the densities are not densities, and
-    ``times`` the ticks at the start and after each of the three.
+    ``surplus_after`` and ``tile_count`` receive what they say, and ``times`` the ticks at the start and after each of
+    the three. Where a density is negative or not finite the count is 0; where the tiling is too small for a batch,
+    nothing is requested.
     """
     clock = wp.array(ptr=times, shape=(4,), dtype=wp.int64)
     clock[0] = ticks()
@@ -171,10 +171,12 @@ def decide_next(
         )
     clock[1] = ticks()
     count_out = wp.array(ptr=tile_count, shape=(1,), dtype=wp.int32)
-    tiles = build_tiling(tiling, spatial, level, index)
+    tiles = wp.int32(0)
+    if are_densities(response.elements, spatial) and are_densities(response.elements, temporal):
+        tiles = build_tiling(tiling, spatial, level, index)
     count_out[0] = tiles
     clock[2] = ticks()
-    if tiles > 0:
+    if tiles >= selection.batch:
         due = Due(due_selected, due_history, due_level, due_index, due_position)
         request_batch(selection, scratch, tiles, level, index, temporal, history, due)
     clock[3] = ticks()
@@ -188,7 +190,9 @@ def take_account(
     result: Address,
     spatial: Address,
     temporal: Address,
+    error_spatial: Address,
+    error_temporal: Address,
     newest_s: Address,
 ):
-    """Sums for the record of a cycle: combined density, spread of ages."""
-    sum_account(elements, fast, spatial, temporal, newest_s, part_of_element, result)
+    """Sums for the record of a cycle: combined density, spread of ages, values that are not finite."""
+    sum_account(elements, fast, spatial, temporal, error_spatial, error_temporal, newest_s, part_of_element, result)

@@ -10,19 +10,23 @@ import warp as wp
 from renderer.launching import Address
 
 
+@wp.func_native("return selection::all_densities((const double*)field, elements);")
+def are_densities(elements: wp.int32, field: Address) -> wp.bool:
+    """Whether no value of a field is negative, infinite or NaN."""
+    ...
+
+
 @wp.func_native("""
     double* node = (double*)sums;
     const double* below = (const double*)density;
-    const bool good = selection::all_densities(below, 1 << (2 * field_level));
     for (int level = field_level - 1; level >= level_low; --level) {
         double* here = node + ((1ll << (2 * level)) - 1) / 3;
         selection::sum_children(below, here, 1 << (2 * level));
         below = here;
     }
-    return good;
 """)
-def sum_nodes(field_level: wp.int32, level_low: wp.int32, density: Address, sums: Address) -> wp.int32:
-    """Integrals over all nodes above the elements. Returns 0 where a density is negative or not finite."""
+def sum_nodes(field_level: wp.int32, level_low: wp.int32, density: Address, sums: Address):
+    """Integrals over all nodes above the elements."""
     ...
 
 
@@ -82,6 +86,10 @@ def emit_tiles(level_low: wp.int32, level_high: wp.int32, split: Address, level:
     double oldest = INFINITY, newest = -INFINITY;
     for (int i = 0; i < elements; i += 8)
         for (int k = 0; k < 8; ++k) lane[k] += s[i + k] * t[i + k];
+    const float *e_s = (const float*)error_spatial, *e_t = (const float*)error_temporal;
+    int infinite = 0;  // x - x is 0 for finite numbers only
+    for (int i = 0; i < elements; ++i)
+        infinite += (s[i] - s[i] != 0.0) + (t[i] - t[i] != 0.0) + (e_s[i] - e_s[i] != 0.0f) + (e_t[i] - e_t[i] != 0.0f);
     for (int i = 0; i < elements; ++i) {
         if (t[i] < fast) continue;
         const double shown = time_s[part[i]];
@@ -92,15 +100,19 @@ def emit_tiles(level_low: wp.int32, level_high: wp.int32, split: Address, level:
     double* out = (double*)result;
     out[0] = ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]));
     out[1] = newest >= oldest ? newest - oldest : 0.0;
+    out[2] = infinite;
 """)
 def sum_account(
     elements: wp.int32,
     fast: wp.float64,
     spatial: Address,
     temporal: Address,
+    error_spatial: Address,
+    error_temporal: Address,
     newest_s: Address,
     part_of_element: Address,
     result: Address,
 ):
-    """Combined density over the field, and the spread of ages among elements of fast refresh."""
+    """Combined density over the field, the spread of ages among elements of fast refresh, and how many values of the
+    four fields are not finite."""
     ...

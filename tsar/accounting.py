@@ -1,4 +1,5 @@
-"""What a cycle's record says of the whole field: the density that is handed out, and how the ages on show differ."""
+"""What a cycle's record says of the whole field: the density that is handed out, how the ages on show differ, and how
+many values are not finite."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from torch import Tensor
 
 from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton, total
-from tsar.types import Densities
+from tsar.types import Densities, Errors
 
 FAST_REFRESH = 0.5
 """Elements refreshed at least this often per cycle count as moving when the spread of ages is measured."""
@@ -24,15 +25,19 @@ class Account:
         combined: Σ θ_s θ_t, samples per cycle.
         age_spread_s: newest minus oldest sample shown among the elements that are refreshed fast, seconds; 0 if there
             are none.
+        nonfinite: densities and errors that are not finite.
     """
 
     combined: float
     age_spread_s: float
+    nonfinite: int
 
 
-def account(densities: Densities, newest_s: Float[Tensor, "side side"], config: TsarConfig) -> Account:
-    """Takes stock of the densities and of the newest samples on show, raster order."""
-    return Account(total(densities.combined()), _age_spread(newest_s, densities, config))
+def account(densities: Densities, errors: Errors, newest_s: Float[Tensor, "side side"], config: TsarConfig) -> Account:
+    """Takes stock of densities and errors, and of the newest samples on show, raster order."""
+    fields = densities.spatial, densities.temporal, errors.spatial, errors.temporal
+    nonfinite = sum(int((~torch.isfinite(field)).sum()) for field in fields)
+    return Account(total(densities.combined()), _age_spread(newest_s, densities, config), nonfinite)
 
 
 def _age_spread(newest_s: Float[Tensor, "side side"], densities: Densities, config: TsarConfig) -> float:

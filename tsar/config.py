@@ -4,7 +4,7 @@ line can be made from it quickly."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import log2
+from math import inf, log2
 from typing import Literal
 
 Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "diffusion", "trivial"]
@@ -23,6 +23,17 @@ def require(condition: bool, name: str, expected: str, got: object) -> None:
         raise ConfigError(f"{name}: expected {expected}, got {got!r}")
 
 
+def tiles_at_most(count: int, level_min: int) -> int:
+    """The largest tiling of at most ``count`` tiles: ``4^level_min`` tiles and three more for every split."""
+    coarse = 4**level_min
+    return coarse + (count - coarse) // 3 * 3
+
+
+def tiles_at_least(count: int, level_min: int) -> int:
+    """The smallest tiling of at least ``count`` tiles."""
+    return max(4**level_min, tiles_at_most(count + 2, level_min))
+
+
 @dataclass(frozen=True)
 class TilingConfig:
     """Bounds of the tiling (Stephens 2011, sec. 4.1.6)."""
@@ -32,7 +43,8 @@ class TilingConfig:
     level_max: int = 0
     """Finest quad level; 0 means one level finer than one sample per output pixel."""
     tile_count_max: int = 0
-    """Most tiles in a tiling; 0 means max(512, 4 * batch size), the thesis' 512 at its batch size of 128."""
+    """Most tiles in a tiling; 0 means max(512, 4 * batch size), the thesis' 512 at its batch size of 128. A tiling has
+    4^level_min + 3 k tiles, so that of at most 512 has 511; it must hold a batch."""
     threshold_samples: float = 256.0
     """A tile is split while the samples asked for in it exceed this; one framelet holds 256."""
 
@@ -40,7 +52,8 @@ class TilingConfig:
         require(self.level_min >= 1, "tiling.level_min", "at least 1", self.level_min)
         require(self.level_max >= 0, "tiling.level_max", "at least 0", self.level_max)
         require(self.tile_count_max >= 0, "tiling.tile_count_max", "at least 0", self.tile_count_max)
-        require(self.threshold_samples > 0, "tiling.threshold_samples", "a positive number", self.threshold_samples)
+        threshold = self.threshold_samples
+        require(0 < threshold < inf, "tiling.threshold_samples", "a positive, finite number", threshold)
 
 
 @dataclass(frozen=True)
@@ -73,19 +86,20 @@ class ResponseConfig:
     solver: Solver = "waterfill"
     """Density transport: how freed density is handed out."""
     gain: float = 1.0
-    """Distance moved in normalised density space per unit error (eq. 6.11 has 1)."""
+    """Distance moved in normalised density space per unit error (eq. 6.11 has 1), in [1e-6, 1e6]."""
     bias: float = 0.0
     """Octaves by which each decision slides along the iso-product curve: positive towards space, negative to time."""
     surplus_max: float = 1.0
     """Bound of the running surplus C as a share of the budget; at 1 a still, plain picture frees all it can."""
     temporal_min: float = 1.0 / 16.0
-    """Least temporal density, refreshes per cycle: even a static tile is looked at this often."""
+    """Least temporal density, refreshes per cycle, in [1e-6, 1]: even a static tile is looked at this often. A batch
+    must hold the coarsest tiling at this rate."""
 
     def __post_init__(self) -> None:
-        require(self.gain > 0, "response.gain", "a positive number", self.gain)
+        require(1e-6 <= self.gain <= 1e6, "response.gain", "a number in [1e-6, 1e6]", self.gain)
         require(-8.0 <= self.bias <= 8.0, "response.bias", "a number in [-8, 8]", self.bias)
         require(0 <= self.surplus_max <= 1, "response.surplus_max", "a share in [0, 1]", self.surplus_max)
-        require(0 < self.temporal_min <= 1, "response.temporal_min", "a density in (0, 1]", self.temporal_min)
+        require(1e-6 <= self.temporal_min <= 1, "response.temporal_min", "a density in [1e-6, 1]", self.temporal_min)
 
 
 @dataclass(frozen=True)
@@ -134,14 +148,21 @@ class TsarConfig:
         low, high = self.level_min, self.level_max
         require(low <= high <= self.field_level, "tiling.level_max", f"between {low} and {self.field_level}", high)
         require(2**high <= self.resolution_px // 2, "tiling.level_max", "tiles of at least two output pixels", high)
-        smallest = max(self.batch_size, 4**low)
-        require(
-            smallest <= self.tile_count_max <= 4**high,
-            "tiling.tile_count_max",
-            f"between {smallest} (every batch must be full) and {4**high} (all tiles of the finest level)",
-            self.tile_count_max,
-        )
+        self._require_room_for_a_batch(4**low, 4**high)
+        support = self.reconstruction.age_support_px
+        require(support < self.resolution_px, "reconstruction.age_support_px", "less than resolution_px", support)
         require(self.cache_size >= self.batch_size, "cache_size", "at least one batch", self.cache_size)
+
+    def _require_room_for_a_batch(self, coarse: int, fine: int) -> None:
+        """Refuses tilings too small for a full batch, and densities whose least sum exceeds the budget."""
+        count, size = self.tile_count_max, self.batch_size
+        require(size <= fine, "batch_size", f"at most {fine} (all tiles of the finest level)", size)
+        least = tiles_at_least(size, self.level_min)
+        needs = f"between {least} (a tiling has {coarse} + 3 k tiles, and every batch must be full) and {fine}"
+        require(least <= count <= fine, "tiling.tile_count_max", f"{needs} (all tiles of the finest level)", count)
+        rate = self.response.temporal_min
+        needs = f"at most {size / coarse:g} (a batch of {size} for the {coarse} tiles of the coarsest level)"
+        require(rate * coarse <= size, "response.temporal_min", needs, rate)
 
     @property
     def field_level(self) -> int:
@@ -164,7 +185,8 @@ class TsarConfig:
 
     @property
     def tile_count_max(self) -> int:
-        return self.tiling.tile_count_max or min(max(512, 4 * self.batch_size), 4**self.level_max)
+        auto = min(max(512, 4 * self.batch_size, 4**self.level_min), 4**self.level_max)
+        return self.tiling.tile_count_max or auto
 
     @property
     def cache_slots(self) -> int:

@@ -21,6 +21,7 @@ from tsar.types import Errors, FrameletBatch
 
 _REC709 = (0.2126, 0.7152, 0.0722)
 _OCTAVES_OF_FULL_ERROR = 8.0
+_POWER_LEAST, _POWER_MOST = torch.finfo(torch.float32).tiny, 2.0**100
 
 RADIANCE_MAX = 1e30
 """Greatest radiance that counts as a number: sums of many samples stay below what float32 can hold."""
@@ -112,11 +113,18 @@ def template_power(octaves: int, offset: float, slope: float, config: ErrorConfi
     """Power the template tolerates per position, fine to coarse, on the normalisation of :func:`levelwise_power`.
 
     ``log2 = offset + slope * f`` per coefficient with ``f = 0`` at the coarsest octave, times the three octants' share
-    that a position gets of a coefficient. Source: Stephens 2011, sec. 5.3.3.2.
+    that a position gets of a coefficient; float64, which holds every slope and offset of the configuration. Source:
+    Stephens 2011, sec. 5.3.3.2.
     """
-    fineness = torch.arange(octaves - 1, -1, -1, dtype=torch.float32)
-    share = torch.exp2(2.0 * (fineness - (octaves - 1))) if config.norm == "l2" else torch.ones(octaves)
-    return torch.exp2(offset + slope * fineness) * share
+    share = 2.0 if config.norm == "l2" else 0.0
+    logarithms = (offset + slope * f + share * (f - (octaves - 1)) for f in range(octaves - 1, -1, -1))
+    return torch.tensor([2.0**power for power in logarithms], dtype=torch.float64)
+
+
+def tolerated_power(octaves: int, offset: float, slope: float, config: ErrorConfig) -> float:
+    """:func:`template_power` summed over octaves, within what float32 holds: beyond either bound no signal, whose power
+    is 0 or lies between the two, has another error than at it."""
+    return min(max(float(template_power(octaves, offset, slope, config).sum()), _POWER_LEAST), _POWER_MOST)
 
 
 def signed_error(
@@ -130,12 +138,12 @@ def signed_error(
     Deviation: the thesis does not say how the difference becomes a number in [-1, 1].
     """
     signal = power.sum(0)
-    template = template_power(power.shape[0], offset, slope, config).sum()
+    template = torch.tensor(tolerated_power(power.shape[0], offset, slope, config), dtype=signal.dtype)
     if config.form == "contrast":
         return (signal - template) / (signal + template)
     floor = torch.finfo(signal.dtype).tiny
     # float64, for the last digit of a logarithm depends on the processor
-    octaves = torch.log2((signal.clamp(min=floor) / template.clamp(min=floor)).to(torch.float64)).to(signal.dtype)
+    octaves = torch.log2((signal.clamp(min=floor) / template).to(torch.float64)).to(signal.dtype)
     return (octaves / _OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)
 
 

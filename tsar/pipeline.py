@@ -105,7 +105,7 @@ def run(
         state, outcome = step(state, config, trace, time_s, cycle, cycle_s, stages)
         cycle_s = checked(cycle_seconds, outcome.samples.counters, outcome.stages.total)
         shown = outcome.reconstruction
-        account = stages.account(state.densities, shown.samples.newest_s, config)
+        account = stages.account(state.densities, outcome.errors, shown.samples.newest_s, config)
         record = _record(before, state, outcome, account, config, cycle, time_s, cycle_s)
         yield record, Display(time_s + LATENCY_CYCLES * cycle_s, time_s, shown.image, shown.samples)
         cycle, time_s = cycle + 1, time_s + cycle_s
@@ -143,5 +143,6 @@ def _record(
         stage_s=dict(outcome.stages.seconds),
         counters=dict(outcome.samples.counters),
         nonfinite=outcome.nonfinite,
+        nonfinite_fields=account.nonfinite,
         age_spread_s=account.age_spread_s,
     )

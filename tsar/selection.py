@@ -14,7 +14,7 @@ from torch import Tensor
 
 from tsar.config import TsarConfig
 from tsar.morton import deinterleave, tile_mean
-from tsar.tiling import tile_of_element
+from tsar.tiling import require_densities, tile_of_element
 from tsar.types import FrameletBatch, Tiling
 
 
@@ -60,7 +60,12 @@ def select(
 
     Returns:
         Indices into the tiling in Morton order, and the history for the next cycle. Ties go to the earlier tile.
+
+    Raises:
+        ValueError: the field holds negative or non-finite values, or the tiling has fewer tiles than a batch.
     """
+    require_densities(temporal_density, "selection.select")
+    require_full(tiling.tile_count, config.batch_size)
     credit = history + temporal_density
     overdue = tile_mean(credit, tiling.level, tiling.index, config.field_level)
     order = torch.sort(overdue, descending=True, stable=True).indices
@@ -69,6 +74,16 @@ def select(
     left[selected] = (overdue[selected] - 1.0).clamp(-1.0, 1.0)
     left = left[tile_of_element(tiling, config.field_level)]
     return selected, torch.where(torch.isnan(left), credit, left)
+
+
+def require_full(tile_count: int, batch_size: int) -> None:
+    """Refuses a tiling that cannot fill a batch.
+
+    Raises:
+        ValueError: it has fewer tiles.
+    """
+    if tile_count < batch_size:
+        raise ValueError(f"selection: expected at least {batch_size} tiles, a full batch, got {tile_count}")
 
 
 @lru_cache(maxsize=8)

@@ -38,7 +38,7 @@ class Stages:
     observe: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig, StageTimer], Observation] = observe
     decide: Callable[[Densities, Errors, Field, TsarConfig, StageTimer], Decision] = decide
     reconstruct: Callable[[FrameletCache, TsarConfig, float], Reconstruction] = reconstruct
-    account: Callable[[Densities, Tensor, TsarConfig], Account] = account
+    account: Callable[[Densities, Errors, Tensor, TsarConfig], Account] = account
 
 
 REFERENCE = Stages()

@@ -18,7 +18,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from tsar.config import TsarConfig
+from tsar.config import TsarConfig, tiles_at_least, tiles_at_most
 from tsar.morton import tile_interval
 from tsar.types import Tiling
 
@@ -37,14 +37,12 @@ def build(spatial_density: Float[Tensor, " e"], config: TsarConfig) -> Tiling:
         config: level bounds, threshold and the least and greatest number of tiles.
 
     Returns:
-        Between ``max(batch_size, 4^level_min)`` and ``tile_count_max`` tiles (to within 3, the tiles a split adds),
-        in Morton order, covering the image exactly once.
+        Between ``batch_size`` and ``tile_count_max`` tiles in Morton order, covering the image exactly once.
 
     Raises:
         ValueError: the field holds negative or non-finite values.
     """
-    if not bool(torch.isfinite(spatial_density).all()) or bool((spatial_density < 0).any()):
-        raise ValueError("tiling.build: expected finite, non-negative densities")
+    require_densities(spatial_density, "tiling.build")
     low, high = config.level_min, config.level_max
     integrals = node_integrals(spatial_density, config.field_level, low, high)
     split = _choose_splits(torch.cat(integrals[:-1]), integrals, config) if high > low else []
@@ -60,6 +58,16 @@ def build(spatial_density: Float[Tensor, " e"], config: TsarConfig) -> Tiling:
     level, index = torch.cat(levels), torch.cat(indices)
     order = torch.argsort(tile_interval(level, index, config.field_level)[0])
     return Tiling(level=level[order], index=index[order])
+
+
+def require_densities(field: Float[Tensor, " e"], where: str) -> None:
+    """Refuses a field that holds negative or non-finite values.
+
+    Raises:
+        ValueError: it does.
+    """
+    if not bool(torch.isfinite(field).all()) or bool((field < 0).any()):
+        raise ValueError(f"{where}: expected finite, non-negative densities")
 
 
 def node_integrals(
@@ -80,8 +88,9 @@ def node_integrals(
 def split_bounds(config: TsarConfig) -> tuple[int, int]:
     """Least and greatest number of splits: enough tiles for a batch, no more than ``tile_count_max``."""
     coarse = 4**config.level_min
-    most = (config.tile_count_max - coarse) // 3
-    return min(-(-max(config.batch_size - coarse, 0) // 3), most), most
+    bounds = tiles_at_least(config.batch_size, config.level_min), tiles_at_most(config.tile_count_max, config.level_min)
+    least, most = ((count - coarse) // 3 for count in bounds)
+    return least, most
 
 
 def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:

@@ -153,6 +153,7 @@ class StepRecord:
         stage_s: measured wall seconds per stage.
         counters: rays and other counts.
         nonfinite: non-finite samples replaced.
+        nonfinite_fields: densities and errors that are not finite; there should be none.
         age_spread_s: newest minus oldest sample time shown inside regions of fast refresh, seconds.
     """
 
@@ -168,4 +169,5 @@ class StepRecord:
     stage_s: dict[str, float]
     counters: dict[str, int]
     nonfinite: int
+    nonfinite_fields: int = 0
     age_spread_s: float = 0.0

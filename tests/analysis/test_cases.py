@@ -10,7 +10,8 @@ from analysis.cases import INPUTS, ROWS, SCALES, Case, framed_config
 from analysis.cost_model import adaptive_flops, admitted, nonadaptive_flops
 from analysis.display_model import DisplayModel
 from scenes import catalog
-from tsar.config import ConfigError, TsarConfig
+from tsar.config import ConfigError, TilingConfig, TsarConfig, tiles_at_least
+from tsar.tiling import split_bounds
 
 QUICK = SCALES["quick"]
 
@@ -40,6 +41,17 @@ def test_every_row_at_every_scale(scale) -> None:
         advantage = [nonadaptive_flops(one.cost) / adaptive_flops(one.cost) for one in (ours, theirs)]
         assert advantage[0] == pytest.approx(advantage[1], rel=0.01)
         assert admitted(ours.cost)
+
+
+@pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)
+def test_the_thesis_bound_of_512_tiles_leaves_every_row_possible(scale) -> None:
+    """No tiling has 512 tiles: rows whose batch the largest below it, 511, cannot fill get the smallest that can."""
+    base = TsarConfig(tiling=TilingConfig(tile_count_max=512))
+    for row, (batch, _) in enumerate(ROWS):
+        config = scale.config(row, base)
+        bound = 512 // scale.divisor**2
+        assert config.tile_count_max == (bound if batch < 512 else tiles_at_least(config.batch_size, config.level_min))
+        assert split_bounds(config)[0] <= split_bounds(config)[1]
 
 
 def test_small_images_get_a_smaller_coarsest_level() -> None:

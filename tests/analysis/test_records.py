@@ -26,9 +26,9 @@ from analysis.records import (
 )
 from tests.analysis.builders import ELEMENTS, LIMITS, SPATIAL, TEMPORAL, good_record, random_tiling, tiling
 from tsar.morton import deinterleave
-from tsar.types import StepRecord
+from tsar.types import Errors, StepRecord
 
-COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full")
+COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full", "nonfinite")
 
 
 def write(path: Path, records: Iterable[StepRecord], rows_per_group: int = 32) -> Path:
@@ -113,6 +113,7 @@ def test_a_good_run_passes(tmp_path_factory: pytest.TempPathFactory, seed: int, 
 
 
 FOUR = [(1, 0), (1, 1), (1, 2), (1, 3)]
+ZERO = torch.zeros(ELEMENTS)
 BROKEN = {
     "spatial density too great": (dict(spatial=field(SPATIAL[1] * 1.001)), "densities_out_of_bounds"),
     "spatial density too small": (dict(spatial=field(SPATIAL[0] * 0.999)), "densities_out_of_bounds"),
@@ -129,6 +130,8 @@ BROKEN = {
     "a batch one short": (dict(selected=torch.tensor([0, 1, 2])), "batch_not_full"),
     "a batch one over": (dict(tiling=random_tiling(3), selected=torch.arange(5)), "batch_not_full"),
     "a tile that is not there": (dict(tiling=tiling(*FOUR), selected=torch.tensor([0, 1, 2, 4])), "batch_not_full"),
+    "an error that is no number": (dict(errors=Errors(torch.full((ELEMENTS,), math.nan), ZERO)), "nonfinite"),
+    "an infinite error": (dict(errors=Errors(ZERO, torch.full((ELEMENTS,), -math.inf))), "nonfinite"),
     "a negative tile": (dict(selected=torch.tensor([-1, 1, 2, 3])), "batch_not_full"),
 }
 

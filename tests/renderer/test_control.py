@@ -92,9 +92,11 @@ def test_every_stage_agrees_with_the_reference_on_the_way(name: str) -> None:
         assert same_tiling(after.tiling, follows.tiling)
         assert_same_request(after.due, follows.due)
         newest = outcome.reconstruction.samples.newest_s
-        account, expected = (s.account(moment.after.densities, newest, config) for s in (ours, REFERENCE))
+        account, expected = (
+            s.account(moment.after.densities, outcome.errors, newest, config) for s in (ours, REFERENCE)
+        )
         assert account.combined == pytest.approx(expected.combined, rel=1e-12)
-        assert account.age_spread_s == expected.age_spread_s
+        assert account.age_spread_s == expected.age_spread_s and account.nonfinite == expected.nonfinite == 0
         moving = max(moving, account.age_spread_s)
     assert past > 0, "no tile came back: temporal errors were not looked at"
     assert moving > 0.0 or name not in ("default", "small"), "ages were alike everywhere"
@@ -129,6 +131,41 @@ def test_what_is_not_a_density_is_refused(bad: float) -> None:
     field[777] = bad
     with pytest.raises(ValueError, match="finite, non-negative densities"):
         decided(Densities(field, even), even, config)
+
+
+@pytest.mark.parametrize("bad", [-1e-300, float("nan"), float("inf")])
+def test_what_is_not_a_temporal_density_is_refused(bad: float) -> None:
+    config = small()
+    even = torch.full((128**2,), 0.5, dtype=torch.float64)
+    field = even.clone()
+    field[777] = bad
+    for decide in (decided, decided_by_reference):
+        with pytest.raises(ValueError, match="finite, non-negative densities"):
+            decide(Densities(even, field), even, config)
+
+
+def test_a_batch_that_the_tiling_cannot_fill_is_refused() -> None:
+    """Nothing is requested that was not chosen, whatever let such a configuration through."""
+    config = small()
+    object.__setattr__(config.tiling, "tile_count_max", 31)
+    even = torch.ones(128**2, dtype=torch.float64)
+    for decide in (decided, decided_by_reference):
+        with pytest.raises(ValueError, match="at least 32 tiles, a full batch, got 31"):
+            decide(Densities(even, even), even, config)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_fields_that_are_not_finite_are_counted(value: float) -> None:
+    config = small()
+    state, none = initial_state(config), torch.zeros(128**2)
+    newest = torch.zeros(2**config.level_max, 2**config.level_max, dtype=torch.float64)
+    for number in range(4):
+        spatial, temporal = state.densities.spatial.clone(), state.densities.temporal.clone()
+        fields = spatial, temporal, none.clone(), none.clone()
+        fields[number][[3, 16383]] = value
+        for found in (compiled_stages(config), REFERENCE):
+            account = found.account(Densities(*fields[:2]), Errors(*fields[2:]), newest, config)
+            assert account.nonfinite == 2
 
 
 @settings(max_examples=30)

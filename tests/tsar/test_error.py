@@ -81,6 +81,22 @@ def test_template_is_linear_in_log_power():
     assert log.tolist() == [-14.0, -11.0, -8.0, -5.0]
 
 
+@pytest.mark.parametrize("form", ["contrast", "difference"])
+@pytest.mark.parametrize("norm", ["l2", "linf"])
+def test_every_template_gives_finite_errors(form, norm):
+    """Whatever slope and offset: no power is the least error, and beyond what float32 holds all signals are alike."""
+    config = ErrorConfig(form=form, norm=norm)
+    power = torch.tensor([0.0, 1e-45, 1e-9, 1.0, 12.0])[None, :, None].repeat(5, 1, 1) / 5
+    for offset in (-60.0, 0.0, 60.0):
+        for slope in (-60.0, -45.0, 0.0, 45.0, 60.0):
+            for octaves in (4, 5):
+                error = signed_error(power[:octaves], offset, slope, config).flatten()
+                assert bool(torch.isfinite(error).all()) and error.abs().max() <= 1.0
+                assert error[0] == -1.0 or (form == "difference" and offset + 4 * slope < -100)
+    assert float(signed_error(power, 60.0, 60.0, config).max()) == -1.0
+    assert float(signed_error(power, -60.0, -60.0, config)[2:].min()) > 0.99 or form == "difference"
+
+
 def test_levelwise_norm_uses_six_octants_and_spreads_shares():
     names = ("ghh", "hgh", "ggh", "hhg", "ghg", "hgg", "ggg")
     fine = haar.Octave(**{name: torch.full((1, 4), float(2**i)) for i, name in enumerate(names)})

@@ -6,7 +6,7 @@ import torch
 from tests.oracles import pictures
 from tsar.baselines.framed import run as run_framed
 from tsar.clock import StageTimer, fixed_clock, wall_clock
-from tsar.config import ConfigError, ResponseConfig, TilingConfig, TsarConfig
+from tsar.config import ConfigError, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
 from tsar.pipeline import run
 from tsar.response.transport import SOLVERS
@@ -210,9 +210,31 @@ def test_a_clock_that_stops_time_is_refused():
         (lambda: TsarConfig(batch_size=-3), r"batch_size: expected between 1 and 8192 framelets, got -3"),
         (lambda: TsarConfig(resolution_px=500), r"resolution_px: expected a power of two in \[64, 8192\], got 500"),
         (lambda: TsarConfig(framelet_side=8), r"framelet_side: expected 16 or 32, got 8"),
-        (lambda: TilingConfig(threshold_samples=0.0), r"tiling.threshold_samples: expected a positive number, got 0"),
-        (lambda: ResponseConfig(temporal_min=0.0), r"response.temporal_min: expected a density in \(0, 1\], got 0"),
+        (
+            lambda: TilingConfig(threshold_samples=0.0),
+            r"tiling.threshold_samples: expected a positive, finite number, got 0",
+        ),
+        (lambda: ResponseConfig(temporal_min=0.0), r"response.temporal_min: expected a density in \[1e-6, 1\], got 0"),
         (lambda: TsarConfig(batch_size=64, tiling=TilingConfig(tile_count_max=32)), r"tiling.tile_count_max: expected"),
+        (
+            lambda: TsarConfig(tiling=TilingConfig(tile_count_max=128)),
+            r"tiling.tile_count_max: expected between 130 \(a tiling has 16 \+ 3 k tiles, and every batch must",
+        ),
+        (
+            lambda: TsarConfig(batch_size=512, tiling=TilingConfig(tile_count_max=512)),
+            r"tiling.tile_count_max: expected between 514 .* got 512",
+        ),
+        (lambda: TsarConfig(batch_size=100, resolution_px=64), r"batch_size: expected at most 64 \(all tiles"),
+        (
+            lambda: TsarConfig(batch_size=2, response=ResponseConfig(temporal_min=0.5)),
+            r"response.temporal_min: expected at most 0.125 \(a batch of 2 for the 16 tiles of the coarsest level\)",
+        ),
+        (lambda: ResponseConfig(gain=float("inf")), r"response.gain: expected a number in \[1e-6, 1e6\], got inf"),
+        (lambda: TilingConfig(threshold_samples=float("inf")), r"tiling.threshold_samples: .* got inf"),
+        (
+            lambda: TsarConfig(batch_size=16, resolution_px=64, reconstruction=ReconstructionConfig(65)),
+            r"age_support_px: .* got 65",
+        ),
         (lambda: TsarConfig(tiling=TilingConfig(level_max=9)), r"tiling.level_max: expected between 2 and 7, got 9"),
     ],
 )

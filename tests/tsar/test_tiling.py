@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles.tiling_serial import build_serial
-from tsar.config import TilingConfig, TsarConfig
+from tsar.config import ConfigError, TilingConfig, TsarConfig, tiles_at_least, tiles_at_most
 from tsar.tiling import build, tile_of_element, uniform
 
 
@@ -45,6 +45,27 @@ def test_against_the_serial_construction(seed):
 def test_a_full_batch_always_exists():
     tiling = build(torch.full((16384,), 1e-9, dtype=torch.float64), TsarConfig(batch_size=128))
     assert tiling.tile_count >= 128 and covers_once(tiling)
+
+
+@pytest.mark.parametrize("level_min", [1, 2, 3])
+def test_sizes_of_tilings_are_those_of_the_coarsest_one_and_its_splits(level_min):
+    sizes = [4**level_min + 3 * splits for splits in range(100)]
+    for count in range(sizes[0], 300):
+        assert tiles_at_most(count, level_min) == max(size for size in sizes if size <= count)
+    for count in range(1, 300):
+        assert tiles_at_least(count, level_min) == min(size for size in sizes if size >= count)
+
+
+@pytest.mark.parametrize("batch", [16, 17, 18, 19, 128, 130])
+def test_the_least_bound_that_is_accepted_fills_the_batch(batch):
+    """Whether the field asks for next to nothing or for more than there may be."""
+    least = tiles_at_least(batch, 2)
+    cfg = TsarConfig(batch_size=batch, tiling=TilingConfig(tile_count_max=least))
+    for density in (1e-9, 1e3):
+        assert build(torch.full((16384,), density, dtype=torch.float64), cfg).tile_count == least >= batch
+    if least > 16:
+        with pytest.raises(ConfigError, match=f"between {least} "):
+            TsarConfig(batch_size=batch, tiling=TilingConfig(tile_count_max=least - 1))
 
 
 def test_more_density_gives_smaller_tiles():
