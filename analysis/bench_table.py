@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,13 @@ from rich.console import Console
 from rich.table import Table
 
 from analysis.bench import SPREAD
+from analysis.store import read_json
 
 _WIDTH = 150
 """Characters a line where the output is not a terminal."""
 
+_ROW = {"group": str, "name": str, "unit": str, "ours": float | None, "less_is_better": bool}
+"""What a row of a stored benchmark must hold to be compared."""
 _MET = {True: "yes", False: "NO", None: ""}
 
 
@@ -81,12 +83,12 @@ def read_rows(path: Path) -> dict[tuple[str, str], Mapping[str, Any]]:
         ValueError: it cannot be read, or holds none.
     """
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
-        return {(row["group"], row["name"]): row for row in rows}
+        rows = read_json(path, {"rows": [_ROW]})["rows"]
     except OSError as error:
         raise ValueError(f"compare: cannot read {str(path)!r} ({error.strerror or error})") from None
-    except (ValueError, KeyError, TypeError):
-        raise ValueError(f"compare: {str(path)!r} holds no rows of a benchmark") from None
+    except ValueError as error:
+        raise ValueError(f"compare: {error}") from None
+    return {(row["group"], row["name"]): row for row in rows}
 
 
 def comparison_table(first: Path, second: Path) -> Table:

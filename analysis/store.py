@@ -274,8 +274,8 @@ def read_json(path: Path, expected: Any) -> Any:
 
     Args:
         path: of the file.
-        expected: a type, such as ``list[float]``, or a dictionary from keys that must be there to what is expected of
-            each; other keys may be there too.
+        expected: a type, such as ``list[float]``; or a dictionary from keys that must be there to what is expected of
+            each, where other keys may be there too; or a list that holds what is expected of every item.
 
     Raises:
         OSError: the file cannot be read.
@@ -304,6 +304,11 @@ def _require(value: Any, expected: Any, where: str) -> None:
             if key not in value:
                 raise ValueError(f"{where}: expected {key!r}, got only {_short(list(value))}")
             _require(value[key], inner, f"{where}: {key}")
+        return
+    if isinstance(expected, list):
+        _require(value, list, where)
+        for number, item in enumerate(value):
+            _require(item, expected[0], f"{where}: {number}")
         return
     try:
         check_type(value, expected, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)

@@ -71,12 +71,27 @@ def test_two_files_are_compared_row_by_row(tmp_path: Path) -> None:
 
 def test_files_that_cannot_be_compared_are_named(tmp_path: Path) -> None:
     good, other = write(tmp_path, "a.json", RATE), write(tmp_path, "b.json", LIMIT)
-    bad = tmp_path / "c.json"
-    bad.write_text('{"rows": 3}')
     for first, second, part in (
         (good, other, "share no row"),
         (good, tmp_path / "d.json", "d.json"),
-        (bad, good, "c.json"),
     ):
         with pytest.raises(ValueError, match=part):
             comparison_table(first, second)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"rows": 3}', '{"rows": [7]}', '{"rows": [{"group": "coherent", "name": "camera rays"}]}']
+)
+def test_a_file_without_rows_of_a_benchmark_is_named(text: str, tmp_path: Path) -> None:
+    good, bad = write(tmp_path, "a.json", RATE), tmp_path / "c.json"
+    bad.write_text(text)
+    with pytest.raises(ValueError, match=r"^compare: .*c\.json: .*expected") as caught:
+        comparison_table(bad, good)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_figure_that_is_no_number_is_named(tmp_path: Path) -> None:
+    good, bad = write(tmp_path, "a.json", RATE), tmp_path / "c.json"
+    bad.write_text(json.dumps({"rows": [{**RATE.record(), "ours": "fast"}]}))
+    with pytest.raises(ValueError, match=r"rows: 0: ours: expected float . None, got \"fast\""):
+        comparison_table(good, bad)

@@ -243,6 +243,8 @@ def test_json_that_was_expected_is_read(tmp_path: Path) -> None:
         ('{"count": 1, "ratios": [1, "x"], "source": {"commit": ""}}', "ratios: expected list[float], got [1, "),
         ('{"count": 1, "ratios": [], "source": null}', "source: expected an object with commit, got null"),
         ('{"count": 1, "ratios": [], "source": {"commit": null}}', "source: commit: expected str, got null"),
+        ('{"count": 1, "ratios": [], "source": {"commit": ""}, "rows": 3}', "rows: expected list, got 3"),
+        ('{"count": 1, "ratios": [], "source": {"commit": ""}, "rows": [{"a": 1}, {}]}', "rows: 1: expected 'a'"),
     ],
 )
 def test_json_that_was_not_expected_is_one_line_that_names_file_and_place(
@@ -251,5 +253,5 @@ def test_json_that_was_not_expected_is_one_line_that_names_file_and_place(
     file = tmp_path / "a.json"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(ValueError) as caught:
-        read_json(file, EXPECTED)
+        read_json(file, {**EXPECTED, "rows": [{"a": int}]})
     assert str(file) in str(caught.value) and part in str(caught.value) and "\n" not in str(caught.value)
