@@ -236,7 +236,7 @@ def test_json_that_was_expected_is_read(tmp_path: Path) -> None:
         ("{", "expected JSON"),
         ("[" * 100_000, "expected JSON"),
         (b"\xff\xfe", "expected JSON"),
-        ("[]", "expected an object with count, ratios, source, got []"),
+        ("[]", "expected an object with count, ratios, source, rows, got []"),
         ("7", "got 7"),
         ("{}", "expected 'count', got only []"),
         ('{"count": 1.5, "ratios": [], "source": {"commit": ""}}', "count: expected int, got 1.5"),
