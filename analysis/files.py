@@ -6,6 +6,8 @@ import fcntl
 import json
 import math
 import os
+import socket
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
@@ -51,6 +53,29 @@ def locked(path: Path) -> Iterator[None]:
     """Holds a lock that the system releases even if this process is killed."""
     with path.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+@contextmanager
+def owned(path: Path, what: str) -> Iterator[None]:
+    """Holds a lock file for this process alone, and writes into it who that is.
+
+    The system releases the lock even if this process is killed. The file stays: one that is removed could be held by
+    two at once.
+
+    Raises:
+        ValueError: another process holds it; the message names ``what``, the folder and who.
+    """
+    with path.open("a+", encoding="utf-8") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            file.seek(0)
+            owner = " ".join(file.read(300).split()) or "another process"
+            raise ValueError(f"{what}: {path.parent} is in use by {owner}") from None
+        file.truncate(0)
+        file.write(f"process {os.getpid()} on {socket.gethostname()} since {time.strftime('%Y-%m-%d %H:%M:%S')}\n")
+        file.flush()
         yield
 
 

@@ -153,7 +153,7 @@ class ServeOptions:
     seed: int = 0
     """Of orders and sides."""
     out: Path = Path("out/perception-human")
-    """Folder for the session: answers.jsonl, trials-human.parquet and summary.json."""
+    """Folder for the session: answers.sqlite, trials-human.parquet and summary.json."""
 
     def __post_init__(self) -> None:
         require(bool(self.observer.strip()), "observer", "a name", self.observer)

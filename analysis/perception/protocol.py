@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
-import os
+import threading
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,12 +15,20 @@ import numpy as np
 import pandas as pd
 
 from analysis.cli import InputError
-from analysis.files import atomic, write_json
+from analysis.files import atomic, owned
+from analysis.perception.answers import Answers, answers_of_lines
 from analysis.perception.observers import COLUMNS
-from analysis.perception.stimuli import read_manifest
+from analysis.perception.stimuli import COLUMNS as STIMULUS
+from analysis.perception.stimuli import check_frames, png_of, read_manifest
 
 HUMAN_TASK = "dual pair"
-_SESSION, _ANSWERS, TABLE = "session.json", "answers.jsonl", "trials-human.parquet"
+TABLE = "trials-human.parquet"
+_STORE, _LOCK = "answers.sqlite", "session.lock"
+_OLD_SESSION, _OLD_ANSWERS = "session.json", "answers.jsonl"
+
+_MOST = {
+    "response_s": 1e8, "display_rate_hz": 1e6, "dropped_frames": 10**9, "refreshes": 10**9, "device_pixel_ratio": 1e3,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,7 +52,13 @@ class Trial:
 
 
 class Session:
-    """The trials of one person, in a folder of their own; opened again it goes on where it was."""
+    """The trials of one person, in a folder of their own; opened again it goes on where it was.
+
+    One process at a time has it open, until it is closed.
+
+    Attributes:
+        fault: why a stimulus cannot be shown, or None.
+    """
 
     def __init__(self, folder: Path, stimuli: Path, observer: str, repetitions: int, seed: int) -> None:
         """Opens the session of a folder, or begins it.
@@ -54,26 +71,50 @@ class Session:
             seed: of orders and sides.
 
         Raises:
-            InputError: the folder holds a session of another person or other stimuli, or there is nothing to compare.
+            ValueError: another process has the session open.
+            InputError: the folder holds a session of another person or other stimuli, a file of it is damaged, or
+                there is nothing to compare.
+            OSError: the folder cannot be written.
         """
         self.folder, self.stimuli = folder, stimuli
         self.manifest = read_manifest(stimuli)
         self.rows: list[dict[str, Any]] = self.manifest["stimuli"]
-        hashes = [row["sha256"] for row in self.rows]
-        identity = {"observer": observer, "repetitions": repetitions, "seed": seed, "sha256": hashes}
         self.observer = observer
+        self.fault: InputError | None = None
+        self._checked: set[int] = set()
+        self._answering = threading.Lock()
         self.trials = _trials(self.rows, repetitions, seed)
         if not self.trials:
             raise InputError("stimuli: expected two levels of a scene, set and filter at least, got one")
         folder.mkdir(parents=True, exist_ok=True)
-        file = folder / _SESSION
-        if not file.exists():
-            write_json(file, identity)
-        elif json.loads(file.read_text()) != identity:
-            raise InputError(f"out: {file}: expected a session of {observer!r} with these stimuli, found another")
-        self.answers: dict[int, dict[str, Any]] = {}
-        for answer in _stored(folder / _ANSWERS):
-            self.answers.setdefault(answer["trial"], answer)
+        shown = [[row[name] for name in STIMULUS] for row in self.rows]
+        person = {"observer": observer, "repetitions": repetitions, "seed": seed}
+        with contextlib.ExitStack() as held:
+            held.enter_context(owned(folder / _LOCK, "out"))
+            file = folder / _STORE
+            earlier = (
+                [] if file.exists() else _earlier(folder, {**person, "sha256": [row["sha256"] for row in self.rows]})
+            )
+            timing = [self.manifest["frame_rate_hz"], self.manifest["size_px"]]
+            identity = {**person, "stimuli": hashlib.sha256(json.dumps([shown, timing]).encode()).hexdigest()}
+            self._store = held.enter_context(contextlib.closing(Answers(file, identity, earlier)))
+            self.answers: dict[int, dict[str, Any]] = {row["trial"]: row for row in self._store.rows()}
+            self._held = held.pop_all()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *caught: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Lets others open the session."""
+        self._held.close()
+
+    @property
+    def token(self) -> str:
+        """What only the page of this session knows, whenever it is opened."""
+        return self._store.token
 
     @property
     def current(self) -> Trial | None:
@@ -92,21 +133,41 @@ class Session:
             Whether it was stored; False where the trial was answered before.
 
         Raises:
-            ValueError: there is no such trial, or its turn has not come, or the side is none.
+            ValueError: there is no such trial, or its turn has not come, or the side is none, or a fact is not what it
+                should be.
+            OSError: it cannot be stored, and does not count.
         """
         if side not in ("left", "right"):
-            raise ValueError(f"answer: expected left or right, got {side!r}")
-        if number in self.answers:
-            return False
-        if self.current is None or number != self.current.number:
-            raise ValueError(f"answer: expected trial {self.current and self.current.number}, got {number}")
-        row = {"trial": number, "answer": side, **facts}
-        with (self.folder / _ANSWERS).open("a") as file:
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        self.answers[number] = row
+            raise ValueError(f"answer: expected left or right, got {str(side)[:40]!r}")
+        row = {"trial": number, "answer": side, **checked_facts(facts)}
+        with self._answering:
+            if number in self.answers:
+                return False
+            if self.current is None or number != self.current.number:
+                raise ValueError(f"answer: expected trial {self.current and self.current.number}, got {number}")
+            self._store.add(row)
+            self.answers[number] = row
         return True
+
+    def frame(self, stimulus: int, number: int) -> bytes:
+        """A frame of a stimulus as a PNG file.
+
+        Raises:
+            IndexError: there is none.
+            InputError: the stimulus is not what it was when it was rendered; ``fault`` then says so.
+        """
+        row = self.rows[stimulus]
+        file = self.stimuli / row["folder"] / row["files"][number]
+        try:
+            if stimulus not in self._checked:
+                check_frames(self.stimuli, row)
+                self._checked.add(stimulus)
+            return png_of(file)
+        except OSError as error:
+            self.fault = InputError(f"stimuli: {file}: cannot be read ({error.strerror or error})")
+        except InputError as error:
+            self.fault = error
+        raise self.fault
 
     def table(self) -> pd.DataFrame:
         """The answered trials, with the columns of simulated ones and what the page measured."""
@@ -166,18 +227,55 @@ def _trials(rows: list[dict[str, Any]], repetitions: int, seed: int) -> list[Tri
     return trials
 
 
-def _stored(file: Path) -> list[dict[str, Any]]:
-    """Answers on disk; a last line that was cut off by a crash does not count."""
+def checked_facts(facts: Mapping[str, Any]) -> dict[str, float | bool]:
+    """What a page measured, in the types of the table; what it could not measure (None) is left out.
+
+    Raises:
+        ValueError: an unknown name, or no number in the range that the table can hold.
+    """
+    found: dict[str, float | bool] = {}
+    for name, value in facts.items():
+        if value is None:
+            continue
+        if name == "fits_window" and isinstance(value, bool):
+            found[name] = value
+        elif name in _MOST and _is_number(value) and 0 <= value <= _MOST[name]:
+            found[name] = type(_MOST[name])(value)
+        else:
+            expected = f"between 0 and {_MOST[name]:g}" if name in _MOST else "true or false"
+            raise ValueError(f"answer: expected {name[:40]} {expected}, got {str(value)[:40]}")
+    return found
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _earlier(folder: Path, identity: dict[str, Any]) -> list[dict[str, Any]]:
+    """Answers of a session that an earlier version began.
+
+    Raises:
+        InputError: the session is another one, or a file of it is damaged.
+    """
+    file = folder / _OLD_SESSION
     if not file.exists():
         return []
-    lines = file.read_text().splitlines()
-    found = []
-    for number, line in enumerate(lines):
-        try:
-            found.append(json.loads(line))
-        except ValueError:
-            if number < len(lines) - 1:
-                raise InputError(f"{file}:{number + 1}: expected an answer, got {line[:60]!r}") from None
-            # what follows must begin on a line of its own
-            file.write_text("".join(f"{json.dumps(row)}\n" for row in found))
+    try:
+        begun = json.loads(file.read_bytes())
+    except ValueError as error:
+        raise InputError(f"out: {file}: expected a session, found a damaged file ({error})") from None
+    if begun != identity:
+        raise InputError(
+            f"out: {file}: expected a session of {identity['observer']!r} with these stimuli, found another"
+        )
+    answers = folder / _OLD_ANSWERS
+    found = answers_of_lines(answers) if answers.exists() else []
+    for number, row in enumerate(found):
+        facts = {name: value for name, value in row.items() if name not in ("trial", "answer")}
+        for name in list(facts):
+            try:
+                checked_facts({name: facts[name]})
+            except ValueError:  # an earlier version took anything; the answer counts all the same
+                del facts[name]
+        found[number] = {"trial": row["trial"], "answer": row["answer"], **checked_facts(facts)}
     return found

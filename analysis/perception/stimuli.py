@@ -22,6 +22,8 @@ from analysis.perception.options import StimuliOptions
 from analysis.tracer_options import JobOptions
 
 MANIFEST = "manifest.json"
+COLUMNS = ("scene", "point_set", "time_filter", "samples", "folder", "files", "sha256")
+"""What the manifest says of every stimulus, among other things."""
 
 
 def render_stimuli(
@@ -110,9 +112,15 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         InputError: there is none, or it cannot be read.
     """
     try:
-        return json.loads((folder / MANIFEST).read_text())
-    except (OSError, ValueError) as error:
+        found = json.loads((folder / MANIFEST).read_bytes())
+        whole = float(found["frame_rate_hz"]) > 0.0 and len(found["size_px"]) == 2
+        for row in found["stimuli"]:
+            whole = whole and all(name in row for name in COLUMNS) and row["samples"] > 0
+        if not whole:
+            raise ValueError("it is not whole")
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"stimuli: expected {folder / MANIFEST}, written by the command 'stimuli' ({error})") from None
+    return found
 
 
 def read_frame(file: Path) -> NDArray[np.uint8]:
@@ -146,13 +154,26 @@ def frames_of(folder: Path, row: dict[str, Any]) -> NDArray[np.uint8]:
     Raises:
         InputError: one is missing or is not what the manifest says.
     """
+    files = check_frames(folder, row)
+    try:
+        return np.stack([read_frame(file) for file in files])
+    except OSError as error:
+        raise InputError(f"stimuli: {folder / row['folder']}: cannot be read ({error.strerror or error})") from None
+
+
+def check_frames(folder: Path, row: dict[str, Any]) -> list[Path]:
+    """The files of a stimulus.
+
+    Raises:
+        InputError: one is missing or is not what the manifest says.
+    """
     files = [folder / row["folder"] / name for name in row["files"]]
     try:
         if hash_of(files) != row["sha256"]:
             raise InputError(f"stimuli: {folder / row['folder']}: expected the frames of the manifest, got others")
-        return np.stack([read_frame(file) for file in files])
     except OSError as error:
         raise InputError(f"stimuli: {error.filename}: cannot be read ({error.strerror})") from None
+    return files
 
 
 def differences(
