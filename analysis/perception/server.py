@@ -1,93 +1,162 @@
-"""A page on this machine that shows a session's trials and takes the answers. Nothing else can reach it."""
+"""A page on this machine that shows a session's trials and takes the answers. Nothing else can reach it.
+
+It listens on the loopback interface, heeds only requests to that address that come from its own page, and takes answers
+only with the token that stands in the page, which other pages of the browser cannot read.
+"""
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
+import hmac
 import json
+import logging
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+from tornado.httpserver import HTTPServer
+from tornado.iostream import IOStream
+from tornado.netutil import bind_sockets
+from tornado.web import Application, HTTPError, RequestHandler
+
+from analysis.cli import InputError
 from analysis.perception.protocol import Session
-from analysis.perception.stimuli import png_of
+
+HOST = "127.0.0.1"
+BODY_MAX = 1 << 16
+"""Bytes of an answer that are read."""
+CONNECTIONS_MAX = 64
+"""Open connections; one more closes the oldest, so that those which never ask anything keep nobody out."""
+TIMEOUT_S = 30.0
+"""To send a whole request in."""
 
 _HERE = Path(__file__).parent
-_PAGE = {"/": ("trial_page.html", "text/html"), "/trial_page.js": ("trial_page.js", "text/javascript")}
-_BODY_MAX = 1 << 16
-_FACTS = {"response_s": float, "display_rate_hz": float, "dropped_frames": int, "refreshes": int, "fits_window": bool,
-          "device_pixel_ratio": float}  # fmt: skip
+_THREADS = 4
 
 
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
+@dataclass(frozen=True)
+class _Service:
+    session: Session
+    break_every: int
+    hosts: frozenset[str]
+    threads: concurrent.futures.Executor
 
-    def __init__(self, session: Session, port: int, break_every: int) -> None:
-        super().__init__(("127.0.0.1", port), _Handler)
-        self.session, self.break_every, self.lock = session, break_every, threading.Lock()
+
+class _Handler(RequestHandler):
+    """Refuses what does not come from the page of this session."""
+
+    def initialize(self, service: _Service) -> None:
+        self.service = service
+
+    def prepare(self) -> None:
+        hosts, headers = self.service.hosts, self.request.headers
+        if headers.get("Host") not in hosts:
+            raise HTTPError(HTTPStatus.MISDIRECTED_REQUEST)
+        origin = headers.get("Origin")
+        if origin is not None and origin not in {f"http://{host}" for host in hosts}:
+            raise HTTPError(HTTPStatus.FORBIDDEN, "the page of another server asks")
+
+    def write_error(self, status_code: int, **facts: Any) -> None:
+        """One line of text."""
+        error = facts.get("exc_info", (None, None))[1]
+        said = error.log_message % error.args if isinstance(error, HTTPError) and error.log_message else None
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"{said or self._reason}\n")
+
+    def log_exception(self, *error: Any) -> None:
+        """Says nothing: the page is told."""
+
+    def state(self) -> None:
+        self.set_header("Cache-Control", "no-store")
+        self.finish(_state(self.service.session, self.service.break_every))
 
 
-class _Handler(BaseHTTPRequestHandler):
-    server: _Server
+class _Asset(_Handler):
+    def get(self, name: str) -> None:
+        name = name or "trial_page.html"
+        self.set_header("Content-Type", "text/javascript" if name.endswith(".js") else "text/html; charset=utf-8")
+        # the same address shows another session later
+        self.set_header("Cache-Control", "no-store")
+        self.set_header("X-Frame-Options", "DENY")
+        self.finish((_HERE / name).read_text(encoding="utf-8").replace("{{token}}", self.service.session.token))
 
-    def log_message(self, format: str, *args: Any) -> None:
-        """Says nothing: the terminal shows the progress."""
 
-    def do_GET(self) -> None:
-        if self.path in _PAGE:
-            name, kind = _PAGE[self.path]
-            self._send((_HERE / name).read_bytes(), kind)
-        elif self.path == "/state":
-            with self.server.lock:
-                self._send(json.dumps(_state(self.server)).encode(), "application/json")
-        elif self.path.startswith("/frame/"):
-            self._frame(self.path.removeprefix("/frame/").split("/"))
-        else:
-            self.send_error(HTTPStatus.NOT_FOUND)
+class _Guarded(_Handler):
+    def prepare(self) -> None:
+        super().prepare()
+        if not hmac.compare_digest(self.request.headers.get("X-Token", "").encode(), self._token.encode()):
+            raise HTTPError(HTTPStatus.FORBIDDEN, "expected the token of the page")
 
-    def do_POST(self) -> None:
-        length = int(self.headers.get("Content-Length") or 0)
-        if self.path != "/answer" or not 0 < length <= _BODY_MAX:
-            self.send_error(HTTPStatus.NOT_FOUND)
-            return
+    @property
+    def _token(self) -> str:
+        return self.service.session.token
+
+
+class _State(_Guarded):
+    def get(self) -> None:
+        self.state()
+
+
+class _Answer(_Guarded):
+    def post(self) -> None:
         try:
-            body = json.loads(self.rfile.read(length))
-            facts = {name: kind(body[name]) for name, kind in _FACTS.items() if name in body}
-            with self.server.lock:
-                self.server.session.answer(int(body["trial"]), str(body["answer"]), facts)
-                self._send(json.dumps(_state(self.server)).encode(), "application/json")
-        except (ValueError, KeyError, TypeError) as error:
-            self.send_error(HTTPStatus.BAD_REQUEST, str(error)[:200])
+            facts = json.loads(self.request.body)
+            number, side = facts.pop("trial"), facts.pop("answer")
+            if type(number) is not int:
+                raise ValueError("answer: expected the number of a trial")
+            self.service.session.answer(number, side, facts)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise HTTPError(HTTPStatus.BAD_REQUEST, "%s", str(error)[:200]) from None
+        except OSError as error:
+            raise HTTPError(HTTPStatus.INSUFFICIENT_STORAGE, "%s", error.strerror or str(error)) from None
+        self.state()
 
-    def _frame(self, parts: list[str]) -> None:
+
+class _Frame(_Guarded):
+    async def get(self, stimulus: str, number: str) -> None:
         """A frame of a stimulus by numbers; no path from outside reaches the disk."""
-        session = self.server.session
+        session, loop = self.service.session, asyncio.get_running_loop()
         try:
-            row = session.rows[int(parts[0])]
-            file = session.stimuli / row["folder"] / row["files"][int(parts[1])]
-            self._send(png_of(file), "image/png")
-        except (ValueError, IndexError, OSError):
-            self.send_error(HTTPStatus.NOT_FOUND)
-
-    def _send(self, content: bytes, kind: str) -> None:
-        self.send_response(HTTPStatus.OK)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(content)))
-        self.send_header("Cache-Control", "no-store" if kind == "application/json" else "max-age=3600")
-        self.end_headers()
-        self.wfile.write(content)
+            content = await loop.run_in_executor(self.service.threads, session.frame, int(stimulus), int(number))
+        except IndexError:
+            raise HTTPError(HTTPStatus.NOT_FOUND) from None
+        except InputError as error:
+            raise HTTPError(HTTPStatus.INTERNAL_SERVER_ERROR, "%s", str(error)) from None
+        self.set_header("Content-Type", "image/png")
+        # kept by the browser, but not for another session at this address
+        self.set_header("Cache-Control", "private, max-age=3600")
+        self.set_header("Vary", "X-Token")
+        self.finish(content)
 
 
-def _state(server: _Server) -> dict[str, Any]:
+class _Bounded(HTTPServer):
+    """A server with a bounded number of connections, all of them served by one thread."""
+
+    def initialize(self, *arguments: Any, **options: Any) -> None:
+        super().initialize(*arguments, **options)
+        self._open: list[IOStream] = []
+
+    def handle_stream(self, stream: IOStream, address: tuple) -> None:
+        self._open = [one for one in self._open if not one.closed()]
+        while len(self._open) >= CONNECTIONS_MAX:
+            self._open.pop(0).close()
+        self._open.append(stream)
+        super().handle_stream(stream, address)
+
+
+def _state(session: Session, break_every: int) -> dict[str, Any]:
     """What the page needs to go on: the current trial, without saying which pair differs in words."""
-    session, trial = server.session, server.session.current
+    trial = session.current
     done, total = len(session.answers), len(session.trials)
     found: dict[str, Any] = {
         "done": done,
         "total": total,
-        "rest": bool(done and done % server.break_every == 0 and trial is not None),
+        "rest": bool(done and done % break_every == 0 and trial is not None),
         "frame_rate_hz": session.manifest["frame_rate_hz"],
         "size_px": session.manifest["size_px"],
         "trial": None,
@@ -106,15 +175,48 @@ def serving(session: Session, port: int = 0, break_every: int = 24) -> Iterator[
     """Serves a session while the block runs; the address of its page.
 
     Raises:
-        OSError: the port is taken.
+        InputError: the port cannot be had.
     """
-    server = _Server(session, port, break_every)
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
-    thread.start()
+    logging.getLogger("tornado").setLevel(logging.CRITICAL)  # the terminal shows the progress
     try:
-        yield f"http://127.0.0.1:{server.server_address[1]}/"
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
-        session.export()
+        (listener,) = bind_sockets(port, HOST)
+    except OSError as error:
+        raise InputError(f"port: expected one that is free, got {port} ({error.strerror})") from None
+    port = listener.getsockname()[1]
+    hosts = frozenset(f"{name}{end}" for name in (HOST, "localhost") for end in [f":{port}", *([""] * (port == 80))])
+    loop, over = asyncio.new_event_loop(), asyncio.Event()
+
+    async def serve(service: _Service) -> None:
+        given = {"service": service}
+        paths = [
+            (r"/(|trial_page\.js)", _Asset, given),
+            ("/state", _State, given),
+            ("/answer", _Answer, given),
+            ("/frame/([0-9]{1,9})/([0-9]{1,9})", _Frame, given),
+        ]
+        server = _Bounded(
+            Application(paths, default_handler_class=_Missing, default_handler_args=given, log_function=lambda _: None),
+            max_body_size=BODY_MAX, max_header_size=BODY_MAX, idle_connection_timeout=TIMEOUT_S, body_timeout=TIMEOUT_S,
+        )  # fmt: skip
+        server.add_socket(listener)
+        await over.wait()
+        server.stop()
+        await server.close_all_connections()
+
+    with concurrent.futures.ThreadPoolExecutor(_THREADS) as threads:
+        service = _Service(session, break_every, hosts, threads)
+        thread = threading.Thread(target=lambda: loop.run_until_complete(serve(service)), daemon=True)
+        thread.start()
+        try:
+            yield f"http://{HOST}:{port}/"
+        finally:
+            loop.call_soon_threadsafe(over.set)
+            thread.join()
+            loop.close()
+            session.export()
+
+
+class _Missing(_Handler):
+    def prepare(self) -> None:
+        super().prepare()
+        raise HTTPError(HTTPStatus.NOT_FOUND)

@@ -81,7 +81,15 @@ def simulate(options: SimulateOptions, task: Task) -> Found:
 
 def serve(options: ServeOptions, task: Task, say: Callable[[str], None]) -> Found:
     """Shows trials to a person until all are answered, or until this is interrupted."""
-    session = Session(options.out, options.stimuli, options.observer, options.repetitions, options.seed)
+    with Session(options.out, options.stimuli, options.observer, options.repetitions, options.seed) as session:
+        _answered(session, options, task, say)
+    table = session.table()
+    late = int(np.count_nonzero(table["dropped_frames"].to_numpy() > 0))
+    found = {"observer": options.observer, "trials": len(session.trials), "answered": len(table), "with_dropped": late}
+    return found, f"{len(table)} of {len(session.trials)} trials answered, {late} with late frames"
+
+
+def _answered(session: Session, options: ServeOptions, task: Task, say: Callable[[str], None]) -> None:
     done = task("answers", len(session.trials))
     done(len(session.answers))
     try:
@@ -90,13 +98,12 @@ def serve(options: ServeOptions, task: Task, say: Callable[[str], None]) -> Foun
             while session.current is not None:
                 time.sleep(0.2)
                 done(len(session.answers))
+                if session.fault is not None:
+                    time.sleep(1.0)  # for the page to hear of it
+                    raise session.fault
             time.sleep(1.0)  # for the page to hear of its last answer
     except KeyboardInterrupt:
         pass  # answers are on disk
-    table = session.table()
-    late = int(np.count_nonzero(table["dropped_frames"].to_numpy() > 0))
-    found = {"observer": options.observer, "trials": len(session.trials), "answered": len(table), "with_dropped": late}
-    return found, f"{len(table)} of {len(session.trials)} trials answered, {late} with late frames"
 
 
 def adaptive(options: AdaptiveOptions, task: Task) -> Found:

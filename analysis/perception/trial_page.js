@@ -3,6 +3,7 @@
 
 const message = document.getElementById("message"), pairs = document.getElementById("pairs");
 const progress = document.getElementById("progress"), canvases = [...document.querySelectorAll("canvas")];
+const headers = { "X-Token": document.querySelector("meta[name=token]").content };
 let state = null, phase = "loading", shown = null;
 
 function say(text) {
@@ -16,8 +17,8 @@ async function frames(trial) {
   const numbers = [...trial.left, ...trial.right], decoded = new Map();
   for (const number of new Set(numbers)) {
     const list = [...Array(trial.frames).keys()].map(async (frame) => {
-      const answer = await fetch(`frame/${number}/${frame}`);
-      if (!answer.ok) throw new Error(`frame ${number}/${frame} is missing`);
+      const answer = await fetch(`frame/${number}/${frame}`, { headers });
+      if (!answer.ok) throw new Error(await answer.text());
       return createImageBitmap(await answer.blob());
     });
     decoded.set(number, await Promise.all(list));
@@ -72,7 +73,13 @@ async function next() {
   }
   phase = "loading";
   say("Loading …");
-  const sequences = await frames(state.trial);
+  let sequences;
+  try {
+    sequences = await frames(state.trial);
+  } catch (error) {
+    pause(`The pictures cannot be shown: ${error.message}`);
+    return;
+  }
   fit(state.size_px);
   message.style.display = "none";
   pairs.style.display = "flex";
@@ -93,13 +100,16 @@ async function answer(side) {
   // the next trial is shown only once this one is on disk; a server that is gone is waited for
   for (;;) {
     try {
-      const reply = await fetch("answer", { method: "POST", body });
-      state = await (reply.ok ? reply : await fetch("state")).json();
-      break;
+      const reply = await fetch("answer", { method: "POST", body, headers });
+      if (reply.status < 500) {
+        state = await (reply.ok ? reply : await fetch("state", { headers })).json();
+        break;
+      }
+      say(`The answer cannot be stored: ${await reply.text()}Waiting …`);
     } catch {
       say("The server does not answer. Waiting …");
-      await new Promise((resolve) => setTimeout(resolve, 300));
     }
+    await new Promise((resolve) => setTimeout(resolve, 300));
   }
   const slow = Math.abs(facts.display_rate_hz / state.frame_rate_hz - Math.round(facts.display_rate_hz / state.frame_rate_hz)) > 0.1;
   progress.title = slow ? `display ${facts.display_rate_hz.toFixed(1)} Hz` : "";
@@ -116,7 +126,7 @@ document.addEventListener("keydown", (event) => {
 });
 
 (async () => {
-  state = await (await fetch("state")).json();
+  state = await (await fetch("state", { headers })).json();
   progress.textContent = `${state.done} of ${state.total}`;
   pause("Two pairs of moving pictures are shown, left and right.\nIn one pair the upper and the lower picture differ.\n" +
     "Press the arrow key of the side where they differ. Guess if you cannot tell.");

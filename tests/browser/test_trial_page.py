@@ -83,6 +83,7 @@ def test_a_session_from_the_first_trial_to_the_last(browser: Browser, tmp_path: 
     # the server is gone, and the answer is given all the same
     page.keyboard.press(correct_key(3))
     expect(page.locator("#message")).to_contain_text("does not answer", timeout=10_000)
+    session.close()
     again = Session(folder, stimuli, "anna", 2, 5)
     assert again.current is not None and again.current.number == 3
     with serving(again, port, break_every=100):
@@ -97,18 +98,60 @@ def test_a_session_from_the_first_trial_to_the_last(browser: Browser, tmp_path: 
     assert (table["response_s"] > 0.0).all() and (table["display_rate_hz"] > 5.0).all()
     assert table["fits_window"].all() and (table["dropped_frames"] >= 0).all()
     assert not errors
+    again.close()
+    page.close()
+
+
+PAIRS = """all => all.map(one => ({
+  left: one.getBoundingClientRect().left,
+  pixels: one.getContext("2d").getImageData(0, 0, one.width, one.height).data.join(),
+}))"""
+
+
+def test_the_pair_that_differs_is_seen_on_the_side_that_is_right(browser: Browser, tmp_path: Path) -> None:
+    stimuli = write_stimuli(tmp_path / "stimuli", frames=1)  # so that what is on the canvases does not change
+    page = browser.new_page(viewport={"width": 900, "height": 700})
+    with Session(tmp_path / "session", stimuli, "anna", 2, 5) as session, serving(session) as address:
+        page.goto(address)
+        page.wait_for_function("phase === 'pause'")
+        page.keyboard.press("Space")
+        for trial in session.trials:
+            page.wait_for_function(
+                f"phase === 'trial' && state.trial.number === {trial.number} && shown.intervals.length > 1"
+            )
+            canvases = page.eval_on_selector_all("canvas", PAIRS)
+            sides = sorted({canvas["left"] for canvas in canvases})
+            seen = [{canvas["pixels"] for canvas in canvases if canvas["left"] == side} for side in sides]
+            differing = [side for side, pair in zip(("left", "right"), seen, strict=True) if len(pair) == 2]
+            assert differing == ([] if trial.test == trial.reference else [trial.side])
+            page.keyboard.press({"left": "ArrowLeft", "right": "ArrowRight"}[trial.side])
+        page.wait_for_function("phase === 'end'")
+        assert session.table()["correct"].all()
+        assert set(session.table()["differing_side"]) == {"left", "right"}
+    page.close()
+
+
+def test_a_stimulus_that_was_damaged_is_said(browser: Browser, tmp_path: Path) -> None:
+    stimuli = write_stimuli(tmp_path / "stimuli")
+    for frame in stimuli.rglob("*.png"):
+        frame.write_bytes(frame.read_bytes() + b"x")
+    page = browser.new_page()
+    with Session(tmp_path / "session", stimuli, "anna", 2, 5) as session, serving(session) as address:
+        page.goto(address)
+        page.wait_for_function("phase === 'pause'")
+        page.keyboard.press("Space")
+        expect(page.locator("#message")).to_contain_text("expected the frames of the manifest", timeout=10_000)
     page.close()
 
 
 def test_a_window_that_is_too_small_is_noted(browser: Browser, tmp_path: Path) -> None:
     stimuli = write_stimuli(tmp_path / "stimuli", side=160)
     page = browser.new_page(viewport={"width": 300, "height": 300})
-    session = Session(tmp_path / "session", stimuli, "bert", 1, 0)
-    with serving(session) as address:
+    with Session(tmp_path / "session", stimuli, "bert", 1, 0) as session, serving(session) as address:
         page.goto(address)
         page.wait_for_function("phase === 'pause'")
         page.keyboard.press("Space")
         press_when_shown(page, "ArrowLeft")
         page.wait_for_function("state.done === 1")
-    assert not session.table()["fits_window"].iloc[0]
+        assert not session.table()["fits_window"].iloc[0]
     page.close()

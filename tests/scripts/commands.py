@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -45,3 +46,16 @@ def assert_refused(status: int, capsys: pytest.CaptureFixture, parts: tuple[str,
 
 def nothing_in(folder: Path) -> bool:
     return not folder.exists() or not any(folder.iterdir())
+
+
+def started_script(name: str, folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    """Starts ``scripts/name`` as a terminal would: in a group of its own, which Ctrl-C reaches."""
+
+    def heed_interrupts() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell in the background has its children ignore them
+
+    command = [sys.executable, str(ROOT / "scripts" / name), *arguments]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command, cwd=folder, stdout=pipe, stderr=pipe, text=True, start_new_session=True, preexec_fn=heed_interrupts
+    )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import signal
 from pathlib import Path
 
 import av
@@ -14,7 +16,7 @@ from PIL import Image
 
 from analysis.perception.stimuli import frames_of, hash_of, png_of
 from tests.analysis.perception.builders import write_stimuli
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, started_script
 
 
 def summary(folder: Path) -> dict:
@@ -124,3 +126,21 @@ def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> Non
     status = call_script("perception.py", monkeypatch, *arguments, *extra)
     assert_refused(status, capsys, parts)
     assert nothing_in(tmp_path / "out")
+
+
+def test_a_session_is_served_once_and_ends_with_its_table(tmp_path: Path, monkeypatch, capsys) -> None:
+    stimuli, out = write_stimuli(tmp_path / "stimuli"), tmp_path / "out"
+    arguments = ("serve", "ANNA", "--stimuli", str(stimuli), "--out", str(out))
+    with started_script("perception.py", tmp_path, *arguments) as server:
+        assert server.stderr is not None and server.stdout is not None
+        assert "in a browser" in next(line for line in server.stderr if "http://127.0.0.1:" in line)
+        assert call_script("perception.py", monkeypatch, *arguments) == 2
+        refused = capsys.readouterr().err
+        assert one_line(refused) and f"{out} is in use by process {server.pid} on " in refused
+        os.killpg(server.pid, signal.SIGINT)
+        assert "0 of 12 trials answered" in server.stdout.read() and "Traceback" not in server.stderr.read()
+    assert server.returncode == 0 and (out / "trials-human.parquet").exists()
+    (out / "answers.sqlite").write_bytes(b"SQLite")
+    assert call_script("perception.py", monkeypatch, *arguments) == 2
+    refused = capsys.readouterr().err
+    assert one_line(refused) and "answers.sqlite: expected the answers of a session, found a damaged file" in refused
