@@ -9,6 +9,7 @@ from itertools import islice
 
 import torch
 
+from analysis.records import unbroken
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TsarConfig
 from tsar.pipeline import run
@@ -35,8 +36,7 @@ def default_stages(config: TsarConfig) -> Stages:
 
 def cycles(config: TsarConfig, trace: Trace, cycle_s: float = CYCLE_S) -> Iterator[StepRecord]:
     """Records of an endless run, those of the warm-up too, of which the numbers are negative."""
-    made = run(config, trace, fixed_clock(cycle_s), 0.0, math.inf, default_stages(config))
-    return (record for record, _ in made)
+    return unbroken(run(config, trace, fixed_clock(cycle_s), 0.0, math.inf, default_stages(config)))
 
 
 @dataclass

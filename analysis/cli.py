@@ -8,13 +8,14 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
 Options = TypeVar("Options")
 
 EXIT_BAD_INPUT = 2
+EXIT_BROKEN = 3
 EXIT_INTERRUPTED = 130
 
 _MEMORY = Path("/proc/meminfo")
@@ -25,6 +26,16 @@ _FRAME = re.compile(r"[╭╮╰╯│─]+|-{3,}")
 
 class InputError(ValueError):
     """Bad input; the message says what was expected, what arrived, and where."""
+
+
+class BrokenInvariants(RuntimeError):
+    """Runs of the adaptive pipeline broke an invariant: what they say cannot be relied on."""
+
+
+def require_unbroken(broken: Sequence[str]) -> None:
+    """Raises BrokenInvariants unless the list of runs that broke an invariant is empty."""
+    if broken:
+        raise BrokenInvariants(f"invariants are broken in {len(broken)} runs: {', '.join(broken)}")
 
 
 @contextlib.contextmanager
@@ -101,31 +112,33 @@ def _one_line(box: str) -> str:
 def run_cli(main: Callable[[], None]) -> None:
     """Runs a script's main function and ends the process.
 
-    Bad input, and a package of an extra that is not installed, end with one line on standard error and status 2, Ctrl-C
-    with one line and status 130.
+    Bad input, and a package of an extra that is not installed, end with one line on standard error and status 2, broken
+    invariants with one line and status 3, Ctrl-C with one line and status 130.
     """
     _spin_briefly()
     warnings.showwarning = _one_warning
     try:
         main()
     except InputError as error:
-        _refuse(error)
+        _end(error, EXIT_BAD_INPUT)
+    except BrokenInvariants as error:
+        _end(error, EXIT_BROKEN)
     except ModuleNotFoundError as error:
         from analysis.extras import extra_of
 
         missing = extra_of(error)
         if missing is None:
             raise
-        _refuse(missing)
+        _end(missing, EXIT_BAD_INPUT)
     except KeyboardInterrupt:
         print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
 
 
-def _refuse(error: InputError) -> NoReturn:
+def _end(error: Exception, status: int) -> NoReturn:
     message = re.sub(r"\s+", " ", str(error)).strip()
     print(f"error: {message}", file=sys.stderr)
-    sys.exit(EXIT_BAD_INPUT)
+    sys.exit(status)
 
 
 def _one_warning(message: Warning | str, *_: object) -> None:

@@ -165,19 +165,20 @@ class _Adaptive:
     counters: list[dict[str, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        from analysis.records import unbroken
         from renderer.control import stages
         from tsar.clock import fixed_clock
         from tsar.pipeline import run
 
         clock, chosen = fixed_clock(self.options.cycle_s), stages(self.config, threads=self.renderer.threads)
-        self._cycles = run(self.config, self.renderer.trace, clock, 0.0, math.inf, chosen)
+        self._cycles = unbroken(run(self.config, self.renderer.trace, clock, 0.0, math.inf, chosen))
 
     def warm_up(self) -> None:
         for _ in islice(self._cycles, self.config.warmup_cycles):
             pass
 
     def __call__(self) -> None:
-        for record, _ in islice(self._cycles, self.options.cycles_per_turn):
+        for record in islice(self._cycles, self.options.cycles_per_turn):
             self.stage_s.append(record.stage_s)
             self.counters.append(record.counters)
 
@@ -264,6 +265,7 @@ def watch_memory(
     """Resident memory over a run of the centre setting that takes ``span_s`` of animation time at most."""
     import psutil
 
+    from analysis.records import unbroken
     from renderer.control import stages
     from tsar.clock import fixed_clock
     from tsar.pipeline import run
@@ -273,7 +275,7 @@ def watch_memory(
     clock = fixed_clock(min(options.cycle_s, span_s / options.memory_cycles if span_s > 0 else math.inf))
     cycles, bytes_ = [], []
     endless = run(config, renderer.trace, clock, 0.0, math.inf, stages(config, threads=renderer.threads))
-    for record, _ in islice(endless, _total(config, options)):
+    for record in islice(unbroken(endless), _total(config, options)):
         if record.cycle >= 0 and record.cycle % options.memory_every == 0:
             cycles.append(record.cycle)
             bytes_.append(resident().rss)

@@ -13,7 +13,7 @@ import importlib.metadata
 import io
 import resource
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -113,6 +113,11 @@ def times_of(key: str, place: Place) -> pd.DataFrame:
     if content is None:
         raise ValueError(f"{file}: expected the table of a finished run, found none or another")
     return pd.read_parquet(io.BytesIO(content))
+
+
+def broken(found: Iterable[dict[str, Any] | None]) -> list[str]:
+    """Names of the results, of some summaries, whose cycles broke an invariant; only adaptive runs have any."""
+    return [one["key"] for one in found if one and not one.get("invariants", {"ok": True})["ok"]]
 
 
 def evaluate(case: Case, key: str, place: Place) -> str:

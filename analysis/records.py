@@ -9,6 +9,7 @@ import math
 import os
 import platform
 import subprocess
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from torch import Tensor
 
+from analysis.cli import BrokenInvariants
 from analysis.extras import DISTRIBUTION
 from analysis.files import PARTIAL, plain
-from tsar.types import StepRecord
+from tsar.types import Display, StepRecord
 
 _META = b"tsar"
 _CONSERVATION = 1e-5
@@ -225,6 +227,21 @@ class InvariantCheck:
         counts = (self._found[name] for name in self._COUNTED)
         ok = self._found["conservation_residual"] <= _CONSERVATION and not any(counts)
         return {**self._found, "ok": bool(ok)}
+
+
+def unbroken(cycles: Iterable[tuple[StepRecord, Display]]) -> Iterator[StepRecord]:
+    """Records of cycles as they come, checked by what the pipeline itself counted: measurements of time go on
+    undisturbed.
+
+    Raises:
+        BrokenInvariants: density is lost or gained, or a density or an error is not finite.
+    """
+    for record, _ in cycles:
+        residual, nonfinite = record.conservation_residual, record.nonfinite_fields
+        if not residual <= _CONSERVATION or nonfinite:
+            found = f"conservation residual {residual:g}, {nonfinite} values not finite"
+            raise BrokenInvariants(f"invariants are broken in cycle {record.cycle}: {found}")
+        yield record
 
 
 def _residual(fields: dict[str, np.ndarray], surplus: float, limits: RecordLimits) -> float:

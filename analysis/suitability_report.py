@@ -13,7 +13,7 @@ import pandas as pd
 from analysis import plots_suitability as plots
 from analysis.cases import ROWS, SCALES, Case
 from analysis.cli import bad_input, full_disk
-from analysis.evaluation import ROOT, Place, finished, times_of
+from analysis.evaluation import ROOT, Place, broken, finished, times_of
 from analysis.farm import run_cases
 from analysis.files import atomic, writable_folder, write_json
 from analysis.progress import bars
@@ -68,6 +68,7 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
         timing(planned, keys, place).to_csv(out / "timing.csv", index=False)
         pictures = plots.write_all(out / "figures", options, results, keys, place)
         summary = _summary(options, planned, keys, place, failures, tables)
+        summary["broken_invariants"] = broken(one.summary for one in results.all)
         write_page(out / "report.html", summary, tables, pictures)
         write_json(out / "summary.json", summary)
     return summary, tables

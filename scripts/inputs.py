@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, parse, run_cli
+from analysis.cli import bad_input, parse, require_unbroken, run_cli
 from analysis.experiment import ROOT, finished, run_experiment
 from analysis.files import plain, writable_folder, write_json
 from analysis.repetitions import InputsOptions, row
@@ -38,6 +38,7 @@ def main() -> None:
     write_json(
         options.out / "summary.json", {"ledger": options.ledger, "runs": rows, "config": config, "provenance": source}
     )
+    require_unbroken([line["run"] for line in rows if not line["invariants_ok"]])
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import parse, run_cli
+from analysis.cli import parse, require_unbroken, run_cli
 from analysis.experiment import run_experiment
 from analysis.run_options import RunOptions
 from analysis.start import process_began_s
@@ -41,6 +41,7 @@ def main() -> None:
     console = Console()
     console.print(table)
     console.print(f"written to {options.out}: summary.json, report.html, error.png, comparison.mp4, steps.parquet")
+    require_unbroken([] if summary["invariants"]["ok"] else [options.input])
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
+from analysis.cli import bad_input, full_disk, parse, require_unbroken, run_cli
 from analysis.extras import require_extra
 from analysis.files import atomic, writable_folder, write_json
 from analysis.sensitivity import AXES, BEST, SensitivityOptions, optimum_table, runs, setting_table, sweeps
@@ -29,7 +29,7 @@ def main() -> None:
         planned = runs(options)
     import pandas as pd
 
-    from analysis.evaluation import ROOT, Place, finished, times_of
+    from analysis.evaluation import ROOT, Place, broken, finished, times_of
     from analysis.farm import run_cases
     from analysis.plots_sensitivity import write_all
     from analysis.progress import bars
@@ -41,7 +41,8 @@ def main() -> None:
     with full_disk(out), bars() as show:
         place.results.mkdir(exist_ok=True)
         keys, failures = run_cases([run.case for run in planned], place, options.farm, show.task("runs", len(planned)))
-    done = {run: keys[run.case] for run in planned if finished(keys[run.case], place)}
+    summaries = {run: finished(keys[run.case], place) for run in planned}
+    done = {run: keys[run.case] for run, found in summaries.items() if found}
     results = {run.place: times_of(key, place) for run, key in done.items()}
     tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}
     stills = {run.setting: key for run, key in done.items() if run.place == (options.figure_input, run.setting, 0)}
@@ -66,6 +67,7 @@ def main() -> None:
     for name, reason in failed.items():
         print(f"failed: {name}: {reason}")
     print(f"{len(done)} of {len(planned)} runs; written to {options.out}: summary.json, tables/, figures/")
+    require_unbroken(broken(summaries.values()))
     sys.exit(1 if failed else 0)
 
 

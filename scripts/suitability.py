@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import parse, run_cli
+from analysis.cli import parse, require_unbroken, run_cli
 from analysis.extras import require_extra
 from analysis.suitability import SuitabilityOptions
 
@@ -40,6 +40,7 @@ def main() -> None:
     console.print(
         f"{done} of {summary['runs']} runs; written to {options.out}: summary.json, tables/, figures/, report.html"
     )
+    require_unbroken(summary["broken_invariants"])
     if summary["failures"]:
         sys.exit(1)
 

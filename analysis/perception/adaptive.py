@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.cases import ROWS, SCALES, Case, Policy, framed_config
-from analysis.cli import InputError
-from analysis.evaluation import Place, finished
+from analysis.cli import InputError, require_unbroken
+from analysis.evaluation import Place, broken, finished
 from analysis.farm import FarmOptions, run_cases
 from analysis.perception.observers import Observer, correct_probability
 from analysis.perception.options import AdaptiveOptions
@@ -29,6 +29,7 @@ def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFram
 
     Raises:
         InputError: a run failed.
+        BrokenInvariants: a run broke an invariant.
     """
     scale = SCALES[options.scale]
     rows = [number for number, (_, side) in enumerate(ROWS) if side == SIDE_PX]
@@ -46,6 +47,7 @@ def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFram
     if failures:
         raise InputError(f"{len(failures)} runs failed: {next(iter(failures.values()))}")
     found = {at: finished(keys[case], place) for at, case in cases.items()}
+    require_unbroken(broken(found.values()))
     table = []
     for name in options.inputs:
         for row in rows:

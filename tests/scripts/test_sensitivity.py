@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from analysis import cases, farm, sensitivity
-from analysis.cases import Scale
+from analysis.cases import Case, Scale
 from analysis.cli import parse
 from analysis.evaluation import Place, finished, source_of_results
 from analysis.sensitivity import Run, SensitivityOptions, Setting, runs
@@ -35,7 +35,7 @@ def error(run: Run) -> float:
     return float(np.exp(0.1 * (run.setting.spatial_slope + 2) + 0.2 * (run.setting.temporal_slope + 1) ** 2 - 0.3))
 
 
-def fill(out: Path, planned: list[Run]) -> None:
+def fill(out: Path, planned: list[Run], more: dict[Case, dict[str, Any]] | None = None) -> None:
     """Results as the runs would leave them, without the runs."""
     place = Place(out / "runs", out / "cache")
     (out / "runs" / "stills").mkdir(parents=True)
@@ -49,7 +49,9 @@ def fill(out: Path, planned: list[Run]) -> None:
         for name in stills:
             with store.make(name) as made:
                 Image.fromarray(rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)).save(made.path)
-        store.write_json(files["summary"].name, {"key": key, "case": run.case, "stills": stills})
+        store.write_json(
+            files["summary"].name, {"key": key, "case": run.case, "stills": stills, **(more or {}).get(run.case, {})}
+        )
 
 
 def summary(out: Path) -> dict[str, Any]:
@@ -85,6 +87,17 @@ def test_results_on_disk_are_read_and_not_made_again(
         with Image.open(out / "figures" / name) as picture:
             assert min(picture.size) > 300 and np.asarray(picture.convert("L"), float).std() > 5.0
     assert {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*") if path.is_file()} == before
+
+
+def test_broken_invariants_end_with_a_status_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    out, planned = tmp_path / "out", runs(options(*SMALL))
+    one = next(run.case for run in planned if run.case.policy == "tsar")
+    fill(out, planned, {one: {"invariants": {"ok": False}}})
+    status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
+    assert status == 3 and f"invariants are broken in 1 runs: {one.name}" in capsys.readouterr().err
+    assert summary(out)["runs_done"] == 30
 
 
 def test_failures_are_listed_and_the_rest_is_shown(
