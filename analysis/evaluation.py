@@ -9,7 +9,6 @@ machines, except the entry ``machine`` of the JSON file, which holds measured se
 from __future__ import annotations
 
 import dataclasses
-import importlib.metadata
 import io
 import resource
 import time
@@ -34,7 +33,8 @@ from analysis.perceptual import jod, one_thread
 from analysis.pictures import Pixels
 from analysis.quality import reference_times
 from analysis.records import InvariantCheck, RecordLimits
-from analysis.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash, source_hash
+from analysis.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
+from analysis.source import code_hash
 from analysis.store import Store
 
 if TYPE_CHECKING:
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 
-_MEASURING = ("cases", "causes", "cost_model", "evaluation", "observation", "perceptual", "quality", "reference")
-_PACKAGES = ("torch", "warp-lang", "numpy", "kornia", "cvvdp", "flip-evaluator")
 _ORACLE_WARMUP = 16  # its first cycles already go where the error is
 
 
@@ -82,12 +80,12 @@ def _store(results: Path) -> Store:
 
 @lru_cache(maxsize=1)
 def source_of_results() -> str:
-    """Hash of the source and libraries that decide a result."""
-    folders = ("tsar", "tsar/response", "tsar/baselines", "renderer", "scenes")
-    parts = [source_hash(ROOT / folder) for folder in folders]
-    parts += [(ROOT / "analysis" / f"{name}.py").read_text() for name in _MEASURING]
-    parts += [importlib.metadata.version(name) for name in _PACKAGES]
-    return content_hash(parts)[:16]
+    """Hash of the source, assets and libraries that decide a result.
+
+    It is taken once in a process, for the process goes on with what it has imported and read: a worker that is older
+    than a change must not pass for one that knows it.
+    """
+    return code_hash(evaluate)
 
 
 def finished(key: str, place: Place) -> dict[str, Any] | None:
@@ -153,7 +151,7 @@ def render_reference(input: str, phase: float, start_s: float, scale: Scale, pla
         spec = ReferenceSpec(
             scene=f"{input} phase {phase:g}",
             scene_hash=_scene_hash(input, phase),
-            renderer_hash=renderer_hash(ROOT, "cpu"),
+            renderer_hash=renderer_hash(renderer, "cpu"),
             start_s=start_s,
             rate_hz=scale.reference_rate_hz,
             count=len(reference_times(start_s, start_s + scale.seconds, scale.reference_rate_hz)),

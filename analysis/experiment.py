@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -118,24 +118,31 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
 
 
 def finished(options: RunOptions) -> dict[str, Any] | None:
-    """The summary of a run of these options by this commit, or None where it is not complete.
+    """The summary of a run of these options, by this code and of this scene as they are now; or None.
 
     It is complete where all of its files are as they were written; those that are damaged are named.
-    """
-    from analysis.records import provenance
 
-    now = provenance(ROOT, dataclasses.asdict(options))
-    if now["uncommitted_changes"]:
-        return None
-    store = _store(options, now)
+    Raises:
+        InputError: the scene cannot be read.
+    """
+    with first_imports():
+        from scenes import catalog
+
     with bad_input():
+        scene, _ = catalog.load_any(options.input, options.phase, options.camera_path)
+        store = Store(options.out, content_of(options, scene))
         found = store.read_json(_SUMMARY, {"provenance": dict, "invariants": {"ok": bool}, "files": list[str]})
     return found if found and all(store.find(name) is not None for name in found["files"]) else None
 
 
-def _store(options: RunOptions, source: Mapping[str, Any]) -> Store:
-    """Where the files of a run from this source are checked."""
-    return Store(options.out, f"{source['commit']} {source['config_hash']}")
+def content_of(options: RunOptions, scene: Scene) -> str:
+    """Hash of all that decides what a run gives: options, the scene's content, and the code."""
+    from analysis.files import plain
+    from analysis.reference import content_hash
+    from analysis.source import code_hash
+
+    kept = {name: value for name, value in plain(options).items() if name not in ("out", "cache")}
+    return content_hash((kept, scene, code_hash(run_experiment)))
 
 
 def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
@@ -144,7 +151,7 @@ def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any
     Returns:
         What is in the summary: what was given, and the files.
     """
-    store = _store(options, summary["provenance"])
+    store = Store(options.out, summary["provenance"]["content"])
     files = [name for name in _FILES if (options.out / name).exists()]
     for name in files:
         store.add(name)
@@ -160,7 +167,7 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
     spec = ReferenceSpec(
         scene=f"{options.input} phase {options.phase:g}",
         scene_hash=content_hash(setup.scene),
-        renderer_hash=renderer_hash(ROOT, options.device),
+        renderer_hash=renderer_hash(setup.renderer, options.device),
         start_s=options.start_s,
         rate_hz=options.reference_rate_hz,
         count=count,
@@ -247,6 +254,7 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
         seed=options.tsar.seed,
         device=options.device,
         threads=setup.renderer.threads,
+        content=content_of(options, setup.scene),
     )
     derived = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}
     summary = {

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import importlib.metadata
 import io
 import json
 import os
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.files import atomic, locked
+from analysis.source import code_hash
 from analysis.store import Journal, warn
 
 _HALF_MAX = float(np.finfo(np.float16).max)
@@ -37,7 +37,7 @@ class ReferenceSpec:
     Attributes:
         scene: name and phase of the scene, for people.
         scene_hash: :func:`content_hash` of the scene.
-        renderer_hash: hash of the renderer's source, versions and kind of device.
+        renderer_hash: :func:`renderer_hash` of the renderer.
         start_s: time of the first image, seconds.
         rate_hz: images per second.
         count: number of images.
@@ -112,27 +112,9 @@ def content_hash(value: Any) -> str:
     return digest.hexdigest()
 
 
-def source_hash(folder: Path, skip: tuple[str, ...] = ()) -> str:
-    """Hash of the Python files and C++ headers in and below a folder, by name and content.
-
-    Args:
-        folder: where they lie.
-        skip: patterns of names that are left out.
-    """
-    digest = hashlib.sha256()
-    for path in sorted([*folder.glob("*.py"), *folder.glob("*/*.h")]):
-        if not any(path.match(pattern) for pattern in skip):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
-
-
-_NOT_TRACING = ("film.py", "sequence.py", "queries.py", "control*.py", "display*.py", "launching.py")
-
-
-def renderer_hash(root: Path, device: str) -> str:
-    """Hash of what decides a picture: the renderer without file formats and stages, Warp, the kind of device."""
-    version = importlib.metadata.version("warp-lang")
-    return "-".join((source_hash(root / "renderer", skip=_NOT_TRACING)[:16], version, device.partition(":")[0]))
+def renderer_hash(renderer: object, device: str) -> str:
+    """Hash of the code that makes the images of a reference, and the kind of device."""
+    return f"{code_hash(type(renderer), obtain)}-{device.partition(':')[0]}"
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from analysis.reference import content_hash, source_hash
+from analysis.reference import content_hash
 from scenes import canonical as c
 
 
@@ -79,13 +78,3 @@ def test_the_hash_is_stable() -> None:
     assert content_hash(scene) == content_hash(whole_scene()) == content_hash(unshared)
     pinned = "f6292ecc8f3ec941"  # a change of it makes every reference on disk unknown
     assert content_hash((1, 2.5, "a", None))[:16] == content_hash([1, 2.5, "a", None])[:16] == pinned
-
-
-def test_source_hash(tmp_path: Path) -> None:
-    def changed_by(name: str, text: str) -> bool:
-        before = source_hash(tmp_path, skip=("film.py",))
-        (tmp_path / name).write_text(text)
-        return source_hash(tmp_path, skip=("film.py",)) != before
-
-    assert changed_by("a.py", "1") and changed_by("a.py", "2") and changed_by("b.py", "2")
-    assert not changed_by("b.py", "2") and not changed_by("film.py", "2") and not changed_by("notes.txt", "2")

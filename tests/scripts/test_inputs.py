@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-import analysis.records
+import analysis.source
 import scripts.inputs as script
 from analysis.cases import INPUTS
-from analysis.experiment import ROOT, RunOptions, write_summary
+from analysis.experiment import RunOptions, content_of, finished, write_summary
 from analysis.repetitions import InputsOptions, row
+from scenes import catalog
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import ConfigError, TsarConfig
 
@@ -75,20 +75,16 @@ def test_a_row_says_which_run_it_was(tmp_path: Path) -> None:
 def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Stands in for the experiment: writes records and a summary. Holds the names of the runs that were made."""
     names: list[str] = []
-    provenance = analysis.records.provenance
-
-    def committed(*arguments: Any, **extra: Any) -> dict[str, Any]:
-        return {**provenance(*arguments, **extra), "uncommitted_changes": False}
 
     def pretend(options: RunOptions) -> dict[str, Any]:
         names.append(options.out.name)
-        found = {**FOUND, "provenance": analysis.records.provenance(ROOT, dataclasses.asdict(options))}
+        scene, _ = catalog.load_any(options.input, options.phase)
+        found = {**FOUND, "provenance": {"content": content_of(options, scene)}}
         options.out.mkdir(exist_ok=True)
         (options.out / "steps.parquet").write_bytes(b"records of " + options.out.name.encode())
         write_summary(options, found)
         return found
 
-    monkeypatch.setattr(analysis.records, "provenance", committed)
     monkeypatch.setattr(script, "run_experiment", pretend)
     return names
 
@@ -113,13 +109,10 @@ def test_finished_runs_are_not_repeated(
     assert made[3:] == ["fly-by-seed0", "fly-by-seed1"], "other options, other runs"
 
 
-def test_runs_with_uncommitted_changes_are_repeated(
-    made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What the source was then is not known."""
+def test_runs_by_other_code_are_repeated(made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ("fly-by", "--repetitions", "1", "--out", str(tmp_path))
-    clean = analysis.records.provenance
-    monkeypatch.setattr(analysis.records, "provenance", lambda *a, **k: {**clean(*a, **k), "uncommitted_changes": True})
+    assert call_script("inputs.py", monkeypatch, *arguments) == 0
+    monkeypatch.setattr(analysis.source, "code_hash", lambda *makers: "upgraded")
     for _ in range(2):
         assert call_script("inputs.py", monkeypatch, *arguments) == 0
     assert made == ["fly-by-seed0"] * 2
@@ -152,7 +145,19 @@ def test_a_damaged_run_is_named_and_repeated(
     assert (f"{file}: is damaged" in again.err) == (damage != "lost")
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"provenance": {}}', '{"provenance": {"commit": "other"}}'])
+def test_a_run_of_a_scene_that_was_edited_is_not_finished(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.pbrt"
+    text = 'Camera "perspective" WorldBegin LightSource "distant" "rgb L" [1 1 1] Shape "sphere" WorldEnd'
+    scene.write_text(text)
+    options = RunOptions(str(scene), out=tmp_path)
+    content = content_of(options, catalog.load_any(str(scene))[0])
+    write_summary(options, {**FOUND, "provenance": {"content": content}})
+    assert finished(options) is not None
+    scene.write_text(text.replace("[1 1 1]", "[1 2 1]"))
+    assert finished(options) is None
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"provenance": {}}', '{"provenance": {"content": "other"}}'])
 def test_summaries_of_something_else_do_not_count(
     made: list[str], content: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,146 @@
+"""What code made a result: a hash of all files and versions that decide it, found by following imports.
+
+A stored result is used again where this hash is the same. No list of files has to be kept: what a module imports
+belongs to it, wherever it lies, and so does what lies beside it and is no Python, such as C++ headers and assets.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.metadata
+import sys
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+_NO_DATA = (".pyc", ".md", ".html", ".js")
+"""Endings of files beside the code that decide no result: pages only show them."""
+
+_DISTRIBUTIONS = {"warp": "warp-lang", "PIL": "pillow", "pycvvdp": "cvvdp", "flip_evaluator": "flip-evaluator"}
+"""Names under which packages are installed, where they are not those that they are imported by."""
+
+
+def code_hash(*makers: Any) -> str:
+    """Hash of the code that classes or functions are made of.
+
+    It covers the modules that define them, all modules of the same checkout that those import, directly or not, files
+    other than Python in and below the folders of those modules, and versions of Python and of all libraries that any
+    of the modules import.
+
+    Args:
+        makers: classes and functions, all of one checkout.
+
+    Returns:
+        16 hexadecimal digits.
+    """
+    return hash_of_modules(*_found(makers))
+
+
+def hash_of_modules(root: Path, starts: Sequence[Path]) -> str:
+    """As :func:`code_hash`, from the folder that packages lie in and the files of modules in them."""
+    modules, libraries = _reached(root, starts)
+    digest = hashlib.sha256()
+    for path in sorted({*modules, *_data(modules)}):
+        digest.update(f"{path.relative_to(root).as_posix()} {_file_hash(path, _state(path))}\n".encode())
+    for name in sorted(libraries):
+        digest.update(f"{name} {version_of(name)}\n".encode())
+    digest.update(f"python {sys.version_info.major}.{sys.version_info.minor}\n".encode())
+    return digest.hexdigest()[:16]
+
+
+def modules_of(*makers: Any) -> tuple[set[Path], set[str]]:
+    """Files of the modules that :func:`code_hash` covers, and names of the libraries that they import."""
+    return _reached(*_found(makers))
+
+
+def _found(makers: Sequence[Any]) -> tuple[Path, list[Path]]:
+    """The folder that all packages lie in, and the files of the modules that define the makers."""
+    files = [Path(sys.modules[maker.__module__].__file__ or "").resolve() for maker in makers]
+    return files[0].parents[makers[0].__module__.count(".")], files
+
+
+def version_of(library: str) -> str | None:
+    """Version of an installed library by the name it is imported by; None where it is not installed."""
+    try:
+        return importlib.metadata.version(_DISTRIBUTIONS.get(library, library))
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
+    """Modules that can be reached by imports, and names of libraries that they import."""
+    modules, libraries, waiting = set[Path](), set[str](), list(starts)
+    while waiting:
+        path = waiting.pop()
+        if path in modules:
+            continue
+        modules.add(path)
+        for name in _imports(path, root, _state(path)):
+            found = _module(root, name)
+            waiting += found
+            top = name.partition(".")[0]
+            if not found and top not in sys.stdlib_module_names:
+                libraries.add(top)
+    return modules, libraries
+
+
+def _module(root: Path, name: str) -> list[Path]:
+    """Files of a dotted name below the root: its module or, of a name within one, that; and the packages above it.
+
+    Of a name that a package itself defines, all of the package: it may fetch that from anywhere below it.
+    """
+    folder, found = root, list[Path]()
+    for part in name.split("."):
+        if (folder / f"{part}.py").is_file():
+            return [*found, folder / f"{part}.py"]
+        if not (folder / part).is_dir():
+            break
+        folder = folder / part
+        if (folder / "__init__.py").is_file():
+            found.append(folder / "__init__.py")
+    return found if folder == root else [*found, *folder.rglob("*.py")]
+
+
+@lru_cache(maxsize=4096)
+def _imports(path: Path, root: Path, state: tuple[int, ...]) -> tuple[str, ...]:
+    """Dotted names of what a module imports, wherever in it that stands but for type checkers."""
+    package = path.parent.relative_to(root).parts
+    return tuple(_names(ast.parse(path.read_bytes()), package))
+
+
+def _names(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            for other in node.orelse:
+                yield from _names(ast.Module([other], []), package)
+        elif isinstance(node, ast.stmt | ast.ExceptHandler | ast.match_case):
+            yield from _names(node, package)
+
+
+def _data(modules: set[Path]) -> Iterator[Path]:
+    """Files beside and below modules that are no Python."""
+    folders = {module.parent for module in modules}
+    for folder in folders:
+        if folders.isdisjoint(folder.parents):
+            for path in folder.rglob("*"):
+                if path.suffix != ".py" and path.suffix not in _NO_DATA and path.is_file():
+                    yield path
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """Changes when a file does."""
+    found = path.stat()
+    return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
+
+
+@lru_cache(maxsize=4096)
+def _file_hash(path: Path, state: tuple[int, ...]) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
