@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.cli import InputError
-from analysis.perception.observers import COLUMNS
 from analysis.perception.peer import peer_fit
 from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples
+from analysis.perception.trials import CONDITIONS
 
 THESIS_JND = {"planescene": 40.0, "spheresscene": 100.0}
 """Samples per pixel, read off figures 19 and 20 of the thesis."""
@@ -27,33 +26,12 @@ THESIS_P = {
 """p values of tables 1 and 2 of the thesis."""
 
 
-CONDITIONS = ("scene", "point_set", "time_filter")
-"""What trials differ in besides the level."""
-
 _GROUPS = (
     ("scene",),
     ("scene", "time_filter"),
     ("point_set", "time_filter"),
     ("scene", "point_set", "time_filter"),
 )
-
-
-def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
-    """The trials that have an answer, and of which kind their observers are.
-
-    Raises:
-        InputError: columns are missing, kinds are mixed, or there is no answer.
-    """
-    missing = [column for column in COLUMNS if column not in table.columns]
-    if missing:
-        raise InputError(f"{name}: expected a table of trials, found no column {', '.join(missing)}")
-    kinds = sorted(table["observer_kind"].dropna().unique())
-    if len(kinds) != 1:
-        raise InputError(f"{name}: expected observers of one kind, got {', '.join(map(str, kinds)) or 'none'}")
-    answered = table.dropna(subset=["correct"])
-    if answered.empty:
-        raise InputError(f"{name}: expected answered trials, got none")
-    return answered.assign(correct=answered["correct"].astype(bool)), str(kinds[0])
 
 
 def fits(trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> pd.DataFrame:
@@ -94,9 +72,15 @@ def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) 
     }  # fmt: skip
 
 
+_TESTED = (
+    "of", "first", "second", "samples", "pairs", "t", "degrees", "p", "mean_difference", "thesis_p",
+)  # fmt: skip
+_STRONGEST = ("of", "first", "second", "samples", "t", "degrees", "p", "mean_difference", "levels", "corrected_p")
+
+
 def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
     """Paired t-tests level by level: of scenes over observers, sets and filters, of sets over observers, scenes and
-    filters, of filters over observers, scenes and sets.
+    filters, of filters over observers, scenes and sets. No rows where there is one of each.
     """
     rows = []
     for column in CONDITIONS:
@@ -116,7 +100,7 @@ def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
                         "thesis_p": expected.get(int(samples), np.nan),
                     }
                 )  # fmt: skip
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=list(_TESTED))
 
 
 def strongest(tested: pd.DataFrame) -> pd.DataFrame:
@@ -131,7 +115,7 @@ def strongest(tested: pd.DataFrame) -> pd.DataFrame:
         corrected = min(1.0, float(best["p"]) * len(part))
         names = dict(zip(("of", "first", "second"), np.atleast_1d(np.asarray(pair)).tolist(), strict=True))
         rows.append({**names, **row, "levels": len(part), "corrected_p": corrected})
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=list(_STRONGEST))
 
 
 def _side_by_side(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:

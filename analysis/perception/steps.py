@@ -26,6 +26,7 @@ from analysis.perception.options import (
 from analysis.perception.protocol import Session
 from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, read_manifest, render_stimuli
+from analysis.perception.trials import CONDITIONS, checked_trials
 from analysis.tracer_options import LEVELS
 
 Task = Callable[[str, int], Callable[[int], None]]
@@ -149,7 +150,7 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
         table = pd.read_parquet(options.trials)
     except (OSError, ValueError) as error:
         raise InputError(f"trials: {options.trials}: cannot be read as Parquet ({error})") from None
-    trials, kind = analyses.checked_trials(table, str(options.trials))
+    trials, kind = checked_trials(table, str(options.trials))
     steps = task("analysis", 4)
     fitted = analyses.fits(trials, options.bootstraps, options.seed, options.psignifit)
     steps(1)
@@ -159,7 +160,7 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
     steps(3)
     pairs = analyses.strongest(tested)
     tables = {"fits": fitted, "tests": tested, "pairs": pairs}
-    if options.power_repetitions:
+    if options.power_repetitions and trials["samples"].nunique() > 1:
         levels = sorted(int(level) for level in trials["samples"].unique())
         jnds = (analyses.THESIS_JND["planescene"], analyses.THESIS_JND["spheresscene"])
         width = float(np.nanmedian(fitted["sigma"].to_numpy(np.float64))) if "sigma" in fitted else 1.5
@@ -200,7 +201,7 @@ def _text(fitted: pd.DataFrame, tested: pd.DataFrame, pairs: pd.DataFrame, kind:
     if len(set(fitted["time_filter"].dropna())) > 1:
         shown.append(["scene", "time_filter"])
     for row in fitted.to_dict("records"):
-        of = [name for name in analyses.CONDITIONS if not pd.isna(row[name])]
+        of = [name for name in CONDITIONS if not pd.isna(row[name])]
         if of not in shown:
             continue  # in the table
         jnd, beside = str(row["status"]), analyses.THESIS_JND.get(row["scene"])

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from analysis.perception.observers import drawn_observers, simulated_trials
 from analysis.perception.stimuli import frames_of, hash_of, png_of
 from tests.analysis.perception.builders import write_stimuli
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, started_script
@@ -89,6 +90,22 @@ def test_simulated_answers_and_their_analysis(tmp_path: Path, monkeypatch, capsy
     assert len(pd.read_csv(found / "power.csv")) == 8 and len(pd.read_csv(found / "fits.csv")) == 2 + 2 + 1 + 2
     assert summary(found)["observer_kind"] == "simulated"
     assert "simulated observers" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("levels", [(1, 8, 64), (8,)])
+def test_one_condition_is_analysed(tmp_path: Path, monkeypatch, capsys, levels: tuple[int, ...]) -> None:
+    rows = [{"scene": "a", "point_set": "b", "time_filter": "c", "samples": one, "jod": 3.0 / one} for one in levels]
+    trials = simulated_trials(pd.DataFrame(rows), drawn_observers(2, 0, 0.1, 0.0), 4, 0)
+    trials.assign(correct=trials["correct"].map({True: "yes", False: "no"})).to_parquet(tmp_path / "trials.parquet")
+    analyse = ("analyse", str(tmp_path / "trials.parquet"), "--bootstraps", "20", "--power-repetitions", "1")
+    assert call_script("perception.py", monkeypatch, *analyse, "--out", str(tmp_path)) == 0, capsys.readouterr().err
+    assert len(pd.read_csv(tmp_path / "tests.csv")) == len(pd.read_csv(tmp_path / "pairs.csv")) == 0
+    found = summary(tmp_path)
+    assert (
+        len(found["fits"]) == 4
+        and found["fits"][0]["trials"] == 8 * len(levels)
+        and ("power" in found) == (len(levels) > 1)
+    )
 
 
 def test_known_thresholds_are_given_back(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.cli import InputError
-from analysis.perception.analysis import checked_trials, comparisons, fits, power, strongest
+from analysis.perception.analysis import comparisons, fits, power, strongest
 from analysis.perception.observers import (
     COLUMNS,
     JOD_SIGMA,
@@ -64,8 +63,7 @@ def test_trials_of_an_observer_do_not_depend_on_others() -> None:
 
 
 def test_the_harder_scene_has_the_higher_threshold_and_the_tests_see_it() -> None:
-    trials, kind = checked_trials(simulated_trials(stimuli(), drawn_observers(12, 1, 0.1, 0.01), 4, 1), "table")
-    assert kind == "simulated"
+    trials = simulated_trials(stimuli(), drawn_observers(12, 1, 0.1, 0.01), 4, 1)
     fitted = fits(trials, 100, 0)
     scenes = fitted[fitted["point_set"].isna() & fitted["time_filter"].isna()].set_index("scene")
     assert scenes.loc["planescene", "high"] < scenes.loc["spheresscene", "low"]
@@ -93,17 +91,6 @@ def test_filters_and_shifts_are_compared_as_scenes_are() -> None:
         filters["p"].min() * filters["p"].notna().sum()
     )
     assert best.loc[("hammersley", "stratified"), "corrected_p"] > 0.05
-
-
-def test_tables_that_are_no_trials() -> None:
-    good = simulated_trials(stimuli(), drawn_observers(1, 1, 0.0, 0.0), 1, 1)
-    for bad, message in (
-        (good.drop(columns="answer"), "no column answer"),
-        (good.assign(observer_kind=["human", "simulated"] * 16), "observers of one kind, got human, simulated"),
-        (good.assign(correct=None), "answered trials, got none"),
-    ):
-        with pytest.raises(InputError, match=message):
-            checked_trials(bad, "table")
 
 
 def test_more_answers_tell_more_apart() -> None:

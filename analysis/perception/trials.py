@@ -1,0 +1,106 @@
+"""Tables of trials, of whoever made them: every column that is read is checked, and converted where that is honest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.cli import InputError
+from analysis.perception.observers import COLUMNS
+
+CONDITIONS = ("scene", "point_set", "time_filter")
+"""What trials differ in besides the level."""
+
+_RIGHT = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+_SIDES = ("left", "right")
+
+
+def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
+    """The trials that have an answer, and of which kind their observers are.
+
+    Args:
+        table: as it was read; trials without ``correct`` have no answer.
+        name: of the file, for messages.
+
+    Returns:
+        Trials with ``correct`` as booleans, ``samples`` as whole numbers, names as text.
+
+    Raises:
+        InputError: columns are missing or hold what they cannot, kinds are mixed, or there is no answer.
+    """
+    missing = [column for column in COLUMNS if column not in table.columns]
+    if missing:
+        raise InputError(f"{name}: expected a table of trials, found no column {', '.join(missing)}")
+    answered = table.loc[table["correct"].notna()]
+    if answered.empty:
+        raise InputError(f"{name}: expected answered trials, got none")
+    correct, samples = (_converted(answered, *column, name) for column in (_CORRECT, _SAMPLES))
+    names = {
+        column: _converted(answered, column, *_NAME, name) for column in ("observer_kind", "observer", *CONDITIONS)
+    }
+    found = answered.assign(**names, correct=correct, samples=samples)
+    kinds = sorted(set(found["observer_kind"]))
+    if len(kinds) != 1:
+        raise InputError(f"{name}: expected observers of one kind, got {', '.join(kinds)}")
+    _check_sides(found, name)
+    return found, kinds[0]
+
+
+def _converted(table: pd.DataFrame, column: str, convert: Any, expected: str, name: str) -> list[Any]:
+    found = []
+    for number, value in zip(table.index, table[column], strict=True):
+        try:
+            found.append(convert(value))
+        except (ValueError, KeyError, TypeError, OverflowError):
+            raise InputError(
+                f"{name}: column {column}, row {number}: expected {expected}, got {str(value)[:40]!r}"
+            ) from None
+    return found
+
+
+def _as_right(value: Any) -> bool:
+    """Whether an answer was right, as a boolean, as 0 or 1, or as text that says so."""
+    if isinstance(value, str):
+        return _RIGHT[value.strip().lower()]
+    if value not in (0, 1):
+        raise ValueError
+    return bool(value)
+
+
+def _as_level(value: Any) -> int:
+    number = float(value)
+    if isinstance(value, (bool, np.bool_)) or not 1.0 <= number <= 2.0**31 or number != int(number):
+        raise ValueError
+    return int(number)
+
+
+def _as_name(value: Any) -> str:
+    """A name that can be one of a file, too."""
+    if isinstance(value, (int, np.integer)):
+        return str(value)
+    if not isinstance(value, str) or not value.strip() or value.startswith(".") or any(c in value for c in "/\\\0"):
+        raise ValueError
+    return value
+
+
+_CORRECT = "correct", _as_right, "right or wrong (true or false, 1 or 0, yes or no)"
+_SAMPLES = "samples", _as_level, "a whole number of samples of at least 1"
+_NAME = _as_name, "a name without slashes that does not begin with a dot"
+
+
+def _check_sides(trials: pd.DataFrame, name: str) -> None:
+    """What is right must be so by the sides too, where both are given.
+
+    Raises:
+        InputError: a trial says otherwise.
+    """
+    given = trials["answer"].isin(_SIDES) & trials["differing_side"].isin(_SIDES)
+    wrong = given & ((trials["answer"] == trials["differing_side"]) != trials["correct"])
+    if wrong.any():
+        row = trials.loc[wrong].iloc[0]
+        raise InputError(
+            f"{name}: column correct, row {trials.index[wrong][0]}: expected {row['answer'] == row['differing_side']} "
+            f"for the answer {row['answer']} where {row['differing_side']} differs, got {bool(row['correct'])}"
+        )

@@ -1,0 +1,108 @@
+"""Tables of trials count for what they say, or are refused in a line that says where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.cli import InputError
+from analysis.perception.analysis import comparisons, fits, strongest
+from analysis.perception.observers import drawn_observers, simulated_trials
+from analysis.perception.trials import checked_trials
+
+STIMULI = pd.DataFrame(
+    [
+        {"scene": "planescene", "point_set": name, "time_filter": "box", "samples": level, "jod": 2.0 / level**0.5}
+        for name in ("hammersley", "poisson")
+        for level in (1, 8, 64)
+    ]
+)
+GOOD = simulated_trials(STIMULI, drawn_observers(3, 1, 0.1, 0.1), 2, 1)
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda right: right.map({True: "1", False: "0"}),
+        lambda right: right.map({True: "yes", False: "No"}),
+        lambda right: right.map({True: "TRUE", False: " false "}),
+        lambda right: right.map({True: "1", False: "0"}).astype("category"),
+        lambda right: right.astype(int),
+        lambda right: right.astype(float),
+        lambda right: right.astype(object),
+        lambda right: right.astype("boolean"),
+    ],
+)
+def test_answers_are_right_or_wrong_however_they_are_written(written: Any) -> None:
+    assert 0.0 < GOOD["correct"].mean() < 1.0
+    found, kind = checked_trials(GOOD.assign(correct=written(GOOD["correct"])), "table")
+    assert kind == "simulated" and found["correct"].dtype == bool
+    assert found["correct"].tolist() == GOOD["correct"].tolist()
+
+
+def test_trials_without_an_answer_are_left_out() -> None:
+    for none in (None, np.nan, pd.NA):
+        correct = GOOD["correct"].astype(object)
+        correct.iloc[[0, 5]] = none
+        found, _ = checked_trials(GOOD.assign(correct=correct), "table")
+        assert found["correct"].tolist() == GOOD["correct"].drop([0, 5]).tolist()
+
+
+def test_levels_and_names_are_converted_where_that_is_honest() -> None:
+    changed = GOOD.assign(samples=GOOD["samples"].astype(str), observer=GOOD["observer"].str[1:].astype(int))
+    found, _ = checked_trials(changed, "table")
+    assert found["samples"].tolist() == GOOD["samples"].tolist() and set(found["observer"]) == {"0", "1", "2"}
+
+
+def spoilt(column: str, value: Any) -> pd.DataFrame:
+    changed = GOOD[column].astype(object)
+    changed.iloc[3] = value
+    return GOOD.assign(**{column: changed})
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        *[("correct", value, "right or wrong") for value in ("maybe", "", 2, 0.5, -1, "2", [1], float("inf"))],
+        *[("samples", value, "a whole number of samples") for value in (None, "many", 0, -8, 2.5, float("inf"), True)],
+        *[("scene", value, "a name without slashes") for value in (None, "", "../x", "a/b", 1.5, ".x")],
+        ("observer", None, "a name"),
+        ("observer_kind", None, "a name"),
+        ("time_filter", "\0", "a name"),
+    ],
+)
+def test_a_value_that_a_column_cannot_hold_is_named(column: str, value: Any, expected: str) -> None:
+    with pytest.raises(InputError, match=rf"table: column {column}, row 3: expected {expected}.*, got "):
+        checked_trials(spoilt(column, value), "table")
+
+
+def test_an_answer_that_contradicts_its_sides_is_named() -> None:
+    with pytest.raises(InputError, match=r"column correct, row 3: expected (True|False) for the answer (left|right)"):
+        checked_trials(spoilt("correct", not GOOD["correct"][3]), "table")
+    checked_trials(spoilt("correct", not GOOD["correct"][3]).assign(differing_side=""), "table")
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        (GOOD.drop(columns="answer"), "no column answer"),
+        (GOOD.assign(observer_kind=["human", "simulated"] * (len(GOOD) // 2)), "one kind, got human, simulated"),
+        (GOOD.assign(correct=None), "answered trials, got none"),
+        (GOOD.iloc[:0], "answered trials, got none"),
+    ],
+)
+def test_tables_that_are_no_trials(bad: pd.DataFrame, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        checked_trials(bad, "table")
+
+
+def test_one_condition_has_fits_and_nothing_to_compare() -> None:
+    trials, _ = checked_trials(GOOD.loc[GOOD["point_set"] == "poisson"], "table")
+    tested = comparisons(trials)
+    assert tested.empty and "p" in tested.columns
+    best = strongest(tested)
+    assert best.empty and "corrected_p" in best.columns
+    assert len(fits(trials, 10, 0)) == 4
