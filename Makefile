@@ -45,7 +45,7 @@ bench: $(STAMP)
 
 # needs no network once its packages are installed
 docs: $(DOCS)
-	$(PY) -m mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
 
 # writes down what is installed now
 constraints: $(STAMP) $(DOCS)

@@ -1,0 +1,59 @@
+"""What README and documentation say exists: links, commands, targets, and code that runs."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+README = ROOT / "README.md"
+PAGES = [README, ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+# the site makes these from other files
+MADE = {ROOT / "docs" / name for name in ("notation.md", "changelog.md", "contributing.md", "reference/index.md")}
+
+LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
+
+
+def test_readme_is_short() -> None:
+    assert len(README.read_text().splitlines()) <= 150
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = {(page.parent / link).resolve() for link in LINK.findall(page.read_text())}
+    assert [str(target) for target in targets if not target.exists() and target not in MADE] == []
+
+
+def test_pictures_are_used() -> None:
+    text = "".join(page.read_text() for page in PAGES)
+    assert [path.name for path in (ROOT / "docs/pictures").iterdir() if f"pictures/{path.name}" not in text] == []
+
+
+def test_commands_and_targets_exist() -> None:
+    text = "".join(page.read_text() for page in PAGES)
+    scripts = set(re.findall(r"scripts/(\w+\.py)", text))
+    targets = set(re.findall(r"(?m)(?:`|^)make ([a-z-]+)", text))
+    assert {name for name in scripts if not (ROOT / "scripts" / name).is_file()} == set()
+    assert targets - set(re.findall(r"(?m)^([a-z-]+):", (ROOT / "Makefile").read_text())) == set()
+    assert len(scripts) > 10 and len(targets) > 4
+
+
+def test_the_python_of_the_readme_runs() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) > 20 and all(re.fullmatch(r"-?\d+\.\d{3} s: \d+ tiles, mean 0\.\d{3}", line) for line in lines)
+
+
+@pytest.mark.slow
+def test_figures_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["figures.py", str(tmp_path)])
+    runpy.run_path(str(ROOT / "docs/figures.py"), run_name="__main__")
+    drawn = {path.name for path in tmp_path.iterdir()}
+    assert drawn == {path.name for path in (ROOT / "docs/pictures").glob("*.png")}
