@@ -37,7 +37,7 @@ class PacketBatches:
         self._keep = buffers, still, moving  # launches know their arrays by address only
         self._threads, self._lock = threads, threading.Lock()
         self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
-        self._counters = self._taken.ctypes.data, self._rays.ctypes.data
+        self._counters = address("taken", self._taken, torch.int32, 1), address("rays", self._rays, torch.int64, 2)
 
     def shade(self, position: Tensor, time_s: Tensor | float) -> tuple[Tensor, int, int]:
         """Colours ``(n, s, 3)`` float32, and how many shadow rays and reflections they took.
@@ -48,17 +48,20 @@ class PacketBatches:
         """
         groups, group_size, _ = position.shape
         color = torch.empty(groups, group_size, 3)
+        count = groups * group_size
+        places = address("position", position, torch.float32, 2 * count)
+        colors = address("color", color, torch.float32, 3 * count)
         with self._lock:
             self._taken[:], self._rays[:] = 0, 0
             command, times = self._moving, 0
             if isinstance(time_s, Tensor):
                 time_s = time_s.to(torch.float64).contiguous()
-                times = address(time_s)
+                times = address("time_s", time_s, torch.float64, count)
             else:
                 command = self._still
                 self._pose(time_s)
             taken, rays = self._counters
-            command.set(taken, groups * group_size, address(position), times, address(color), rays)
+            command.set(taken, count, places, times, colors, rays)
             TEAM.run([command] * self._threads)
             shadow, reflection = self._rays.tolist()
         return color, shadow, reflection

@@ -7,7 +7,6 @@ they hand the work to those: solvers other than ``waterfill``, and batches with 
 from __future__ import annotations
 
 import time
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import torch
@@ -23,6 +22,7 @@ from renderer.control_selection import SelectionPlan
 from renderer.display import Display
 from renderer.launching import Command, address, require_same
 from renderer.team import TEAM
+from renderer.views import PerCache, point_at_cache
 from tsar.accounting import FAST_REFRESH, Account
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
@@ -37,6 +37,8 @@ from tsar.selection import Request, cell_centres, require_full
 from tsar.stages import REFERENCE, Stages
 from tsar.tiling import split_bounds, tie_order
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
+
+_F32, _F64, _I32, _I64 = torch.float32, torch.float64, torch.int32, torch.int64
 
 
 def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) -> Stages:
@@ -76,12 +78,14 @@ class Control:
         self._most_tiles = 4**config.level_min + 3 * split_bounds(config)[1]
         self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
         self._scratch = kernels.Scratch()
-        self._scratch.value, self._scratch.key = map(address, self._ranks)
+        for name, row in zip(("value", "key"), self._ranks, strict=True):
+            setattr(self._scratch, name, address(name, row, _F64, self._ranks.shape[1]))
         self._prepare_observation()
         self._prepare_decision()
         self._parts = _part_of_element(config)
         self._sums = np.zeros(3)
-        fixed = self._elements, FAST_REFRESH, address(self._parts), self._sums.ctypes.data
+        parts = address("parts", self._parts, _I32, self._elements)
+        fixed = self._elements, FAST_REFRESH, parts, address("sums", self._sums, _F64, 3)
         self._account = Command(kernels.take_account, *fixed)
 
     def observe(
@@ -100,18 +104,19 @@ class Control:
         if count > config.batch_size:
             raise ValueError(f"batch: expected at most {config.batch_size} framelets, got {count}")
         with stage("cache"):
-            claim, observe = self._commands(cache)
+            claim, observe = self._per_cache(cache)
+            color = _single(color).contiguous()
             spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
-            fields = address(spatial), address(temporal)
-            tiles = count, address(batch.level), address(batch.index)
+            fields = self._field("errors.spatial", spatial, _F32), self._field("errors.temporal", temporal, _F32)
+            level = address("batch.level", batch.level, _I64, count)
+            tiles = count, level, address("batch.index", batch.index, _I64, count)
+            colors = address("color", color, _F32, count * 3 * config.samples)
             claim(*tiles, self._times_of(batch), *fields)
         with stage("error"):
-            if color.dtype != torch.float32 or not color.is_contiguous():
-                color = color.to(torch.float32).contiguous()
-            self._run(observe, *tiles, address(color), *fields)
+            self._run(observe, *tiles, colors, *fields)
             if self._progress[1]:
                 color, nonfinite = replace_nonfinite(color, config.framelet_side)
-                self._run(observe, *tiles, address(color), *fields)
+                self._run(observe, *tiles, address("color", color, _F32, count * 3 * config.samples), *fields)
         return Observation(Errors(spatial, temporal), nonfinite)
 
     def decide(
@@ -135,10 +140,30 @@ class Control:
         level, index = (torch.empty(self._most_tiles, dtype=torch.int64) for _ in range(2))
         selected, due_level, due_index = (torch.empty(count, dtype=torch.int64) for _ in range(3))
         credit, position = torch.empty(self._elements, dtype=torch.float64), torch.empty(count, samples, 2)
-        signed = _single(errors.spatial), _single(errors.temporal)
-        given = densities.spatial, densities.temporal, *signed, spatial, temporal, level, index, history
-        due = selected, credit, due_level, due_index, position
-        self._decide(int(compiled), surplus, *map(address, (*given, *due)))
+        fields = (
+            ("densities.spatial", densities.spatial, _F64),
+            ("densities.temporal", densities.temporal, _F64),
+            ("errors.spatial", _single(errors.spatial), _F32),
+            ("errors.temporal", _single(errors.temporal), _F32),
+            ("spatial", spatial, _F64),
+            ("temporal", temporal, _F64),
+        )
+        due = (
+            ("selected", selected, _I64, count),
+            ("credit", credit, _F64, self._elements),
+            ("due level", due_level, _I64, count),
+            ("due index", due_index, _I64, count),
+            ("position", position, _F32, count * samples * 2),
+        )
+        self._decide(
+            int(compiled),
+            surplus,
+            *(self._field(*field) for field in fields),
+            address("level", level, _I64, self._most_tiles),
+            address("index", index, _I64, self._most_tiles),
+            self._field("history", history, _F64),
+            *(address(*part) for part in due),
+        )
         tiles = int(self._tile_count[0])
         if tiles == 0:
             raise ValueError("tiling: expected finite, non-negative densities")
@@ -154,15 +179,27 @@ class Control:
 
     def account(self, densities: Densities, errors: Errors, newest_s: Tensor, config: TsarConfig) -> Account:
         """As :func:`tsar.accounting.account`."""
-        signed = _single(errors.spatial), _single(errors.temporal)
-        self._account(*map(address, (densities.spatial, densities.temporal, *signed, newest_s)))
+        fields = (
+            ("densities.spatial", densities.spatial, _F64),
+            ("densities.temporal", densities.temporal, _F64),
+            ("errors.spatial", _single(errors.spatial), _F32),
+            ("errors.temporal", _single(errors.temporal), _F32),
+        )
+        newest = address("newest_s", newest_s, _F64, 4**config.level_max)
+        self._account(*(self._field(*field) for field in fields), newest)
         combined, spread, nonfinite = self._sums.tolist()
         return Account(combined, spread, int(nonfinite))
 
+    def _field(self, name: str, values: Tensor, dtype: torch.dtype) -> int:
+        """Address of a field over the elements."""
+        return address(name, values, dtype, self._elements)
+
     def _times_of(self, batch: FrameletBatch) -> int:
         """Address of the time of each framelet, that of its first sample."""
-        time_s = batch.time_s
-        self._times[: len(batch.level)] = time_s if isinstance(time_s, float) else batch.times[:, 0].numpy()
+        time_s, count = batch.time_s, len(batch.level)
+        if isinstance(time_s, Tensor) and len(time_s) != count:
+            raise ValueError(f"batch.time_s: expected {count} framelets, got {len(time_s)}")
+        self._times[:count] = time_s[:, 0].numpy() if isinstance(time_s, Tensor) else time_s
         return self._times_address
 
     def _run(self, observe: Command, *arguments: int) -> None:
@@ -171,35 +208,39 @@ class Control:
         observe.set(*arguments)
         TEAM.run([observe] * self._threads)
 
-    def _commands(self, cache: FrameletCache) -> tuple[Command, Command]:
+    def _record(self, cache: FrameletCache) -> tuple[Command, Command]:
         """Launches that know where a cache lies: one claims slots, one observes a batch."""
-        found = self._of_cache.get(cache)
-        if found is None:
-            fixed = self._error_plan, _cache_view(cache, self.config), self._claim, self._pending.ctypes.data
-            found = (
-                Command(kernels.claim_slots, *fixed, self._scratch),
-                Command(kernels.observe_batch, *fixed, self._progress.ctypes.data),
-            )
-            self._of_cache[cache] = found
-        return found
+        pending = address("pending", self._pending, torch.uint8, self.config.batch_size)
+        fixed = self._error_plan, _cache_view(cache, self.config), self._claim, pending
+        progress = address("progress", self._progress, _I32, 2)
+        return (
+            Command(kernels.claim_slots, *fixed, self._scratch),
+            Command(kernels.observe_batch, *fixed, progress),
+        )
 
     def _prepare_observation(self) -> None:
         config, claim = self.config, ClaimMemory()
-        self._of_cache: WeakKeyDictionary[FrameletCache, tuple[Command, Command]] = WeakKeyDictionary()
+        self._per_cache = PerCache(self._record)
         self._error_plan = _error_plan(config)
-        self._places = torch.empty(2, config.batch_size, dtype=torch.int64)
-        self._spare = torch.empty(config.batch_size, state_size(config.samples))
-        self._marks = torch.zeros(config.cache_slots, dtype=torch.bool)
-        claim.slot, claim.past = map(address, self._places)
-        claim.spare, claim.marks = address(self._spare), address(self._marks)
+        batch, slots, state = config.batch_size, config.cache_slots, state_size(config.samples)
+        self._places = torch.empty(2, batch, dtype=_I64)
+        self._spare = torch.empty(batch, state)
+        self._marks = torch.zeros(slots, dtype=torch.bool)
+        claim.slot, claim.past = (address("places", row, _I64, batch) for row in self._places)
+        claim.spare = address("spare", self._spare, _F32, batch * state)
+        claim.marks = address("marks", self._marks, torch.bool, slots)
         self._claim = claim
-        self._pending, self._progress = np.zeros(config.batch_size, np.uint8), np.zeros(2, np.int32)
-        self._times = np.zeros(config.batch_size)
-        self._times_address = self._times.ctypes.data
+        self._pending, self._progress = np.zeros(batch, np.uint8), np.zeros(2, np.int32)
+        self._times = np.zeros(batch)
+        self._times_address = address("times", self._times, _F64, batch)
 
     def _prepare_decision(self) -> None:
         self._surplus, self._tile_count, self._decided = np.zeros(1), np.zeros(1, np.int32), np.zeros(4, np.int64)
-        results = (array.ctypes.data for array in (self._surplus, self._tile_count, self._decided))
+        results = (
+            address("surplus", self._surplus, _F64, 1),
+            address("tile count", self._tile_count, _I32, 1),
+            address("times", self._decided, _I64, 4),
+        )
         plans = self._make_response_plan(), self._make_tiling_plan(), self._make_selection_plan()
         self._decide = Command(kernels.decide_next, *plans, self._scratch, *results)
 
@@ -207,7 +248,8 @@ class Control:
         plan = _response_plan(self.config)
         self._active = torch.empty(self._elements, dtype=torch.int32)
         self._columns = torch.empty(COLUMNS, self._elements, dtype=torch.float64)
-        plan.active, plan.columns = address(self._active), address(self._columns)
+        plan.active = self._field("active", self._active, _I32)
+        plan.columns = address("columns", self._columns, _F64, COLUMNS * self._elements)
         return plan
 
     def _make_tiling_plan(self) -> kernels.TilingPlan:
@@ -220,15 +262,18 @@ class Control:
         plan.field_level, plan.level_low, plan.level_high = config.field_level, low, high
         plan.splits_least, plan.splits_most = split_bounds(config)
         plan.threshold = config.tiling.threshold_samples
-        plan.order, plan.sums = address(self._order), address(self._nodes)
-        plan.key, plan.split = address(self._node_keys), address(self._split)
+        ordered = (4**high - 4**low) // 3
+        plan.order = address("order", self._order, _I64, ordered)
+        plan.sums = address("sums", self._nodes, _F64, nodes)
+        plan.key = address("keys", self._node_keys, _F64, nodes)
+        plan.split = address("splits", self._split, torch.uint8, nodes)
         return plan
 
     def _make_selection_plan(self) -> SelectionPlan:
         config, plan = self.config, SelectionPlan()
         self._centres = cell_centres(config.framelet_side)
         plan.batch, plan.field_level, plan.samples = config.batch_size, config.field_level, config.samples
-        plan.centre = address(self._centres)
+        plan.centre = address("centres", self._centres, _F32, 2 * config.samples)
         return plan
 
 
@@ -263,9 +308,8 @@ def _response_plan(config: TsarConfig) -> ResponsePlan:
 
 def _cache_view(cache: FrameletCache, config: TsarConfig) -> CacheView:
     view = CacheView()
-    view.slots, view.samples, view.state = cache.level.shape[0], config.samples, state_size(config.samples)
-    for name in ("level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"):
-        setattr(view, name, address(getattr(cache, name)))
+    view.samples, view.state = config.samples, state_size(config.samples)
+    point_at_cache(view, cache, config)
     return view
 
 

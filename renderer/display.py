@@ -4,7 +4,6 @@ rows that threads share."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import torch
@@ -16,6 +15,7 @@ from renderer.display_age import DisplayPlan
 from renderer.display_bands import PLANES
 from renderer.launching import Command, address, require_same
 from renderer.team import TEAM
+from renderer.views import PerCache, point_at_cache
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton
@@ -52,48 +52,48 @@ class Display:
         threads = min(threads, config.resolution_px // self._plan.band)
         self._holes = np.zeros(threads, np.int32)
         self._workers = [self._make_worker(number) for number in range(threads)]
-        self._of_cache: WeakKeyDictionary[FrameletCache, _Launches] = WeakKeyDictionary()
+        self._per_cache = PerCache(self._record)
 
     def reconstruct(self, cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
         """As :func:`tsar.reconstruction.reconstruct`, to which an image with holes is left."""
         require_same(config, self.config)
-        launches = self._launches(cache)
+        launches = self._per_cache(cache)
         newest_s = torch.empty(self._cells, self._cells, dtype=torch.float64)
         level = torch.empty(self._cells, self._cells, dtype=torch.int64)
         image = torch.empty(config.resolution_px, config.resolution_px, 3)
-        launches.find(cycle_s, address(newest_s), address(level))
+        cells, pixels = self._cells**2, address("image", image, torch.float32, 3 * config.resolution_px**2)
+        launches.find(
+            cycle_s, address("newest_s", newest_s, torch.float64, cells), address("level", level, torch.int64, cells)
+        )
         self._taken[0] = 0
         for paint in launches.paint:
-            paint.set(self._count[0], address(image))
+            paint.set(self._count[0], pixels)
         TEAM.run(launches.paint)
         if self._holes.any():
             return reconstruct(cache, config, cycle_s)
         launches.bury()
         return Reconstruction(image, SampleMap(newest_s, level), float(self._overdraw[0]))
 
-    def _launches(self, cache: FrameletCache) -> _Launches:
-        found = self._of_cache.get(cache)
-        if found is None:
-            view = kernels.CachedFramelets()
-            view.slots = cache.level.shape[0]
-            for name in ("level", "index", "time_s", "dead", "color"):
-                setattr(view, name, address(getattr(cache, name)))
-            paint = [
-                Command(kernels.paint_bands, self._plan, view, worker, self._taken.ctypes.data)
-                for worker in self._workers
-            ]
-            found = _Launches(
-                Command(kernels.find_candidates, self._plan, view, self._count.ctypes.data),
-                paint,
-                Command(kernels.bury_dead, self._plan, view, self._overdraw.ctypes.data),
-            )
-            self._of_cache[cache] = found
-        return found
+    def _record(self, cache: FrameletCache) -> _Launches:
+        view = kernels.CachedFramelets()
+        point_at_cache(view, cache, self.config)
+        taken = address("taken", self._taken, torch.int32, 1)
+        count = address("count", self._count, torch.int32, 1)
+        overdraw = address("overdraw", self._overdraw, torch.float64, 1)
+        return _Launches(
+            Command(kernels.find_candidates, self._plan, view, count),
+            [Command(kernels.paint_bands, self._plan, view, worker, taken) for worker in self._workers],
+            Command(kernels.bury_dead, self._plan, view, overdraw),
+        )
 
-    def _keep(self, name: str, tensor: Tensor) -> int:
+    def _keep(self, name: str, tensor: Tensor, dtype: torch.dtype, count: int) -> int:
         """Address of a tensor that lives as long as this object."""
         self._memory[name] = tensor.contiguous()
-        return address(self._memory[name])
+        return address(name, self._memory[name], dtype, count)
+
+    def _room(self, name: str, count: int, dtype: torch.dtype = torch.float32) -> int:
+        """Address of memory that lives as long as this object, zero at first."""
+        return self._keep(name, torch.zeros(count, dtype=dtype), dtype, count)
 
     def _make_plan(self) -> DisplayPlan:
         config, plan = self.config, DisplayPlan()
@@ -103,26 +103,28 @@ class Display:
         plan.half = config.reconstruction.age_support_px // 2
         plan.band = min(max(_BAND_PIXELS // resolution, _BAND_ROWS_LEAST), resolution)
         axes = [_axis(side, resolution >> level) for level in range(low, high + 1)]
+        length = sum(axis[0].numel() for axis in axes) + _SPARE
         for place, name in enumerate(("left", "right", "share_left", "share_right", "weight")):
-            setattr(plan, name, self._keep(name, torch.cat([*(axis[place] for axis in axes), axes[0][place][:_SPARE]])))
+            values = torch.cat([*(axis[place] for axis in axes), axes[0][place][:_SPARE]])
+            setattr(plan, name, self._keep(name, values, torch.float32 if place > 1 else torch.int32, length))
         lengths = torch.tensor([0, *(axis[0].numel() for axis in axes)], dtype=torch.int32)
-        plan.first = self._keep("first", torch.cumsum(lengths, 0, dtype=torch.int32))
+        first = torch.cumsum(lengths, 0, dtype=torch.int32)
+        plan.first = self._keep("first", first, torch.int32, len(axes) + 1)
         margins = [(axis[0].numel() - (resolution >> level)) // 2 for level, axis in enumerate(axes, low)]
-        plan.margin = self._keep("margin", torch.tensor(margins, dtype=torch.int32))
+        plan.margin = self._keep("margin", torch.tensor(margins, dtype=torch.int32), torch.int32, len(axes))
         width = resolution // cells
         plan.reach = -(-plan.half // width) - (-max(margins) // width)
-        plan.order = self._keep("order", raster_to_morton(side).to(torch.int32))
+        plan.order = self._keep("order", raster_to_morton(side).to(torch.int32), torch.int32, side**2)
         nodes = (4 ** (high + 1) - 1) // 3
-        plan.node_time = self._keep("node_time", torch.empty(nodes, dtype=torch.float64))
-        plan.node_level = self._keep("node_level", torch.empty(nodes, dtype=torch.int32))
-        plan.cell_age = self._keep("cell_age", torch.empty(cells**2))
-        plan.cell_least = self._keep("cell_least", torch.empty(2, cells**2))
-        pixels = resolution + 2 * plan.half + 1
-        plan.row_integral = self._keep("row_integral", torch.empty(pixels, dtype=torch.float64))
-        plan.row_sum = self._keep("row_sum", torch.empty(cells, resolution, dtype=torch.float64))
-        plan.slot_age = self._keep("slot_age", torch.empty(slots))
-        plan.candidate = self._keep("candidate", torch.empty(slots, dtype=torch.int32))
-        plan.seen = self._keep("seen", torch.empty(slots, dtype=torch.int32))
+        plan.node_time = self._room("node_time", nodes, torch.float64)
+        plan.node_level = self._room("node_level", nodes, torch.int32)
+        plan.cell_age = self._room("cell_age", cells**2)
+        plan.cell_least = self._room("cell_least", 2 * cells**2)
+        plan.row_integral = self._room("row_integral", resolution + 2 * plan.half + 1, torch.float64)
+        plan.row_sum = self._room("row_sum", cells * resolution, torch.float64)
+        plan.slot_age = self._room("slot_age", slots)
+        plan.candidate = self._room("candidate", slots, torch.int32)
+        plan.seen = self._room("seen", slots, torch.int32)
         return plan
 
     def _make_worker(self, number: int) -> kernels.Worker:
@@ -130,12 +132,12 @@ class Display:
         resolution, side = config.resolution_px, config.framelet_side
         widest = max(2 * side, 2 * (resolution >> config.level_min))
         planes, rows = PLANES * self._plan.band * resolution, 3 * side * widest
-        worker.planes = self._keep(f"planes {number}", torch.zeros(planes + _SPARE))
-        worker.rows = self._keep(f"rows {number}", torch.zeros(rows + _SPARE))
-        worker.samples = self._keep(f"samples {number}", torch.zeros(3 * side**2))
-        worker.box = self._keep(f"box {number}", torch.empty(resolution, dtype=torch.float64))
-        worker.ages = self._keep(f"ages {number}", torch.empty(resolution))
-        worker.result = self._holes[number:].ctypes.data
+        worker.planes = self._room(f"planes {number}", planes + _SPARE)
+        worker.rows = self._room(f"rows {number}", rows + _SPARE)
+        worker.samples = self._room(f"samples {number}", 3 * side**2)
+        worker.box = self._room(f"box {number}", resolution, torch.float64)
+        worker.ages = self._room(f"ages {number}", resolution)
+        worker.result = address("holes", self._holes[number : number + 1], torch.int32, 1)
         return worker
 
 

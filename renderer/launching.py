@@ -11,6 +11,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
+import torch
 import warp as wp
 from numpy.typing import NDArray
 from torch import Tensor
@@ -21,20 +23,41 @@ Address = wp.uint64
 """In a kernel: of the first element of a contiguous tensor on the CPU."""
 
 
-def address(tensor: Tensor) -> int:
-    """Where a tensor's elements lie, one after the other, on the CPU.
+def address(name: str, values: Tensor | NDArray, dtype: torch.dtype, count: int) -> int:
+    """Where an array's elements lie for native code, which takes their kind and number on trust.
+
+    Args:
+        name: of the array, for the error.
+        values: the array, which the caller keeps alive.
+        dtype, count: kind and number of elements that are read or written there.
 
     Raises:
-        ValueError: if they lie otherwise.
+        ValueError: unless the array has these, one after the other, on the CPU.
     """
-    if not tensor.is_contiguous() or tensor.is_cuda:
-        raise ValueError(f"expected a contiguous tensor on the CPU, got strides {tensor.stride()} on {tensor.device}")
-    return tensor.data_ptr()
+    if isinstance(values, np.ndarray):
+        values = torch.from_numpy(values)
+    if values.dtype is not dtype or values.numel() != count or not values.is_cpu or not values.is_contiguous():
+        raise ValueError(f"{name}: expected {count} contiguous elements of {dtype} on cpu, got {_described(values)}")
+    return values.data_ptr()
+
+
+def _described(values: Tensor) -> str:
+    gaps = "" if values.is_contiguous() else f" with strides {tuple(values.stride())}"
+    return f"shape {tuple(values.shape)}{gaps} of {values.dtype} on {values.device}"
 
 
 def shared(values: NDArray, dtype: type) -> wp.array:
-    """A contiguous NumPy array as a Warp one on the CPU, in the same memory."""
-    return wp.array(values, dtype=dtype, device="cpu", copy=False)
+    """A contiguous NumPy array as a Warp one on the CPU, in the same memory.
+
+    Raises:
+        ValueError: if its elements are of another kind, or do not lie one after the other.
+    """
+    made = wp.array(values, dtype=dtype, device="cpu", copy=False)
+    if made.ptr != values.ctypes.data or not made.is_contiguous:  # where the kind differs Warp makes a copy unasked
+        raise ValueError(
+            f"expected contiguous elements of {dtype.__name__}, got shape {values.shape} of {values.dtype}"
+        )
+    return made
 
 
 def require_same(config: TsarConfig, own: TsarConfig) -> None:

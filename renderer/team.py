@@ -12,10 +12,11 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
+import torch
 
 from renderer import device as devices
 from renderer import team_kernels as kernels
-from renderer.launching import Command
+from renderer.launching import Command, address
 
 PATIENCE_US = 1000
 """How long a helper waits actively: longer than any pause between the launches of one cycle."""
@@ -30,7 +31,7 @@ class _Helper:
     def __init__(self, patience_us: int) -> None:
         self._mail = np.zeros(16, np.int64)
         self._mail[_STATE] = _PARKED
-        where = self._mail.ctypes.data
+        where = address("mail", self._mail, torch.int64, len(self._mail))
         self._serve = Command(kernels.serve, where, patience_us)
         self._post, self._join = Command(kernels.post, where), Command(kernels.join, where)
         self._wake = threading.Semaphore(0)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-import pytest
-import torch
 import warp as wp
 
 from renderer import device as devices
-from renderer.launching import Address, Command, address
+from renderer.launching import Address, Command
 
 wp.set_module_options({"enable_backward": False})
 
@@ -54,8 +52,3 @@ def test_a_launch_without_varying_arguments() -> None:
     out, pair = np.zeros(7), Pair()
     Command(copy_out, out.ctypes.data, pair, 1, 2.0, 3.0, 4, 5)()
     assert out.tolist() == [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
-
-
-def test_only_contiguous_tensors_have_an_address() -> None:
-    with pytest.raises(ValueError, match="expected a contiguous tensor on the CPU"):
-        address(torch.zeros(4, 4).T)
