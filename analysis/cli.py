@@ -112,8 +112,8 @@ def _one_line(box: str) -> str:
 def run_cli(main: Callable[[], None]) -> None:
     """Runs a script's main function and ends the process.
 
-    Bad input, and a package of an extra that is not installed, end with one line on standard error and status 2, broken
-    invariants with one line and status 3, Ctrl-C with one line and status 130.
+    Bad input, and a package that is not installed or in a version that does not serve, end with one line on standard
+    error and status 2, broken invariants with one line and status 3, Ctrl-C with one line and status 130.
     """
     _spin_briefly()
     warnings.showwarning = _one_warning
@@ -130,6 +130,8 @@ def run_cli(main: Callable[[], None]) -> None:
         if missing is None:
             raise
         _end(missing, EXIT_BAD_INPUT)
+    except ImportError as error:
+        _end(error, EXIT_BAD_INPUT)
     except KeyboardInterrupt:
         print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)

@@ -16,6 +16,8 @@ import torch
 import warp as wp
 
 DEVICES = ("cpu", "cuda:0")
+WARP_TESTED = "1.19"
+"""Release of Warp that this package was tested with, any patch of it: launches use what it does not promise to keep."""
 
 _SLOW_LOAD_S = 0.4
 _LINE_INTERVAL_S = 2.0
@@ -27,6 +29,23 @@ _lock = threading.Lock()
 
 class DeviceError(ValueError):
     """The device asked for cannot be used here."""
+
+
+class VersionError(ImportError):
+    """A package is installed in a version that does not serve here."""
+
+
+def require_tested(found: str) -> None:
+    """Checks a version of Warp.
+
+    Raises:
+        VersionError: if it is not of the release that was tested.
+    """
+    if found.split(".")[:2] != WARP_TESTED.split("."):
+        raise VersionError(f"warp-lang: expected version {WARP_TESTED}.x, which was tested, found {found}")
+
+
+require_tested(wp.__version__)  # before anything else of it is touched
 
 
 @contextlib.contextmanager

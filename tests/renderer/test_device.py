@@ -7,11 +7,13 @@ import os
 import subprocess
 import sys
 import threading
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+import warp as wp
 
 from renderer import device
 
@@ -57,6 +59,17 @@ class Loads:
             assert self.gates[module.__name__].wait(60.0)
         if module.__name__ in self.broken:
             raise RuntimeError(f"{module.__name__} does not compile")
+
+    def after(self, name: str, word: str, write: Callable[[str], int]) -> Callable[[str], int]:
+        """Writes, and lets a module go once a text with a word has been written."""
+
+        def written(text: str) -> int:
+            count = write(text)
+            if word in text:
+                self.gates[name].set()
+            return count
+
+        return written
 
     def letting_go(self, lines: list[str]) -> Callable[[str], None]:
         """Keeps lines; each line lets the next module in order go."""
@@ -156,7 +169,7 @@ def test_lines_go_to_standard_error(loads, capsys: pytest.CaptureFixture, monkey
     """Also on a terminal where something else, such as a bar, has taken the stream's place."""
     made = loads("kernels.a")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    threading.Timer(0.1, made.gates["kernels.a"].set).start()
+    monkeypatch.setattr(sys.stderr, "write", made.after("kernels.a", "compiling", sys.stderr.write))
     device.load_kernels(A, "cpu")
     shown = capsys.readouterr()
     lines = shown.err.splitlines()
@@ -170,10 +183,10 @@ def test_a_terminal_shows_a_status_that_goes_away(loads, monkeypatch: pytest.Mon
             return True
 
     made, terminal = loads("kernels.a"), Terminal()
+    monkeypatch.setattr(terminal, "write", made.after("kernels.a", "compiling", terminal.write))
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setattr(sys, "__stderr__", terminal)
-    threading.Timer(0.5, made.gates["kernels.a"].set).start()
     device.load_kernels(A, "cpu")
     written = terminal.getvalue()
     assert "compiling kernels for cpu" in written and "kernels.a" in written
@@ -191,3 +204,28 @@ def test_modules_that_share_a_function_compile_side_by_side(tmp_path: Path) -> N
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == ["[11.0, 13.0, 15.0]", "[21.0, 23.0, 25.0]"]
     assert "0 of 2 modules ready" in done.stderr and "to come: first, second" in done.stderr
+
+
+@pytest.mark.parametrize("found", ["1.18.1", "1.20.0", "1.190.0", "2.0.0", "0.0"])
+def test_a_version_of_warp_that_was_not_tested_is_refused(found: str) -> None:
+    with pytest.raises(ImportError, match=rf"^warp-lang: expected version 1\.19\.x, which was tested, found {found}$"):
+        device.require_tested(found)
+
+
+def test_the_installed_version_is_the_one_asked_for() -> None:
+    """The range of the package's metadata is the one that is checked."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (warp,) = (line for line in project["dependencies"] if line.startswith("warp-lang"))
+    major, minor = map(int, device.WARP_TESTED.split("."))
+    assert warp == f"warp-lang>={major}.{minor},<{major}.{minor + 1}"
+    device.require_tested(wp.__version__)
+
+
+def test_a_command_says_in_one_line_that_the_version_is_wrong(tmp_path: Path) -> None:
+    """The version is asked for before anything of the package is used."""
+    (tmp_path / "warp.py").write_text("__version__ = '1.7.2'\n")
+    command = [sys.executable, str(ROOT / "scripts/run.py"), "fly-by", "--out", str(tmp_path / "out")]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: warp-lang: expected version 1.19.x, which was tested, found 1.7.2\n"
