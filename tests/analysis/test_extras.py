@@ -58,6 +58,24 @@ def test_an_import_that_fails_within_a_command_names_the_extra(tmp_path: Path) -
     assert "package defusedxml" in done.stderr and "the extra 'formats'" in done.stderr
 
 
+@pytest.mark.slow
+def test_the_base_alone_compares_and_explains_every_command(tmp_path: Path) -> None:
+    names = [module for modules in EXTRAS.values() for module in modules]
+    blocked = f"import runpy, sys; sys.modules.update(dict.fromkeys({names})); "
+    blocked += "runpy.run_path(sys.argv.pop(1), None, '__main__')"
+
+    def run(script: Path, *arguments: str) -> None:
+        command = [sys.executable, "-c", blocked, str(script), *arguments]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+
+    small = ["--seconds", "0.2", "--resolution-px", "128", "--batch-size", "32", "--out", "out"]
+    run(ROOT / "scripts/run.py", "fly-by", *small)
+    assert (tmp_path / "out" / "report.html").is_file()
+    for script in (ROOT / "scripts").glob("*.py"):
+        run(script, "--help")
+
+
 def test_another_module_that_is_missing_is_a_fault_of_ours(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     monkeypatch.chdir(tmp_path)
