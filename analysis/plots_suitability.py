@@ -14,7 +14,7 @@ from PIL import Image
 from analysis.cases import INPUTS, ROWS, SCALES, Case
 from analysis.evaluation import Place
 from analysis.plots import ADAPTIVE, FRAMED, save
-from analysis.quality import percentile
+from analysis.quality import WHISKERS, percentile
 from analysis.suitability import STILLS, SuitabilityOptions
 from analysis.suitability_tables import Result, Results, ratios
 
@@ -142,7 +142,9 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
             continue
         drawn = True
         flier = {"marker": "+", "markersize": 3, "markeredgecolor": "0.45"}
-        made = axis.boxplot(shown, positions=list(values), widths=0.7, patch_artist=True, flierprops=flier)
+        made = axis.boxplot(
+            shown, positions=list(values), widths=0.7, patch_artist=True, flierprops=flier, whis=WHISKERS
+        )
         for row, box in zip(values, made["boxes"], strict=True):
             box.set(facecolor=_INK[ROWS[row][1]], alpha=0.75, linewidth=0.7)
         for median in made["medians"]:

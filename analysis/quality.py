@@ -23,6 +23,9 @@ from torch import Tensor
 
 from tsar.types import Display
 
+WHISKERS = 1.5
+"""Interquartile ranges beyond the box at which whiskers end at the latest, in tables and figures."""
+
 Floats = NDArray[np.float64]
 Payload = TypeVar("Payload")
 
@@ -198,7 +201,7 @@ def ratio_statistics(adaptive: Floats, framed: Floats) -> RatioStatistics:
     ratios = ratio(adaptive, framed)
     ordered = _sorted(ratios)
     low, median, high = (percentile(ordered, p) for p in (25.0, 50.0, 75.0))
-    reach = 1.5 * (high - low) if math.isfinite(low) else 0.0
+    reach = WHISKERS * (high - low) if math.isfinite(low) else 0.0
     inside = ordered[(ordered >= low - reach) & (ordered <= high + reach)]
     return RatioStatistics(
         count=len(ordered),

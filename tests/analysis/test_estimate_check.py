@@ -122,6 +122,18 @@ def test_tables_of_signs_and_pairs_without_direction() -> None:
     assert found["share_same_quadrant"]["value"] == pytest.approx(1 / 3)
 
 
+def test_intervals_are_of_95_percent() -> None:
+    """One tile of three is wrong: it is drawn three times with a chance of 1/27, which is 3.7 %."""
+    true = np.array([[[1.0, 1.0]], [[1.0, 1.0]], [[1.0, -1.0]]])
+    for sign, ends in ((1.0, (0.0, 1.0)), (-1.0, (0.0, 1.0))):
+        assert agreement(np.abs(true) * sign, true)["share_sign_time"]["interval"] == ends
+    # of 28 tiles one may be dealt to itself or to 27 others: right with a chance of 1/28, which is 3.6 %
+    lone = np.ones((28, 1, 2))
+    lone[0, 0, 1] = -1.0
+    low, high = agreement(lone, lone)["share_sign_time"]["dealt_interval"]
+    assert (low, high) == (pytest.approx(26 / 28), 1.0)
+
+
 SMALL = SpectrumOptions(
     samples=32,
     frames=16,

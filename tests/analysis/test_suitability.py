@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from analysis.cases import INPUTS, ROWS
+from analysis.plots_suitability import boxes
 from analysis.suitability import Run, SuitabilityOptions, runs
 from analysis.suitability_tables import (
     Result,
@@ -121,6 +122,42 @@ def test_intervals_cover_what_repetitions_differ_by() -> None:
     assert first["ours"] == 0.5 and first["low"] == 0.0 and first["high"] == 1.0
     again = share_table(made(lambda run: 0.5 if run.repetition == 0 else 2.0)).set_index("share")
     assert table.equals(again), "the draws are seeded"
+
+
+def test_intervals_are_of_95_percent() -> None:
+    """Of three repetitions one differs: it is drawn three times with a chance of 1/27, which is 3.7 %; an interval of
+    95 % holds that case, one of 90 % does not."""
+    options = SuitabilityOptions(inputs=("chase",), rows=(7,), repetitions=3, solvers=())
+
+    def tables(error) -> tuple[pd.Series, pd.Series]:
+        results = Results([result(run, error(run)) for run in runs(options)])
+        policies = policy_table(results, 7, 128).set_index("policy")
+        return share_table(results).set_index("share").loc["ratios at most 1"], policies.loc["tsar"]
+
+    def error(run: Run, different: float, others: float) -> float:
+        if run.label == "tsar":
+            return different if run.repetition == 0 else others
+        return 0.0 if run.label == "oracle" else 1.0
+
+    shares, gains = tables(lambda run: error(run, 2.0, 0.5))
+    assert (shares["low"], shares["ours"], shares["high"]) == (0.0, pytest.approx(2 / 3), 1.0)
+    assert (gains["gain_low"], gains["gain_high"]) == (-1.0, 0.5)
+    shares, gains = tables(lambda run: error(run, 0.5, 2.0))
+    assert (shares["low"], shares["ours"], shares["high"]) == (0.0, pytest.approx(1 / 3), 1.0)
+    assert (gains["gain_low"], gains["gain_high"]) == (-1.0, 0.5)
+
+
+def test_whiskers_of_the_figure_end_within_one_and_a_half_boxes() -> None:
+    """Ratios 10 … 18 with one of 25: the box reaches from 11.5 to 16, a whisker to 22.75 at most."""
+    options = SuitabilityOptions(inputs=("chase",), rows=(7,), repetitions=1, policies=(), solvers=())
+    ratios = np.resize(np.arange(9.0) + 10.0, TIMES)
+    ratios[0] = 25.0
+    figure = boxes(Results([result(r, 1.0 if r.label == "framed" else ratios) for r in runs(options)]), ["chase"], "")
+    assert figure is not None
+    drawn = [line.get_ydata() for line in figure.axes[0].get_lines()]
+    assert any(list(line) == [25.0] for line in drawn), "an outlier"
+    reached = [max(line) for line in drawn if len(line) == 2 and max(line) > 16.0]
+    assert set(reached) == {18.0}
 
 
 def test_one_repetition_has_no_interval() -> None:

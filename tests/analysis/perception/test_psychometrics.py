@@ -56,6 +56,19 @@ def test_intervals_hold_the_threshold_about_as_often_as_they_say() -> None:
     assert 0.8 <= coverage(20, 100) <= 1.0
 
 
+def test_intervals_are_of_95_percent() -> None:
+    """As far apart as the 2.5th and 97.5th percentiles of fits, each polished, to data drawn from the first fit."""
+    asked = [16] * 8
+    found = fit(LEVELS, drawn(60.0, 1.0, 16, 2), asked, 400, 7)
+    assert found.interval is not None
+    share = correct_share(np.array(LEVELS, np.float64), found.mu, found.sigma, found.lapse)
+    again = np.random.default_rng(8).binomial(asked, share, (300, 8))
+    octaves = np.log2([fit(LEVELS, row.tolist(), asked).jnd for row in again])
+    width = math.log2(found.interval[1] / found.interval[0])
+    of_95, of_90 = (np.ptp(np.quantile(octaves, [tail, 1.0 - tail])) for tail in (0.025, 0.05))
+    assert abs(width / of_95 - 1.0) < 0.4 * (1.0 - of_90 / of_95), (width, of_95, of_90)
+
+
 @pytest.mark.slow
 def test_coverage_is_close_to_nominal() -> None:
     assert 0.91 <= coverage(300, 400) <= 0.98
