@@ -105,7 +105,7 @@ class Display:
         axes = [_axis(side, resolution >> level) for level in range(low, high + 1)]
         length = sum(axis[0].numel() for axis in axes) + _SPARE
         for place, name in enumerate(("left", "right", "share_left", "share_right", "weight")):
-            values = torch.cat([*(axis[place] for axis in axes), axes[0][place][:_SPARE]])
+            values = torch.cat([*(axis[place] for axis in axes), axes[0][place].repeat(_SPARE)[:_SPARE]])
             setattr(plan, name, self._keep(name, values, torch.float32 if place > 1 else torch.int32, length))
         lengths = torch.tensor([0, *(axis[0].numel() for axis in axes)], dtype=torch.int32)
         first = torch.cumsum(lengths, 0, dtype=torch.int32)
