@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from tsar.config import require
+from tsar.config import closed_choices, require
 
 if TYPE_CHECKING:
     from analysis.progress import Bars
@@ -35,6 +35,7 @@ _FEWEST_REPETITIONS = 7
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class BenchOptions:
     """How fast the simulator is, and beside whom: rays, shaded samples, overhead, growth, start."""
 

@@ -17,6 +17,7 @@ from analysis import bench_mitsuba as peer
 from analysis.bench import BenchOptions, Row, counted, rate_row, take_turns
 from analysis.bench_scenes import bumpy_scene, driving_scenes, renderer_of
 from scenes.canonical import Scene
+from tsar.config import closed_choices
 
 if TYPE_CHECKING:
     from analysis.progress import Bars
@@ -31,6 +32,7 @@ _REST_S = 0.03  # Mitsuba's threads spin on after a rendering
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class Still:
     """One picture that both sides render.
 

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 from analysis.cost_model import CostParameters, Ledger, nonadaptive_flops, parameters_of
 from analysis.display_model import DisplayModel
 from analysis.files import plain
-from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, require, tiles_at_least
+from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
 
 Policy = Literal["tsar", "framed", "framed supersampled", "frameless", "afr", "oracle"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
@@ -91,6 +91,7 @@ SCALES: dict[str, Scale] = {
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class Case:
     """One policy on one input at one setting. Everything that decides its result.
 
@@ -125,7 +126,6 @@ class Case:
 
     def __post_init__(self) -> None:
         require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
-        require(self.policy in POLICIES, "policy", f"one of {', '.join(POLICIES)}", self.policy)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
         span = self.jod_span_s

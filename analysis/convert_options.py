@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 import tyro
 
-from tsar.config import require
+from tsar.config import closed_choices, require
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class ConvertOptions:
     """A scene file of one renderer as that of another, with its meshes and pictures, and a report of what was lost."""
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Literal
 from analysis.cli import bad_input, require_memory
 from analysis.cost_model import RAYS
 from analysis.cost_refit import Cell, MemoryTrace
-from tsar.config import TsarConfig, require
+from tsar.config import TsarConfig, closed_choices, require
 
 if TYPE_CHECKING:
     from analysis.progress import Bars
@@ -30,6 +30,7 @@ _FEWEST_BATCHES, _FEWEST_RESOLUTIONS = 3, 3
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class MeasurementOptions:
     """What is run to hold against the model."""
 

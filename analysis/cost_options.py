@@ -11,7 +11,7 @@ import tyro
 
 from analysis.cost_measurement import MeasurementOptions
 from analysis.cost_model import CostParameters
-from tsar.config import require
+from tsar.config import closed_choices, require
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class TableParameters:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class CostReportOptions:
     """Cost of an adaptive cycle and of a framed image: the model under every ledger, and this machine."""
 

@@ -12,12 +12,13 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from analysis.tracer_options import PointSetName
-from tsar.config import require
+from tsar.config import closed_choices, require
 
 _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class RenderOptions:
     """A still, or a sequence of stills at a constant rate."""
 

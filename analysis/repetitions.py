@@ -13,10 +13,11 @@ import tyro
 from analysis.cases import INPUTS
 from analysis.cost_model import CAPACITY_DEFAULT, Ledger
 from analysis.experiment import RunOptions
-from tsar.config import TsarConfig, require
+from tsar.config import TsarConfig, closed_choices, require
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class InputsOptions:
     """Which inputs, and how often. Runs that are complete in the folder are not repeated."""
 

@@ -10,10 +10,11 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.cost_model import CAPACITY_DEFAULT, CostParameters, Ledger, parameters_of
-from tsar.config import StagesName, TsarConfig, require
+from tsar.config import StagesName, TsarConfig, closed_choices, require
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class RunOptions:
     """One comparison of the adaptive renderer with the framed one at equal cost."""
 

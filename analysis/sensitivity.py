@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from analysis.cases import INPUTS, ROWS, SCALES, Case, framed_config
 from analysis.cost_model import Ledger
 from analysis.farm import FarmOptions
-from tsar.config import TsarConfig, require
+from tsar.config import TsarConfig, closed_choices, require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +38,7 @@ _DRAWS = 4000
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class SensitivityOptions:
     """Runs over a grid of spatial and temporal slopes, and over offsets and bias. Runs on disk are not repeated."""
 

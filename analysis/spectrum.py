@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.cli import InputError, bad_input
 from analysis.repetitions import INPUTS
-from tsar.config import TsarConfig, require
+from tsar.config import TsarConfig, closed_choices, require
 
 if TYPE_CHECKING:
     from renderer.trace import Renderer
@@ -34,6 +34,7 @@ _LAUNCH_SAMPLES = 1 << 18
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class SpectrumOptions:
     """Power-spectrum slopes, ideal sample density, and how well the streaming estimate points at it.
 

@@ -18,10 +18,11 @@ from analysis.cases import INPUTS, POLICIES, ROWS, SCALES, Case, Policy, framed_
 from analysis.cost_model import Ledger
 from analysis.display_model import DisplayModel
 from analysis.farm import FarmOptions
-from tsar.config import Solver, TsarConfig, require
+from tsar.config import Solver, TsarConfig, closed_choices, require
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class SuitabilityOptions:
     """Every run of table 7.2 at equal cost, beside the thesis' results. Runs that are on disk are not repeated."""
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.farm import FarmOptions
-from tsar.config import require
+from tsar.config import closed_choices, require
 
 PointSetName = Literal[
     "hammersley",
@@ -31,6 +31,7 @@ LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class GalleryOptions:
     """One picture for each effect of the ray tracer."""
 
@@ -63,6 +64,7 @@ class GalleryOptions:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class AcceleratorOptions:
     """Ray-triangle tests per ray of brute force, kd-tree and tree of boxes, and the two images of the report."""
 
@@ -121,6 +123,7 @@ class PointSetOptions:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class TileOptions:
     """One picture of a scene, in tiles over processes or machines."""
 
@@ -164,6 +167,7 @@ class TileOptions:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class JobOptions:
     """Every combination of sampling levels, point sets and time filters of a job file."""
 

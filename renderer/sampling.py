@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from renderer.blue_noise import FRAMES, SIDE_PX, mask
 from renderer.point_sets import GOLDEN, Points, PointSet, mixed_words, point_set
+from tsar.config import closed_choices
 
 # --- shifts ----------------------------------------------------------------------------------------------------------
 
@@ -96,6 +97,7 @@ def _cached_set(name: PointSet, count: int, seed: int) -> Points:
 
 
 @dataclass(frozen=True)
+@closed_choices("SamplePlan.")
 class SamplePlan:
     """How every pixel of a picture or sequence is sampled."""
 
@@ -119,10 +121,6 @@ class SamplePlan:
     """Whether every frame has a point set of its own, rather than all the same."""
 
     def __post_init__(self) -> None:
-        if self.space_filter not in ("box", "gaussian") or self.time_filter not in ("box", "triangle"):
-            raise ValueError(f"SamplePlan: no such filter: {self.space_filter!r}, {self.time_filter!r}")
-        if self.shift not in _SHIFTS:
-            raise ValueError(f"SamplePlan.shift: expected one of {', '.join(_SHIFTS)}, got {self.shift!r}")
         if not 0.0 < self.sigma_px < math.inf:
             raise ValueError(f"SamplePlan.sigma_px: expected a positive number, got {self.sigma_px}")
         if not 0.0 < self.box_share <= 1.0:

@@ -3,9 +3,12 @@ line can be made from it quickly."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from math import inf, log2
-from typing import Literal
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "diffusion", "trivial"]
 
@@ -23,6 +26,48 @@ def require(condition: bool, name: str, expected: str, got: object) -> None:
         raise ConfigError(f"{name}: expected {expected}, got {got!r}")
 
 
+Record = TypeVar("Record")
+
+
+def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
+    """Has a dataclass refuse what the ``Literal`` of a field does not list, before anything else is checked.
+
+    Stands beneath ``@dataclass``. The records made raise :class:`ConfigError`.
+
+    Args:
+        place: what goes before the field's name in the message.
+    """
+
+    def closed(record: type[Record]) -> type[Record]:
+        own = getattr(record, "__post_init__", None)
+
+        def __post_init__(self: Record) -> None:
+            for name, many, choices in _choices(type(self)):
+                value = getattr(self, name)
+                ok = all(item in choices for item in value) if many else value in choices
+                require(ok, place + name, f"{'some' if many else 'one'} of {', '.join(map(str, choices))}", value)
+            if own is not None:
+                own(self)
+
+        record.__post_init__ = __post_init__
+        return record
+
+    return closed
+
+
+@cache
+def _choices(record: type) -> tuple[tuple[str, bool, tuple[Any, ...]], ...]:
+    """Fields of closed choices: name, whether the field is a tuple of them, and the choices."""
+    found = []
+    for name, kind in get_type_hints(record).items():
+        many = get_origin(kind) is tuple
+        item = get_args(kind)[0] if many else kind
+        parts = get_args(item) if get_origin(item) in (Union, UnionType) else (item,)
+        if Literal in map(get_origin, parts):  # beside it there is None at most
+            found.append((name, many, tuple(choice for part in parts for choice in get_args(part) or (None,))))
+    return tuple(found)
+
+
 def tiles_at_most(count: int, level_min: int) -> int:
     """The largest tiling of at most ``count`` tiles: ``4^level_min`` tiles and three more for every split."""
     coarse = 4**level_min
@@ -35,6 +80,7 @@ def tiles_at_least(count: int, level_min: int) -> int:
 
 
 @dataclass(frozen=True)
+@closed_choices("tiling.")
 class TilingConfig:
     """Bounds of the tiling (Stephens 2011, sec. 4.1.6)."""
 
@@ -57,6 +103,7 @@ class TilingConfig:
 
 
 @dataclass(frozen=True)
+@closed_choices("error.")
 class ErrorConfig:
     """The error estimate's template: log2 power = offset + slope * octave, octave 0 the coarsest (sec. 5.3.3.2)."""
 
@@ -80,6 +127,7 @@ class ErrorConfig:
 
 
 @dataclass(frozen=True)
+@closed_choices("response.")
 class ResponseConfig:
     """The control decision (chapter 6)."""
 
@@ -103,6 +151,7 @@ class ResponseConfig:
 
 
 @dataclass(frozen=True)
+@closed_choices("reconstruction.")
 class ReconstructionConfig:
     """Image reconstruction (sec. 4.2)."""
 
@@ -115,6 +164,7 @@ class ReconstructionConfig:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class TsarConfig:
     """Everything that decides a run of the pipeline, given the renderer and the cost of a cycle."""
 

@@ -10,13 +10,14 @@ import tyro
 
 from analysis.cases import INPUTS
 from analysis.display_model import DisplayModel
-from tsar.config import require
+from tsar.config import closed_choices, require
 
 _ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"
 STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_job.txt")
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class StimuliOptions:
     """Renders the stimuli of job files, and a manifest with their hashes; goes on where it was stopped."""
 
@@ -163,6 +164,7 @@ class ServeOptions:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class AdaptiveOptions:
     """Puts TSAR and the framed renderer before the simulated observer, by batch size at equal cost."""
 
