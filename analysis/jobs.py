@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.files import write_json
-from analysis.render_options import previous_job
+from analysis.reference import content_hash
+from analysis.source import code_hash
 from analysis.tracer_options import JobOptions
 from scenes import catalog
 from scenes.canonical import Scene, SceneError
@@ -51,23 +51,26 @@ def prepare(options: JobOptions) -> Work:
 
 
 def run_job(
-    work: Work, options: JobOptions, config_hash: str, task: Callable[[str, int], Callable[[int], None]]
+    work: Work, options: JobOptions, task: Callable[[str, int], Callable[[int], None]]
 ) -> list[dict[str, Any]]:
     """Renders what is not on disk yet; a row per combination.
 
     Args:
         work: from :func:`prepare`.
         options: of the job.
-        config_hash: tells whether frames on disk are of the same job.
         task: shows how far it is.
     """
+    from analysis.stills import render_stills
+    from renderer.frames import pictures
     from renderer.trace import Renderer
 
+    code = code_hash(Renderer, pictures, render_stills)
+    content = content_hash((work.scene, work.settings, work.size_px, code))
     renderer = Renderer(work.scene, threads=options.threads or None, seed=options.seed)
     rows = []
     for combination in work.job.combinations:
         done = task(combination.name, len(work.frames))
-        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, config_hash, done)})
+        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, content, done)})
     renderer.close()
     return rows
 
@@ -77,12 +80,12 @@ def _run(
     combination: Combination,
     work: Work,
     options: JobOptions,
-    config_hash: str,
+    content: str,
     done: Callable[[int], None],
 ) -> dict[str, Any]:
+    from analysis.stills import render_stills
     from renderer.frames import pictures
     from renderer.sampling import SamplePlan
-    from renderer.sequence import render_stills
 
     plan = SamplePlan(
         combination.samples,
@@ -95,11 +98,8 @@ def _run(
         combination.shift,  # type: ignore[arg-type]
     )
     folder = options.out / combination.name
-    if previous_job(folder) != config_hash:
-        for old in folder.glob("frame*.*"):
-            old.unlink()
-    write_json(folder / "job.json", {"config_hash": config_hash})
+    key = content_hash((plan, content))
     times_s = {number: work.settings.frame_start_s(number) for number in work.frames}
     picture = pictures(renderer, plan, *work.size_px)
-    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", done)
+    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", key, done)
     return {"frames": len(work.frames), "rendered_now": rendered, "nonfinite": nonfinite}

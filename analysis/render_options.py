@@ -1,9 +1,8 @@
-"""Options of plain rendering, and what tells whether stills on disk belong to the same job."""
+"""Options of plain rendering."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,13 +82,5 @@ class RenderOptions:
 
     @property
     def job(self) -> dict[str, Any]:
-        """What decides the content of the stills."""
+        """What decides the content of the stills, beside the content of the scene and the code."""
         return {name: value for name, value in dataclasses.asdict(self).items() if name not in _NOT_OF_THE_STILLS}
-
-
-def previous_job(out: Path) -> str | None:
-    """Hash of the job whose stills lie in a folder; None where there is none."""
-    try:
-        return json.loads((out / "job.json").read_text())["config_hash"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return None

@@ -35,6 +35,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -238,12 +239,35 @@ class Store:
         """Names of the files that were made in the folder, under any key, and not discarded since."""
         return set(self._files.entries())
 
+    def require_own(self, names: Iterable[str]) -> None:
+        """Raises ValueError where a file that is not on the list has one of the names: making it would destroy that."""
+        listed = self.listed()
+        for name in names:
+            if name not in listed and (self.folder / name).exists():
+                raise ValueError(f"{self.folder / name}: expected no file that this command did not make; move it")
+
     def discard(self, names: Iterable[str]) -> list[str]:
-        """Deletes those of the files that are on the list; returns which were."""
-        gone = sorted(self.listed().intersection(names))
-        for name in gone:
-            (self.folder / name).unlink(missing_ok=True)
+        """Deletes those of the files that are on the list and hold what was written; returns which were.
+
+        One that was changed since stays, is named, and is no longer on the list.
+        """
+        gone = []
+        for name in sorted(self.listed().intersection(names)):
+            file, written = self.folder / name, {entry.sha256 for entry in self._files.entries()[name]}
+            if file.exists() and _digest(file) not in written:
+                warn(f"{file}: was changed since it was written; it stays")
+            else:
+                file.unlink(missing_ok=True)
+                gone.append(name)
             self._files.journal.append({"name": name, "discarded": True})
+        return gone
+
+    def discard_outdated(self, pattern: str) -> list[str]:
+        """Deletes files whose names are of a pattern and that other keys alone made; returns which, says how many."""
+        keys = {name: {entry.key for entry in entries} for name, entries in self._files.entries().items()}
+        gone = self.discard(name for name, found in keys.items() if self.key not in found and fnmatch(name, pattern))
+        if gone:
+            warn(f"{self.folder}: {len(gone)} files of an earlier run with other input or code were removed")
         return gone
 
     def _checked(self, name: str, digest_of: Callable[[Path], str]) -> Entry | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -13,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.files import atomic, write_json
-from analysis.render_options import previous_job
+from analysis.reference import content_hash
+from analysis.source import code_hash
+from analysis.store import Store
 from analysis.tracer_options import TileOptions
 
 if TYPE_CHECKING:
@@ -38,11 +40,25 @@ class Picture:
     time_s: float
     seed: int
     threads: int
+    source: str
+    """:func:`source_of` the scene."""
 
     @property
     def content(self) -> dict[str, Any]:
         """What decides the bits: all but the threads."""
         return {name: value for name, value in dataclasses.asdict(self).items() if name != "threads"}
+
+
+@lru_cache(maxsize=4)
+def source_of(scene: str) -> str:
+    """Hash of the content of a scene and the code that renders it.
+
+    It is taken once in a process, for the process goes on with what it has imported and read: a worker that is older
+    than a change must not pass for one that knows it.
+    """
+    from scenes import catalog
+
+    return content_hash((catalog.load(scene), code_hash(render_chunk)))
 
 
 def picture_of(options: TileOptions, threads: int) -> Picture:
@@ -58,7 +74,7 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
     point_set(options.point_set, options.samples)
     size = options.width_px or film.width_px, options.height_px or film.height_px
     kinds = options.samples, options.point_set, options.space_filter
-    return Picture(options.scene, size, *kinds, options.time_s, options.seed, threads)
+    return Picture(options.scene, size, *kinds, options.time_s, options.seed, threads, source_of(options.scene))
 
 
 def chunks_of(picture: Picture, chunk_tiles: int) -> list[range]:
@@ -79,10 +95,16 @@ def _renderer(scene: str, seed: int, threads: int) -> Renderer:
 
 
 def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:
-    """Pixels ``(tiles, 256, 3)`` of some tiles, the rays they took, and seconds without building the scene."""
+    """Pixels ``(tiles, 256, 3)`` of some tiles, the rays they took, and seconds without building the scene.
+
+    Raises:
+        ValueError: this process runs another source, or knows another scene, than the one that asked.
+    """
     from renderer.frames import render_tiles
     from renderer.sampling import SamplePlan
 
+    if picture.source != source_of(picture.scene):
+        raise ValueError(f"{picture.scene}: expected source {picture.source[:16]}, this worker runs another one")
     renderer = _renderer(picture.scene, picture.seed, picture.threads)
     plan = SamplePlan(picture.samples, picture.point_set, picture.seed, picture.space_filter)  # type: ignore[arg-type]
     start = time.perf_counter()
@@ -129,7 +151,7 @@ def assembled(picture: Picture, chunks: Sequence[range], pixels: Sequence[NDArra
 
 
 def render_resumed(
-    client: Client, picture: Picture, options: TileOptions, config_hash: str, done: Callable[[int], None]
+    client: Client, picture: Picture, options: TileOptions, done: Callable[[int], None]
 ) -> tuple[Tensor, dict[str, Any]]:
     """Renders what an interrupted run of the same picture has not left on disk, and puts the picture together.
 
@@ -137,32 +159,36 @@ def render_resumed(
         client: of the cluster.
         picture: what to render.
         options: of the command.
-        config_hash: tells whether chunks on disk are of the same picture.
         done: told how many chunks are on disk.
 
     Returns:
         The picture, and how it came about.
+
+    Raises:
+        ValueError: a file of another origin lies where a chunk belongs, or one was changed as soon as it was written.
     """
-    folder, chunks = options.out / "chunks", chunks_of(picture, options.chunk_tiles)
-    if previous_job(folder) != config_hash:
-        for old in folder.glob("chunk*.npz"):
-            old.unlink()
-    write_json(folder / "job.json", {"config_hash": config_hash})
-    files = [folder / f"chunk{number:06d}.npz" for number in range(len(chunks))]
-    missing = [number for number, file in enumerate(files) if not file.exists()]
+    store = Store(options.out / "chunks", content_hash((picture.content, options.chunk_tiles)))
+    chunks = chunks_of(picture, options.chunk_tiles)
+    names = [f"chunk{number:06d}.npz" for number in range(len(chunks))]
+    store.require_own(names)
+    missing = [number for number, name in enumerate(names) if store.find(name) is None]
     count = len(chunks) - len(missing)
     done(count)
     start = time.perf_counter()
     for place, (pixels, rays, seconds) in rendered(client, picture, [chunks[number] for number in missing]):
-        with atomic(files[missing[place]]) as temporary:
-            np.savez(temporary, pixels=pixels, seconds=seconds, kinds=list(rays), rays=list(rays.values()))
+        with store.make(names[missing[place]]) as making:
+            np.savez(making.path, pixels=pixels, seconds=seconds, kinds=list(rays), rays=list(rays.values()))
         count += 1
         done(count)
     wall_s, rays, seconds, parts = time.perf_counter() - start, Counter[str](), 0.0, []
-    for file in files:
-        with np.load(file) as stored:
+    for name in names:
+        content = store.read(name)
+        if content is None:
+            raise ValueError(f"{store.folder / name}: expected the chunk that was written, found another")
+        with np.load(io.BytesIO(content)) as stored:
             parts.append(stored["pixels"])
             rays.update(dict(zip(stored["kinds"].tolist(), stored["rays"].tolist(), strict=True)))
             seconds += float(stored["seconds"])
+    store.discard_outdated("chunk*")
     facts = {"chunks": len(chunks), "chunks_rendered_now": len(missing), "wall_s": wall_s, "worker_s": seconds}
     return assembled(picture, chunks, parts), {**facts, "rays": dict(rays)}

@@ -1,52 +1,20 @@
-"""Stills of a sequence, written one by one so that an interrupted rendering goes on where it stopped."""
+"""Stills of a sequence: their names, and films of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from torch import Tensor
 
-from renderer.film import LosslessWriter, Mp4Writer, write_image
+from renderer.film import LosslessWriter, Mp4Writer
 
 
 def still_path(folder: Path, number: int, ending: str) -> Path:
     """Where the still of a number lies; ``ending`` is ``.exr``, ``.png`` or ``.ppm``."""
     return folder / f"frame{number:05d}{ending}"
-
-
-def render_stills(
-    picture: Callable[[int, float], Tensor],
-    times_s: Mapping[int, float],
-    folder: Path,
-    ending: str,
-    done: Callable[[int], None] = lambda count: None,
-) -> tuple[int, int]:
-    """Renders the stills that are not on disk yet.
-
-    Args:
-        picture: linear radiance ``(h, w, 3)`` of the still of a number, at a time.
-        times_s: animation time of each still by its number, seconds.
-        folder, ending: where stills go, and their format.
-        done: called with the number of stills that are on disk.
-
-    Returns:
-        How many were rendered now, and how many of their values were not finite.
-
-    Raises:
-        FilmError: a still cannot be written.
-    """
-    rendered, nonfinite = 0, 0
-    for count, (number, time_s) in enumerate(times_s.items()):
-        path = still_path(folder, number, ending)
-        if not path.exists():
-            nonfinite += write_image(path, picture(number, time_s))
-            rendered += 1
-        done(count + 1)
-    return rendered, nonfinite
 
 
 def write_lossless(frames: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> None:

@@ -29,15 +29,12 @@ def main() -> None:
         writable_folder(options.out, "out")
     from analysis.progress import bars
     from analysis.records import provenance
-    from analysis.reference import content_hash
     from renderer.film import FilmError
 
     config = dataclasses.asdict(options)
-    kept = {name: config[name] for name in ("space_filter", "sigma_px", "box_share", "format", "seed")}
     source = provenance(Path(__file__).parent.parent, config, scene=work.settings.name, seed=options.seed)
-    stills = provenance(Path(__file__).parent.parent, {**kept, "size": work.size_px, "scene": content_hash(work.scene)})
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
-        rows = run_job(work, options, stills["config_hash"], shown.task)
+        rows = run_job(work, options, shown.task)
         found = {"job": dataclasses.asdict(work.job), "settings": dataclasses.asdict(work.settings), "rows": rows}
         write_json(options.out / "summary.json", {**found, "config": config, "provenance": source})
     rendered, bad = (sum(row[name] for row in rows) for name in ("rendered_now", "nonfinite"))

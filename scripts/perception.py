@@ -13,7 +13,6 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -47,12 +46,9 @@ def main() -> None:
     config = dataclasses.asdict(options)
     source = provenance(ROOT, config, seed=options.seed)
 
-    def config_hash(content: Any) -> str:
-        return provenance(ROOT, content)["config_hash"]
-
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
         if isinstance(options, StimuliOptions):
-            found, text = steps.stimuli(options, config_hash, shown.task)
+            found, text = steps.stimuli(options, shown.task)
         elif isinstance(options, SimulateOptions):
             found, text = steps.simulate(options, shown.task)
         elif isinstance(options, RecoverOptions):

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.files import writable_folder, write_json
-from analysis.render_options import RenderOptions, previous_job
+from analysis.render_options import RenderOptions
 
 
 def main() -> None:
@@ -36,10 +36,13 @@ def main() -> None:
 
     from analysis.progress import bars
     from analysis.records import provenance
+    from analysis.reference import content_hash
+    from analysis.source import code_hash
+    from analysis.stills import render_stills
     from renderer.film import FilmError
     from renderer.frames import pictures
     from renderer.sampling import SamplePlan
-    from renderer.sequence import render_stills, still_path, write_film
+    from renderer.sequence import still_path, write_film
     from renderer.trace import Renderer
 
     with bad_input():
@@ -52,15 +55,12 @@ def main() -> None:
         )
         picture = pictures(renderer, plan or options.samples_per_axis, options.width_px, options.height_px)
     source = provenance(Path(__file__).parent.parent, options.job, scene=scene.name, device=options.device)
+    key = content_hash((options.job, scene, code_hash(Renderer, pictures, render_stills)))
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
-        if previous_job(options.out) != source["config_hash"]:
-            for old in options.out.glob("frame*.*"):
-                old.unlink()
-        write_json(options.out / "job.json", {"config_hash": source["config_hash"]})
         stills = [still_path(options.out, number, options.still_ending) for number in range(options.frames)]
         done = shown.task("frames", options.frames)
         rendered, nonfinite = render_stills(
-            picture, dict(enumerate(options.times_s)), options.out, options.still_ending, done
+            picture, dict(enumerate(options.times_s)), options.out, options.still_ending, key, done
         )
         if options.format == "mp4":
             write_film(stills, options.out / "film.mp4", options.fps)

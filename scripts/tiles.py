@@ -42,14 +42,13 @@ def main() -> None:
     root, config = Path(__file__).parent.parent, dataclasses.asdict(options)
     chunks = chunks_of(picture, options.chunk_tiles)
     found: dict = {"config": config, "provenance": provenance(root, config, scene=picture.scene, seed=options.seed)}
-    with connected(farm) as client, full_disk(options.out, FilmError), bars() as shown:
+    with bad_input(), connected(farm) as client, full_disk(options.out, FilmError), bars() as shown:
         if options.study:
             turns = len({1, *options.study}) * options.repetitions
             done, number = shown.task("turns", turns), itertools.count(1)
             found |= study(client, picture, chunks, options.study, options.repetitions, lambda: done(next(number)))
         else:
-            key = provenance(root, {**picture.content, "chunk_tiles": options.chunk_tiles})["config_hash"]
-            image, facts = render_resumed(client, picture, options, key, shown.task("chunks", len(chunks)))
+            image, facts = render_resumed(client, picture, options, shown.task("chunks", len(chunks)))
             found |= {**facts, "nonfinite": write_image(options.out / f"{picture.scene}.png", image)}
             write_image(options.out / f"{picture.scene}.exr", image)
         write_json(options.out / "summary.json", found)

@@ -47,6 +47,7 @@ WIRING = {
     "analysis/spectrum.py": ("renderer", "scenes", "tsar"),
     "analysis/tiles.py": ("renderer", "scenes"),
     "analysis/spectrum_study.py": ("scenes",),
+    "analysis/stills.py": ("renderer",),
 }
 
 # the other modules of the analysis read what the pipeline hands out and run none of its stages

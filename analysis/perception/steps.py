@@ -38,9 +38,9 @@ SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
 POWER_OBSERVERS, POWER_ANSWERS = (6, 12, 24, 48), (4, 12)
 
 
-def stimuli(options: StimuliOptions, config_hash: Callable[[Any], str], task: Task) -> Found:
+def stimuli(options: StimuliOptions, task: Task) -> Found:
     """Renders stimuli and their manifest."""
-    manifest = render_stimuli(options, config_hash, task)
+    manifest = render_stimuli(options, task)
     rows = manifest["stimuli"]
     rendered, frames = sum(row["rendered_now"] for row in rows), sum(len(row["files"]) for row in rows)
     summary = {"stimuli": len(rows), "frames": frames, "rendered_now": rendered}

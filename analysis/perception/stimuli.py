@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 import json
@@ -19,6 +20,9 @@ from analysis.display_model import DisplayModel
 from analysis.files import write_json
 from analysis.jobs import prepare, run_job
 from analysis.perception.options import StimuliOptions
+from analysis.reference import content_hash
+from analysis.source import code_hash
+from analysis.store import Store
 from analysis.tracer_options import JobOptions
 
 MANIFEST = "manifest.json"
@@ -26,21 +30,16 @@ COLUMNS = ("scene", "point_set", "time_filter", "samples", "folder", "files", "s
 """What the manifest says of every stimulus, among other things."""
 
 
-def render_stimuli(
-    options: StimuliOptions, config_hash: Callable[[Any], str], task: Callable[[str, int], Callable[[int], None]]
-) -> dict[str, Any]:
+def render_stimuli(options: StimuliOptions, task: Callable[[str, int], Callable[[int], None]]) -> dict[str, Any]:
     """Renders what is missing and writes the manifest.
 
     Args:
         options: jobs, size and length.
-        config_hash: of what decides the frames of a job.
         task: shows how far it is.
 
     Returns:
         The manifest: a row a stimulus, with its folder, number of frames and their hash.
     """
-    from renderer.sequence import write_lossless
-
     rows: list[dict[str, Any]] = []
     for job_file in options.jobs:
         job = JobOptions(
@@ -56,15 +55,12 @@ def render_stimuli(
         work = prepare(job)
         scene = work.settings.name
         folder = options.out / scene
-        found = run_job(work, _placed(job, folder), config_hash(_content(job, work)), task)
+        found = run_job(work, dataclasses.replace(job, out=folder), task)
         for combination, row in zip(work.job.combinations, found, strict=True):
             files = [folder / combination.name / f"frame{number:05d}.{options.format}" for number in work.frames]
             video = {}
             if options.video:
-                film = files[0].with_name("stimulus.mkv")
-                if row["rendered_now"] or not film.exists():
-                    write_lossless(map(read_frame, files), film, work.settings.frame_rate_hz)
-                video = {"video": film.name, "video_sha256": hash_of([film])}
+                video = _film(files, work.settings.frame_rate_hz)
             rows.append(
                 {
                     **video,
@@ -84,17 +80,20 @@ def render_stimuli(
     return manifest
 
 
-def _placed(job: JobOptions, folder: Path) -> JobOptions:
-    import dataclasses
+def _film(files: Sequence[Path], rate_hz: float) -> dict[str, str]:
+    """Joins frames into a film that keeps every value, unless it is on disk; its name and hash."""
+    from renderer.sequence import write_lossless
 
-    return dataclasses.replace(job, out=folder)
-
-
-def _content(job: JobOptions, work: Any) -> dict[str, Any]:
-    from analysis.reference import content_hash
-
-    kept = {name: getattr(job, name) for name in ("space_filter", "sigma_px", "box_share", "format", "seed")}
-    return {**kept, "size": work.size_px, "scene": content_hash(work.scene)}
+    code = code_hash(write_lossless, read_frame)
+    store, name = Store(files[0].parent, content_hash((hash_of(files), rate_hz, code))), "stimulus.mkv"
+    store.require_own([name])
+    found = store.find(name)
+    if found is None:
+        with store.make(name) as making:
+            write_lossless(map(read_frame, files), making.path, rate_hz)
+        found = store.find(name)
+    assert found is not None
+    return {"video": name, "video_sha256": found.sha256}
 
 
 def hash_of(files: Sequence[Path]) -> str:
@@ -181,7 +180,7 @@ def differences(
 ) -> pd.DataFrame:
     """How many JOD every stimulus is from the one with the most samples of its scene, set and filter.
 
-    Scores are kept in ``jod.json`` of the folder, by the hashes of both stimuli and the display.
+    Scores are kept in ``jod.json`` of the folder, by the hashes of both stimuli, the display and the metric.
 
     Args:
         folder: of the stimuli.
@@ -191,7 +190,7 @@ def differences(
     """
     from analysis.perceptual import jod
 
-    manifest = read_manifest(folder)
+    manifest, code = read_manifest(folder), code_hash(jod)
     kept_file = folder / "jod.json"
     kept: dict[str, float] = json.loads(kept_file.read_text()) if kept_file.exists() else {}
     table = pd.DataFrame(manifest["stimuli"])
@@ -201,7 +200,7 @@ def differences(
         ordered = group.sort_values("samples").to_dict("records")
         reference, reference_frames = ordered[-1], None
         for row in ordered:
-            key = f"{row['sha256']} {reference['sha256']} {display.name} {display.rate_hz:g}"
+            key = f"{row['sha256']} {reference['sha256']} {display.name} {display.rate_hz:g} {code}"
             if row is reference:
                 kept[key] = 0.0
             elif key not in kept:

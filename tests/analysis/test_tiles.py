@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import threading
@@ -23,13 +24,14 @@ from analysis.tiles import (
     render_chunk,
     render_resumed,
     rendered,
+    source_of,
 )
 from renderer.frames import render_image
 from renderer.sampling import SamplePlan
 from renderer.trace import Renderer
 from scenes import catalog
 
-PICTURE = Picture("quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1)
+PICTURE = Picture("quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light"))
 
 
 @pytest.fixture(scope="module")
@@ -91,21 +93,57 @@ def test_a_worker_killed_in_the_middle_changes_no_bit(client, expected) -> None:
         time.sleep(0.2)
 
 
-def test_an_interrupted_picture_goes_on_where_it_stopped(client, expected, tmp_path: Path) -> None:
+def test_an_interrupted_picture_goes_on_where_it_stopped(client, expected, tmp_path: Path, capsys) -> None:
     options = TileOptions("quad-light", 70, 50, 8, seed=3, chunk_tiles=4, out=tmp_path)
     picture = picture_of(options, threads=1)
     assert picture == PICTURE
     shown: list[int] = []
-    image, facts = render_resumed(client, picture, options, "a", shown.append)
+    image, facts = render_resumed(client, picture, options, shown.append)
     assert torch.equal(image, expected)
     assert (facts["chunks"], facts["chunks_rendered_now"], shown) == (5, 5, [0, 1, 2, 3, 4, 5])
     assert facts["rays"]["primary_rays"] == 20 * 256 * 8  # tiles that hang over are traced whole
-    for gone in (1, 3):
-        (tmp_path / "chunks" / f"chunk{gone:06d}.npz").unlink()
-    again, facts = render_resumed(client, picture, options, "a", shown.append)
-    assert facts["chunks_rendered_now"] == 2 and torch.equal(again, expected)
-    assert render_resumed(client, picture, options, "other", shown.append)[1]["chunks_rendered_now"] == 5
-    assert not list((tmp_path / "chunks").glob("*.partial*"))
+    chunks = [tmp_path / "chunks" / f"chunk{number:06d}.npz" for number in range(5)]
+    chunks[1].unlink()
+    chunks[3].write_bytes(chunks[3].read_bytes()[:-1000])
+    np.savez(chunks[4], pixels=np.zeros((1, 256, 3), np.float32), seconds=1.0, kinds=["primary_rays"], rays=[7])
+    again, facts = render_resumed(client, picture, options, shown.append)
+    assert facts["chunks_rendered_now"] == 3 and torch.equal(again, expected)
+    assert facts["rays"]["primary_rays"] == 20 * 256 * 8
+    said = capsys.readouterr().err
+    assert [str(file) in said for file in chunks] == [False, False, False, True, True]
+    (tmp_path / "chunks" / "chunk-notes.md").write_text("mine")
+    larger = dataclasses.replace(options, chunk_tiles=7)
+    assert render_resumed(client, picture, larger, shown.append)[1]["chunks_rendered_now"] == 3
+    left = sorted(path.name for path in (tmp_path / "chunks").iterdir())
+    assert left == ["chunk-notes.md", "chunk000000.npz", "chunk000001.npz", "chunk000002.npz", "files.journal"]
+    assert "2 files of an earlier run" in capsys.readouterr().err
+
+
+def test_a_worker_of_another_source_renders_nothing() -> None:
+    """It would render an older scene, or by older code."""
+    with pytest.raises(ValueError, match="quad-light: expected source old, this worker runs another one"):
+        render_chunk(dataclasses.replace(PICTURE, source="old"), [0])
+
+
+def test_a_chunk_that_fails_is_tried_again(client, expected) -> None:
+    """Such as for want of memory that others have for a moment."""
+
+    def fail_twice() -> None:
+        import analysis.tiles
+
+        real, left = analysis.tiles._renderer, [2]
+
+        def renderer(*arguments):
+            left[0] -= 1
+            if left[0] >= 0:
+                raise OSError("for a moment")
+            return real(*arguments)
+
+        analysis.tiles._renderer = renderer
+
+    client.run(fail_twice)
+    chunks = chunks_of(PICTURE, 5)
+    assert torch.equal(put_together(chunks, rendered(client, PICTURE, chunks)), expected)
 
 
 def test_a_study_counts_and_compares(client) -> None:

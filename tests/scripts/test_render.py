@@ -11,9 +11,28 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import analysis.source
 from renderer.film import read_exr
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
+MESH = """
+v -1 -1 0
+v 1 -1 0
+v 1 1 1
+v -1 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+f 1/1 2/2 3/3
+f 1/1 3/3 4/4
+"""
+SCENE = """<scene version="0.5.0"><integrator type="direct"/><sensor type="perspective"><float name="fov" value="40"/>
+<transform name="toWorld"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+<film type="hdrfilm"><integer name="width" value="160"/><integer name="height" value="120"/></film></sensor>
+<shape type="obj"><string name="filename" value="cube.obj"/><boolean name="faceNormals" value="true"/>
+<bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="paint.png"/></texture>
+</bsdf></shape><include filename="lamp.xml"/></scene>"""
 SIZE = ("--width-px", "48", "--height-px", "32", "--samples-per-axis", "1")
 
 
@@ -38,7 +57,7 @@ def render(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, tmp_p
         status = call_script("render.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
         shown = capsys.readouterr()
         assert status == 0, shown.err
-        found = re.search(r"^\d+ frames \((\d+) rendered now, 0 values not finite\) in ", shown.out)
+        found = re.search(r"^\d+ frames \((\d+) rendered now, 0 values not finite\) in ", shown.out, re.MULTILINE)
         assert found is not None, shown.out
         return int(found[1])
 
@@ -50,7 +69,7 @@ def test_a_still_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("1 frames (1 rendered now, 0 values not finite)")
     out = tmp_path / "out"
-    assert sorted(path.name for path in out.iterdir()) == ["frame00000.png", "job.json", "summary.json"]
+    assert sorted(path.name for path in out.iterdir()) == ["files.journal", "frame00000.png", "summary.json"]
     pixels = picture(out / "frame00000.png")
     assert pixels.shape == (32, 48, 3) and pixels.dtype == np.uint8 and pixels.std() > 10.0
     found = summary(out)
@@ -100,6 +119,39 @@ def test_another_job_replaces_the_stills(render, tmp_path: Path, other: tuple[st
     assert render(*other) == 1
     assert stills(out) == ["frame00000.png"], "none of the other job is left"
     assert (out / "frame00000.png").read_bytes() != before
+
+
+def test_an_edited_scene_gives_the_new_picture_beside_the_users_own_files(render, tmp_path: Path) -> None:
+    """Scene file, mesh, texture and included file keep their names."""
+    out, picture_file = tmp_path / "out", tmp_path / "paint.png"
+    scene, mesh, part = tmp_path / "in.xml", tmp_path / "cube.obj", tmp_path / "lamp.xml"
+    scene.write_text(SCENE)
+    mesh.write_text(MESH)
+    part.write_text('<scene version="0.5.0"><emitter type="directional"><vector name="direction" x="-0.4" y="-0.6" '
+                    'z="-1"/><rgb name="irradiance" value="2.5 2.5 2.5"/></emitter></scene>')  # fmt: skip
+    Image.new("RGB", (2, 2), (200, 100, 50)).save(picture_file)
+    out.mkdir()
+    for name in ("frame-notes.md", "frames.csv"):
+        (out / name).write_text("mine")
+    arguments = (str(scene), *SIZE)
+    assert render(*arguments) == 1 and render(*arguments) == 0
+    seen = {picture(out / "frame00000.png").tobytes()}
+    Image.new("RGB", (2, 2), (50, 100, 200)).save(picture_file)
+    edits = {part: ("2.5 2.5 2.5", "1 2 3"), mesh: ("v 1 1 1", "v 1 2 1"), scene: ('value="40"', 'value="50"')}
+    for file, (old, new) in {picture_file: ("", ""), **edits}.items():
+        if old:
+            file.write_text(file.read_text().replace(old, new))
+        assert render(*arguments) == 1 and render(*arguments) == 0
+        seen.add(picture(out / "frame00000.png").tobytes())
+        assert len(seen) == 2 + [picture_file, *edits].index(file), f"{file} was edited"
+    assert all((out / name).read_text() == "mine" for name in ("frame-notes.md", "frames.csv"))
+
+
+def test_an_upgraded_renderer_renders_again(render, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert render("plain", *SIZE) == 1 and render("plain", *SIZE) == 0
+    real = analysis.source.version_of
+    monkeypatch.setattr(analysis.source, "version_of", lambda name: "9" if name == "warp" else real(name))
+    assert render("plain", *SIZE) == 1 and render("plain", *SIZE) == 0
 
 
 def test_exr_is_linear_and_png_its_encoding(render, tmp_path: Path) -> None:
