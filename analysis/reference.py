@@ -114,7 +114,7 @@ def content_hash(value: Any) -> str:
 
 def renderer_hash(renderer: object, device: str) -> str:
     """Hash of the code that makes the images of a reference, and the kind of device."""
-    return f"{code_hash(type(renderer), obtain)}-{device.partition(':')[0]}"
+    return f"{code_hash(type(renderer), ReferenceSpec)}-{device.partition(':')[0]}"
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,8 @@ def hash_of_modules(root: Path, starts: Sequence[Path]) -> str:
     modules, libraries = _reached(root, starts)
     digest = hashlib.sha256()
     for path in sorted({*modules, *_data(modules)}):
-        digest.update(f"{path.relative_to(root).as_posix()} {_file_hash(path, _state(path))}\n".encode())
+        content = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest.update(f"{path.relative_to(root).as_posix()} {content}\n".encode())
     for name in sorted(libraries):
         digest.update(f"{name} {version_of(name)}\n".encode())
     digest.update(f"python {sys.version_info.major}.{sys.version_info.minor}\n".encode())
@@ -77,7 +78,7 @@ def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
         if path in modules:
             continue
         modules.add(path)
-        for name in _imports(path, root, _state(path)):
+        for name in _imports(path.read_bytes(), path.parent.relative_to(root).parts):
             found = _module(root, name)
             waiting += found
             top = name.partition(".")[0]
@@ -104,10 +105,9 @@ def _module(root: Path, name: str) -> list[Path]:
 
 
 @lru_cache(maxsize=4096)
-def _imports(path: Path, root: Path, state: tuple[int, ...]) -> tuple[str, ...]:
-    """Dotted names of what a module imports, wherever in it that stands but for type checkers."""
-    package = path.parent.relative_to(root).parts
-    return tuple(_names(ast.parse(path.read_bytes()), package))
+def _imports(content: bytes, package: tuple[str, ...]) -> tuple[str, ...]:
+    """Dotted names of what a module of a package imports, wherever in it that stands but for type checkers."""
+    return tuple(_names(ast.parse(content), package))
 
 
 def _names(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:
@@ -133,14 +133,3 @@ def _data(modules: set[Path]) -> Iterator[Path]:
             for path in folder.rglob("*"):
                 if path.suffix != ".py" and path.suffix not in _NO_DATA and path.is_file():
                     yield path
-
-
-def _state(path: Path) -> tuple[int, ...]:
-    """Changes when a file does."""
-    found = path.stat()
-    return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
-
-
-@lru_cache(maxsize=4096)
-def _file_hash(path: Path, state: tuple[int, ...]) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

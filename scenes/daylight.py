@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache, partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import DirectionalLight, EnvironmentLight, Matrix, SunSky
-from scenes.loading import asset
+from scenes.loading import FileState, asset, state_of
 
 SUN_DEG = 0.5358
 """Full angle of the sun's disk."""
@@ -27,10 +28,15 @@ _UNIT = 0.00936766
 """From the coefficients' radiance to that of Mitsuba 3: W m⁻² sr⁻¹ nm⁻¹, as measured."""
 
 
-@lru_cache(maxsize=1)
 def _tables() -> dict[str, NDArray[np.float64]]:
     """Turbidity 1 to 10 along the first axis of each."""
-    with np.load(asset("daylight/hosek_wilkie.npz")) as stored:
+    path = asset("daylight/hosek_wilkie.npz")
+    return _read_tables(path, state_of(path))
+
+
+@lru_cache(maxsize=1)
+def _read_tables(path: Path, state: FileState | None) -> dict[str, NDArray[np.float64]]:
+    with np.load(path) as stored:
         return {name: stored[name].astype(np.float64) for name in stored.files}
 
 

@@ -37,7 +37,21 @@ def asset(name: str) -> Path:
     return path
 
 
-@lru_cache(maxsize=32)
+FileState = tuple[int, int, int, int]
+
+
+def state_of(path: Path) -> FileState | None:
+    """What differs between a file and itself once it was written to or replaced; None where there is none.
+
+    What is read from a file is kept for as long as this stays.
+    """
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
+
+
 def read_image(path: Path) -> Picture:
     """Reads a picture as linear Rec. 709 RGB.
 
@@ -55,6 +69,11 @@ def read_image(path: Path) -> Picture:
     path = Path(path)
     if not path.is_file():
         raise SceneError(f"texture {path}: expected an image file, found none")
+    return _image(path, state_of(path))
+
+
+@lru_cache(maxsize=32)
+def _image(path: Path, state: FileState | None) -> Picture:
     try:
         pixels = _read_exr(path) if path.suffix.lower() == ".exr" else _read_srgb(path)
     except Exception as error:  # decoders raise what they like on broken files

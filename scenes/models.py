@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from scenes.canonical import (
     SceneError,
     Texture,
 )
-from scenes.loading import decode_srgb, one_line
+from scenes.loading import FileState, decode_srgb, one_line, state_of
 from scenes.values import vertices_of
 
 MODEL_ENDINGS = (".obj", ".ply", ".stl", ".glb", ".gltf")
@@ -30,7 +29,11 @@ _DEFAULT = Phong(ConstantTexture((0.5, 0.5, 0.5)))
 _EXPONENT_MAX = 1.0e4
 
 
-@lru_cache(maxsize=32)
+_KEPT_MAX = 32
+_kept: dict[Path, tuple[dict[Path, FileState | None], tuple[Instance, ...]]] = {}
+"""Models that were read, and the files that each was made of."""
+
+
 def read_model(path: Path) -> tuple[Instance, ...]:
     """Parts of a model, each with its own material, in the file's frame.
 
@@ -51,6 +54,18 @@ def read_model(path: Path) -> tuple[Instance, ...]:
             a texture or material file that is not there.
     """
     path = Path(path)
+    files, kept = _kept.pop(path, ({}, ()))
+    if not files or any(state_of(file) != state for file, state in files.items()):
+        files = {path: state_of(path)}
+        kept = _read(path, files)
+    _kept[path] = files, kept
+    if len(_kept) > _KEPT_MAX:
+        del _kept[next(iter(_kept))]
+    return kept
+
+
+def _read(path: Path, files: dict[Path, FileState | None]) -> tuple[Instance, ...]:
+    """The parts of a model; enters all other files that it asks for into ``files``, also those that are not there."""
     if path.suffix.lower() not in MODEL_ENDINGS:
         raise SceneError(f"model {path}: expected a file that ends in {', '.join(MODEL_ENDINGS)}")
     if not path.is_file():
@@ -58,9 +73,16 @@ def read_model(path: Path) -> tuple[Instance, ...]:
     if path.suffix.lower() == ".obj":
         _check_obj(path)
     import trimesh  # slow, and most scenes read no model
+    from trimesh.resolvers import FilePathResolver
+
+    class Resolver(FilePathResolver):
+        def absolute(self, name: str) -> Path:
+            file = super().absolute(name)
+            files.setdefault(file, state_of(file))
+            return file
 
     try:
-        loaded = trimesh.load_scene(path, process=False)
+        loaded = trimesh.load_scene(path, process=False, resolver=Resolver(str(path)))
         nodes = [(str(node), *loaded.graph[node]) for node in loaded.graph.nodes_geometry]
         parts = [(node, np.asarray(matrix, np.float64), loaded.geometry[key]) for node, matrix, key in nodes]
     except Exception as error:  # parsers raise what they like on broken files

@@ -27,7 +27,7 @@ from scenes.canonical import (
     Rectangle,
     Rgb,
 )
-from scenes.loading import asset, clamp_radiance, read_image
+from scenes.loading import FileState, asset, clamp_radiance, read_image, state_of
 from scenes.meshing import Array, Surface, box, boxes, ellipsoid, extrude, grid, grids, join, moved, tube
 
 ROAD_HALF_WIDTH_M = 6.0
@@ -67,9 +67,13 @@ def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.
     return small.permute(1, 2, 0).numpy()
 
 
-@lru_cache(maxsize=1)
 def sky() -> EnvironmentLight:
     """Sky with a strip of hills, whose upper edge fades into the haze."""
+    return _sky(*(state_of(asset(name)) for name in ("sky.exr", "landscape_band.jpg")))
+
+
+@lru_cache(maxsize=1)
+def _sky(*states: FileState | None) -> EnvironmentLight:
     height, width = _SKY_PX
     horizon, tall = height // 2, round(_HORIZON_DEG / 180.0 * height)
     picture = read_image(asset("sky.exr"))
@@ -254,9 +258,13 @@ def _posts() -> Surface:
     return join(parts)
 
 
-@lru_cache(maxsize=1)
 def instances() -> tuple[Instance, ...]:
     """Everything that stands still, one mesh a material."""
+    return _instances(state_of(asset("pavement_albedo_512.png")))
+
+
+@lru_cache(maxsize=1)
+def _instances(state: FileState | None) -> tuple[Instance, ...]:
     paving = ImageTexture(
         read_image(asset("pavement_albedo_512.png")), (1.0 / PAVING_M, 1.0 / PAVING_M), source="pavement_albedo_512.png"
     )

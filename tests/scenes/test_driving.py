@@ -192,8 +192,8 @@ def test_phase_moves_the_car_ahead_and_nothing_else(scenes: dict[str, Scene], na
 def forget() -> None:
     """Drops what was built before, so that the next load builds it again."""
     for kept in (
-        car.body_parts, wheel.tyre, wheel.rim, wheel.brake, world.sky, world.instances, world._grass, world._facade,
-        loading.read_image,
+        car.body_parts, wheel.tyre, wheel.rim, wheel.brake, world._sky, world._instances, world._grass,
+        world._facade, loading._image,
     ):  # fmt: skip
         kept.cache_clear()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,28 @@ def decoded(code: int) -> float:
 
 
 # --- pictures --------------------------------------------------------------------------------------------------------
+
+
+def test_a_picture_is_read_once_and_again_when_it_changes(tmp_path: Path) -> None:
+    """Edited in place, to the same length."""
+    path = tmp_path / "a.ppm"
+    path.write_bytes(b"P6\n1 1\n255\n" + bytes((255, 0, 0)))
+    first = read_image(path)
+    assert read_image(path) is first
+    path.write_bytes(b"P6\n1 1\n255\n" + bytes((0, 255, 0)))
+    assert read_image(path).tolist() == [[[0.0, 1.0, 0.0]]] and first.tolist() == [[[1.0, 0.0, 0.0]]]
+
+
+def test_a_changed_asset_changes_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from scenes import world
+
+    before = world.sky()
+    assert world.sky() is before
+    shutil.copytree(loading.ASSETS, tmp_path / "assets")
+    monkeypatch.setattr(loading, "ASSETS", tmp_path / "assets")
+    height, width = read_image(asset("sky.exr")).shape[:2]
+    write_exr(asset("sky.exr"), {"RGB": np.full((height, width, 3), 0.25, np.float32)})
+    assert (world.sky().image != before.image).any()
 
 
 def test_png_is_decoded_to_linear_values(tmp_path: Path) -> None:

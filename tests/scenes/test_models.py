@@ -153,3 +153,25 @@ def test_faults_are_named_in_one_line(kind: str, message: str, tmp_path: Path) -
     with pytest.raises(SceneError, match=message) as caught:
         read_model(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("edited", ["square.obj", "square.mtl", "grey.png"])
+def test_a_model_is_read_once_and_again_when_one_of_its_files_changes(edited: str, tmp_path: Path) -> None:
+    """Edited in place, to the same length."""
+    Image.new("RGB", (2, 2), (100, 100, 100)).save(tmp_path / "grey.png")
+    path = written(tmp_path, "newmtl paint\nKd 0.8 0.8 0.8\nmap_Kd grey.png\n")
+    other = written(tmp_path, "newmtl paint\nKd 0.8 0.8 0.8\nmap_Kd grey.png\n").with_name("other.obj")
+    other.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    first, beside = read_model(path), read_model(other)
+    assert read_model(path) is first
+    file = tmp_path / edited
+    if edited == "grey.png":
+        Image.new("RGB", (2, 2), (101, 100, 100)).save(file)
+    else:
+        file.write_text(file.read_text().replace("2 3 0", "2 4 0").replace("map_Kd", "MAP_KD"))
+    again = read_model(path)
+    assert again is not first and read_model(path) is again and read_model(other) is beside
+    if edited == "square.obj":
+        assert again[0].shape.vertices.max() == 4.0 and first[0].shape.vertices.max() == 3.0
+    if edited == "grey.png":
+        assert (again[0].material.diffuse.image != first[0].material.diffuse.image).any()

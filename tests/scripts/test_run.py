@@ -21,7 +21,7 @@ from analysis.cli import InputError
 from analysis.experiment import RunOptions, prepare, run_experiment
 from analysis.files import plain
 from renderer.film import read_exr
-from scenes import loading, world
+from scenes import loading
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 from tsar.config import TsarConfig
 
@@ -277,14 +277,8 @@ def test_an_unreadable_texture_is_named(broken: str, tmp_path: Path, monkeypatch
     shutil.copytree(loading.ASSETS, assets)
     (assets / broken).write_bytes(b"not a picture" * 20)
     monkeypatch.setattr(loading, "ASSETS", assets)
-    for kept in (world.instances, world.sky, loading.read_image):
-        kept.cache_clear()
-    try:
-        with pytest.raises(InputError) as caught:
-            prepare(options(tmp_path, "out", threads=1))
-    finally:
-        for kept in (world.instances, world.sky, loading.read_image):
-            kept.cache_clear()
+    with pytest.raises(InputError) as caught:
+        prepare(options(tmp_path, "out", threads=1))
     message = str(caught.value)
     assert message.startswith(f"texture {assets / broken}: ") and "\n" not in message
     assert nothing_in(tmp_path / "out")
