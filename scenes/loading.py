@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,6 +19,10 @@ from scenes.values import vertices_of
 ASSETS = Path(__file__).parent / "assets"
 
 Picture = NDArray[np.float32]
+
+PIXELS_MOST = 1 << 27
+"""Of a picture, such as 16384 x 8192; a few kilobytes of file can hold more than memory does. One takes about 36 bytes
+while its scene is loaded."""
 
 
 def one_line(error: BaseException) -> str:
@@ -64,7 +69,7 @@ def read_image(path: Path) -> Picture:
         ``(height, width, 3)`` float32, row 0 at the top; shared between callers, so read-only.
 
     Raises:
-        SceneError: if the file is missing or cannot be read.
+        SceneError: if the file is missing, cannot be read, or holds more than :data:`PIXELS_MOST` pixels.
     """
     path = Path(path)
     if not path.is_file():
@@ -84,8 +89,17 @@ def _image(path: Path, state: FileState | None) -> Picture:
     return pixels
 
 
+def _require_size(width: int, height: int) -> None:
+    if width * height > PIXELS_MOST:
+        raise SceneError(f"expected at most {PIXELS_MOST:,} pixels, got {width} x {height}")
+
+
 def _read_srgb(path: Path) -> Picture:
-    with Image.open(path) as image:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large ones are refused here
+        image = Image.open(path)
+    with image:
+        _require_size(*image.size)
         return decode_srgb(np.array(image.convert("RGB")))
 
 
@@ -97,6 +111,9 @@ def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _read_exr(path: Path) -> Picture:
+    with OpenEXR.File(str(path), header_only=True) as file:
+        first, last = (corner.astype(np.int64) for corner in file.header()["dataWindow"])
+        _require_size(*(last - first + 1).tolist())
     with OpenEXR.File(str(path)) as file:
         channels = file.channels()
         if "RGB" in channels:

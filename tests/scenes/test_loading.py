@@ -141,6 +141,24 @@ def test_broken_pictures_are_named(tmp_path: Path, name: str) -> None:
     assert message.startswith(f"texture {path}: ") and "\n" not in message and len(message) > len(str(path)) + 12
 
 
+@pytest.mark.parametrize("ending", [".png", ".exr"])
+def test_pictures_too_large_for_memory_are_refused_before_they_are_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder, ending: str
+) -> None:
+    if ending == ".png":  # 22 kB that would take 5 GB
+        path = tmp_path / "bits.png"
+        Image.new("1", (12000, 12000)).save(path)
+        size = "12000 x 12000"
+    else:
+        path, size = tmp_path / "wide.exr", "3 x 2"
+        write_exr(path, {"RGB": np.zeros((2, 3, 3), np.float32)})
+        monkeypatch.setattr(loading, "PIXELS_MOST", 5)
+    monkeypatch.setattr(loading, "decode_srgb", lambda encoded: pytest.fail("decoded"))
+    with pytest.raises(SceneError, match=rf"expected at most .* pixels, got {size}"):
+        read_image(path)
+    assert not recwarn.list
+
+
 def test_assets_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert asset("sky.exr").is_file()
     monkeypatch.setattr(loading, "ASSETS", tmp_path)
