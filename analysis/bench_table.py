@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from analysis import tables
 from analysis.bench import SPREAD
 from analysis.store import read_json
 
@@ -22,8 +23,8 @@ _MET = {True: "yes", False: "NO", None: ""}
 
 def console() -> Console:
     """Standard output, wide enough for a row where it goes into a file."""
-    wide = Console()
-    return wide if wide.is_terminal else Console(width=_WIDTH)
+    shown = tables.console()
+    return shown if shown.is_terminal else tables.console(_WIDTH)
 
 
 def figure(value: float | None) -> str:

@@ -62,7 +62,7 @@ def error_figure(
     upper.plot(times_s, np.where(adaptive > 0, adaptive, np.nan), color=ADAPTIVE, linewidth=1.2, label="TSAR")
     upper.set_yscale("log")
     upper.set_ylabel("mean squared error")
-    upper.set_title(title, fontsize=10, loc="left")
+    upper.set_title(title, fontsize=10, loc="left", parse_math=False)
     upper.margins(y=0.15)
     upper.legend(frameon=False, fontsize=8, ncols=3, loc="upper left")
     shown = np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan)

@@ -49,7 +49,7 @@ def slope_figure(spectra: Sequence[Spectrum]) -> Figure:
         slopes = [member.slope for member in members]
         axis.plot([np.mean(slopes)] * 2, [row - 0.36, row + 0.36], color="0.2", linewidth=1.6)
     for source in sources:
-        axis.plot([], [], "o", color=ink[source], markersize=4.5, label=source)
+        axis.plot([], [], "o", color=ink[source], markersize=4.5, label=source.replace("$", r"\$"))
     axis.plot([], [], color="0.2", linewidth=1.6, label="mean of the group")
     axis.set_yticks(range(len(groups)), groups)
     axis.set_ylim(len(groups) - 0.4, -0.6)
@@ -74,7 +74,7 @@ def example_spectra_figure(spectra: Sequence[Spectrum]) -> Figure:
         assert spectrum.picture is not None
         above.imshow(spectrum.picture)
         above.set_axis_off()
-        above.set_title(f"{spectrum.name}\n{spectrum.group}", fontsize=8)
+        above.set_title(f"{spectrum.name}\n{spectrum.group}", fontsize=8, parse_math=False)
         frequency = np.arange(1, len(spectrum.power) + 1)
         _plain(below)
         below.loglog(frequency, spectrum.power, color=FRAMED, linewidth=1.2)

@@ -23,21 +23,21 @@ class Bars:
 
     def say(self, line: str) -> None:
         """Prints a line above the bars."""
-        self._progress.console.print(line, highlight=False, markup=False, soft_wrap=True)
+        self._progress.console.print(line, highlight=False, soft_wrap=True)
 
 
 @contextmanager
 def bars() -> Iterator[Bars]:
     """Shows bars while the block runs, from the first one on: without any, nothing is printed."""
     columns = (
-        TextColumn("{task.description:<12}"),
+        TextColumn("{task.description:<12}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    progress = Progress(*columns, console=Console(stderr=True))
+    progress = Progress(*columns, console=Console(stderr=True, markup=False, emoji=False))
     try:
         yield Bars(progress)
     finally:

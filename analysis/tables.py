@@ -1,10 +1,22 @@
-"""Tables on the terminal."""
+"""Text and tables on the terminal."""
 
 from __future__ import annotations
 
 import pandas as pd
 from rich.console import Console
 from rich.table import Table
+
+_WIDTH = 150
+"""Characters a line of a data frame at least."""
+
+
+def console(width: int | None = None) -> Console:
+    """Standard output. Text appears as it is: a path may hold brackets or colons, which rich would take for markup.
+
+    Args:
+        width: characters a line; by default those of the terminal.
+    """
+    return Console(width=width, markup=False, emoji=False)
 
 
 def frame_table(rows: pd.DataFrame, title: str = "") -> None:
@@ -14,7 +26,7 @@ def frame_table(rows: pd.DataFrame, title: str = "") -> None:
         table.add_column(str(name), justify="right" if pd.api.types.is_numeric_dtype(rows[name]) else "left")
     for row in rows.itertuples(index=False):
         table.add_row(*(_short(value) for value in row))
-    Console(width=max(150, Console().width)).print(table)
+    console(max(_WIDTH, console().width)).print(table)
 
 
 def _short(value: object) -> str:

@@ -151,9 +151,10 @@ def _shown(report: Callable[[str], None] | None) -> Iterator[tuple[Callable[[str
     # where a progress bar stands on the terminal it has put itself in the place of the stream
     elif sys.stderr is sys.__stderr__ and sys.stderr.isatty():
         from rich.console import Console
+        from rich.text import Text
 
-        with Console(stderr=True).status("") as status:
-            yield status.update, _STATUS_INTERVAL_S
+        with Console(stderr=True, markup=False, emoji=False).status("") as status:
+            yield lambda line: status.update(Text(line)), _STATUS_INTERVAL_S
     else:
         yield lambda line: print(line, file=sys.stderr, flush=True), _LINE_INTERVAL_S
 

@@ -22,26 +22,26 @@ def main() -> None:
 
     summary = write_report(options)
 
-    from rich.console import Console
     from rich.table import Table
 
     from analysis.cost_tables import tables
+    from analysis.tables import console
 
-    console = Console()
+    shown = console()
     for found in tables(summary):
         table = Table(title=found.title, title_justify="left", caption=found.note or None, caption_justify="left")
         for number, name in enumerate(found.header):
             table.add_column(name, justify="right" if number else "left")
         for row in found.rows:
             table.add_row(*row)
-        console.print(table)
+        shown.print(table)
     rows = ", ".join(f"{batch} at {side}²" for batch, side in summary["admitted"])
     segments = f"{options.admitted_segments:g} segments"
-    console.print(f"admitted at {segments}, ledger {options.ledger}: {len(summary['admitted'])} rows: {rows or 'none'}")
+    shown.print(f"admitted at {segments}, ledger {options.ledger}: {len(summary['admitted'])} rows: {rows or 'none'}")
     crossing = summary["crossing_batch"]
-    console.print(f"equal cost at batch {'none' if crossing is None else f'{crossing:,.1f}'}")
+    shown.print(f"equal cost at batch {'none' if crossing is None else f'{crossing:,.1f}'}")
     names = ", ".join(sorted(path.name for path in options.out.iterdir() if path.is_file()))
-    console.print(f"written to {options.out}: {names}")
+    shown.print(f"written to {options.out}: {names}")
 
 
 if __name__ == "__main__":

@@ -21,8 +21,9 @@ def main() -> None:
     options = parse(RunOptions, __doc__ or "")
     summary = run_experiment(options, process_began_s())
 
-    from rich.console import Console
     from rich.table import Table
+
+    from analysis.tables import console
 
     statistics = summary["ratio_statistics"]
     table = Table(title=f"{options.input}, ledger {summary['ledger']}", show_header=False, title_justify="left")
@@ -38,9 +39,9 @@ def main() -> None:
     }
     for name, value in rows.items():
         table.add_row(name, value)
-    console = Console()
-    console.print(table)
-    console.print(f"written to {options.out}: summary.json, report.html, error.png, comparison.mp4, steps.parquet")
+    shown = console()
+    shown.print(table)
+    shown.print(f"written to {options.out}: summary.json, report.html, error.png, comparison.mp4, steps.parquet")
     require_unbroken([] if summary["invariants"]["ok"] else [options.input])
 
 

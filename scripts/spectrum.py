@@ -15,33 +15,31 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, parse, run_cli
-from analysis.files import writable_folder
+from analysis.cli import parse, run_cli
 from analysis.spectrum import SpectrumOptions
 
 
 def main() -> None:
     """Parses, measures, prints what came out and where it is."""
     options = parse(SpectrumOptions, __doc__ or "")
-    with bad_input():
-        writable_folder(options.out, "out")
     from analysis.spectrum_study import run_study
 
     summary = run_study(options)
 
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    from analysis.tables import console
+
+    shown = console()
     for title, columns, rows in tables(summary):
         table = Table(title=title, title_justify="left")
         for number, column in enumerate(columns):
             table.add_column(column, justify="right" if number else "left")
         for row in rows:
             table.add_row(*row)
-        console.print(table)
+        shown.print(table)
     names = ", ".join(sorted(path.name for path in options.out.iterdir() if path.suffix in (".png", ".json")))
-    console.print(f"written to {options.out}: {names}")
+    shown.print(f"written to {options.out}: {names}")
 
 
 def tables(summary: dict[str, Any]) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:

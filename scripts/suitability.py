@@ -25,19 +25,16 @@ def main() -> None:
 
     summary, tables = study(options)
 
-    from rich.console import Console
-
     from analysis.suitability_report import console_tables
+    from analysis.tables import console
 
-    console = Console()
-    if console.width < 110:
-        console = Console(width=110)
+    shown = console(max(110, console().width))
     for table in console_tables(tables):
-        console.print(table)
+        shown.print(table)
     for name, reason in summary["failures"].items():
-        console.print(f"failed: {name}: {reason}")
+        shown.print(f"failed: {name}: {reason}")
     done = summary["runs_done"]
-    console.print(
+    shown.print(
         f"{done} of {summary['runs']} runs; written to {options.out}: summary.json, tables/, figures/, report.html"
     )
     require_unbroken(summary["broken_invariants"])
