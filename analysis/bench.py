@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from analysis import limits
 from tsar.config import closed_choices, require
 
 if TYPE_CHECKING:
@@ -69,16 +70,13 @@ class BenchOptions:
         for name in self.groups:
             require(name in GROUPS, "only", f"one of {', '.join(GROUPS)}", name)
         least = _FEWEST_REPETITIONS
-        require(self.repetitions >= least, "repetitions", f"at least {least}", self.repetitions)
+        limits.within(self, repetitions=(least, limits.REPETITIONS[1]), subdivisions=(0, 9), cycles=(100, 10**6))
         side = self.resolution_px
         require(64 <= side <= 4096 and side & (side - 1) == 0, "resolution_px", "a power of two in [64, 4096]", side)
-        for name in self.subdivisions:
-            require(0 <= name <= 9, "subdivisions", "between 0 and 9", name)
         most = (side // FRAMELET_SIDE) ** 2
         require(1 <= self.batch_size <= most, "batch_size", f"between 1 and {most}, a picture's", self.batch_size)
         for file in self.scene_files:
             require(file.is_file(), "scene_files", "scene files", file)
-        require(self.cycles >= 100, "cycles", "at least 100", self.cycles)
 
     @property
     def groups(self) -> tuple[str, ...]:

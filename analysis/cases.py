@@ -8,7 +8,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from analysis.cost_model import CostParameters, Ledger, nonadaptive_flops, parameters_of
+from analysis import limits
+from analysis.cost_model import MODELLED, CostParameters, Ledger, cycle_seconds, nonadaptive_flops, parameters_of
 from analysis.display_model import DisplayModel
 from analysis.files import plain
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
@@ -128,6 +129,10 @@ class Case:
         require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
+        if not self.policy.startswith("framed") and self.ledger in MODELLED:
+            cycle_s = cycle_seconds(self.ledger, self.capacity, self.cost)({}, 0.0)
+            pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
+            limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
         span = self.jod_span_s
         ok = span is None or 0 <= span[0] < span[1] <= self.scale.seconds
         require(ok, "jod_span_s", f"from and to within the {self.scale.seconds:g} s of a run", span)

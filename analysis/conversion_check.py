@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import tyro
 
+from analysis import limits
 from analysis.peer_renderers import Picture, rendered
 from tsar.config import require
 
@@ -40,9 +41,7 @@ class CheckOptions:
     """Folder for the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
 
     def __post_init__(self) -> None:
-        require(16 <= self.width_px <= 4096, "width_px", "between 16 and 4096", self.width_px)
-        require(1 <= self.samples <= 1 << 16, "samples", "between 1 and 65536", self.samples)
-        require(0.0 < self.limit_s <= 86400.0, "limit_s", "between 0 and 86400", self.limit_s)
+        limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))
         require(bool(self.scenes) or self.markers, "scenes", "scene files, or --markers", "neither")
         for scene in self.scenes:
             require(scene.is_file(), "scenes", "scene files", scene)

@@ -15,6 +15,7 @@ from itertools import islice
 from statistics import median
 from typing import TYPE_CHECKING, Literal
 
+from analysis import limits
 from analysis.cli import bad_input, require_memory
 from analysis.cost_model import RAYS
 from analysis.cost_refit import Cell, MemoryTrace
@@ -66,13 +67,24 @@ class MeasurementOptions:
             least = _FEWEST_BATCHES if name == "measured_batches" else _FEWEST_RESOLUTIONS
             values = getattr(self, name)
             require(len(set(values)) >= least, name, f"at least {least} different values", values)
-        for name in ("repetitions", "cycles_per_turn", "memory_every"):
-            require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
-        require(0 < self.cycle_s < math.inf, "cycle_s", "a positive, finite number", self.cycle_s)
+        limits.within(
+            self,
+            measured_batches=(1, 8192),
+            measured_batch=(1, 8192),
+            measured_resolutions=(64, 8192),
+            measured_resolution=(64, 8192),
+            repetitions=limits.REPETITIONS,
+            cycles_per_turn=(1, 10_000),
+            cycle_s=(1e-6, 3600.0),
+            measured_warmup=(0, 100_000),
+            memory_cycles=(0, limits.CYCLES_MOST),
+            memory_every=(1, limits.CYCLES_MOST),
+            threads=limits.THREADS,
+        )
+        asked = self.repetitions * self.cycles_per_turn * len(self.settings)
+        limits.require_count("repetitions", self.repetitions, asked, "cycles measured")
         few = self.memory_cycles == 0 or self.memory_cycles >= 4 * self.memory_every
         require(few, "memory_cycles", "0, or at least 4 times memory_every", self.memory_cycles)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
-        require(self.measured_warmup >= 0, "measured_warmup", "at least 0", self.measured_warmup)
         for setting in self.settings:
             self.pipeline(*setting)
 

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from analysis import limits
 from analysis.cost_measurement import MeasurementOptions
 from analysis.cost_model import CostParameters
 from tsar.config import closed_choices, require
@@ -50,6 +51,8 @@ class TableParameters:
     """FLOPs per shading of a ray's end point."""
 
     def __post_init__(self) -> None:
+        bounds = dict.fromkeys((item.name for item in dataclasses.fields(self)), (1e-6, 1e15))
+        limits.within(self, **{**bounds, "trace_segments": (0.0, limits.SEGMENTS[1])})
         for name in ("tree_size", "tiling_size"):
             require(getattr(self, name) > 1, name, "more than 1, for its logarithm counts", getattr(self, name))
         _ = self.model
@@ -88,7 +91,9 @@ class CostReportOptions:
     def __post_init__(self) -> None:
         for name in ("batches", "resolutions"):
             values = getattr(self, name)
-            require(len(values) > 0 and min(values) >= 1, name, "numbers of at least 1", values)
+            require(len(values) > 0, name, "at least one number", values)
+        segments = (0.0, limits.SEGMENTS[1])
+        limits.within(self, batches=(1, 1 << 20), resolutions=limits.SIDES_PX, admitted_segments=segments)
         _ = self.admitting
 
     @property

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.cli import bad_input, full_disk, require_memory
+from analysis.cli import InputError, bad_input, full_disk, require_memory
 from analysis.cost_model import cycle_seconds, frame_seconds
 from analysis.files import writable_folder
 from analysis.run_options import RunOptions
@@ -32,6 +32,7 @@ ROOT = Path(__file__).resolve().parent.parent
 _SUMMARY = "summary.json"
 _FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
 _BYTES_PER_PIXEL = 260  # images, age fields and films in flight at output resolution
+_BYTES_PER_CACHED_SAMPLE = 20  # colours and wavelet coefficients
 _BYTES_PER_SAMPLE = 64  # positions, times and colours of a framed image
 
 
@@ -51,11 +52,13 @@ def prepare(options: RunOptions) -> Setup:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        writable_folder(options.out, "out")
-        writable_folder(options.cache, "cache")
         pixels, finest = options.tsar.resolution_px**2, max(options.framed.values())
         need = pixels * (_BYTES_PER_PIXEL + _BYTES_PER_SAMPLE * finest**2)
         require_memory(need, f"resolution_px: {options.tsar.resolution_px}")
+        slots = options.tsar.cache_slots
+        require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
+        writable_folder(options.out, "out")
+        writable_folder(options.cache, "cache")
     with first_imports():
         from scenes import catalog
 
@@ -111,6 +114,10 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
             reference = _reference(options, setup, len(times_s), bars)
             framed, meters = _framed(options, setup)
             comparison = _compare(options, times_s, reference, Streams(adaptive, framed), bars)
+    if totals.cycles == 0:
+        (options.out / "steps.parquet").unlink()
+        (options.out / "comparison.mp4").unlink(missing_ok=True)
+        raise InputError(f"seconds: expected time for a cycle before the last reference image, got {options.seconds:g}")
     with full_disk(options.out):
         invariants = check_invariants(options.out / "steps.parquet")
         measured = Measured(comparison, totals, meters, options.framed, invariants, reference.nonfinite, options.cost)

@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from analysis import limits
 from analysis.cases import Case, Scale
 from analysis.cli import InputError
-from tsar.config import require
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -36,7 +36,7 @@ class FarmOptions:
     """Address of a running Dask scheduler, such as tcp://host:8786; empty starts a local cluster."""
 
     def __post_init__(self) -> None:
-        require(self.workers >= 0, "workers", "at least 0", self.workers)
+        limits.within(self, workers=limits.WORKERS)
 
     @property
     def processes(self) -> int:

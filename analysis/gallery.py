@@ -95,11 +95,14 @@ def sample_plan(options: GalleryOptions) -> SamplePlan:
     """How pixels are sampled.
 
     Raises:
-        ValueError: for a number of samples that the point set cannot have, or an effect that is not known.
+        ValueError: for a number of samples that the point set cannot have, an effect that is not known, or pictures
+            that memory does not hold.
     """
     names(options)
+    from renderer.checks import check_frame_size
     from renderer.sampling import SamplePlan
 
+    check_frame_size(options.width_px, options.height_px, 1)
     return SamplePlan(options.samples, options.point_set, options.seed, options.space_filter)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from analysis.reference import content_hash
 from analysis.source import code_hash
 from analysis.tracer_options import JobOptions
+from renderer.checks import check_frame_size
 from scenes import catalog
 from scenes.canonical import Scene, SceneError
 from scenes.formats.block_settings import Settings
@@ -43,6 +44,7 @@ def prepare(options: JobOptions) -> Work:
     size = (settings.width_px, settings.height_px)
     if options.width_px:
         size = (options.width_px, max(1, round(options.width_px * settings.height_px / settings.width_px)))
+    check_frame_size(*size, 1)
     end = options.first_frame + options.frames if options.frames else settings.frame_count
     if not options.first_frame < end <= settings.frame_count:
         count = settings.frame_count

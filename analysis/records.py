@@ -225,7 +225,8 @@ class InvariantCheck:
     def result(self) -> dict[str, Any]:
         """Counts and ``ok``."""
         counts = (self._found[name] for name in self._COUNTED)
-        ok = self._found["conservation_residual"] <= _CONSERVATION and not any(counts)
+        kept = self._found["conservation_residual"] <= _CONSERVATION and not any(counts)
+        ok = kept and self._found["cycles"] > 0  # nothing held where nothing ran
         return {**self._found, "ok": bool(ok)}
 
 

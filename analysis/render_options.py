@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
+from analysis import limits
 from analysis.tracer_options import PointSetName
-from tsar.config import closed_choices, require
+from tsar.config import closed_choices
 
 _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
 
@@ -62,13 +62,19 @@ class RenderOptions:
     """Folder for the results; frames that an interrupted run of the same job left there are kept."""
 
     def __post_init__(self) -> None:
-        for name, most in (("width_px", 32768), ("height_px", 32768), ("samples_per_axis", 64), ("frames", 10**6)):
-            require(1 <= getattr(self, name) <= most, name, f"between 1 and {most}", getattr(self, name))
-        require(0 < self.fps < math.inf, "fps", "a positive, finite number", self.fps)
-        require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
-        require(0 <= self.samples <= 1 << 16, "samples", "between 0 and 65536", self.samples)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        limits.within(
+            self,
+            width_px=limits.SIDES_PX,
+            height_px=limits.SIDES_PX,
+            samples_per_axis=(1, 64),
+            samples=(0, 1 << 16),
+            frames=(1, 10**6),
+            fps=(1e-6, 1e5),
+            time_s=limits.TIMES_S,
+            phase=(0.0, 1.0),
+            seed=limits.SEEDS,
+            threads=limits.THREADS,
+        )
 
     @property
     def times_s(self) -> list[float]:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from analysis import limits
 from analysis.cases import INPUTS
 from analysis.cost_model import CAPACITY_DEFAULT, Ledger
 from analysis.experiment import RunOptions
@@ -41,10 +42,11 @@ class InputsOptions:
     """Folder for the results, one folder a run within."""
 
     def __post_init__(self) -> None:
-        require(self.repetitions >= 1, "repetitions", "at least 1", self.repetitions)
+        limits.within(self, repetitions=limits.REPETITIONS)
         require(len(self.inputs) >= 1, "inputs", "at least one", self.inputs)
         unknown = [name for name in self.inputs if name not in INPUTS]
         require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        self.runs()
 
     def runs(self) -> list[RunOptions]:
         """Every run, resolved."""

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from analysis.cost_model import CAPACITY_DEFAULT, CostParameters, Ledger, parameters_of
+from analysis import limits
+from analysis.cost_model import (
+    CAPACITY_DEFAULT,
+    MODELLED,
+    CostParameters,
+    Ledger,
+    cycle_seconds,
+    frame_seconds,
+    parameters_of,
+)
 from tsar.config import StagesName, TsarConfig, closed_choices, require
 
 
@@ -62,20 +70,31 @@ class RunOptions:
     """Folder for references, shared by all runs."""
 
     def __post_init__(self) -> None:
-        for name in ("seconds", "capacity", "trace_segments", "reference_rate_hz"):
-            value = getattr(self, name)
-            require(0 < value < math.inf, name, "a positive, finite number", value)
-        for name in ("start_s", "phase"):
-            require(math.isfinite(getattr(self, name)), name, "a finite number", getattr(self, name))
-        for name in ("framed_samples_per_axis", "reference_samples_per_axis"):
-            require(1 <= getattr(self, name) <= 16, name, "between 1 and 16", getattr(self, name))
+        limits.within(
+            self,
+            seconds=limits.SPANS_S,
+            start_s=limits.TIMES_S,
+            phase=(0.0, 1.0),
+            capacity=(1e-12, 1e24),
+            trace_segments=limits.SEGMENTS,
+            reference_rate_hz=limits.RATES_HZ,
+            framed_samples_per_axis=(1, 16),
+            reference_samples_per_axis=(1, 16),
+            threads=limits.THREADS,
+        )
         for name in ("framed_samples_per_axis", "supersampled_samples_per_axis"):
             value = getattr(self, name)
             require(0 <= value <= 16 and value & (value - 1) == 0, name, "a power of two up to 16", value)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
-        require(
-            self.tsar.warmup_cycles >= 4, "warmup_cycles", "at least 4 (the latency and one)", self.tsar.warmup_cycles
-        )
+        warmup = self.tsar.warmup_cycles
+        require(warmup >= 4, "warmup_cycles", "at least 4 (the latency and one)", warmup)
+        images = self.seconds * self.reference_rate_hz
+        require(images >= 1e-6, "seconds", f"time for a reference image at {self.reference_rate_hz:g} Hz", self.seconds)
+        limits.require_count("seconds", self.seconds, images, "reference images")
+        if self.counted in MODELLED:
+            cycle_s = cycle_seconds(self.counted, self.capacity, self.cost)({}, 0.0)
+            limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
+            frame_s = frame_seconds(self.counted, self.capacity, self.cost)({}, 0.0)
+            limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
 
     @property
     def counted(self) -> Ledger:

@@ -19,6 +19,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
+from analysis import limits
 from analysis.cases import INPUTS, ROWS, SCALES, Case, framed_config
 from analysis.cost_model import Ledger
 from analysis.farm import FarmOptions
@@ -82,7 +83,9 @@ class SensitivityOptions:
             chosen = getattr(self, name)
             require(len(chosen) == len(set(chosen)), name, "none twice", chosen)
         require(0 <= self.row < len(ROWS), "row", f"a number from 0 to {len(ROWS) - 1}", self.row)
-        require(self.repetitions >= 1, "repetitions", "at least 1", self.repetitions)
+        slopes, changes = (-60.0, 60.0), (-120.0, 120.0)
+        limits.within(self, spatial_slopes=slopes, temporal_slopes=slopes, offsets=changes, biases=(-8.0, 8.0))
+        limits.within(self, repetitions=limits.REPETITIONS)
         require(self.figure_input in self.inputs, "figure_input", "one of the inputs", self.figure_input)
         seconds = SCALES[self.scale].seconds
         require(0 <= self.still_s < seconds, "still_s", f"a time within the run's {seconds:g} s", self.still_s)

@@ -14,6 +14,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
+from analysis import limits
 from analysis.cli import InputError, bad_input
 from analysis.repetitions import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
@@ -88,8 +89,10 @@ class SpectrumOptions:
     def __post_init__(self) -> None:
         unknown = [name for name in (*self.inputs, self.input) if name not in INPUTS]
         require(not unknown and len(self.inputs) > 0, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
-        for name, low, high in (("frames_per_input", 1, 100), ("samples_per_axis", 1, 16)):
-            require(low <= getattr(self, name) <= high, name, f"between {low} and {high}", getattr(self, name))
+        limits.within(self, frames_per_input=(1, 100), samples_per_axis=(1, 16), threads=limits.THREADS)
+        limits.within(self, samples=(32, 1 << 15), frames=(8, 1 << 15))
+        limits.within(self, agreement_samples=(64, 1 << 15), agreement_frames=(16, 1 << 15))
+        limits.within(self, tile_level=(0, 10), agreement_level=(0, 9))
         for name, low in (("samples", 32), ("frames", 8), ("agreement_samples", 64), ("agreement_frames", 16)):
             value = getattr(self, name)
             require(value >= low and value & (value - 1) == 0, name, f"a power of two from {low}", value)
@@ -105,7 +108,6 @@ class SpectrumOptions:
         require(0 < self.span_s <= 3, "span_s", "a number in (0, 3]", self.span_s)
         require(-3 <= self.start_s <= 6 - self.span_s, "start_s", "within the animation, from -3 to 6 s", self.start_s)
         require(0 < self.tau < 1, "tau", "a share in (0, 1)", self.tau)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
 
     def does(self, part: Part) -> bool:
         """Whether a part is wanted."""

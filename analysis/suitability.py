@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from analysis import limits
 from analysis.cases import INPUTS, POLICIES, ROWS, SCALES, Case, Policy, framed_config
 from analysis.cost_model import Ledger
 from analysis.display_model import DisplayModel
@@ -73,8 +74,15 @@ class SuitabilityOptions:
             require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
         for name, values in (("rows", self.rows), ("policy_row", (self.policy_row,))):
             require(all(0 <= row < len(ROWS) for row in values), name, f"numbers from 0 to {len(ROWS) - 1}", values)
-        require(self.repetitions >= 1, "repetitions", "at least 1", self.repetitions)
-        require(self.jod_repetitions >= 0, "jod_repetitions", "at least 0", self.jod_repetitions)
+        limits.within(
+            self,
+            repetitions=limits.REPETITIONS,
+            jod_repetitions=(0, limits.REPETITIONS[1]),
+            framed_rate_hz=(0.01, 1000.0),
+            trace_segments=limits.SEGMENTS,
+            start_s=limits.TIMES_S,
+            jod_span_s=(0.0, SCALES[self.scale].seconds),
+        )
         self.display.repeats(SCALES[self.scale].reference_rate_hz)
 
 

@@ -49,9 +49,9 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
         InputError: something asked for cannot be had.
     """
     with bad_input():
+        planned = runs(options)
         writable_folder(options.out, "out")
         writable_folder(options.cache, "cache")
-        planned = runs(options)
     out = options.out.resolve()
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
     place.results.mkdir(exist_ok=True)

@@ -65,14 +65,17 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
     """The picture asked for.
 
     Raises:
-        ValueError: there is no such scene, or the point set cannot have so many points.
+        ValueError: there is no such scene, the point set cannot have so many points, or memory does not hold so many
+            pixels.
     """
+    from renderer.checks import check_frame_size
     from renderer.point_sets import point_set
     from scenes import catalog
 
     film = catalog.load(options.scene).film
     point_set(options.point_set, options.samples)
     size = options.width_px or film.width_px, options.height_px or film.height_px
+    check_frame_size(*size, 1)
     kinds = options.samples, options.point_set, options.space_filter
     return Picture(options.scene, size, *kinds, options.time_s, options.seed, threads, source_of(options.scene))
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
+from analysis import limits
 from analysis.farm import FarmOptions
 from tsar.config import closed_choices, require
 
@@ -57,10 +57,8 @@ class GalleryOptions:
     """Folder for NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
 
     def __post_init__(self) -> None:
-        for name, most in (("width_px", 32768), ("height_px", 32768), ("samples", 1 << 16)):
-            require(1 <= getattr(self, name) <= most, name, f"between 1 and {most}", getattr(self, name))
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
+        sides, samples = limits.SIDES_PX, (1, 1 << 16)
+        limits.within(self, width_px=sides, height_px=sides, samples=samples, seed=limits.SEEDS, threads=limits.THREADS)
 
 
 @dataclass(frozen=True)
@@ -86,12 +84,8 @@ class AcceleratorOptions:
     """Threads for tracing images; 0 takes one per core."""
 
     def __post_init__(self) -> None:
-        for count in self.triangles:
-            require(16 <= count <= 4_000_000, "triangles", "between 16 and 4,000,000", count)
-        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
-        require(0.01 <= self.scale <= 4.0, "scale", "between 0.01 and 4", self.scale)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
+        limits.within(self, triangles=(16, 4_000_000), repetitions=(1, 100), scale=(0.01, 4.0))
+        limits.within(self, seed=limits.SEEDS, threads=limits.THREADS)
 
 
 @dataclass(frozen=True)
@@ -116,10 +110,7 @@ class PointSetOptions:
             ok = 1 <= level <= 4096 and round(level ** (1 / 3)) ** 3 == level
             require(ok, "levels", "cubes between 1 and 4096", level)
         require(len(set(self.levels)) >= 3, "levels", "at least three, for a slope", self.levels)
-        require(1 <= self.cases <= 1 << 20, "cases", "between 1 and 1048576", self.cases)
-        require(1 <= self.sets_of_each <= 256, "sets_of_each", "between 1 and 256", self.sets_of_each)
-        require(0 <= self.frame_px <= 2048, "frame_px", "between 0 and 2048", self.frame_px)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
+        limits.within(self, cases=(1, 1 << 20), sets_of_each=(1, 256), frame_px=(0, 2048), seed=limits.SEEDS)
 
 
 @dataclass(frozen=True)
@@ -155,15 +146,17 @@ class TileOptions:
     """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
 
     def __post_init__(self) -> None:
-        for name in ("width_px", "height_px"):
-            require(0 <= getattr(self, name) <= 32768, name, "between 0 and 32768", getattr(self, name))
-        require(1 <= self.samples <= 1 << 16, "samples", "between 1 and 65536", self.samples)
-        require(1 <= self.chunk_tiles <= 1 << 16, "chunk_tiles", "between 1 and 65536", self.chunk_tiles)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(math.isfinite(self.time_s), "time_s", "a finite number", self.time_s)
-        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
-        for count in self.study:
-            require(1 <= count <= 64, "study", "between 1 and 64", count)
+        limits.within(
+            self,
+            width_px=(0, limits.SIDES_PX[1]),
+            height_px=(0, limits.SIDES_PX[1]),
+            samples=(1, 1 << 16),
+            time_s=limits.TIMES_S,
+            seed=limits.SEEDS,
+            chunk_tiles=(1, 1 << 16),
+            study=(1, 64),
+            repetitions=(1, 100),
+        )
 
 
 @dataclass(frozen=True)
@@ -198,10 +191,13 @@ class JobOptions:
     left there are kept."""
 
     def __post_init__(self) -> None:
-        require(0 <= self.width_px <= 32768, "width_px", "between 0 and 32768", self.width_px)
-        require(self.first_frame >= 0, "first_frame", "at least 0", self.first_frame)
-        require(self.frames >= 0, "frames", "at least 0", self.frames)
-        require(0.0 < self.sigma_px <= 16.0, "sigma_px", "between 0 and 16", self.sigma_px)
-        require(0.0 < self.box_share <= 1.0, "box_share", "between 0 and 1", self.box_share)
-        require(0 <= self.seed < 1 << 32, "seed", "between 0 and 2^32 - 1", self.seed)
-        require(self.threads >= 0, "threads", "at least 0", self.threads)
+        limits.within(
+            self,
+            width_px=(0, limits.SIDES_PX[1]),
+            first_frame=(0, 10**6),
+            frames=(0, 10**6),
+            sigma_px=(1e-3, 16.0),
+            box_share=(1e-6, 1.0),
+            seed=limits.SEEDS,
+            threads=limits.THREADS,
+        )

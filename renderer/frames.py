@@ -66,8 +66,19 @@ def render_tiles(
     Returns:
         Linear radiance, pixels along the Morton curve; those outside the picture are traced as well. Counts by kind.
     """
-    samples = _tile_samples(plan, tiles, size_px, frame_time_s, shutter_s, frame)
-    return _traced(renderer, samples, len(tiles), size_px, frame, plan.seed)
+    parts, counters = [], Counter[str]()
+    at_once = _tiles_at_once(plan)
+    for first in range(0, len(tiles), at_once):
+        some = tiles[first : first + at_once]
+        samples = _tile_samples(plan, some, size_px, frame_time_s, shutter_s, frame)
+        colors, rays = _traced(renderer, samples, len(some), size_px, frame, plan.seed)
+        parts.append(colors)
+        counters.update(rays)
+    return torch.cat(parts), dict(counters)
+
+
+def _tiles_at_once(plan: SamplePlan) -> int:
+    return max(1, _SAMPLES_AT_ONCE // (TILE_PX**2 * plan.samples_per_pixel))
 
 
 Samples = tuple[NDArray[np.float32], NDArray[np.float64]]
@@ -122,7 +133,7 @@ def render_image(
     """
     image = torch.zeros(height_px, width_px, 3)
     count = tile_count(width_px, height_px)
-    at_once = max(1, _SAMPLES_AT_ONCE // (TILE_PX**2 * plan.samples_per_pixel))
+    at_once = _tiles_at_once(plan)
     size = width_px, height_px
     chunks = [range(first, min(first + at_once, count)) for first in range(0, count, at_once)]
     with ThreadPoolExecutor(1) as ahead:  # places the next samples while these are traced

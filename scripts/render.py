@@ -22,6 +22,7 @@ from analysis.render_options import RenderOptions
 def main() -> None:
     """Parses, renders, prints what was written where."""
     options = parse(RenderOptions, __doc__ or "")
+    from renderer.checks import check_frame_size
     from renderer.kernels import explanation
     from scenes import catalog
 
@@ -32,6 +33,7 @@ def main() -> None:
         if options.explain:
             print("\n".join(explanation(scene)))
             return
+        check_frame_size(options.width_px, options.height_px, 1 if options.samples else options.samples_per_axis)
         writable_folder(options.out, "out")
 
     from analysis.progress import bars

@@ -24,9 +24,9 @@ def main() -> None:
     options = parse(SensitivityOptions, __doc__ or "")
     require_extra("study", "perception")
     with bad_input():
+        planned = runs(options)
         writable_folder(options.out, "out")
         writable_folder(options.cache, "cache")
-        planned = runs(options)
     import pandas as pd
 
     from analysis.evaluation import ROOT, Place, broken, finished, times_of

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
-from math import inf, log2
+from math import log2
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -95,11 +95,11 @@ class TilingConfig:
     """A tile is split while the samples asked for in it exceed this; one framelet holds 256."""
 
     def __post_init__(self) -> None:
-        require(self.level_min >= 1, "tiling.level_min", "at least 1", self.level_min)
-        require(self.level_max >= 0, "tiling.level_max", "at least 0", self.level_max)
+        require(1 <= self.level_min <= 9, "tiling.level_min", "between 1 and 9", self.level_min)
+        require(0 <= self.level_max <= 9, "tiling.level_max", "between 0 and 9", self.level_max)
         require(self.tile_count_max >= 0, "tiling.tile_count_max", "at least 0", self.tile_count_max)
         threshold = self.threshold_samples
-        require(0 < threshold < inf, "tiling.threshold_samples", "a positive, finite number", threshold)
+        require(1e-6 <= threshold <= 1e12, "tiling.threshold_samples", "a number in [1e-6, 1e12]", threshold)
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,8 @@ class TsarConfig:
             ok = low <= value <= high and value & (value - 1) == 0
             require(ok, name, f"a power of two in [{low}, {high}]", value)
         require(self.framelet_side in (16, 32), "framelet_side", "16 or 32", self.framelet_side)
-        require(self.warmup_cycles >= 0, "warmup_cycles", "at least 0", self.warmup_cycles)
+        for name, most in (("cache_size", 2**20), ("warmup_cycles", 100_000), ("seed", 2**32 - 1)):
+            require(0 <= getattr(self, name) <= most, name, f"between 0 and {most}", getattr(self, name))
         low, high = self.level_min, self.level_max
         require(low <= high <= self.field_level, "tiling.level_max", f"between {low} and {self.field_level}", high)
         require(2**high <= self.resolution_px // 2, "tiling.level_max", "tiles of at least two output pixels", high)

@@ -8,11 +8,13 @@ from typing import Annotated, Literal
 
 import tyro
 
+from analysis import limits
 from analysis.cases import INPUTS
 from analysis.display_model import DisplayModel
 from tsar.config import closed_choices, require
 
 _ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"
+_SIGMAS_JOD = (1e-3, 100.0)
 STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_job.txt")
 
 
@@ -43,9 +45,15 @@ class StimuliOptions:
     """Folder for the stimuli, manifest.json and summary.json."""
 
     def __post_init__(self) -> None:
-        require(16 <= self.width_px <= 8192, "width_px", "between 16 and 8192", self.width_px)
-        require(self.first_frame >= 0, "first_frame", "at least 0", self.first_frame)
-        require(self.frames >= 1, "frames", "at least 1", self.frames)
+        limits.within(
+            self,
+            width_px=(16, 8192),
+            first_frame=(0, 10**6),
+            frames=(1, 10**6),
+            box_share=(1e-6, 1.0),
+            seed=limits.SEEDS,
+            threads=limits.THREADS,
+        )
         require(len(self.jobs) >= 1, "jobs", "at least one", self.jobs)
 
 
@@ -73,11 +81,17 @@ class SimulateOptions:
     """Folder for trials-simulated.parquet, jod.csv and summary.json."""
 
     def __post_init__(self) -> None:
-        require(1 <= self.observers <= 10_000, "observers", "between 1 and 10000", self.observers)
-        require(1 <= self.repetitions <= 1000, "repetitions", "between 1 and 1000", self.repetitions)
-        require(0.0 < self.sigma_jod <= 100.0, "sigma_jod", "between 0 and 100", self.sigma_jod)
-        require(0.0 <= self.sensitivity_spread <= 3.0, "sensitivity_spread", "between 0 and 3", self.sensitivity_spread)
-        require(0.0 <= self.lapse_mean <= 0.2, "lapse_mean", "between 0 and 0.2", self.lapse_mean)
+        limits.within(
+            self,
+            observers=(1, 10_000),
+            repetitions=limits.REPETITIONS,
+            sigma_jod=_SIGMAS_JOD,
+            sensitivity_spread=(0.0, 3.0),
+            lapse_mean=(0.0, 0.2),
+            seed=limits.SEEDS,
+        )
+        answers = self.observers * self.repetitions
+        limits.require_count("observers", self.observers, answers, "answers to each stimulus", most=10**6)
 
 
 @dataclass(frozen=True)
@@ -98,10 +112,7 @@ class AnalyseOptions:
     """Folder for fits.csv, tests.csv, power.csv, figures and summary.json."""
 
     def __post_init__(self) -> None:
-        require(0 <= self.bootstraps <= 100_000, "bootstraps", "between 0 and 100000", self.bootstraps)
-        require(
-            0 <= self.power_repetitions <= 10_000, "power_repetitions", "between 0 and 10000", self.power_repetitions
-        )
+        limits.within(self, bootstraps=(0, 100_000), power_repetitions=(0, 10_000), seed=limits.SEEDS)
 
 
 @dataclass(frozen=True)
@@ -128,13 +139,10 @@ class RecoverOptions:
     def __post_init__(self) -> None:
         for jnd in self.jnds:
             require(1.0 < jnd < 512.0, "jnds", "between 1 and 512", jnd)
-        for sigma in self.sigmas:
-            require(0.25 <= sigma <= 6.0, "sigmas", "between 0.25 and 6", sigma)
-        for lapse in self.lapses:
-            require(0.0 <= lapse <= 0.08, "lapses", "between 0 and 0.08", lapse)
-        require(1 <= self.trials <= 1_000_000, "trials", "between 1 and 1000000", self.trials)
-        require(1 <= self.experiments <= 100_000, "experiments", "between 1 and 100000", self.experiments)
-        require(20 <= self.bootstraps <= 100_000, "bootstraps", "between 20 and 100000", self.bootstraps)
+        limits.within(self, sigmas=(0.25, 6.0), lapses=(0.0, 0.08), trials=(1, 1_000_000), seed=limits.SEEDS)
+        limits.within(self, experiments=(1, 100_000), bootstraps=(20, 100_000))
+        fits = len(self.jnds) * len(self.sigmas) * len(self.lapses) * self.experiments * self.bootstraps
+        limits.require_count("experiments", self.experiments, fits, "fits", most=10**8)
 
 
 @dataclass(frozen=True)
@@ -158,9 +166,7 @@ class ServeOptions:
 
     def __post_init__(self) -> None:
         require(bool(self.observer.strip()), "observer", "a name", self.observer)
-        require(1 <= self.repetitions <= 100, "repetitions", "between 1 and 100", self.repetitions)
-        require(self.break_every >= 1, "break_every", "at least 1", self.break_every)
-        require(0 <= self.port <= 65535, "port", "between 0 and 65535", self.port)
+        limits.within(self, repetitions=(1, 100), break_every=(1, 10**6), port=(0, 65535), seed=limits.SEEDS)
 
 
 @dataclass(frozen=True)
@@ -190,9 +196,8 @@ class AdaptiveOptions:
     def __post_init__(self) -> None:
         for name in self.inputs:
             require(name in INPUTS, "inputs", f"one of {', '.join(INPUTS)}", name)
-        require(0.0 < self.sigma_jod <= 100.0, "sigma_jod", "between 0 and 100", self.sigma_jod)
+        limits.within(self, sigma_jod=_SIGMAS_JOD, workers=limits.WORKERS, seed=limits.SEEDS)
         require(0.0 <= self.span_s[0] < self.span_s[1] <= 2.0, "span_s", "from and to within the 2 s", self.span_s)
-        require(self.workers >= 0, "workers", "at least 0", self.workers)
 
 
 Step = (

@@ -15,10 +15,10 @@ from analysis.cli import run_cli
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def run_script(name: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def run_script(name: str, folder: Path, *arguments: str, timeout_s: float = 600) -> subprocess.CompletedProcess[str]:
     """Runs ``scripts/name`` from a folder, in a process of its own."""
     command = [sys.executable, str(ROOT / "scripts" / name), *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=600)
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=timeout_s)
 
 
 def call_script(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:

@@ -74,7 +74,7 @@ def test_parameters_come_from_the_command_line(tmp_path: Path, monkeypatch: pyte
         (("--trace-segments", "nan"), ("trace_segments", "nan")),
         (("--tree-size", "1"), ("tree_size", "1")),
         (("--ledger", "wall"), ("--ledger", "wall")),
-        (("--batches", "0", "32"), ("batches", "at least 1")),
+        (("--batches", "0", "32"), ("batches", "between 1 and 1048576")),
         (("--measured-resolutions", "100", "200", "300"), ("resolution_px", "power of two", "100")),
         (("--repetitions", "0"), ("repetitions", "0")),
         (("--input", "nonsense"), ("nonsense", "fly-by")),

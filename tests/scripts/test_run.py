@@ -208,7 +208,7 @@ def test_options_leave_out_what_they_say(folder: Path, again: tuple[dict[str, An
     [
         (("fly-by", "--batch-size", "-1"), ("batch_size", "-1")),
         (("fly-by", "--batch-size", "many"), ("--batch-size", "many")),
-        (("fly-by", "--capacity", "0"), ("capacity", "positive", "0.0")),
+        (("fly-by", "--capacity", "0"), ("capacity", "between 1e-12 and", "0.0")),
         (("fly-by", "--capacity", "nan"), ("capacity", "nan")),
         (("fly-by", "--resolution-px", "100"), ("resolution_px", "power of two", "100")),
         (("fly-by", "--solver", "magic"), ("solver", "magic", "waterfill")),

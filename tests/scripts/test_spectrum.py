@@ -87,7 +87,7 @@ def test_pictures_that_are_refused(
         (("--samples", "100"), ("samples", "100")),
         (("--inputs", "car"), ("inputs", "car")),
         (("--only", "colours"), ("only", "colours")),
-        (("--only", "ideal", "--samples", "1024", "--frames", str(2**24)), ("samples", "GiB")),
+        (("--only", "ideal", "--samples", "1024", "--frames", str(2**15)), ("samples", "GiB")),
         (("--tau", "2"), ("tau", "2")),
     ],
 )

@@ -22,11 +22,11 @@ SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-
         (("--inputs", "nowhere"), ("inputs", "nowhere")),
         (("--rows", "16"), ("rows", "0 to 15")),
         (("--scale", "huge"), ("--scale", "huge")),
-        (("--repetitions", "0"), ("repetitions", "at least 1")),
+        (("--repetitions", "0"), ("repetitions", "between 1 and 1000")),
         (("--ledger", "wall"), ("ledger", "wall")),
         (("--workers", "-1"), ("workers", "-1")),
         (("--display.rate-hz", "75"), ("rate_hz", "60 or 120")),
-        (("--framed-rate-hz", "0"), ("framed_rate_hz", "positive")),
+        (("--framed-rate-hz", "0"), ("framed_rate_hz", "between 0.01 and 1000")),
     ],
 )
 def test_bad_input_ends_with_one_line(
