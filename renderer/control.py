@@ -1,12 +1,13 @@
 """The control stages as kernels on the CPU: what the pipeline decides between two batches, in a few launches.
 
 They compute what the functions of ``tsar`` compute, within rounding. Where a configuration or a tensor is not theirs
-they hand the work to those: solvers other than ``waterfill``, and batches with samples that are not finite.
+they hand the work to those: what ``coverage.py`` does not list, and batches with samples that are not finite.
 """
 
 from __future__ import annotations
 
 import time
+from typing import get_args
 
 import numpy as np
 import torch
@@ -19,6 +20,7 @@ from renderer.control_cache import CacheView, ClaimMemory
 from renderer.control_estimate import ErrorPlan
 from renderer.control_response import COLUMNS, ResponsePlan
 from renderer.control_selection import SelectionPlan
+from renderer.coverage import StageName, covers
 from renderer.display import Display
 from renderer.launching import Command, address, require_same
 from renderer.team import TEAM
@@ -53,7 +55,7 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
 
 
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
-    """Kernels throughout, but for the response where its solver is not compiled."""
+    """Kernels throughout, but for what they do not cover of a configuration (:func:`renderer.coverage.covers`)."""
     devices.load_kernels((kernels, display_kernels), "cpu")
     control, display = Control(config, threads), Display(config, threads)
     return Stages(
@@ -74,6 +76,7 @@ class Control:
     def __init__(self, config: TsarConfig, threads: int = 1) -> None:
         """Prepares the launches of a configuration; ``threads`` share what is large."""
         self.config, self._threads = config, threads
+        self._covered: dict[StageName, bool] = {stage: covers(config, stage) for stage in get_args(StageName)}
         self._elements = config.sdf_side**2
         self._most_tiles = 4**config.level_min + 3 * split_bounds(config)[1]
         self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
@@ -100,6 +103,8 @@ class Control:
             ValueError: if the batch is larger than the configuration's.
         """
         require_same(config, self.config)
+        if not self._covered["observe"]:
+            return REFERENCE.observe(batch, color, cache, config, stage)
         count, nonfinite = batch.level.shape[0], 0
         if count > config.batch_size:
             raise ValueError(f"batch: expected at most {config.batch_size} framelets, got {count}")
@@ -122,13 +127,15 @@ class Control:
     def decide(
         self, densities: Densities, errors: Errors, history: Tensor, config: TsarConfig, stage: StageTimer
     ) -> Decision:
-        """As :func:`tsar.decision.decide`; responses by other solvers than ``waterfill`` are the reference's.
+        """As :func:`tsar.decision.decide`; responses that are not compiled are the reference's.
 
         Raises:
             ValueError: if a density is negative or not finite, or the tiling is too small for a batch.
         """
         require_same(config, self.config)
-        compiled = config.response.solver == "waterfill"
+        if not self._covered["decide"]:
+            return REFERENCE.decide(densities, errors, history, config, stage)
+        compiled = self._covered["respond"]
         if not compiled:
             with stage("response"):
                 densities = respond(densities, errors, config)
@@ -179,6 +186,8 @@ class Control:
 
     def account(self, densities: Densities, errors: Errors, newest_s: Tensor, config: TsarConfig) -> Account:
         """As :func:`tsar.accounting.account`."""
+        if not self._covered["account"]:
+            return REFERENCE.account(densities, errors, newest_s, config)
         fields = (
             ("densities.spatial", densities.spatial, _F64),
             ("densities.temporal", densities.temporal, _F64),

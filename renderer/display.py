@@ -11,6 +11,7 @@ from torch import Tensor
 
 from renderer import device as devices
 from renderer import display_kernels as kernels
+from renderer.coverage import covers
 from renderer.display_age import DisplayPlan
 from renderer.display_bands import PLANES
 from renderer.launching import Command, address, require_same
@@ -19,7 +20,8 @@ from renderer.views import PerCache, point_at_cache
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton
-from tsar.reconstruction import Reconstruction, reconstruct, spatial_weights
+from tsar.reconstruction import Reconstruction, spatial_weights
+from tsar.stages import REFERENCE
 from tsar.types import SampleMap
 
 _BAND_PIXELS = 1 << 15
@@ -44,7 +46,7 @@ class Display:
     def __init__(self, config: TsarConfig, threads: int = 1) -> None:
         """Prepares launches for ``threads`` threads."""
         devices.load_kernels(kernels, "cpu")
-        self.config = config
+        self.config, self._covered = config, covers(config, "reconstruct")
         self._cells = 2**config.level_max
         self._memory: dict[str, Tensor] = {}
         self._plan = self._make_plan()
@@ -55,8 +57,10 @@ class Display:
         self._per_cache = PerCache(self._record)
 
     def reconstruct(self, cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
-        """As :func:`tsar.reconstruction.reconstruct`, to which an image with holes is left."""
+        """As :func:`tsar.reconstruction.reconstruct`, to which an image with holes is left, and what is not covered."""
         require_same(config, self.config)
+        if not self._covered:
+            return REFERENCE.reconstruct(cache, config, cycle_s)
         launches = self._per_cache(cache)
         newest_s = torch.empty(self._cells, self._cells, dtype=torch.float64)
         level = torch.empty(self._cells, self._cells, dtype=torch.int64)
@@ -70,7 +74,7 @@ class Display:
             paint.set(self._count[0], pixels)
         TEAM.run(launches.paint)
         if self._holes.any():
-            return reconstruct(cache, config, cycle_s)
+            return REFERENCE.reconstruct(cache, config, cycle_s)
         launches.bury()
         return Reconstruction(image, SampleMap(newest_s, level), float(self._overdraw[0]))
 
