@@ -9,7 +9,14 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from analysis import limits
-from analysis.cost_model import MODELLED, CostParameters, Ledger, cycle_seconds, nonadaptive_flops, parameters_of
+from analysis.cost_model import (
+    CostParameters,
+    Ledger,
+    cycle_seconds,
+    expected_ledger,
+    nonadaptive_flops,
+    parameters_of,
+)
 from analysis.display_model import DisplayModel
 from analysis.files import plain
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
@@ -129,8 +136,8 @@ class Case:
         require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
-        if not self.policy.startswith("framed") and self.ledger in MODELLED:
-            cycle_s = cycle_seconds(self.ledger, self.capacity, self.cost)({}, 0.0)
+        if not self.policy.startswith("framed"):
+            cycle_s = cycle_seconds(expected_ledger(self.ledger), self.capacity, self.cost)({}, 0.0)
             pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
             limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
         span = self.jod_span_s
@@ -147,8 +154,7 @@ class Case:
     @property
     def capacity(self) -> float:
         """FLOP/s of the machine on which the framed renderer keeps its rate at this resolution."""
-        priced = "thesis" if self.ledger == "work" else self.ledger
-        return float(nonadaptive_flops(self.cost, priced)) * self.framed_rate_hz
+        return float(nonadaptive_flops(self.cost, expected_ledger(self.ledger))) * self.framed_rate_hz
 
     @property
     def name(self) -> str:

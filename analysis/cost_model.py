@@ -274,6 +274,11 @@ def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters) -> Seconds
     return _seconds(ledger, capacity, p, float(adaptive_flops(p, ledger)), float(control))
 
 
+def expected_ledger(ledger: Ledger) -> Ledger:
+    """The ledger that tells before a run about what this one will count: rays to come are taken from ``thesis``."""
+    return "thesis" if ledger == "work" else ledger
+
+
 def frame_seconds(ledger: Ledger, capacity: float, p: CostParameters, samples_per_axis: int = 1) -> Seconds:
     """Clock of the framed renderer, as :func:`cycle_seconds`."""
     return _seconds(ledger, capacity, p, float(nonadaptive_flops(p, ledger, samples_per_axis)), 0.0)

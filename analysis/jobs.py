@@ -52,9 +52,7 @@ def prepare(options: JobOptions) -> Work:
     return Work(job, scene, settings, size, range(options.first_frame, end))
 
 
-def run_job(
-    work: Work, options: JobOptions, task: Callable[[str, int], Callable[[int], None]]
-) -> list[dict[str, Any]]:
+def run_job(work: Work, options: JobOptions, task: Callable[[str, int], Callable[[int], None]]) -> list[dict[str, Any]]:
     """Renders what is not on disk yet; a row per combination.
 
     Args:

@@ -21,6 +21,7 @@ from kornia.color import linear_rgb_to_rgb
 from numpy.typing import NDArray
 from torch import Tensor
 
+from analysis.cli import InputError
 from tsar.types import Display
 
 WHISKERS = 1.5
@@ -63,14 +64,14 @@ class Hold(Generic[Payload]):
         """The image on the display at ``time_s``; times must not decrease.
 
         Raises:
-            ValueError: nothing has been displayed by then.
+            InputError: nothing has been displayed by then.
         """
         while self._next is not None and self._next[1].display_time_s <= time_s:
             self._current = self._next
             self.refresh_s.append(self._current[1].display_time_s)
             self._next = next(self._stream, None)
         if self._current is None:
-            raise ValueError(f"display: nothing is shown yet at {time_s:.4f} s; the run needs a longer warm-up")
+            raise InputError(f"warmup_cycles: expected enough for an image at {time_s:.4f} s, nothing is shown yet")
         return self._current
 
 

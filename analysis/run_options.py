@@ -11,10 +11,10 @@ import tyro
 from analysis import limits
 from analysis.cost_model import (
     CAPACITY_DEFAULT,
-    MODELLED,
     CostParameters,
     Ledger,
     cycle_seconds,
+    expected_ledger,
     frame_seconds,
     parameters_of,
 )
@@ -90,10 +90,11 @@ class RunOptions:
         images = self.seconds * self.reference_rate_hz
         require(images >= 1e-6, "seconds", f"time for a reference image at {self.reference_rate_hz:g} Hz", self.seconds)
         limits.require_count("seconds", self.seconds, images, "reference images")
-        if self.counted in MODELLED:
-            cycle_s = cycle_seconds(self.counted, self.capacity, self.cost)({}, 0.0)
+        if self.counted != "wall":
+            priced = expected_ledger(self.counted)
+            cycle_s = cycle_seconds(priced, self.capacity, self.cost)({}, 0.0)
             limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
-            frame_s = frame_seconds(self.counted, self.capacity, self.cost)({}, 0.0)
+            frame_s = frame_seconds(priced, self.capacity, self.cost)({}, 0.0)
             limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
 
     @property

@@ -45,7 +45,7 @@ def test_hold_reads_one_image_ahead_only() -> None:
 
 
 def test_hold_before_the_first_image() -> None:
-    with pytest.raises(ValueError, match="warm-up"):
+    with pytest.raises(InputError, match="warmup_cycles: expected enough"):
         quality.Hold(shown(1.0)).at(0.5)
 
 

@@ -141,6 +141,8 @@ ABSURD = {
         ("--capacity", "1e30"),
         ("--capacity", "1e20"),
         ("--capacity", "1e-9"),
+        ("--capacity", "1e30", "--ledger", "work"),
+        ("--capacity", "1e-9", "--ledger", "work"),
         ("--warmup-cycles", "1000000000"),
         ("--threads", "100000"),
         ("--gain", "inf"),
@@ -199,3 +201,15 @@ def test_pictures_that_memory_does_not_hold_are_refused_before_anything_is_writt
     monkeypatch.chdir(tmp_path)
     assert_refused(call_script(script, monkeypatch, *arguments), capsys, ("GiB of memory", "1.0 GiB are free"))
     assert nothing_in(tmp_path)
+
+
+def test_a_run_that_shows_no_cycle_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    size = ("--resolution-px", "64", "--batch-size", "16", "--reference-samples-per-axis", "1", "--threads", "1")
+    span = ("--seconds", "0.01", "--reference-rate-hz", "20", "--capacity", "3e10")
+    places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    assert call_script("run.py", monkeypatch, "fly-by", *size, *span, *places) == 2
+    shown = capsys.readouterr()
+    assert shown.out == "" and shown.err.splitlines()[-1].startswith("error: seconds: expected time for a cycle")
+    assert nothing_in(tmp_path / "out")
