@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis import quality
+from analysis.cli import InputError
 from tsar.types import Display
 
 
