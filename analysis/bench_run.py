@@ -20,7 +20,7 @@ from analysis.bench_shading import shaded
 from analysis.bench_start import start_rows
 from analysis.bench_threads import cores, order
 from analysis.cli import bad_input, full_disk
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.records import provenance
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,7 +49,7 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
         driving_scenes(options)
         from renderer.device import pick
 

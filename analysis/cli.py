@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import re
@@ -12,15 +13,18 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
+from analysis.files import release_folders
+from tsar.memory import free_memory_bytes
+
 Options = TypeVar("Options")
 
 EXIT_BAD_INPUT = 2
 EXIT_BROKEN = 3
 EXIT_INTERRUPTED = 130
 
-_MEMORY = Path("/proc/meminfo")
 _SPINNING = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
 _SPINS = "1000"  # from 300 to 3000 cycles were measured to take alike
+_NO_MEMORY = re.compile(r"can't allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread|out of memory")
 _FRAME = re.compile(r"[╭╮╰╯│─]+|-{3,}")
 
 
@@ -45,11 +49,29 @@ def bad_input() -> Iterator[None]:
         yield
     except InputError:
         raise
+    except (MemoryError, RuntimeError) as error:
+        lack = _lack_of_memory(error)
+        if lack is None:
+            raise
+        raise lack from error
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        raise InputError(f"{where}{error.strerror or error}") from error
-    except (ValueError, MemoryError) as error:
+        raise _lack_of_memory(error) or InputError(f"{where}{error.strerror or error}") from error
+    except ValueError as error:
         raise InputError(str(error) or type(error).__name__) from error
+
+
+def _lack_of_memory(error: BaseException) -> InputError | None:
+    """What to say of an error that means that memory ran out; None of any other."""
+    text = " ".join(str(error).split())
+    if not (
+        isinstance(error, MemoryError)
+        or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
+        or (isinstance(error, RuntimeError) and _NO_MEMORY.search(text))
+    ):
+        return None
+    free = free_memory_bytes() / 2**30
+    return InputError(f"out of memory ({text or type(error).__name__}); {free:.1f} GiB are free now: ask for less")
 
 
 @contextlib.contextmanager
@@ -61,7 +83,8 @@ def full_disk(folder: Path, *writer_errors: type[Exception]) -> Iterator[None]:
     except writer_errors as error:
         raise InputError(str(error)) from error
     except OSError as error:
-        raise InputError(f"{error.filename or folder}: cannot be written ({error.strerror or error})") from error
+        reason = f"{error.filename or folder}: cannot be written ({error.strerror or error})"
+        raise _lack_of_memory(error) or InputError(reason) from error
 
 
 def parse(options: type[Options], description: str, arguments: list[str] | None = None) -> Options:
@@ -84,21 +107,9 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
 
 def require_memory(need_bytes: float, what: str) -> None:
     """Raises InputError where less memory is free than ``what`` needs."""
-    have = _free_memory_bytes()
+    have = free_memory_bytes()
     if need_bytes > have:
         raise InputError(f"{what} needs about {need_bytes / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free")
-
-
-def _free_memory_bytes() -> int:
-    """Memory that can be had, what the system keeps of files included: it gives that back."""
-    try:
-        with _MEMORY.open() as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-    except OSError:
-        pass
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def _one_line(box: str) -> str:
@@ -132,9 +143,16 @@ def run_cli(main: Callable[[], None]) -> None:
         _end(missing, EXIT_BAD_INPUT)
     except ImportError as error:
         _end(error, EXIT_BAD_INPUT)
+    except (MemoryError, RuntimeError, OSError) as error:
+        lack = _lack_of_memory(error)
+        if lack is None:
+            raise
+        _end(lack, EXIT_BAD_INPUT)
     except KeyboardInterrupt:
         print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
+    finally:
+        release_folders()
 
 
 def _end(error: Exception, status: int) -> NoReturn:

@@ -25,7 +25,7 @@ from analysis.cost_model import (
 )
 from analysis.cost_options import CostReportOptions
 from analysis.cost_refit import Cell
-from analysis.files import atomic, writable_folder, write_json
+from analysis.files import atomic, own_folder, write_json
 
 if TYPE_CHECKING:
     from pyvista import PolyData
@@ -210,7 +210,7 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     (options.out / "summary.json").unlink(missing_ok=True)
     measured = None
     if options.measure:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.cli import InputError, bad_input, full_disk, require_memory
 from analysis.cost_model import cycle_seconds, frame_seconds
-from analysis.files import writable_folder
+from analysis.files import own_folder, writable_folder
 from analysis.run_options import RunOptions
 from analysis.start import first_imports, first_made
 from analysis.store import Store
@@ -57,7 +57,7 @@ def prepare(options: RunOptions) -> Setup:
         require_memory(need, f"resolution_px: {options.tsar.resolution_px}")
         slots = options.tsar.cache_slots
         require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
         writable_folder(options.cache, "cache")
     with first_imports():
         from scenes import catalog

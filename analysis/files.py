@@ -7,12 +7,13 @@ import json
 import math
 import os
 import socket
+import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -66,17 +67,60 @@ def owned(path: Path, what: str) -> Iterator[None]:
     Raises:
         ValueError: another process holds it; the message names ``what``, the folder and who.
     """
-    with path.open("a+", encoding="utf-8") as file:
+    with _taken(path, what):
+        yield
+
+
+def _taken(path: Path, what: str) -> TextIO:
+    """A lock file that this process holds until it is closed, with who that is in it."""
+    while True:
+        file = path.open("a+", encoding="utf-8")
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             file.seek(0)
             owner = " ".join(file.read(300).split()) or "another process"
+            file.close()
             raise ValueError(f"{what}: {path.parent} is in use by {owner}") from None
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {socket.gethostname()} since {time.strftime('%Y-%m-%d %H:%M:%S')}\n")
-        file.flush()
-        yield
+        if _is(path, file):
+            break
+        file.close()  # its last owner removed it meanwhile
+    now, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)[:160]
+    file.truncate(0)
+    file.write(f"process {os.getpid()} on {socket.gethostname()} since {now}: {command}\n")
+    file.flush()
+    return file
+
+
+def _is(path: Path, file: TextIO) -> bool:
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
+
+
+_OWNER = ".owner"
+_owned_folders: dict[Path, TextIO] = {}
+
+
+def own_folder(path: Path, what: str) -> Path:
+    """Creates a folder that this process alone writes results to, until :func:`release_folders` or its end.
+
+    Raises:
+        ValueError: it cannot be created or written, or another process writes there; the message says which.
+    """
+    folder = writable_folder(path, what).resolve()
+    if folder not in _owned_folders:
+        _owned_folders[folder] = _taken(folder / _OWNER, what)
+    return path
+
+
+def release_folders() -> None:
+    """Gives back all folders that this process owns."""
+    while _owned_folders:
+        folder, file = _owned_folders.popitem()
+        with file, suppress(OSError):
+            (folder / _OWNER).unlink()
 
 
 def writable_folder(path: Path, what: str) -> Path:

@@ -10,7 +10,7 @@ from analysis import plots_spectrum as plots
 from analysis.cli import bad_input, full_disk, require_memory
 from analysis.estimate_check import check_estimate, measure_example, measure_input
 from analysis.experiment import ROOT
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.plots import save
 from analysis.progress import Bars, bars
 from analysis.records import provenance
@@ -46,7 +46,7 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
         need = 16 * _BYTES_PER_SAMPLE * options.agreement_samples**2 * options.agreement_frames
         require_memory(need, f"agreement_samples: {options.agreement_samples}")
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
         pictures = _pictures(options) if options.does("slopes") else []
     (options.out / "summary.json").unlink(missing_ok=True)
     found: dict[str, Any] = {}

@@ -15,7 +15,7 @@ from analysis.cases import ROWS, SCALES, Case
 from analysis.cli import bad_input, full_disk
 from analysis.evaluation import ROOT, Place, broken, finished, times_of
 from analysis.farm import run_cases
-from analysis.files import atomic, writable_folder, write_json
+from analysis.files import atomic, own_folder, writable_folder, write_json
 from analysis.progress import bars
 from analysis.records import provenance
 from analysis.suitability import Run, SuitabilityOptions, runs
@@ -50,7 +50,7 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     """
     with bad_input():
         planned = runs(options)
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
         writable_folder(options.cache, "cache")
     out = options.out.resolve()
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
 from scenes.canonical import SceneError
+from tsar.memory import free_memory_bytes
 
 _BYTES_PER_PIXEL = 12
 _SAMPLES_PER_PIXEL_AXIS_MAX = 1024
@@ -56,20 +55,9 @@ def check_frame_size(width_px: int, height_px: int, samples_per_axis: int) -> No
             f"render_frame: expected at most {_SAMPLES_PER_AXIS_MAX:,} samples along an axis, got "
             f"{max(width_px, height_px)} pixels of {samples_per_axis}"
         )
-    need, have = width_px * height_px * _BYTES_PER_PIXEL, _free_memory_bytes()
+    need, have = width_px * height_px * _BYTES_PER_PIXEL, free_memory_bytes()
     if need > have:
         raise ValueError(
             f"render_frame: {width_px} x {height_px} pixels need about {need / 2**30:.1f} GiB of memory, "
             f"{have / 2**30:.1f} GiB are free"
         )
-
-
-def _free_memory_bytes() -> int:
-    try:
-        with open("/proc/meminfo") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-    except OSError:
-        pass
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

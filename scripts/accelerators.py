@@ -14,7 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import atomic, writable_folder, write_json
+from analysis.files import atomic, own_folder, write_json
 from analysis.tracer_options import AcceleratorOptions
 
 
@@ -25,7 +25,7 @@ def main() -> None:
     from analysis.accelerators import lines, render_report_image, table
 
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     from analysis.plots import save
     from analysis.plots_accelerators import tests_figure
     from analysis.progress import bars

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from analysis.cli import bad_input, parse, run_cli
 from analysis.conversion_check import CheckOptions
 from analysis.extras import require_extra
-from analysis.files import atomic, writable_folder, write_json
+from analysis.files import atomic, own_folder, write_json
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -26,7 +26,7 @@ def main() -> None:
     options = parse(CheckOptions, __doc__ or "")
     require_extra("formats", "peers", "perception")
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     import pandas as pd
 
     from analysis.conversion_check import checked

@@ -12,7 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.tracer_options import GalleryOptions
 
 
@@ -24,7 +24,7 @@ def main() -> None:
 
     with bad_input():
         plan = sample_plan(options)
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     from analysis.progress import bars
     from analysis.records import provenance
     from renderer.film import FilmError

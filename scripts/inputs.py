@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, parse, require_unbroken, run_cli
 from analysis.experiment import ROOT, finished, run_experiment
-from analysis.files import plain, writable_folder, write_json
+from analysis.files import own_folder, plain, write_json
 from analysis.repetitions import InputsOptions, row
 
 
@@ -22,7 +22,7 @@ def main() -> None:
     """Runs what is missing, prints and writes a table of the ratios."""
     options = parse(InputsOptions, __doc__ or "")
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
         runs = options.runs()
     rows = []
     for run in runs:

@@ -14,7 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.tracer_options import JobOptions
 
 
@@ -26,7 +26,7 @@ def main() -> None:
 
     with bad_input():
         work = prepare(options)
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     from analysis.progress import bars
     from analysis.records import provenance
     from renderer.film import FilmError

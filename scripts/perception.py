@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.extras import require_extra
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.perception.options import (
     AdaptiveOptions,
     RecoverOptions,
@@ -37,7 +37,7 @@ def main() -> None:
     options = parse(Step, __doc__ or "")  # type: ignore[arg-type]
     require_extra(*NEEDS.get(type(options), ()))
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     from analysis.perception import steps
     from analysis.progress import bars
     from analysis.records import provenance

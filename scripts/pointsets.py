@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import atomic, writable_folder, write_json
+from analysis.files import atomic, own_folder, write_json
 from analysis.tracer_options import PointSetOptions
 
 
@@ -24,7 +24,7 @@ def main() -> None:
     from analysis.point_sets import INTEGRANDS, SETS, blurred_frames, mean_errors, measure, slopes
 
     with bad_input():
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     import numpy as np
 
     from analysis import plots_point_sets as plots

@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.render_options import RenderOptions
 
 
@@ -34,7 +34,7 @@ def main() -> None:
             print("\n".join(explanation(scene)))
             return
         check_frame_size(options.width_px, options.height_px, 1 if options.samples else options.samples_per_axis)
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
 
     from analysis.progress import bars
     from analysis.records import provenance

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.cli import bad_input, full_disk, parse, require_unbroken, run_cli
 from analysis.extras import require_extra
-from analysis.files import atomic, writable_folder, write_json
+from analysis.files import atomic, own_folder, writable_folder, write_json
 from analysis.sensitivity import AXES, BEST, SensitivityOptions, optimum_table, runs, setting_table, sweeps
 
 
@@ -25,7 +25,7 @@ def main() -> None:
     require_extra("study", "perception")
     with bad_input():
         planned = runs(options)
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
         writable_folder(options.cache, "cache")
     import pandas as pd
 

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from analysis.cli import bad_input, full_disk, parse, run_cli
 from analysis.extras import require_extra
 from analysis.farm import FarmOptions, connected
-from analysis.files import writable_folder, write_json
+from analysis.files import own_folder, write_json
 from analysis.tracer_options import TileOptions
 
 
@@ -30,7 +30,7 @@ def main() -> None:
     farm = FarmOptions(workers=max(options.study)) if options.study else options.farm
     with bad_input():
         picture = picture_of(options, 1 if options.study else farm.threads)
-        writable_folder(options.out, "out")
+        own_folder(options.out, "out")
     import pandas as pd
 
     from analysis.progress import bars

@@ -51,7 +51,7 @@ WIRING = {
 }
 
 # the other modules of the analysis read what the pipeline hands out and run none of its stages
-ANALYSIS_OF_TSAR = ("tsar.types", "tsar.config", "tsar.morton")
+ANALYSIS_OF_TSAR = ("tsar.types", "tsar.config", "tsar.morton", "tsar.memory")
 
 STARTS_WARP = "renderer/device.py"
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "common", "manager", "managers", "misc"}

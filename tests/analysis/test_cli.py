@@ -6,15 +6,15 @@ import errno
 import os
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
 from analysis import cli
-from analysis.cli import InputError, bad_input, parse, require_memory, run_cli
+from analysis.cli import InputError, bad_input, full_disk, parse, require_memory, run_cli
 from tsar.config import TsarConfig
 
 
@@ -147,7 +147,6 @@ def test_the_spinning_is_settled_before_torch_is_imported() -> None:
     [
         (ValueError("side: got 3"), "side: got 3"),
         (ValueError(), "ValueError"),
-        (MemoryError(), "MemoryError"),
         (InputError("as it is"), "as it is"),
         (FileNotFoundError(errno.ENOENT, "No such file or directory", "a/b.obj"), "a/b.obj: No such file or directory"),
         (OSError("plain"), "plain"),
@@ -164,26 +163,50 @@ def test_bad_input_lets_other_faults_through() -> None:
         raise KeyError("a")
 
 
-def test_require_memory_counts_what_the_system_can_give_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    meminfo = tmp_path / "meminfo"
-    meminfo.write_text("MemTotal: 9999999 kB\nMemFree: 10 kB\nMemAvailable:    2097152 kB\n")
-    monkeypatch.setattr(cli, "_MEMORY", meminfo)
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        RuntimeError("[enforce fail at alloc_cpu.cpp:132] DefaultCPUAllocator: can't allocate memory: you tried to"),
+        RuntimeError("Failed to allocate 123 bytes on device 'cpu'"),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+    ],
+)
+def test_a_lack_of_memory_is_one_line(error: Exception, capsys: pytest.CaptureFixture) -> None:
+    def main() -> None:
+        raise error
+
+    def marked(block) -> None:
+        with block:
+            raise error
+
+    for failing in (main, lambda: marked(bad_input()), lambda: marked(full_disk(Path("x")))):
+        with pytest.raises(SystemExit) as stop:
+            run_cli(failing)
+        said = capsys.readouterr().err
+        assert stop.value.code == 2 and said.startswith("error: out of memory (") and said.count("\n") == 1
+
+
+def test_other_faults_of_a_run_are_not_a_lack_of_memory() -> None:
+    for error in (RuntimeError("shape"), OSError(errno.EIO, "I/O error")):
+        with pytest.raises(type(error)), bad_input() if isinstance(error, RuntimeError) else nullcontext():
+            raise error
+
+
+def test_require_memory_says_what_is_needed_and_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cli, "free_memory_bytes", lambda: 2 * 2**30)
     require_memory(2.0 * 2**30, "x")
     with pytest.raises(InputError, match=r"^resolution_px: 99 needs about 2\.5 GiB of memory, 2\.0 GiB are free$"):
         require_memory(2.5 * 2**30, "resolution_px: 99")
 
 
-def test_require_memory_on_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where the system keeps no such file."""
-    for place in (Path("/proc/meminfo"), tmp_path / "none"):
-        monkeypatch.setattr(cli, "_MEMORY", place)
-        require_memory(1, "x")
-        with pytest.raises(InputError):
-            require_memory(1e18, "x")
-
-
-def test_a_warning_is_one_line_without_its_place_in_the_code(capsys: pytest.CaptureFixture) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        run_cli(lambda: warnings.warn("too\nfar", stacklevel=1))
-    assert capsys.readouterr().err == "warning: too far\n"
+def test_a_command_under_a_limit_of_memory_ends_with_one_line(tmp_path: Path) -> None:
+    """The limit of the process, not of the machine, is what is free."""
+    program = "import analysis.cli as c\nimport numpy as np\nc.run_cli(lambda: {body})"
+    root = Path(__file__).resolve().parents[2]
+    bodies = ("c.require_memory(3e9, 'pictures')", "np.ones(400_000_000)")
+    for body, part in zip(bodies, ("pictures needs about 2.8 GiB of memory", "out of memory"), strict=True):
+        command = f'ulimit -v 2000000; exec "{sys.executable}" -c "{program.format(body=body)}"'
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        done = subprocess.run(["bash", "-c", command], cwd=root, env=environment, capture_output=True, text=True)
+        assert done.returncode == 2 and part in done.stderr and done.stderr.count("\n") == 1, done.stderr

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.files import atomic, plain, writable_folder, write_json
+from analysis.files import atomic, own_folder, plain, release_folders, writable_folder, write_json
 
 
 def names(folder: Path) -> list[str]:
@@ -107,3 +109,41 @@ def test_a_file_in_place_of_a_folder_is_named(tmp_path: Path, below: str) -> Non
     (tmp_path / "taken").touch()
     with pytest.raises(ValueError, match=r"^out: cannot write to '.*taken.*' \(.+\)$"):
         writable_folder(tmp_path / "taken" / below, "out")
+
+
+OWNER = """
+import sys, time
+from pathlib import Path
+from analysis.cli import bad_input, run_cli
+from analysis.files import own_folder
+def main():
+    with bad_input():
+        own_folder(Path(sys.argv[1]), "out")
+    print("mine", flush=True)
+    sys.stdin.read()
+run_cli(main)
+"""
+
+
+def test_a_folder_has_one_owner_at_a_time(tmp_path: Path) -> None:
+    """The second is told who the first is; a killed one leaves nothing locked, one that ends leaves nothing at all."""
+    root = Path(__file__).resolve().parents[2]
+    command = [sys.executable, "-c", OWNER, str(tmp_path / "out")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": root}
+    with subprocess.Popen(command, **pipes) as first:
+        assert first.stdout.readline() == "mine\n"
+        second = subprocess.run(command, input="", capture_output=True, text=True, cwd=root)
+        assert second.returncode == 2 and second.stderr.count("\n") == 1
+        assert f"error: out: {tmp_path / 'out'} is in use by process {first.pid} on " in second.stderr
+        first.kill()
+    assert len(list((tmp_path / "out").iterdir())) == 1
+    third = subprocess.run(command, input="", capture_output=True, text=True, cwd=root)
+    assert third.returncode == 0 and third.stdout == "mine\n" and not list((tmp_path / "out").iterdir())
+
+
+def test_a_process_owns_a_folder_as_often_as_it_likes(tmp_path: Path) -> None:
+    try:
+        assert own_folder(tmp_path, "out") == own_folder(tmp_path / "." / "", "out") == tmp_path
+    finally:
+        release_folders()
+    assert not list(tmp_path.iterdir())

@@ -260,9 +260,7 @@ def test_folders_that_cannot_be_written(
 def test_a_resolution_beyond_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    meminfo = tmp_path / "meminfo"
-    meminfo.write_text("MemAvailable: 2097152 kB\n")
-    monkeypatch.setattr(cli, "_MEMORY", meminfo)
+    monkeypatch.setattr(cli, "free_memory_bytes", lambda: 2 * 2**30)
     where = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     status = call_script("run.py", monkeypatch, "fly-by", "--resolution-px", "8192", *where)
     shown = capsys.readouterr()
