@@ -15,6 +15,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
+from scenes.arithmetic import exp
+
 SIDE_PX = 64
 FRAMES = 16
 """Size of the mask; it repeats."""
@@ -66,12 +68,12 @@ class _Field:
     def __init__(self, frames: int, side: int) -> None:
         self.frames, self.side, self.count = frames, side, frames * side * side
         along = np.minimum(np.arange(side), side - np.arange(side))
-        near = np.exp(-(along**2) / (2.0 * _SIGMA**2))
+        near = exp(-(along**2) / (2.0 * _SIGMA**2))
         plane = np.outer(near, near)
         # twice the plane, so that any shift of it round the torus is a view
         self._plane = np.tile(plane, (2, 2))
         later = np.minimum(np.arange(frames), frames - np.arange(frames))
-        times = np.exp(-(later**2) / (2.0 * _SIGMA**2))
+        times = exp(-(later**2) / (2.0 * _SIGMA**2))
         times[0] = 0.0  # the voxel itself is counted in its plane
         self._times = np.tile(times, 2)
         self._energy = np.zeros((frames, side, side))

@@ -34,6 +34,7 @@ from renderer.structs import (
     TrackRecord,
 )
 from renderer.tracks import TrackTable
+from scenes.arithmetic import inverse, product
 from scenes.canonical import (
     Cube,
     Disk,
@@ -145,12 +146,12 @@ class _Builder:
         unit_to_object = np.eye(4)
         unit_to_object[:3, :3] *= unit.scale
         unit_to_object[:3, 3] = unit.center
-        from_local = to_world @ unit_to_object
-        to_local = np.linalg.inv(from_local)
+        from_local = product(to_world, unit_to_object)
+        to_local = inverse(from_local)
         for matrix in (from_local, to_local):
             check_finite(matrix, f"Instance {name!r}: to_world of a shape of half size {unit.scale:g}")
         corners = np.stack(np.meshgrid(*zip(unit.lower, unit.upper, strict=True), indexing="ij"), -1).reshape(-1, 3)
-        placed = corners @ from_local[:3, :3].T + from_local[:3, 3]
+        placed = product(corners, from_local[:3, :3].T) + from_local[:3, 3]
         # a little wider, so that a flat box is not missed by a rounded ray
         margin = 4.0e-6 * (np.abs(placed).max() + np.ptp(placed, axis=0).max())
         row |= {
@@ -174,7 +175,7 @@ class _Builder:
             # whatever the turn: the farthest corner of any box
             radius = 1.00001 * float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper)), axis=1).max())
             extent = np.ptp([lower.min(axis=0), upper.max(axis=0)], axis=0)
-            surface = 2.0 * np.pi * radius**2 if track else extent @ np.roll(extent, 1)
+            surface = 2.0 * np.pi * radius**2 if track else product(extent, np.roll(extent, 1))
             first = len(nodes)
             for node in box_tree(lower, upper, float(surface)):
                 instance = int(members[node.item]) if node.item >= 0 else -1

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,6 +17,8 @@ import torch
 from jaxtyping import Float
 from numpy.typing import NDArray
 from torch import Tensor
+
+from scenes.arithmetic import power
 
 STILL_FORMATS = (".exr", ".png", ".ppm")
 
@@ -50,11 +53,15 @@ def count_nonfinite(image: Tensor) -> int:
 
 def encode_srgb(image: Float[Tensor, "h w 3"]) -> NDArray[np.uint8]:
     """``(h, w, 3)`` uint8 sRGB of linear radiance, clipped; NaN becomes black, infinity white."""
-    from kornia.color import linear_rgb_to_rgb
+    finite = torch.nan_to_num(image.detach().cpu().to(torch.float32), nan=0.0, posinf=1.0, neginf=0.0)
+    return np.searchsorted(_steps(), finite.numpy(), side="right").astype(np.uint8)
 
-    finite = torch.nan_to_num(image.detach().cpu().to(torch.float32), nan=0.0, posinf=1.0, neginf=0.0).clamp(0.0, 1.0)
-    encoded = linear_rgb_to_rgb(finite.permute(2, 0, 1)).permute(1, 2, 0)
-    return (encoded * 255.0 + 0.5).clamp(0.0, 255.0).to(torch.uint8).contiguous().numpy()
+
+@lru_cache(maxsize=1)
+def _steps() -> NDArray[np.float32]:
+    """Least radiance of each of the codes 1 to 255: no processor then rounds a picture's values in its own way."""
+    middle = (np.arange(255) + 0.5) / 255.0
+    return np.where(middle > 0.04045, power((middle + 0.055) / 1.055, 2.4), middle / 12.92).astype(np.float32)
 
 
 def write_exr(path: Path, image: Float[Tensor, "h w 3"], half: bool = True) -> int:

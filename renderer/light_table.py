@@ -21,6 +21,7 @@ from renderer.structs import (
     LIGHT_SUN_DISC,
     SceneData,
 )
+from scenes.arithmetic import cos, inverse, norm, product
 from scenes.canonical import (
     DirectionalLight,
     EnvironmentLight,
@@ -89,7 +90,7 @@ class LightTable:
         stretch = np.linalg.svd(linear, compute_uv=False)
         if stretch[0] > stretch[2] * (1.0 + 1e-6):
             raise SceneError(f"{name}: emission: expected a Sphere scaled alike along all axes, got {stretch.tolist()}")
-        self.rows.append({**row, "kind": LIGHT_SPHERE, "radius": instance.shape.radius * stretch[0]})
+        self.rows.append({**row, "kind": LIGHT_SPHERE, "radius": instance.shape.radius * norm(linear[:, 0])})
 
     def place_environment(self, data: SceneData, materials: MaterialTable, seen: EnvironmentLight | None) -> None:
         """Fills what kernels read of the environment.
@@ -107,7 +108,7 @@ class LightTable:
         rows, columns = np.array([0.0, 1.0]), np.array([[0.0, 1.0]])
         if self.environment is not None:
             turn = np.asarray(self.environment.to_world, np.float64)[:3, :3]
-            if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-5):
+            if not np.allclose(product(turn, turn.T), np.eye(3), atol=1e-5):
                 raise SceneError("EnvironmentLight.to_world: expected a rotation, got a matrix that stretches")
             data.lighting_level, data.lighting_to_map, data.lighting_scale = _map(self.environment, materials)
             if data.lighting_scale > 0.0 and self.environment.image.max() > 0.0:
@@ -128,7 +129,7 @@ def check_environment(light: EnvironmentLight) -> None:
 
 
 def _map(light: EnvironmentLight, materials: MaterialTable) -> tuple[int, wp.mat33, float]:
-    turn = np.linalg.inv(np.asarray(light.to_world, np.float64)[:3, :3])
+    turn = inverse(np.asarray(light.to_world, np.float64)[:3, :3])
     level = materials.add_image(light.image, mipmap=False)[0]
     return level, wp.mat33(*turn.astype(np.float32).reshape(-1).tolist()), float(light.scale)
 
@@ -142,12 +143,12 @@ def summed_chances(
 
     Source: Pharr, Jakob and Humphreys 2016, "Physically Based Rendering", sec. 14.2.4.
     """
-    bright = image.astype(np.float64) @ _LUMINANCE
+    bright = product(image.astype(np.float64), _LUMINANCE)
     # the integral of a linear interpolation over a cell: an eighth comes from each neighbour
     bright = 0.75 * bright + 0.125 * (np.roll(bright, 1, axis=1) + np.roll(bright, -1, axis=1))
     above, below = np.vstack([bright[:1], bright[:-1]]), np.vstack([bright[1:], bright[-1:]])
     bright = 0.75 * bright + 0.125 * (above + below)
-    edges = np.cos(np.linspace(0.0, np.pi, len(image) + 1))
+    edges = cos(np.linspace(0.0, np.pi, len(image) + 1))
     weight = bright * (edges[:-1] - edges[1:])[:, None]
     per_row = weight.sum(axis=1)
     even = np.linspace(0.0, 1.0, image.shape[1] + 1)[None]
@@ -158,7 +159,7 @@ def summed_chances(
 
 
 def _directional_row(light: DirectionalLight) -> dict:
-    length = float(np.linalg.norm(light.direction))
+    length = norm(light.direction)
     if not 0.0 < length < np.inf:
         raise SceneError(f"DirectionalLight.direction: expected a direction, got {light.direction}")
     if not 0.0 <= light.angle_deg < 180.0:
@@ -167,7 +168,7 @@ def _directional_row(light: DirectionalLight) -> dict:
     row = {"kind": LIGHT_DIRECTIONAL, "place": -np.asarray(light.direction) / length, "color": light.irradiance}
     if light.angle_deg == 0.0:
         return row
-    cosine = np.cos(np.radians(light.angle_deg) / 2.0)
+    cosine = cos(np.radians(light.angle_deg) / 2.0)
     # the mean cosine over the disc is (1 + cosine) / 2: a surface that faces its middle gets the whole irradiance
     color = np.asarray(light.irradiance) * 2.0 / (1.0 + cosine)
     return row | {"kind": LIGHT_SUN_DISC, "cos_inner": cosine, "color": color}
@@ -177,7 +178,7 @@ def _spot_row(light: SpotLight) -> dict:
     check_finite((*light.position, *light.target), "SpotLight.position, target")
     check_light(light.intensity, "SpotLight.intensity")
     axis = np.subtract(light.target, light.position)
-    length = float(np.linalg.norm(axis))
+    length = norm(axis)
     if length == 0.0:
         raise SceneError(f"SpotLight.target: expected another place than its position, got {light.target}")
     if not 0.0 <= light.inner_deg <= light.outer_deg < 180.0:
@@ -186,6 +187,6 @@ def _spot_row(light: SpotLight) -> dict:
         )
     if light.profile != "hermite":
         raise SceneError(f"SpotLight.profile: expected hermite, which the renderer draws, got {light.profile}")
-    cosines = np.cos(np.radians([light.inner_deg, light.outer_deg]))
+    cosines = cos(np.radians([light.inner_deg, light.outer_deg]))
     row = {"kind": LIGHT_SPOT, "place": light.position, "color": light.intensity, "across": axis / length}
     return row | {"cos_inner": cosines[0], "cos_outer": cosines[1]}

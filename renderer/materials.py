@@ -18,6 +18,7 @@ from renderer.structs import (
     WRAP_CLAMP,
     WRAP_REPEAT,
 )
+from scenes.arithmetic import cos
 from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
@@ -194,4 +195,4 @@ class MaterialTable:
 
 
 def _cos_half(angle_deg: float) -> float:
-    return float(np.cos(np.radians(angle_deg) / 2.0))
+    return float(cos(np.radians(angle_deg) / 2.0))

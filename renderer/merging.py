@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.arithmetic import inverse, product
 from scenes.canonical import Instance, Mesh, RigidTrack
 
 COPIED_FACES_MAX = 1 << 20
@@ -86,11 +87,11 @@ def _placed(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.float32
     mesh = instance.shape
     assert isinstance(mesh, Mesh)
     linear, offset = instance.to_world[:3, :3], instance.to_world[:3, 3]
-    vertices = mesh.vertices.astype(np.float64) @ linear.T + offset
+    vertices = product(mesh.vertices.astype(np.float64), linear.T) + offset
     if mesh.normals is None:
         return vertices, np.zeros((len(vertices), 3), np.float32)
     # their lengths keep their ratios, so that they interpolate as they would in object space
-    normals = mesh.normals.astype(np.float64) @ np.linalg.inv(linear)
+    normals = product(mesh.normals.astype(np.float64), inverse(linear))
     longest = np.linalg.norm(normals, axis=1).max(initial=0.0)
     return vertices, (normals / (longest if longest > 0.0 else 1.0)).astype(np.float32)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.animation import pose_at
+from scenes.arithmetic import product
 from scenes.canonical import Disk, Instance, Light, Matrix, Mesh, PointLight, RigidTrack, Scene, Sphere, SpotLight
 
 _NEAR = 128.0
@@ -39,7 +40,7 @@ def near_origin(scene: Scene) -> Scene:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         bounds = [_bounds(instance) for instance in scene.instances]
-        eye = _pose(getattr(scene.camera, "track", None)) @ scene.camera.to_world
+        eye = product(_pose(getattr(scene.camera, "track", None)), scene.camera.to_world)
     if not bounds or not np.isfinite([*np.reshape(bounds, (-1, 3)), eye[:3, 3]]).all():
         return scene
     lower, upper = (np.array(corners) for corners in zip(*bounds, strict=True))
@@ -58,7 +59,7 @@ def _shift(seen: Vector, lower: Vector, upper: Vector, half: Vector) -> Vector:
     whole = float(np.max(upper.max(axis=0) - lower.min(axis=0))) / 2.0
     # a little more, so that a scene of just such a size has the same step wherever it is
     size = max(1.001 * min(_EXTENTS * whole, _SIZES * typical), float(np.abs(seen).max()) * 2.0**-52)
-    step = 2.0 ** math.ceil(math.log2(size))
+    step = math.ldexp(1.0, math.frexp(size)[1])
     return step * np.round(seen / step)
 
 
@@ -75,14 +76,15 @@ def _box(instance: Instance) -> tuple[Vector, Vector]:
         upper = np.full(3, shape.radius if isinstance(shape, Sphere | Disk) else 1.0)
         lower = -upper
     linear, middle = instance.to_world[:3, :3], (lower + upper) / 2.0
-    return linear @ middle + instance.to_world[:3, 3], np.abs(linear) @ ((upper - lower) / 2.0)
+    return product(linear, middle) + instance.to_world[:3, 3], product(np.abs(linear), (upper - lower) / 2.0)
 
 
 def _bounds(instance: Instance) -> tuple[Vector, Vector]:
     """Of an instance, in the world, at time zero."""
     pose = _pose(instance.track)
     middle, reach = _box(instance)
-    middle, reach = pose[:3, :3] @ middle + pose[:3, 3], np.abs(pose[:3, :3]) @ reach
+    turned, place = pose[:3, :3], pose[:3, 3]
+    middle, reach = product(turned, middle) + place, product(np.abs(turned), reach)
     return middle - reach, middle + reach
 
 

@@ -14,6 +14,8 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from scenes.arithmetic import log, power
+
 Points = Float[NDArray[np.float64], "n 3"]
 PointSet = Literal[
     "hammersley",
@@ -79,13 +81,11 @@ def _hammersley(count: int, _rng: np.random.Generator) -> Points:
 
 
 def _stratified(count: int, rng: np.random.Generator) -> Points:
-    side = round(count ** (1.0 / 3.0))
-    if side**3 != count:
-        below = math.floor(count ** (1.0 / 3.0) + 1e-9)
-        raise ValueError(
-            f"point set stratified: expected a cube of samples, such as {max(below, 1) ** 3} or {(below + 1) ** 3}, "
-            f"got {count}"
-        )
+    side = round(power(count, 1.0 / 3.0))
+    if math.prod((side,) * 3) != count:
+        below = math.floor(power(count, 1.0 / 3.0) + 1e-9)
+        cubes = " or ".join(str(math.prod((near,) * 3)) for near in (max(below, 1), below + 1))
+        raise ValueError(f"point set stratified: expected a cube of samples, such as {cubes}, got {count}")
     cells = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     return (cells + rng.random((count, 3))) / side
 
@@ -110,7 +110,7 @@ def _poisson(count: int, rng: np.random.Generator) -> Points:
 
 def packing_distance(count: int) -> float:
     """Least distance between ``count`` points of the unit torus in the densest packing of space (Gauss 1831)."""
-    return (math.sqrt(2.0) / count) ** (1.0 / 3.0)
+    return float(power(math.sqrt(2.0) / count, 1.0 / 3.0))
 
 
 def toroidal_distance(
@@ -158,7 +158,7 @@ def cell_counts(count: int, density_ratio: float) -> tuple[int, int, int]:
 
     def far(sides: tuple[int, int, int]) -> float:
         across, down, times = sides
-        return 2.0 * abs(math.log(times / math.sqrt(across * down) / density_ratio)) + math.log(across / down)
+        return 2.0 * abs(log(times / math.sqrt(across * down) / density_ratio)) + log(across / down)
 
     divisors = [number for number in range(1, count + 1) if count % number == 0]
     grids = [

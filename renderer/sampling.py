@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from renderer.blue_noise import FRAMES, SIDE_PX, mask
 from renderer.point_sets import GOLDEN, Points, PointSet, mixed_words, point_set
+from scenes.arithmetic import cos, log1p, sin
 from tsar.config import closed_choices
 
 # --- shifts ----------------------------------------------------------------------------------------------------------
@@ -72,9 +73,9 @@ def gaussian_warp(
     Deviation: the radius is that of ``1 - u``, which never is 0 where ``u`` is in [0, 1); the thesis takes ``u``, whose
     0 has no logarithm.
     """
-    radius = sigma_px * np.sqrt(-2.0 * np.log1p(-np.asarray(u)))
+    radius = sigma_px * np.sqrt(-2.0 * log1p(-np.asarray(u)))
     turn = 2.0 * np.pi * np.asarray(v)
-    return radius * np.cos(turn), radius * np.sin(turn)
+    return radius * cos(turn), radius * sin(turn)
 
 
 def box_warp(t: Float[NDArray[np.float64], "*n"], share: float) -> Float[NDArray[np.float64], "*n"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
+from scenes.arithmetic import arcsin
 from scenes.canonical import RigidTrack
 
 _STILL = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))
@@ -12,7 +13,7 @@ _STILL = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]])
 
 def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     # by the chord: well conditioned for near keys, where an arc cosine is not
-    return 2.0 * np.arcsin(np.clip(np.linalg.norm(b - a, axis=-1) / 2.0, 0.0, 1.0))
+    return 2.0 * arcsin(np.clip(np.linalg.norm(b - a, axis=-1) / 2.0, 0.0, 1.0))
 
 
 class TrackTable:

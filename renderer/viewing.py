@@ -10,6 +10,7 @@ import warp as wp
 from renderer.checks import check_affine, check_finite
 from renderer.structs import CAMERA_PANORAMA, CAMERA_PARALLEL, CAMERA_PERSPECTIVE, ViewData
 from renderer.tracks import TrackTable
+from scenes.arithmetic import tan
 from scenes.canonical import EnvironmentCamera, OrthographicCamera, PerspectiveCamera, Scene, SceneError
 
 ViewingCamera = PerspectiveCamera | OrthographicCamera | EnvironmentCamera
@@ -50,7 +51,7 @@ def camera_view(camera: ViewingCamera, tracks: TrackTable, aspect: float, footpr
     half = 1.0
     if isinstance(camera, PerspectiveCamera):
         view.kind = CAMERA_PERSPECTIVE
-        half = math.tan(math.radians(camera.fov_deg) / 2.0)
+        half = tan(math.radians(camera.fov_deg) / 2.0)
         view.spread = 2.0 * half / footprint_px
         view.lens_radius, view.focal_distance = camera.lens_radius, camera.focal_distance
     elif isinstance(camera, OrthographicCamera):

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
+from scenes.arithmetic import cos, rotation_about, rotation_between, sin
 from scenes.canonical import Matrix, RigidTrack
 
 Times = NDArray[np.floating]
@@ -31,7 +32,7 @@ def continuous_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float
     Returns:
         ``(n, 4)``, the same rotations; the first keeps its sign.
     """
-    dots = np.einsum("ij,ij->i", quaternions[1:], quaternions[:-1])
+    dots = (quaternions[1:] * quaternions[:-1]).sum(axis=1)
     signs = np.concatenate([[1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))])
     return quaternions * signs[:, None]
 
@@ -70,8 +71,7 @@ def pose_at(track: RigidTrack, time_s: float) -> Matrix:
         return matrix
     first = min(int(key), last - 1)
     pair = slice(first, first + 2)
-    turn = Slerp([0.0, 1.0], Rotation.from_quat(track.rotation[pair]))
-    matrix[:3, :3] = turn(key - first).as_matrix()
+    matrix[:3, :3] = rotation_between(*track.rotation[pair], key - first).as_matrix()
     matrix[:3, 3] = track.translation[first] + (key - first) * (track.translation[first + 1] - track.translation[first])
     return matrix
 
@@ -88,7 +88,7 @@ def look_at(eye: NDArray[np.float64], target: NDArray[np.float64], roll_rad: flo
     right = np.cross(UP, back)
     right = right / np.linalg.norm(right, axis=-1, keepdims=True)
     rotation = Rotation.from_matrix(np.stack([right, np.cross(back, right), back], axis=-1))
-    return rotation * Rotation.from_rotvec([0.0, 0.0, roll_rad]) if roll_rad else rotation
+    return rotation * rotation_about(UP, roll_rad) if roll_rad else rotation
 
 
 def camera_to_world(eye: NDArray[np.float64], target: NDArray[np.float64], roll_rad: float = 0.0) -> Matrix:
@@ -143,7 +143,7 @@ class Path:
         heading = np.full(np.shape(distance), self.heading_rad)
         for begin, length, turn in self.bends:
             part = np.clip((distance - begin) / length, 0.0, 1.0)
-            heading = heading + turn * (part - np.sin(2.0 * np.pi * part) / (2.0 * np.pi))
+            heading = heading + turn * (part - sin(2.0 * np.pi * part) / (2.0 * np.pi))
         return heading
 
     def curvature(self, distance: Times) -> Times:
@@ -151,19 +151,19 @@ class Path:
         curvature = np.zeros(np.shape(distance))
         for begin, length, turn in self.bends:
             part = np.clip((distance - begin) / length, 0.0, 1.0)
-            curvature = curvature + turn / length * (1.0 - np.cos(2.0 * np.pi * part))
+            curvature = curvature + turn / length * (1.0 - cos(2.0 * np.pi * part))
         return curvature
 
     def position(self, distance: Times, step: float = 0.02) -> NDArray[np.float64]:
         """Points ``(n, 2)`` at distances ``(n,)``; bends are integrated by the midpoint rule at ``step``."""
         distance = np.asarray(distance, np.float64)
-        straight = np.array([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+        straight = np.array([cos(self.heading_rad), sin(self.heading_rad)])
         if not self.bends:
             return np.asarray(self.start) + distance[:, None] * straight
         low, high = min(float(distance.min()), 0.0), max(float(distance.max()), 0.0)
         knots = step * np.arange(np.floor(low / step), np.ceil(high / step) + 1)
         heading = self.heading(knots[:-1] + step / 2.0)
-        moves = step * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        moves = step * np.stack([cos(heading), sin(heading)], axis=-1)
         points = np.concatenate([[[0.0, 0.0]], np.cumsum(moves, axis=0)])
         points = points - points[int(np.argmin(np.abs(knots)))] + np.asarray(self.start)
         return np.stack([np.interp(distance, knots, points[:, axis]) for axis in (0, 1)], axis=-1)
@@ -171,6 +171,5 @@ class Path:
     def pose(self, time_s: Times) -> Pose:
         """Motion of a body with ``+x`` ahead and ``+z`` up, its origin on the path at height zero."""
         distance = self.distance(time_s)
-        turns = self.heading(distance)[:, None] * UP
         points = self.position(distance)
-        return np.concatenate([points, np.zeros((len(points), 1))], axis=1), Rotation.from_rotvec(turns)
+        return np.concatenate([points, np.zeros((len(points), 1))], axis=1), rotation_about(UP, self.heading(distance))

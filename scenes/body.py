@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline, PchipInterpolator
 
+from scenes.arithmetic import cos, exp, hypot, power, sin
 from scenes.meshing import Array, Surface, from_faces, grid, join, mirrored_y, smooth_normals
 
 FRONT_AXLE_M = 1.38
@@ -62,7 +63,7 @@ def belt_at(x: Array) -> Array:
 def _stations() -> Array:
     """Where sections lie: evenly, but denser over the windscreens, whose edges bend most."""
     x = np.linspace(-2.25 + _END_RADIUS, 2.25 - _END_RADIUS, 1200)
-    density = 1.0 + 0.5 * np.exp(-(((x - 0.6) / 0.5) ** 2)) + 0.5 * np.exp(-(((x + 1.35) / 0.4) ** 2))
+    density = 1.0 + 0.5 * exp(-(((x - 0.6) / 0.5) ** 2)) + 0.5 * exp(-(((x + 1.35) / 0.4) ** 2))
     share = np.cumsum(density)
     return np.interp(np.linspace(share[0], share[-1], _STATIONS), share, x)
 
@@ -74,11 +75,11 @@ def _controls(x: Array) -> Array:
     cabin = np.clip((height - 0.14) / 0.22, 0.0, 1.0)
     cabin = cabin * cabin * (3.0 - 2.0 * cabin)
     shoulder = width - 0.050
-    rail_y = shoulder - 0.085 - 0.41 * np.maximum(height - 0.09, 0.0) ** 0.9
+    rail_y = shoulder - 0.085 - 0.41 * power(np.maximum(height - 0.09, 0.0), 0.9)
     rail_z = top - 0.040 - 0.030 * cabin
 
     def on_side(share: float) -> tuple[Array, Array]:
-        bulge = 0.022 * cabin * np.sin(np.pi * share)
+        bulge = 0.022 * cabin * sin(np.pi * share)
         return rail_y + share * (shoulder - rail_y) + bulge, rail_z + share * (belt + 0.012 - rail_z) + 0.4 * bulge
 
     zero = np.zeros_like(x)
@@ -114,8 +115,8 @@ def _end(section: Array, x: float, side: float) -> list[Array]:
     reach = np.array([section[:, 0].max(), 0.5 * np.ptp(section[:, 1])])
     rings = []
     for angle in np.linspace(0.0, np.pi / 2.0, _END_RINGS + 1)[1:]:
-        ring = middle + (section - middle) * (1.0 - _END_RADIUS * (1.0 - np.cos(angle)) / reach)
-        rings.append(np.insert(ring, 0, x + side * _END_RADIUS * np.sin(angle), axis=1))
+        ring = middle + (section - middle) * (1.0 - _END_RADIUS * (1.0 - cos(angle)) / reach)
+        rings.append(np.insert(ring, 0, x + side * _END_RADIUS * sin(angle), axis=1))
     edge = rings[-1]
     along = np.linspace(0.0, 1.0, len(edge))[:, None]
     spine = edge[0] + along * (edge[-1] - edge[0])
@@ -128,7 +129,7 @@ def _bend(points: Array) -> Array:
     """Sweeps corners back, rakes nose and tail in side view, and flares the sides over the wheels."""
     x, y, z = np.moveaxis(points, -1, 0)
     sweep = np.interp(x, [-2.25, -1.6, -0.9, -0.2, 0.9, 1.7, 2.25], [-0.19, -0.12, -0.05, 0.0, 0.10, 0.17, 0.30])
-    bent = x - sweep * np.abs(y / 0.9) ** 2.2
+    bent = x - sweep * power(np.abs(y / 0.9), 2.2)
     nose = np.clip((x - 1.75) / 0.5, 0.0, 1.0) ** 2
     tail = np.clip((-1.75 - x) / 0.5, 0.0, 1.0) ** 2
 
@@ -139,8 +140,8 @@ def _bend(points: Array) -> Array:
     bent = bent + tail * (0.05 * beyond((z - 0.75) / 0.25) + 0.10 * beyond((0.52 - z) / 0.2))
     flare = np.zeros_like(x)
     for axle in (FRONT_AXLE_M, REAR_AXLE_M):
-        away = np.hypot(bent - axle, z - AXLE_HEIGHT_M)
-        flare = np.maximum(flare, np.exp(-(((away - ARCH_RADIUS_M) / 0.10) ** 2)))
+        away = hypot(bent - axle, z - AXLE_HEIGHT_M)
+        flare = np.maximum(flare, exp(-(((away - ARCH_RADIUS_M) / 0.10) ** 2)))
     outer = np.clip((y - 0.55) / 0.2, 0.0, 1.0)
     return np.stack([bent, y + 0.020 * flare * outer, z], -1)
 
@@ -160,7 +161,7 @@ def shell() -> Surface:
 def wheel_housing(side: float, axle: float) -> Surface:
     """Liner around one wheel: an arch from the body's skin inwards, closed by a wall; seen from the wheel."""
     angle = np.linspace(np.radians(-25.0), np.radians(205.0), 30)
-    ring = np.stack([axle + ARCH_RADIUS_M * np.cos(angle), AXLE_HEIGHT_M + ARCH_RADIUS_M * np.sin(angle)], -1)
+    ring = np.stack([axle + ARCH_RADIUS_M * cos(angle), AXLE_HEIGHT_M + ARCH_RADIUS_M * sin(angle)], -1)
     ring[:, 1] = np.maximum(ring[:, 1], 0.20)
     depth = np.array([0.50, 0.70, 0.868])
     net = np.empty((len(ring), len(depth), 3))

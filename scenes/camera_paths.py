@@ -6,8 +6,8 @@ import dataclasses
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from scenes.arithmetic import cos, norm, product, rotation_about
 from scenes.canonical import Mesh, PerspectiveCamera, Scene, SceneError
 from scenes.formats.meshed import as_mesh
 from scenes.values import RigidTrack
@@ -37,20 +37,20 @@ def on_a_path(scene: Scene, path: CameraPath) -> Scene:
     if camera.track is not None:
         raise SceneError("camera_path: expected a scene whose camera stands still, this one moves")
     eye = camera.to_world[:3, 3]
-    forward = -camera.to_world[:3, 2] / np.linalg.norm(camera.to_world[:3, 2])
+    forward = -camera.to_world[:3, 2] / norm(camera.to_world[:3, 2])
     way = looked_at_distance(scene, eye, forward)
     if path == "turntable":
         up = camera.to_world[:3, 1]
         axis = np.zeros(3)
         axis[int(np.abs(up).argmax())] = np.sign(up[int(np.abs(up).argmax())])
         center = eye + way * forward
-        turns = Rotation.from_rotvec(np.linspace(0.0, 2.0 * np.pi, _KEYS)[:, None] * axis)
+        turns = rotation_about(axis, np.linspace(0.0, 2.0 * np.pi, _KEYS))
         rotation = turns.as_quat()
         rotation[1:] *= np.cumprod(np.where((rotation[1:] * rotation[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))[:, None]
         translation = center - turns.apply(center)
         track = RigidTrack(0.0, TURN_S / (_KEYS - 1), translation, rotation)
         return dataclasses.replace(scene, camera=dataclasses.replace(camera, track=track), duration_s=TURN_S)
-    there = 0.5 - 0.5 * np.cos(np.linspace(0.0, 2.0 * np.pi, _KEYS))
+    there = 0.5 - 0.5 * cos(np.linspace(0.0, 2.0 * np.pi, _KEYS))
     translation = FLIGHT_SHARE * way * there[:, None] * forward
     still = np.tile([0.0, 0.0, 0.0, 1.0], (_KEYS, 1))
     track = RigidTrack(0.0, FLIGHT_S / (_KEYS - 1), translation, still)
@@ -64,7 +64,7 @@ def looked_at_distance(scene: Scene, eye: np.ndarray, forward: np.ndarray) -> fl
         shape = instance.shape
         points = shape.vertices if isinstance(shape, Mesh) else as_mesh(shape).vertices
         center = 0.5 * (points.min(axis=0) + points.max(axis=0)).astype(np.float64)
-        middles.append((instance.to_world @ np.append(center, 1.0))[:3])
-    ahead = np.array([(middle - eye) @ forward for middle in middles])
+        middles.append(product(instance.to_world, np.append(center, 1.0))[:3])
+    ahead = np.array([product(middle - eye, forward) for middle in middles])
     ahead = ahead[ahead > 0.0]
     return float(np.median(ahead)) if len(ahead) else 1.0

@@ -11,7 +11,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.animation import Path, Times, attached, sample_track
+from scenes.animation import UP, Path, Times, attached, sample_track
+from scenes.arithmetic import arctan, hypot, rotation_about
 from scenes.body import (
     ARCH_RADIUS_M,
     AXLE_HEIGHT_M,
@@ -88,7 +89,7 @@ def _central(y: float) -> Field:
 
 
 def _wheel_arch(axle: float) -> Field:
-    return lambda p: np.hypot(p[:, 0] - axle, p[:, 2] - AXLE_HEIGHT_M) - ARCH_RADIUS_M
+    return lambda p: hypot(p[:, 0] - axle, p[:, 2] - AXLE_HEIGHT_M) - ARCH_RADIUS_M
 
 
 def _regions() -> list[tuple[str, list[Field]]]:
@@ -148,7 +149,7 @@ def _details() -> list[tuple[str, Surface]]:
     """Small parts of the left side; the right side mirrors them."""
     handle = [("chrome", ellipsoid((x, 0.905, 0.80), (0.085, 0.022, 0.014), 8, 12)) for x in (0.12, -0.80)]
     pipe = lathe(np.array([[0.030, 0.0], [0.036, 0.0], [0.036, 0.16]])[::-1], 16)
-    upright = Rotation.from_euler("z", 90, degrees=True).as_matrix()
+    upright = rotation_about(UP, np.pi / 2.0).as_matrix()
     return [
         *handle,
         ("paint", ellipsoid((0.66, 1.00, 0.985), (0.075, 0.105, 0.068))),
@@ -183,14 +184,14 @@ def instances(path: Path, start_s: float, end_s: float, interval_s: float = 1.0 
 
 def _wheel_turn(path: Path, steered: bool, side: float) -> Callable[[Times], Rotation]:
     """Orientation of a wheel in the car's frame: steering about z, rolling about the axle, outer side outwards."""
-    outward = Rotation.from_euler("z", 0.0 if side > 0 else 180.0, degrees=True)
+    outward = rotation_about(UP, 0.0 if side > 0 else np.pi)
 
     def turn(time_s: Times) -> Rotation:
         distance = path.distance(time_s)
-        steer = np.arctan(path.curvature(distance) * (FRONT_AXLE_M - REAR_AXLE_M)) * steered
+        steer = arctan(path.curvature(distance) * (FRONT_AXLE_M - REAR_AXLE_M)) * steered
         # in a bend the inner wheel goes a shorter way
         rolled = distance - side * HUB_OFFSET_M * (path.heading(distance) - path.heading_rad)
-        return Rotation.from_euler("ZY", np.stack([steer, rolled / RADIUS_M], -1)) * outward
+        return rotation_about(UP, steer) * rotation_about((0.0, 1.0, 0.0), rolled / RADIUS_M) * outward
 
     return turn
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.arithmetic import arccos, arcsin, cos, exp, norm, power, product, sin
 from scenes.canonical import DirectionalLight, EnvironmentLight, Matrix, SunSky
 from scenes.loading import FileState, asset, state_of
 
@@ -49,8 +50,8 @@ def _between(table: NDArray[np.float64], at: float) -> NDArray[np.float64]:
 
 def _elevation_rad(light: SunSky) -> float:
     """Of the sun, at least zero."""
-    sun, up = (np.array(part) / np.linalg.norm(part) for part in (light.sun_direction, light.up))
-    return max(math.asin(float(np.clip(sun @ up, -1.0, 1.0))), 0.0)
+    sun, up = (np.array(part) / norm(part) for part in (light.sun_direction, light.up))
+    return max(arcsin(float(np.clip(product(sun, up), -1.0, 1.0))), 0.0)
 
 
 def sky_radiance(light: SunSky, directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -64,20 +65,21 @@ def sky_radiance(light: SunSky, directions: NDArray[np.float64]) -> NDArray[np.f
         ``(n, 3)`` linear RGB, not negative.
     """
     tables, elevation = _tables(), _elevation_rad(light)
-    x = (elevation / (0.5 * math.pi)) ** (1.0 / 3.0)
-    weights = np.array([math.comb(5, n) * (1.0 - x) ** (5 - n) * x**n for n in range(6)])
+    x = power(elevation / (0.5 * math.pi), 1.0 / 3.0)
+    weights = np.array([math.comb(5, n) * power(1.0 - x, 5 - n) * power(x, n) for n in range(6)])
     mixed = []
     for name in ("sky_radiance", "sky_shape"):
         of_albedo = _between(tables[name], light.turbidity - 1.0)
-        mixed.append(np.tensordot(weights, _between(of_albedo, light.ground_albedo), 1))
+        of_height = _between(of_albedo, light.ground_albedo)
+        mixed.append(product(weights, of_height.reshape(6, -1)).reshape(of_height.shape[1:]))
     a, b, c, d, e, f, g, i, h = mixed[1].T
-    sun, up = (np.array(part) / np.linalg.norm(part) for part in (light.sun_direction, light.up))
-    height = (directions @ up)[:, None]
-    toward = np.clip(directions @ sun, -1.0, 1.0)[:, None]
+    sun, up = (np.array(part) / norm(part) for part in (light.sun_direction, light.up))
+    height = product(directions, up)[:, None]
+    toward = np.clip(product(directions, sun), -1.0, 1.0)[:, None]
     above = np.maximum(height, 0.0)
-    anisotropy = (1.0 + toward**2) / (1.0 + h * h - 2.0 * h * toward) ** 1.5
-    horizon = 1.0 + a * np.exp(b / (above + 0.01))
-    glow = c + d * np.exp(e * np.arccos(toward)) + f * toward**2 + g * anisotropy + i * np.sqrt(above)
+    anisotropy = (1.0 + toward**2) / power(1.0 + h * h - 2.0 * h * toward, 1.5)
+    horizon = 1.0 + a * exp(b / (above + 0.01))
+    glow = c + d * exp(e * arccos(toward)) + f * toward**2 + g * anisotropy + i * np.sqrt(above)
     radiance = light.scale * _UNIT * mixed[0] * horizon * glow
     return np.where(height >= 0.0, np.maximum(radiance, 0.0), 0.0)
 
@@ -87,34 +89,38 @@ def sky_map(light: SunSky, height: int = MAP_HEIGHT) -> EnvironmentLight:
     to_world = facing_up(light.up)
     polar = (np.arange(height) + 0.5) * math.pi / height
     around = (np.arange(2 * height) + 0.5) * math.pi / height
-    sine = np.sin(polar)[:, None]
+    sine = sin(polar)[:, None]
     local = np.stack(
-        [np.sin(around) * sine, np.broadcast_to(np.cos(polar)[:, None], (height, 2 * height)), -np.cos(around) * sine],
+        [
+            sin(around) * sine,
+            np.broadcast_to(cos(polar)[:, None], (height, 2 * height)),
+            -cos(around) * sine,
+        ],
         axis=-1,
     )
-    world = local.reshape(-1, 3) @ to_world[:3, :3].T
+    world = product(local.reshape(-1, 3), to_world[:3, :3].T)
     image = sky_radiance(light, world).reshape(height, 2 * height, 3).astype(np.float32)
     return EnvironmentLight(image, to_world, source="sky")
 
 
 def sun_light(light: SunSky) -> DirectionalLight:
     """The sun as a light from one direction, as wide as its disk."""
-    x = (_elevation_rad(light) / (0.5 * math.pi)) ** (1.0 / 3.0)
+    x = power(_elevation_rad(light) / (0.5 * math.pi), 1.0 / 3.0)
     of_height = _between(_tables()["sun_irradiance"], light.turbidity - 1.0)
     irradiance = light.scale * np.maximum(_between(of_height, x * (len(of_height) - 1)), 0.0)
-    away = -np.array(light.sun_direction) / np.linalg.norm(light.sun_direction)
+    away = -np.array(light.sun_direction) / norm(light.sun_direction)
     return DirectionalLight((away[0], away[1], away[2]), (irradiance[0], irradiance[1], irradiance[2]), SUN_DEG)
 
 
 def facing_up(up: tuple[float, float, float], axis: int = 1) -> Matrix:
     """A rotation that takes an axis (y, unless another is asked for) to ``up``; identity where it is that already."""
-    unit = np.array(up) / np.linalg.norm(up)
+    unit = np.array(up) / norm(up)
     matrix = np.eye(4)
     if np.array_equal(unit, np.eye(3)[axis]):
         return matrix
     first = np.eye(3)[int(np.abs(unit).argmin())]
-    first = first - (first @ unit) * unit
-    first /= np.linalg.norm(first)
+    first = first - product(first, unit) * unit
+    first /= norm(first)
     matrix[:3, axis] = unit
     matrix[:3, (axis + 1) % 3] = first
     matrix[:3, (axis + 2) % 3] = np.cross(unit, first)
@@ -144,4 +150,8 @@ def sun_at(
     time = datetime(*date, tzinfo=UTC) + timedelta(hours=hour - timezone)
     place = Observer(latitude_deg, longitude_deg)
     around, height = (math.radians(f(place, time)) for f in (azimuth, partial(elevation, with_refraction=False)))
-    return math.cos(height) * math.sin(around), math.cos(height) * math.cos(around), math.sin(height)
+    return (
+        cos(height) * sin(around),
+        cos(height) * cos(around),
+        sin(height),
+    )

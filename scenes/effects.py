@@ -13,6 +13,7 @@ from PIL import Image
 
 from scenes import world
 from scenes.animation import camera_to_world
+from scenes.arithmetic import norm
 from scenes.canonical import (
     ConstantTexture,
     Cube,
@@ -164,7 +165,7 @@ def depth_of_field() -> Scene:
             strict=True,
         )
     ]
-    distance = float(np.linalg.norm(np.subtract((0.0, 0.5, 0.55), EYE)))
+    distance = norm(np.subtract((0.0, 0.5, 0.55), EYE))
     camera = PerspectiveCamera(
         camera_to_world(np.array(EYE), np.array((0.0, 0.5, 0.55))), 38.0, lens_radius=0.28, focal_distance=distance
     )

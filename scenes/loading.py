@@ -6,13 +6,12 @@ import warnings
 from functools import lru_cache
 from pathlib import Path
 
-import kornia.color
 import numpy as np
 import OpenEXR
-import torch
 from numpy.typing import NDArray
 from PIL import Image
 
+from scenes.arithmetic import power
 from scenes.canonical import Mesh, SceneError
 from scenes.values import vertices_of
 
@@ -105,9 +104,9 @@ def _read_srgb(path: Path) -> Picture:
 
 def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Linear values of 8-bit sRGB ones."""
-    # by a table: the power of a whole picture has other bits for another number of threads
-    steps = torch.arange(256, dtype=torch.float32).expand(3, 1, 256) / 255.0
-    return kornia.color.rgb_to_linear_rgb(steps)[0, 0].numpy()[encoded]
+    steps = np.arange(256, dtype=np.float32) / np.float32(255.0)
+    bright = power((steps + np.float32(0.055)) / np.float32(1.055), np.float32(2.4)).astype(np.float32)
+    return np.where(steps > np.float32(0.04045), bright, steps / np.float32(12.92))[encoded]
 
 
 def _read_exr(path: Path) -> Picture:

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.arithmetic import arccos, arctan2, cos, norm, product, sin
 from scenes.canonical import Mesh
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ def smooth_normals(vertices: Array, faces: Indices, weld_m: float = 1e-6, piece:
     for corner in range(3):
         ahead = unit(corners[:, (corner + 1) % 3] - corners[:, corner])
         behind = unit(corners[:, (corner + 2) % 3] - corners[:, corner])
-        angle = np.arccos(np.clip(np.einsum("ij,ij->i", ahead, behind), -1.0, 1.0)) * proper
+        angle = arccos(np.clip((ahead * behind).sum(axis=1), -1.0, 1.0)) * proper
         np.add.at(sums, place[faces[:, corner]], face_normal * angle[:, None])
     return unit(sums[place])
 
@@ -144,12 +145,12 @@ def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> Surface:
         crease_deg: profile corners sharper than this are not smoothed over.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, segments + 1)
-    heading = np.unwrap(np.arctan2(*np.diff(profile, axis=0).T[::-1]))
+    heading = np.unwrap(arctan2(*np.diff(profile, axis=0).T[::-1]))
     sharp = np.flatnonzero(np.abs(np.diff(heading)) > np.radians(crease_deg)) + 1
     strips = []
     for begin, end in zip([0, *sharp], [*sharp, len(profile) - 1], strict=True):
         part = profile[begin : end + 1]
-        ring = np.stack([np.sin(turn), np.zeros_like(turn), np.cos(turn)], -1)
+        ring = np.stack([sin(turn), np.zeros_like(turn), cos(turn)], -1)
         points = part[None, :, :1] * ring[:, None] + part[None, :, 1:] * np.array([0.0, 1.0, 0.0])
         strips.append(grid(points))
     return join(strips)
@@ -192,7 +193,7 @@ def extrude(outline: Array, lower: float, upper: float) -> Surface:
 def tube(start: Sequence[float], end: Sequence[float], radius: float, end_radius: float, sides: int = 10) -> Surface:
     """A closed, tapering round bar between two points, metres."""
     begin, finish = np.asarray(start, np.float64), np.asarray(end, np.float64)
-    length = float(np.linalg.norm(finish - begin))
+    length = norm(finish - begin)
     profile = np.array([[0.0, 0.0], [radius, 0.0], [end_radius, length], [0.0, length]])
     bar = lathe(profile, sides)
     along = (finish - begin) / length
@@ -213,14 +214,14 @@ def ellipsoid(center: Sequence[float], radii: Sequence[float], rings: int = 10, 
 def _ball(rings: int, segments: int) -> Surface:
     """A ball of radius one; shared, so never changed in place."""
     turn = np.linspace(np.pi, 0.0, rings + 1)
-    return lathe(np.stack([np.sin(turn), np.cos(turn)], -1), segments)
+    return lathe(np.stack([sin(turn), cos(turn)], -1), segments)
 
 
 def transformed(surface: Surface, rotation: Array, translation: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Surface:
     """The surface turned by ``(3, 3)`` and shifted; a reflection also turns its faces round."""
     faces = surface.faces if np.linalg.det(rotation) > 0.0 else surface.faces[:, ::-1]
-    vertices = surface.vertices @ rotation.T + np.asarray(translation, np.float64)
-    return Surface(vertices, faces, surface.normals @ rotation.T, surface.uvs)
+    vertices = product(surface.vertices, rotation.T) + np.asarray(translation, np.float64)
+    return Surface(vertices, faces, product(surface.normals, rotation.T), surface.uvs)
 
 
 def moved(surface: Surface, translation: Sequence[float] | Array) -> Surface:

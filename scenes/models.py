@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.arithmetic import power, product
 from scenes.canonical import (
     ConstantTexture,
     ImageTexture,
@@ -118,7 +119,7 @@ def place_model(
     return tuple(
         dataclasses.replace(
             part,
-            to_world=to_world @ part.to_world,
+            to_world=product(to_world, part.to_world),
             track=track,
             material=material or part.material,
             name=name or part.name,
@@ -215,7 +216,7 @@ def _metallic_roughness(material: Any, path: Path) -> Phong:
     return Phong(
         texture or ConstantTexture(_rgb(base * (1.0 - metallic))),
         specular=_rgb((0.04 * (1.0 - metallic) + base * metallic) * (1.0 - mirror)),
-        exponent=float(np.clip(2.0 / max(roughness, 1e-3) ** 4 - 2.0, 1.0, _EXPONENT_MAX)),
+        exponent=float(np.clip(2.0 / float(power(max(roughness, 1e-3), 4)) - 2.0, 1.0, _EXPONENT_MAX)),
         fresnel_min=mirror,
         fresnel_max=mirror,
         mirror_tint=_rgb(base),

@@ -12,6 +12,7 @@ import numpy as np
 
 from scenes import world
 from scenes.animation import camera_to_world
+from scenes.arithmetic import cos, sin
 from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
@@ -42,16 +43,28 @@ _BOX_FACES = 12 + 2  # of the box and the floor, were they triangles
 def knotted_tube(around: int, along: int) -> Mesh:
     """A trefoil of a round tube: ``2 * around * along`` triangles with smooth normals, within 3 units of the origin."""
     t = np.linspace(0.0, 2.0 * np.pi, along, endpoint=False)
-    center = np.stack([np.sin(t) + 2.0 * np.sin(2.0 * t), np.cos(t) - 2.0 * np.cos(2.0 * t), -np.sin(3.0 * t)], axis=1)
+    center = np.stack(
+        [
+            sin(t) + 2.0 * sin(2.0 * t),
+            cos(t) - 2.0 * cos(2.0 * t),
+            -sin(3.0 * t),
+        ],
+        axis=1,
+    )
     tangent = np.stack(
-        [np.cos(t) + 4.0 * np.cos(2.0 * t), -np.sin(t) + 4.0 * np.sin(2.0 * t), -3.0 * np.cos(3.0 * t)], axis=1
+        [
+            cos(t) + 4.0 * cos(2.0 * t),
+            -sin(t) + 4.0 * sin(2.0 * t),
+            -3.0 * cos(3.0 * t),
+        ],
+        axis=1,
     )
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     # the knot winds about the z axis, so that the radial direction is never along it
     side = center - (center * tangent).sum(axis=1, keepdims=True) * tangent
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     turn = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)[None, :, None]
-    normal = np.cos(turn) * side[:, None] + np.sin(turn) * np.cross(tangent, side)[:, None]
+    normal = cos(turn) * side[:, None] + sin(turn) * np.cross(tangent, side)[:, None]
     vertices = center[:, None] + 0.42 * normal
     i, j = (part.ravel() for part in np.meshgrid(np.arange(along), np.arange(around), indexing="ij"))
     a, b = i * around + j, (i + 1) % along * around + j

@@ -51,7 +51,7 @@ class RigidTrack:
             raise SceneError("RigidTrack: keys hold non-finite values")
         if not np.allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-6):
             raise SceneError("RigidTrack.rotation: expected unit quaternions")
-        if (np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0).any():
+        if ((q[1:] * q[:-1]).sum(axis=1) < 0.0).any():
             raise SceneError("RigidTrack.rotation: neighbouring keys must have the same sign")
 
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from scenes.arithmetic import cos, sin
 from scenes.canonical import Mesh
 from scenes.meshing import Array, Surface, extrude, grid, join, lathe, smooth_normals, transformed
 
@@ -21,7 +22,7 @@ _SEGMENTS = 60
 
 def _turn(angle: float) -> Array:
     """Rotation ``(3, 3)`` about the axle."""
-    c, s = np.cos(angle), np.sin(angle)
+    c, s = cos(angle), sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
@@ -43,8 +44,8 @@ def _spoke() -> Surface:
     """One spoke along ``+z``: a bevelled, slightly dished bar that widens towards hub and rim."""
     along = np.linspace(0.0, 1.0, 9)
     radius = 0.052 + along * (_RIM_RADIUS - 0.016 - 0.052)
-    half_width = 0.0235 - 0.004 * np.sin(np.pi * along) + 0.012 * along**3
-    face = 0.070 + 0.022 * along - 0.014 * np.sin(np.pi * along)
+    half_width = 0.0235 - 0.004 * sin(np.pi * along) + 0.012 * (along * along * along)
+    face = 0.070 + 0.022 * along - 0.014 * sin(np.pi * along)
     depth = 0.052 - 0.018 * along
     # section in (sideways, axial): a flat outer face with bevelled edges, narrower at the back
     section = np.array(
@@ -62,7 +63,7 @@ def _spoke() -> Surface:
 def _nut(angle: float) -> Surface:
     """A hexagonal wheel nut on the hub."""
     turn = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
-    head = extrude(0.0105 * np.stack([np.cos(turn), np.sin(turn)], -1), 0.0, 0.018)
+    head = extrude(0.0105 * np.stack([cos(turn), sin(turn)], -1), 0.0, 0.018)
     lay = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # z to y
     return transformed(transformed(head, lay, (0.0, 0.064, 0.042)), _turn(angle))
 
@@ -101,7 +102,7 @@ def caliper() -> Surface:
     """A caliper that clasps the disc behind the axle (towards ``-x``); it does not turn with the wheel."""
     turn = np.radians(np.linspace(-32.0, 32.0, 8))
     inside, outside = 0.118, 0.186
-    arc = np.stack([-np.cos(turn), np.sin(turn)], -1)
+    arc = np.stack([-cos(turn), sin(turn)], -1)
     section = np.array(
         [(outside, -0.035), (outside, 0.026), (outside - 0.01, 0.036), (inside, 0.036), (inside, -0.035)]
     )

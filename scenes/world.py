@@ -12,11 +12,10 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-import torch
-from kornia.geometry.transform import resize
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import correlate1d
 
+from scenes.arithmetic import cos, exp, power, product, sin
 from scenes.canonical import (
     ConstantTexture,
     DirectionalLight,
@@ -52,19 +51,45 @@ _SUN_UV = (0.595, 0.232)  # where the sun stands in the sky picture
 def sun_towards() -> Array:
     """Unit vector towards the sun."""
     turn, polar = 2.0 * np.pi * _SUN_UV[0], np.pi * _SUN_UV[1]
-    local = np.array([np.sin(turn) * np.sin(polar), np.cos(polar), -np.cos(turn) * np.sin(polar)])
-    return _Y_UP_TO_Z_UP[:3, :3] @ local
+    local = np.array(
+        [
+            sin(turn) * sin(polar),
+            cos(polar),
+            -cos(turn) * sin(polar),
+        ]
+    )
+    return product(_Y_UP_TO_Z_UP[:3, :3], local)
+
+
+def _gaussian(sigma: float, radius: int) -> Array:
+    """Weights of a filter, which add up to one."""
+    weights = exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    return weights / weights.sum()
+
+
+def _blurred(image: Array, sigma: float) -> Array:
+    """A Gaussian over ``(h, w)`` that wraps around, cut off at four deviations."""
+    weights = _gaussian(sigma, int(4.0 * sigma + 0.5))
+    return correlate1d(correlate1d(image, weights, 0, mode="wrap"), weights, 1, mode="wrap")
 
 
 def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    """On one thread: the bits of the filter depend on their number."""
-    planes, threads = torch.tensor(image).permute(2, 0, 1)[None], torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        small = resize(planes, (height, width), "bilinear", antialias=True)[0]
-    finally:
-        torch.set_num_threads(threads)
-    return small.permute(1, 2, 0).numpy()
+    """Bilinear, after a Gaussian along what becomes smaller; as ``kornia.geometry.transform.resize`` with antialias."""
+    planes = image.astype(np.float64)
+    factors = image.shape[0] / height, image.shape[1] / width
+    for axis, factor in enumerate(factors):
+        if max(factors) > 1.0:
+            sigma = max((factor - 1.0) / 2.0, 1e-3)
+            planes = correlate1d(planes, _gaussian(sigma, int(max(4.0 * sigma, 3.0)) // 2), axis, mode="mirror")
+    for axis, (factor, count) in enumerate(zip(factors, (height, width), strict=True)):
+        last = image.shape[axis] - 1
+        # places in float32, as there
+        at = np.clip((np.float64(np.float32(factor)) * (np.arange(count) + 0.5) - 0.5).astype(np.float32), 0.0, last)
+        first = at.astype(np.int64)
+        share = np.expand_dims(at - first, (1, 2) if axis == 0 else (0, 2))
+        near, far = (np.take(planes, index, axis) for index in (first, np.minimum(first + 1, last)))
+        planes = near * (1.0 - share) + far * share
+    return planes.astype(np.float32)
 
 
 def sky() -> EnvironmentLight:
@@ -83,7 +108,7 @@ def _sky(*states: FileState | None) -> EnvironmentLight:
     image[:horizon] = _resized(above, scale * len(above), width)[:horizon]
     hills = np.ascontiguousarray(_resized(read_image(asset("landscape_band.jpg"))[:190], tall, width // 2))
     strip = np.roll(np.concatenate([hills, hills[:, ::-1]], axis=1), _SEAM_PX, axis=1)
-    fade = np.linspace(0.0, 1.0, tall)[:, None, None] ** 0.45
+    fade = power(np.linspace(0.0, 1.0, tall), 0.45)[:, None, None]
     haze = image[horizon - tall : horizon].mean(axis=(0, 1))
     solid = np.clip(fade * 1.6, 0.0, 1.0)
     distant = 0.75 * haze * (1.0 - fade) + strip * 1.25 * fade
@@ -103,7 +128,7 @@ def sun() -> DirectionalLight:
 def _grass() -> NDArray[np.float32]:
     """Blades and patches: tileable noise of three scales."""
     noise = np.random.default_rng(11).standard_normal((3, 256, 256))
-    scales = [gaussian_filter(layer, width, mode="wrap") for layer, width in zip(noise, (0.6, 4.0, 18.0), strict=True)]
+    scales = [_blurred(layer, width) for layer, width in zip(noise, (0.6, 4.0, 18.0), strict=True)]
     fine, middle, coarse = (layer / layer.std() for layer in scales)
     light = np.clip(1.0 + 0.28 * fine + 0.16 * middle + 0.14 * coarse, 0.3, 2.0)[..., None]
     dry = np.clip(0.5 + 0.2 * coarse + 0.1 * middle, 0.0, 1.0)[..., None]
@@ -224,9 +249,9 @@ def _crowns() -> Surface:
     for x, y, size in _TREES:
         for _ in range(6):
             turn, out = shapes.uniform(0.0, 2.0 * np.pi), shapes.uniform(0.2, 1.1) * size
-            center = (x + out * np.cos(turn), y + out * np.sin(turn), size * shapes.uniform(3.2, 5.0))
+            center = (x + out * cos(turn), y + out * sin(turn), size * shapes.uniform(3.2, 5.0))
             ball = ellipsoid(center, (size * shapes.uniform(0.9, 1.4, 3)).tolist(), 9, 14)
-            bumps = 1.0 + 0.09 * np.sin(
+            bumps = 1.0 + 0.09 * sin(
                 7.1 * ball.vertices[:, :1] + 5.3 * ball.vertices[:, 1:2] + 6.7 * ball.vertices[:, 2:]
             )
             vertices = np.asarray(center) + (ball.vertices - np.asarray(center)) * bumps
@@ -251,7 +276,7 @@ def _posts() -> Surface:
             moved(ellipsoid((0.0, 0.0, 0.0), (0.16, 0.38, 0.09)), (x, reach, 6.30)),
         ]
     turn = np.linspace(0.0, 2.0 * np.pi, 13)[:-1]
-    ring = 0.075 * np.stack([np.cos(turn), np.sin(turn)], -1)
+    ring = 0.075 * np.stack([cos(turn), sin(turn)], -1)
     for x in (-12.0, -10.2, -8.4, 8.4, 10.2, 12.0):
         for y in (half + 0.7, -half - 0.7):
             parts.append(moved(extrude(ring, 0.0, 0.95), (x, y, 0.0)))

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from scenes.arithmetic import arctan, product
 from scenes.canonical import (
     Bumped,
     CheckerboardTexture,
@@ -112,12 +113,12 @@ class Approximation:
         if isinstance(instance.shape, Rectangle | Sphere):
             return [made]
         if isinstance(instance.shape, Cube):
-            places = [instance.to_world @ side for side in _sides()]
+            places = [product(instance.to_world, side) for side in _sides()]
             return [dataclasses.replace(made, shape=Rectangle(), to_world=place) for place in places]
         if isinstance(instance.shape, Disk):
             side = math.sqrt(math.pi) / 2.0 * instance.shape.radius
             self.report.add(name, "a round lamp", "a square one of the same area")
-            scaled = instance.to_world @ np.diag([side, side, 1.0, 1.0])
+            scaled = product(instance.to_world, np.diag([side, side, 1.0, 1.0]))
             return [dataclasses.replace(made, shape=Rectangle(), to_world=scaled)]
         self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
         return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
@@ -226,7 +227,7 @@ def _sides() -> list[np.ndarray]:
 
 def spread_deg(alpha: float) -> float:
     """Full angle of the cone that facets of an alpha spread rays over."""
-    return min(180.0, math.degrees(4.0 * math.atan(alpha)))
+    return min(180.0, math.degrees(4.0 * arctan(alpha)))
 
 
 def drawable(scene: Scene, report: LossReport) -> Scene:

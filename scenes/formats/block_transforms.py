@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scenes.arithmetic import norm, rotation_about
 from scenes.canonical import Matrix, SceneError
 from scenes.formats.block_text import Block
 
@@ -13,7 +14,9 @@ from scenes.formats.block_text import Block
 def transform(block: Block) -> Matrix:
     """Scale, then turns about x, y and z in degrees, then location."""
     matrix = np.eye(4)
-    turn = Rotation.from_euler("xyz", block.get("rotation", (0.0, 0.0, 0.0)), degrees=True).as_matrix()
+    angles = np.radians(block.get("rotation", (0.0, 0.0, 0.0)))
+    x, y, z = (rotation_about(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
+    turn = (z * y * x).as_matrix()
     matrix[:3, :3] = turn * np.broadcast_to(np.asarray(block.get("scale", 1.0), np.float64), 3)
     matrix[:3, 3] = block.get("location", (0.0, 0.0, 0.0))
     return matrix
@@ -35,10 +38,10 @@ def facing(block: Block, place: NDArray[np.float64], target: NDArray[np.float64]
     aim = target - place
     if not aim.any():
         raise SceneError(f"{block.where}: light.target: expected another place than its location, got {tuple(target)}")
-    helper = np.array([0.0, 1.0, 0.0]) if abs(aim[1]) < 0.9 * np.linalg.norm(aim) else np.array([1.0, 0.0, 0.0])
-    normal = aim / np.linalg.norm(aim)
+    helper = np.array([0.0, 1.0, 0.0]) if abs(aim[1]) < 0.9 * norm(aim) else np.array([1.0, 0.0, 0.0])
+    normal = aim / norm(aim)
     across = np.cross(helper, normal)
-    across /= np.linalg.norm(across)
+    across /= norm(across)
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([across, np.cross(normal, across), normal], axis=1)
     matrix[:3, 3] = place

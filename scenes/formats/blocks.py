@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.animation import Pose, Times, sample_track
+from scenes.arithmetic import product
 from scenes.canonical import (
     ConstantTexture,
     Cube,
@@ -204,7 +205,7 @@ class _Loader:
         if "groupname" in block.values:
             group = self._known(self.groups, block, "groupname")
             outer = transform(group)
-            matrix, velocity = outer @ matrix, outer[:3, :3] @ velocity
+            matrix, velocity = product(outer, matrix), product(outer[:3, :3], velocity)
             velocity = velocity + np.asarray(group.get("velocity", (0.0, 0.0, 0.0)))
         if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
             raise SceneError(f"{block.where}: {block.kind}.scale: expected a transform that can be inverted, got 0")
@@ -234,7 +235,7 @@ class _Loader:
             half_x, half_y = np.asarray(block.require("size")) / 2.0
             matrix = facing(block, np.asarray(block.require("location")), np.asarray(block.require("target")))
             black = Phong(ConstantTexture((0.0, 0.0, 0.0)))
-            scaled = matrix @ np.diag([half_x, half_y, 1.0, 1.0])
+            scaled = product(matrix, np.diag([half_x, half_y, 1.0, 1.0]))
             return Instance(Rectangle(), black, scaled, name=f"light of {block.where}", emission=color)
         if kind == "environment":
             return EnvironmentLight(read_image(self.folder / block.require("map")), source=block.get("map"))

@@ -186,7 +186,7 @@ def checked(directive: Directive, found: Matrix) -> Matrix:
     """A transform that can be inverted; raises SceneError for another."""
     part = found[:3, :3]
     size = np.abs(part).max(initial=0.0)
-    if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not abs(np.linalg.det(part)) > 1e-30 * size**3 > 0.0:
+    if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0:
         raise SceneError(
             f"{directive.place}: {directive.name}: expected a matrix that can be inverted, last row 0 0 0 1"
         )

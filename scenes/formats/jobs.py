@@ -9,10 +9,12 @@ Source: motion-blur perception thesis, chapter 3, fig. 12.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
+from scenes.arithmetic import power
 from scenes.canonical import SceneError
 from scenes.formats.block_settings import POINT_SET_NAMES, TIME_FILTERS
 
@@ -88,7 +90,7 @@ def read_job(path: Path) -> Job:
     job = Job(" ".join(lines[0][1]), tuple(levels), tuple(point_sets), tuple(filters))
     if any(combination.points == "stratified" for combination in job.combinations):
         for level in job.levels:
-            if round(level ** (1 / 3)) ** 3 != level:
+            if math.prod((round(power(level, 1.0 / 3.0)),) * 3) != level:
                 raise SceneError(f"{path}:{lines[2][0]}: sampling level: expected cubes for stratifiedmc, got {level}")
     return job
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scenes.arithmetic import norm, product
 from scenes.canonical import (
     ConstantTexture,
     DirectionalLight,
@@ -205,16 +206,16 @@ class LuxReader(PbrtReader):
         target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
         if kind in ("point", "spot"):
             power = parameters.number("power", 0.0) * parameters.number("efficacy", 17.0)
-            luminance = float(np.dot(_LUMINANCE, strength))
+            luminance = float(product(_LUMINANCE, strength))
             if power > 0.0 and luminance > 0.0:
                 strength = rgb(np.array(strength) * power / (4.0 * math.pi * luminance))
                 self.report.add(where, "the power of a lamp", "an intensity, as even all round")
         if kind == "distant":
             direction = np.subtract(target, start)
-            if not np.linalg.norm(direction) > 0.0:
+            if not norm(direction) > 0.0:
                 raise SceneError(f"{where}: distant: expected from and to apart")
             angle = math.degrees(2.0 * parameters.number("theta", 0.0))
-            self.lights.append(DirectionalLight(rgb(direction / np.linalg.norm(direction)), strength, angle))
+            self.lights.append(DirectionalLight(rgb(direction / norm(direction)), strength, angle))
         elif kind == "spot":
             outer = parameters.number("coneangle", 30.0)
             inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
@@ -228,16 +229,16 @@ class LuxReader(PbrtReader):
     def _daylight(self, kind: str, parameters: Parameters) -> None:
         toward = parameters.numbers("sundir", 3)
         direction = np.array((0.0, 0.0, 1.0)) if toward is None else toward
-        if not np.linalg.norm(direction) > 0.0:
+        if not norm(direction) > 0.0:
             raise SceneError(f"{parameters.place}: sundir: expected a direction")
-        turned = self.transforms.current[0][:3, :3] @ direction
+        turned = product(self.transforms.current[0][:3, :3], direction)
         part = {"sun": "sun", "sky": "sky", "sky2": "sky"}.get(kind, "both")
         if "relsize" in parameters:
             parameters.number("relsize", 1.0)
             self.report.add(str(parameters.place), "the size of the sun's disk", "the real one")
         turbidity, gain = parameters.number("turbidity", 2.0), parameters.number("gain", 1.0)
         up = self.transforms.current[0][:3, 2]
-        unit, zenith = rgb(turned / np.linalg.norm(turned)), rgb(up / np.linalg.norm(up))
+        unit, zenith = rgb(turned / norm(turned)), rgb(up / norm(up))
         for one, size in (("sun", SUN_UNIT), ("sky", SKY_UNIT)):
             if part in (one, "both"):
                 self.lights.append(SunSky(unit, turbidity, gain * size, one, zenith, 0.0))  # type: ignore[arg-type]
@@ -265,9 +266,11 @@ class LuxReader(PbrtReader):
         power, emission = self.attributes.power, self.attributes.emission
         if len(self.instances) == count or emission is None or not power > 0.0:
             return
-        luminance = float(np.dot(_LUMINANCE, emission))
+        luminance = float(product(_LUMINANCE, emission))
         lamp = self.instances[-1]
-        corners = as_mesh(lamp.shape).vertices[as_mesh(lamp.shape).faces].astype(np.float64) @ lamp.to_world[:3, :3].T
+        corners = product(
+            as_mesh(lamp.shape).vertices[as_mesh(lamp.shape).faces].astype(np.float64), lamp.to_world[:3, :3].T
+        )
         area = (
             0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
         )

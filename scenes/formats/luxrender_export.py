@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from scenes.arithmetic import power, product
 from scenes.canonical import (
     Camera,
     Cube,
@@ -94,9 +95,9 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
     def _camera(self, camera: Camera) -> None:
         """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored picture by a window from right to left."""
         poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
-        size = abs(np.linalg.det(poses[0][:3, :3])) ** (1.0 / 3.0)
+        size = power(abs(np.linalg.det(poses[0][:3, :3])), 1.0 / 3.0)
         axes = poses[0][:3, :3] / size
-        if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-4:
+        if np.abs(product(axes.T, axes) - np.eye(3)).max() > 1e-4:
             self.report.add("camera", "a sheared camera", "an upright one")
         if isinstance(camera, PerspectiveCamera) and abs(size - 1.0) > 1e-6:
             lens, focus = size * camera.lens_radius, camera.focal_distance
@@ -155,7 +156,7 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
             self.lines.append(f'\tLightSource "infinite" "color L" {listed(radiance)} "float gain" [ 1 ]')
             return
         file = self.output.picture(light.image, light.source, (".exr",))
-        turn = light.to_world @ inverse(MAP_AXES)
+        turn = product(light.to_world, inverse(MAP_AXES))
         self.lines += [
             "\tTransformBegin",
             f"\t\tTransform {written_matrix(turn)}",

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from scenes import loading
+from scenes.arithmetic import power
 from scenes.canonical import (
     ConstantTexture,
     Glass,
@@ -188,4 +189,4 @@ def lux_image(path: Path, gamma: float, gain: float, where: str) -> np.ndarray:
     encoded = image if path.suffix.lower() == ".exr" else encoded_again(image)
     if gamma == 1.0 and gain == 1.0 and path.suffix.lower() == ".exr":
         return image
-    return (np.float32(gain) * np.maximum(encoded, 0.0) ** np.float32(gamma)).astype(np.float32)
+    return np.float32(gain) * power(np.maximum(encoded, 0.0), np.float32(gamma)).astype(np.float32)

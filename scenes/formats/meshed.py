@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from scenes.arithmetic import product
 from scenes.canonical import (
     CheckerboardTexture,
     Cube,
@@ -51,7 +52,7 @@ def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
     """A mesh and its place without a mirror in the place: the mesh is mirrored in its stead."""
     if np.linalg.det(matrix[:3, :3]) > 0.0:
         return mesh, matrix
-    return _mirrored(mesh), matrix @ FLIPPED
+    return _mirrored(mesh), product(matrix, FLIPPED)
 
 
 def _mirrored(mesh: Mesh) -> Mesh:

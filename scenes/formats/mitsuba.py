@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from scenes import loading
+from scenes.arithmetic import arctan, hypot, norm, product, tan
 from scenes.canonical import (
     Camera,
     DirectionalLight,
@@ -185,7 +186,7 @@ class MitsubaReader:
             if child.tag in ("film", "sampler"):
                 self._node(child)
         keys, times_s = properties.motion()
-        to_world, track = keys[0] @ FORWARD, motion(keys, times_s, properties.where, self.report)
+        to_world, track = product(keys[0], FORWARD), motion(keys, times_s, properties.where, self.report)
         properties.asked.update(("nearClip", "farClip"))
         shutter = properties.number("shutterOpen", 0.0), properties.number("shutterClose", 0.0)
         if kind in ("perspective", "thinlens"):
@@ -205,13 +206,13 @@ class MitsubaReader:
         width, height = self.film.width_px, self.film.height_px
         axis = properties.text("fovAxis", "x")
         sides = {"x": width, "y": height, "smaller": min(width, height), "larger": max(width, height),
-                 "diagonal": math.hypot(width, height)}  # fmt: skip
+                 "diagonal": hypot(width, height)}  # fmt: skip
         if axis not in sides:
             raise SceneError(f"{properties.where}: fovAxis: expected one of {', '.join(sides)}, got {axis!r}")
         if "fov" in properties or "focalLength" not in properties:
             fov = properties.number("fov", -1.0)
             if fov < 0.0 and "fov" not in properties:  # 50 mm on film of 36 x 24 mm
-                fov, axis = 2.0 * math.degrees(math.atan(math.hypot(36.0, 24.0) / 100.0)), "diagonal"
+                fov, axis = 2.0 * math.degrees(arctan(hypot(36.0, 24.0) / 100.0)), "diagonal"
         else:
             text = properties.text("focalLength", "50mm").removesuffix("mm").strip()
             try:
@@ -220,12 +221,12 @@ class MitsubaReader:
                 length = 0.0
             if not 0.1 <= length <= 1e5:
                 raise SceneError(f"{properties.where}: focalLength: expected millimetres, got {text[:20]!r}")
-            fov, axis = 2.0 * math.degrees(math.atan(math.hypot(36.0, 24.0) / (2.0 * length))), "diagonal"
+            fov, axis = 2.0 * math.degrees(arctan(hypot(36.0, 24.0) / (2.0 * length))), "diagonal"
         if not 0.0 < fov < 180.0:
             raise SceneError(f"{properties.where}: fov: expected an angle in (0, 180), got {fov:g}")
         if sides[axis] == min(width, height):
             return fov
-        return math.degrees(2.0 * math.atan(math.tan(math.radians(fov) / 2.0) * min(width, height) / sides[axis]))
+        return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * min(width, height) / sides[axis]))
 
     # --- lights --------------------------------------------------------------------------------------------------
 
@@ -233,22 +234,22 @@ class MitsubaReader:
         kind, properties = node.get("type"), Properties(node, self.report)
         matrix = properties.transform()
         if kind == "point":
-            place = matrix @ np.append(properties.vector("position", grey(0.0)), 1.0)
+            place = product(matrix, np.append(properties.vector("position", grey(0.0)), 1.0))
             self.lights.append(PointLight(rgb(place[:3]), properties.color("intensity", grey(1.0))))
         elif kind == "spot":
             outer = properties.number("cutoffAngle", 20.0)
             inner = properties.number("beamWidth", 0.75 * outer)
-            ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]))
+            ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / norm(matrix[:3, 2]))
             if any(child.tag in ("texture", "ref") for child in properties.rest):
                 self.report.add(properties.where, "a picture in a spot light", "none")
             self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
         elif kind in ("directional", "collimated"):
             direction = properties.vector("direction", rgb(matrix[:3, 2]))
-            if not np.linalg.norm(direction) > 0.0:
+            if not norm(direction) > 0.0:
                 raise SceneError(f"{properties.where}: direction: expected one")
             if kind == "collimated":
                 self.report.add(properties.where, "a beam of no width", "a parallel light")
-            unit = rgb(direction / np.linalg.norm(direction))
+            unit = rgb(direction / norm(direction))
             self.lights.append(DirectionalLight(unit, properties.color("irradiance", grey(1.0))))
         elif kind == "constant":
             radiance = properties.color("radiance", grey(1.0))
@@ -274,10 +275,10 @@ class MitsubaReader:
         turned = matrix[:3, :3]
         direction = properties.vector("sunDirection", (0.0, 1.0, 0.0))
         if "sunDirection" not in properties:
-            direction = turned @ self._by_time(properties)
-        if not np.linalg.norm(direction) > 0.0:
+            direction = product(turned, self._by_time(properties))
+        if not norm(direction) > 0.0:
             raise SceneError(f"{properties.where}: sunDirection: expected a direction")
-        unit, up = rgb(direction / np.linalg.norm(direction)), rgb(turned[:, 1] / np.linalg.norm(turned[:, 1]))
+        unit, up = rgb(direction / norm(direction)), rgb(turned[:, 1] / norm(turned[:, 1]))
         turbidity, scale = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
         albedo = float(np.mean(properties.color("albedo", grey(0.15))))
         shares = {part: properties.number(f"{part}Scale", 1.0) for part in ("sun", "sky")}

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scenes.arithmetic import product
 from scenes.canonical import (
     Camera,
     Cube,
@@ -127,12 +128,12 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         elif isinstance(camera, OrthographicCamera):
             made = self.plugin("sensor", "orthographic")
             half = camera.half_width
-            local = FORWARD @ np.diag([half, half, 1.0, 1.0])
+            local = product(FORWARD, np.diag([half, half, 1.0, 1.0]))
         else:
             made = self.plugin("sensor", "spherical" if isinstance(camera, EnvironmentCamera) else "perspective")
             if self.modern or not isinstance(camera, EnvironmentCamera):
                 self.report.add("camera", type(camera).__name__, "one that the target may not have")
-        self._placing(made, [key @ local for key in keys], times_s, "camera", True)
+        self._placing(made, [product(key, local) for key in keys], times_s, "camera", True)
         return made
 
     # --- lights and shapes ---------------------------------------------------------------------------------------
@@ -201,7 +202,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         if shines(instance) or not (shared or (len(keys) > 1 and not self.modern)):
             made, local = self._shape(instance)
             self.root.append(made)
-            self._placing(made, [key @ local for key in keys], times_s, where)
+            self._placing(made, [product(key, local) for key in keys], times_s, where)
             return
         key = part_key(instance)
         if key not in self._groups:
@@ -239,7 +240,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         if not isinstance(shape, Sphere):
             return False
         axes = instance.to_world[:3, :3]
-        even = axes.T @ axes
+        even = product(axes.T, axes)
         stretched = np.abs(even - even.trace() / 3.0 * np.eye(3)).max() > 1e-4 * even.trace()
         return bool(stretched) or (textured and float(np.linalg.det(axes)) > 0.0)
 

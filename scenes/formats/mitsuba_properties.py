@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scenes.arithmetic import norm, power, product
 from scenes.canonical import Rgb, SceneError
 from scenes.formats.directives import NUMBER_MAX
 from scenes.formats.losses import LossReport
@@ -164,7 +165,7 @@ def color_of(node: Node) -> Rgb:
         return xyz_to_rgb(values)
     if node.tag == "srgb":
         clipped = np.clip(values, 0.0, 1.0)
-        values = np.where(clipped <= 0.04045, clipped / 12.92, ((clipped + 0.055) / 1.055) ** 2.4)
+        values = np.where(clipped <= 0.04045, clipped / 12.92, power((clipped + 0.055) / 1.055, 2.4))
     return rgb(values)
 
 
@@ -185,10 +186,10 @@ def transform_of(node: Node) -> Matrix:
             made = looking(step)
         else:
             raise SceneError(f"{step.place}: expected a step of a transform, got {step.tag!r}")
-        matrix = made @ matrix
+        matrix = product(made, matrix)
     part = matrix[:3, :3]
     size = np.abs(part).max(initial=0.0)
-    if not np.isfinite(matrix).all() or not abs(np.linalg.det(part)) > 1e-30 * size**3 > 0.0:
+    if not np.isfinite(matrix).all() or not abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0:
         raise SceneError(f"{node.place}: transform: expected one that can be inverted")
     return matrix
 
@@ -202,9 +203,9 @@ def looking(step: Node) -> Matrix:
     else:
         up = np.eye(3)[int(np.abs(forward).argmin())]
     left = np.cross(up, forward)
-    if min(np.linalg.norm(forward), np.linalg.norm(left)) < 1e-12:
+    if min(norm(forward), norm(left)) < 1e-12:
         raise SceneError(f"{step.place}: lookat: expected an upward direction across the line of sight")
-    forward, left = forward / np.linalg.norm(forward), left / np.linalg.norm(left)
+    forward, left = forward / norm(forward), left / norm(left)
     matrix = np.eye(4)
     matrix[:3] = np.stack([left, np.cross(forward, left), forward, points["origin"]], axis=1)
     return matrix

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from scenes.arithmetic import norm, product
 from scenes.canonical import (
     ConstantTexture,
     Cube,
@@ -75,7 +76,7 @@ class MitsubaShapes:
         if properties.truth("flipNormals", False):
             shape = turned(as_mesh(shape))
         self.surfaces.left_over(properties)
-        return [Instance(shape, material, keys[0] @ local, track, node.get("id"), emission)]
+        return [Instance(shape, material, product(keys[0], local), track, node.get("id"), emission)]
 
     def _instances(self, properties: Properties) -> list[Instance]:
         keys, times_s = properties.motion()
@@ -90,7 +91,7 @@ class MitsubaShapes:
                 return [
                     dataclasses.replace(
                         part,
-                        to_world=keys[0] @ part.to_world,
+                        to_world=product(keys[0], part.to_world),
                         track=moved_by(keys[0], part.track) if track is None and part.track is not None else track,
                     )
                     for part in parts
@@ -124,7 +125,7 @@ class MitsubaShapes:
             if not radius > 0.0:
                 raise SceneError(f"{where}: radius: expected a positive number, got {radius:g}")
             place = translation(*properties.vector("center", grey(0.0)).tolist())
-            return Sphere(radius), place @ FLIPPED if depends_on_uv(material) else place
+            return Sphere(radius), product(place, FLIPPED) if depends_on_uv(material) else place
         if kind in ("rectangle", "cube", "disk"):
             shapes = {"rectangle": Rectangle(), "cube": Cube(), "disk": Disk()}
             if not depends_on_uv(material) or kind == "rectangle":
@@ -139,12 +140,12 @@ class MitsubaShapes:
 
     def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
         first, last = properties.vector("p0", grey(0.0)), properties.vector("p1", (0.0, 0.0, 1.0))
-        radius, length = properties.number("radius", 1.0), float(np.linalg.norm(last - first))
+        radius, length = properties.number("radius", 1.0), norm(last - first)
         if not (radius > 0.0 and length > 0.0):
             raise SceneError(f"{properties.where}: cylinder: expected a radius and two ends apart")
         axis = (last - first) / length
         side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
-        side /= np.linalg.norm(side)
+        side /= norm(side)
         place = np.eye(4)
         place[:3] = np.stack([side, np.cross(axis, side), axis, first], axis=1)
         mesh = revolution.cylinder(radius, 0.0, length)

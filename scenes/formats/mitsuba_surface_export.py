@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from scenes.arithmetic import tan
 from scenes.canonical import (
     Bumped,
     CheckerboardTexture,
@@ -206,7 +207,7 @@ class MitsubaSurfaceWriter:
             made = self.plugin("bsdf", "roughdiffuse" if rough else "diffuse")
             self.texture(made, material.reflectance, "reflectance")
             if rough:
-                self.put(made, "float", "alpha", number(math.tan(math.radians(material.sigma_deg)) * math.sqrt(2.0)))
+                self.put(made, "float", "alpha", number(tan(math.radians(material.sigma_deg)) * math.sqrt(2.0)))
             elif material.sigma_deg:
                 self.report.add(where, f"a roughness of {material.sigma_deg:g} degrees", "smooth")
             return made

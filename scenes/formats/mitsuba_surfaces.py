@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenes import loading
+from scenes.arithmetic import arctan, power
 from scenes.canonical import (
     Bumped,
     CheckerboardTexture,
@@ -113,7 +114,7 @@ class MitsubaSurfaces:
         image = loading.read_image(path)
         gamma = properties.number("gamma", -1.0)
         if gamma > 0.0 and path.suffix.lower() != ".exr":
-            image = (encoded_again(image) ** np.float32(gamma)).astype(np.float32)
+            image = power(encoded_again(image), np.float32(gamma)).astype(np.float32)
         wrap = properties.text("wrapMode", "repeat")
         if wrap not in _WRAPS:
             raise SceneError(f"{where}: wrapMode: expected one of {', '.join(_WRAPS)}, got {wrap!r}")
@@ -196,7 +197,7 @@ class MitsubaSurfaces:
         sigma = 0.0
         if properties.node.get("type") == "roughdiffuse":
             # alpha is sqrt(2) times the slopes' deviation that sigma is the angle of
-            sigma = math.degrees(math.atan(properties.number("alpha", 0.2) / math.sqrt(2.0)))
+            sigma = math.degrees(arctan(properties.number("alpha", 0.2) / math.sqrt(2.0)))
             properties.truth("useFastApprox", False)
         return Matte(self.texture(properties, name, grey(0.5)), sigma)
 

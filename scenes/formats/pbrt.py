@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import loading
+from scenes.arithmetic import arctan, norm, product, products, tan
 from scenes.canonical import (
     Camera,
     ConstantTexture,
@@ -147,14 +148,14 @@ class PbrtReader(DirectiveReader):
         if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
             shutter = 0.0, 0.0  # the default of a still
         half, mirror = self._window(parameters, directive)
-        start = keys[0] @ FORWARD @ mirror
+        start = products(keys[0], FORWARD, mirror)
         if parameters.number("frameaspectratio", 0.0):
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
         if kind == "perspective":
             fov = parameters.number("fov", 2.0 * parameters.number("halffov", 45.0))
             if not 0.0 < fov < 180.0:
                 raise SceneError(f"{directive.place}: fov: expected an angle in (0, 180), got {fov:g}")
-            fov = math.degrees(2.0 * math.atan(math.tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
+            fov = math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
             lens, focus = parameters.number("lensradius", 0.0), parameters.number("focaldistance", FAR)
             self.camera = PerspectiveCamera(start, fov, lens, focus, track, shutter)
         elif kind == "orthographic":
@@ -217,7 +218,7 @@ class PbrtReader(DirectiveReader):
 
     def _placed(self, point: Any, default: tuple[float, float, float]) -> Rgb:
         at = np.asarray(default if point is None else point, np.float64)
-        return rgb((self.transforms.current[0] @ np.append(at, 1.0))[:3])
+        return rgb(product(self.transforms.current[0], np.append(at, 1.0))[:3])
 
     def _read_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
@@ -241,9 +242,9 @@ class PbrtReader(DirectiveReader):
         elif kind == "distant":
             target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
             direction = np.subtract(target, start)
-            if not np.linalg.norm(direction) > 0.0:
+            if not norm(direction) > 0.0:
                 raise SceneError(f"{where}: distant: expected from and to apart")
-            self.lights.append(DirectionalLight(rgb(direction / np.linalg.norm(direction)), strength))
+            self.lights.append(DirectionalLight(rgb(direction / norm(direction)), strength))
         elif kind in ("infinite", "exinfinite"):
             self.lights.append(self._environment(parameters, strength, where))
         else:
@@ -271,8 +272,10 @@ class PbrtReader(DirectiveReader):
         to_world = self.transforms.current[0].copy()
         to_world[:3, 3] = 0.0
         if strength[0] == strength[1] == strength[2]:
-            return EnvironmentLight(image, to_world @ MAP_AXES, strength[0], str(path))
-        return EnvironmentLight((image * np.array(strength)).astype(np.float32), to_world @ MAP_AXES, 1.0, str(path))
+            return EnvironmentLight(image, product(to_world, MAP_AXES), strength[0], str(path))
+        return EnvironmentLight(
+            (image * np.array(strength)).astype(np.float32), product(to_world, MAP_AXES), 1.0, str(path)
+        )
 
     def _read_area_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
@@ -308,7 +311,7 @@ class PbrtReader(DirectiveReader):
                 moved = moved_by(start, part.track)
             elif part.track is not None:
                 self.report.add(str(directive.place), "a motion within a motion", "that of the instance")
-            self._keep(dataclasses.replace(part, to_world=start @ part.to_world, track=moved), directive)
+            self._keep(dataclasses.replace(part, to_world=product(start, part.to_world), track=moved), directive)
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
         if len(self.instances) >= _SHAPE_MAX:
@@ -335,7 +338,10 @@ class PbrtReader(DirectiveReader):
         if isinstance(shape, Mesh):
             shape, local = shape_of(shape, material, str(directive.place), self.report)
         start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
-        self._keep(Instance(shape, material, start @ local, track, emission=self.attributes.emission), directive)
+        self._keep(
+            Instance(shape, material, product(start, local), track, emission=self.attributes.emission),
+            directive,
+        )
         self.left_over(parameters, f"shape {kind!r}")
 
 

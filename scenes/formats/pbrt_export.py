@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenes.animation import pose_at
+from scenes.arithmetic import product
 from scenes.canonical import (
     Camera,
     ConstantTexture,
@@ -128,7 +129,7 @@ class PbrtWriter(PbrtSurfaceWriter):
     def _camera(self, camera: Camera) -> None:
         track = getattr(camera, "track", None)
         keys = self.keys(track, camera.to_world, "camera")
-        self.lines += self.moved([inverse(key @ FORWARD) for key in keys])
+        self.lines += self.moved([inverse(product(key, FORWARD)) for key in keys])
         self.lines.append(self._camera_line(camera))
 
     def keys(self, track: RigidTrack | None, to_world: Matrix, where: str) -> list[Matrix]:
@@ -138,7 +139,7 @@ class PbrtWriter(PbrtSurfaceWriter):
             return poses
         if len(poses) > 2 or (times_s[0], times_s[-1]) != self.times_s:
             self.report.add(where, f"a motion of {len(poses)} keys", "from its first place to its last, evenly")
-        return [pose_at(track, time_s) @ to_world for time_s in self.times_s]
+        return [product(pose_at(track, time_s), to_world) for time_s in self.times_s]
 
     def moved(self, keys: list[Matrix]) -> list[str]:
         """Lines that set the transform."""
@@ -217,7 +218,7 @@ class PbrtWriter(PbrtSurfaceWriter):
             self.lines.append(f'\tLightSource "infinite" "rgb L" {listed(radiance)}')
             return
         file = self.output.picture(light.image, light.source, PICTURES)
-        turn = light.to_world @ inverse(MAP_AXES)
+        turn = product(light.to_world, inverse(MAP_AXES))
         self.lines += [
             "\tAttributeBegin",
             f"\t\tTransform {written_matrix(turn)}",

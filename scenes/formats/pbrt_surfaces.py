@@ -6,7 +6,6 @@ Source: PBRT v3 file format, sections on materials and textures; Pharr, Jakob an
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from scenes import loading
+from scenes.arithmetic import log, power
 from scenes.canonical import (
     Bumped,
     CheckerboardTexture,
@@ -46,8 +46,8 @@ _NO_TEXTURES = ("windy", "fbm", "wrinkled", "marble", "dots", "uv", "bilerp")
 
 def alpha_of_roughness(roughness: float) -> float:
     """Microfacet alpha of PBRT's perceptual roughness (``RoughnessToAlpha``, Pharr et al. 2016, sec. 8.4.2)."""
-    x = math.log(max(roughness, 1e-3))
-    return 1.62142 + 0.819955 * x + 0.1734 * x**2 + 0.0171201 * x**3 + 0.000640711 * x**4
+    x = log(max(roughness, 1e-3))
+    return 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)))
 
 
 @dataclass
@@ -318,7 +318,7 @@ def mean_of(texture: Texture) -> Rgb:
 def encoded_again(image: np.ndarray) -> np.ndarray:
     """The encoded values of a decoded picture, for files that say theirs are linear."""
     low = image <= 0.0031308
-    return np.where(low, 12.92 * image, 1.055 * np.maximum(image, 0.0) ** (1.0 / 2.4) - 0.055).astype(np.float32)
+    return np.where(low, 12.92 * image, 1.055 * power(np.maximum(image, 0.0), 1.0 / 2.4) - 0.055).astype(np.float32)
 
 
 def _count(parameters: Parameters, name: str, count: int) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from scenes.animation import pose_at
+from scenes.arithmetic import product
 from scenes.canonical import Emissive, Instance, Mesh, Scene
 from scenes.formats.losses import LossReport
 from scenes.formats.transform_stack import track_times
@@ -42,12 +43,12 @@ def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix
     if track is None or len(track.translation) == 1:
         return [placed(track, to_world)], [0.0]
     times_s = track_times(track)
-    return [pose_at(track, time_s) @ to_world for time_s in times_s], times_s
+    return [product(pose_at(track, time_s), to_world) for time_s in times_s], times_s
 
 
 def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:
     """Where something is at the first key of its motion."""
-    return to_world if track is None else pose_at(track, track.start_s) @ to_world
+    return to_world if track is None else product(pose_at(track, track.start_s), to_world)
 
 
 def tracks_of(scene: Scene) -> list[RigidTrack]:

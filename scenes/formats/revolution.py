@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.arithmetic import arccos, cos, hypot, sin
 from scenes.canonical import Mesh
 
 AROUND, ALONG = 64, 16
@@ -34,9 +35,9 @@ def revolved(profile: Profile, along: int, turn_deg: float = 360.0, source: str 
     (r0, z0), (r1, z1) = profile(np.clip(v - step, 0.0, 1.0)), profile(np.clip(v + step, 0.0, 1.0))
     # the derivatives by u and v span the surface; their product points the way that PBRT's quadrics do
     dr, dz = r1 - r0, z1 - z0
-    normal = np.stack([dz * np.cos(phi), dz * np.sin(phi), -dr], axis=-1)
+    normal = np.stack([dz * cos(phi), dz * sin(phi), -dr], axis=-1)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    points = np.stack([radius * np.cos(phi), radius * np.sin(phi), z], axis=-1)
+    points = np.stack([radius * cos(phi), radius * sin(phi), z], axis=-1)
     row = np.arange(along)[:, None] * (around + 1) + np.arange(around)
     a, b, c, d = (part.ravel() for part in (row, row + 1, row + around + 2, row + around + 1))
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
@@ -76,18 +77,18 @@ def hyperboloid(p1: NDArray[np.float64], p2: NDArray[np.float64], turn_deg: floa
 
     def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         p = p1 + v[..., None] * (p2 - p1)
-        return np.hypot(p[..., 0], p[..., 1]), p[..., 2]
+        return hypot(p[..., 0], p[..., 1]), p[..., 2]
 
     return revolved(profile, ALONG, turn_deg, "hyperboloid")
 
 
 def partial_sphere(radius: float, z_min: float, z_max: float, turn_deg: float = 360.0) -> Mesh:
     """The part of a sphere between two heights."""
-    low, high = (math.acos(min(1.0, max(-1.0, z / radius))) for z in (z_min, z_max))
+    low, high = (arccos(min(1.0, max(-1.0, z / radius))) for z in (z_min, z_max))
 
     def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         theta = low + (high - low) * v
-        return radius * np.sin(theta), radius * np.cos(theta)
+        return radius * sin(theta), radius * cos(theta)
 
     return revolved(profile, 2 * ALONG, turn_deg, "sphere")
 
@@ -96,7 +97,7 @@ def lamp_sphere(radius: float) -> Mesh:
     """A sphere of 224 triangles and of the area of the round one; LuxCore samples the light of 256 at most."""
 
     def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return np.sin(math.pi * v), -np.cos(math.pi * v)
+        return sin(math.pi * v), -cos(math.pi * v)
 
     unit = revolved(profile, 8, source="sphere", full=16)
     scale = radius * math.sqrt(4.0 * math.pi / area(unit))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scenes.arithmetic import exp, expm1, power, product
 from scenes.values import Rgb
 
 XYZ_TO_RGB = np.array(
@@ -48,11 +49,11 @@ def grey(value: float) -> Rgb:
 
 def xyz_to_rgb(xyz: ArrayLike) -> Rgb:
     """Linear Rec. 709 of a CIE XYZ colour; what lies outside becomes 0."""
-    return rgb(np.maximum(XYZ_TO_RGB @ np.asarray(xyz, np.float64), 0.0))
+    return rgb(np.maximum(product(XYZ_TO_RGB, np.asarray(xyz, np.float64)), 0.0))
 
 
 def _lobe(x: NDArray[np.float64], peak: float, left: float, right: float) -> NDArray[np.float64]:
-    return np.exp(-0.5 * ((x - peak) * np.where(x < peak, left, right)) ** 2)
+    return exp(-0.5 * ((x - peak) * np.where(x < peak, left, right)) ** 2)
 
 
 def matching(wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -88,7 +89,7 @@ def blackbody_rgb(kelvin: float, scale: float) -> Rgb:
     second = 1.438776877e7  # hc / k, nm K
 
     def emitted(nm: NDArray[np.float64]) -> NDArray[np.float64]:
-        return nm**-5.0 / np.expm1(np.minimum(second / (nm * kelvin), 700.0))
+        return power(nm, -5.0) / expm1(np.minimum(second / (nm * kelvin), 700.0))
 
     peak = emitted(np.array([2.897771955e6 / kelvin]))[0]
     return sampled_rgb(at, scale * emitted(at) / peak)

@@ -11,6 +11,7 @@ import math
 
 from scipy.optimize import brentq
 
+from scenes.arithmetic import cos, sin
 from scenes.canonical import SpotLight
 from scenes.formats.losses import LossReport
 from scenes.values import Rgb
@@ -24,12 +25,12 @@ _NAMES = {
 
 def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
     """Power of a spot of unit intensity over 2π, from its axis to its edge."""
-    low, high = math.cos(math.radians(outer_deg)), math.cos(math.radians(inner_deg))
+    low, high = cos(math.radians(outer_deg)), cos(math.radians(inner_deg))
     if outer_deg - inner_deg < 1e-6:
         return 1.0 - low
     if profile == "linear":
         inner, outer = math.radians(inner_deg), math.radians(outer_deg)
-        return 1.0 - (math.sin(outer) - math.sin(inner)) / (outer - inner)
+        return 1.0 - (sin(outer) - sin(inner)) / (outer - inner)
     share = 0.5 if profile == "hermite" else 0.2
     return 1.0 - high + share * (high - low)
 

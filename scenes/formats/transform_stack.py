@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from scenes.animation import continuous_quaternions, pose_at
+from scenes.arithmetic import inverse, norm, product, products, rotation_about, rotation_between
 from scenes.formats.losses import LossReport
 from scenes.values import Matrix, RigidTrack
 
@@ -16,11 +17,6 @@ KEYS_MAX = 1024
 """Of a motion."""
 
 _RIGID = 1e-4
-
-
-def inverse(matrix: Matrix) -> Matrix:
-    """The transform back."""
-    return np.asarray(np.linalg.inv(matrix), np.float64)
 
 
 def translation(x: float, y: float, z: float) -> Matrix:
@@ -38,10 +34,10 @@ def scaling(x: float, y: float, z: float) -> Matrix:
 def rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
     """A turn about an axis, counter-clockwise seen from its tip; identity for an axis of no length."""
     axis = np.array([x, y, z])
-    length = np.linalg.norm(axis)
+    length = norm(axis)
     matrix = np.eye(4)
     if length > 0.0:
-        matrix[:3, :3] = Rotation.from_rotvec(np.radians(angle_deg) * axis / length).as_matrix()
+        matrix[:3, :3] = rotation_about(axis / length, np.radians(angle_deg)).as_matrix()
     return matrix
 
 
@@ -53,9 +49,9 @@ def look_at(
     """
     forward = target - eye
     right = np.cross(up, forward) if left_handed else np.cross(forward, up)
-    if min(np.linalg.norm(forward), np.linalg.norm(right)) < 1e-12:
+    if min(norm(forward), norm(right)) < 1e-12:
         return None
-    forward, right = forward / np.linalg.norm(forward), right / np.linalg.norm(right)
+    forward, right = forward / norm(forward), right / norm(right)
     above = np.cross(forward, right) if left_handed else np.cross(right, forward)
     matrix = np.eye(4)
     matrix[:3] = np.stack([right, above, forward, eye], axis=1)
@@ -70,18 +66,23 @@ def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack
     gaps = np.diff(times_s)
     if not (gaps > 0.0).all():
         return None
-    moved = np.stack(keys) @ np.linalg.inv(keys[0])
+    moved = product(np.stack(keys), inverse(keys[0]))
     turns = moved[:, :3, :3]
-    if np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max() > _RIGID or (np.linalg.det(turns) < 0.0).any():
+    if (
+        np.abs(product(turns, turns.transpose(0, 2, 1)) - np.eye(3)).max() > _RIGID
+        or (np.linalg.det(turns) < 0.0).any()
+    ):
         return None
-    shifts, turned = moved[:, :3, 3], Rotation.from_matrix(turns)
+    shifts, quaternions = moved[:, :3, 3], Rotation.from_matrix(turns).as_quat()
     interval = float(gaps.mean())
     if np.abs(gaps - interval).max() > 1e-6 * interval:
         count = min(int(np.ceil((times_s[-1] - times_s[0]) / gaps.min())) + 1, KEYS_MAX)
         at = np.linspace(times_s[0], times_s[-1], count)
         shifts = np.stack([np.interp(at, times_s, shifts[:, axis]) for axis in range(3)], axis=1)
-        turned, interval = Slerp(times_s, turned)(at), float(at[1] - at[0])
-    quaternions = turned.as_quat()
+        first = np.clip(np.searchsorted(times_s, at, "right") - 1, 0, len(times_s) - 2)
+        share = (at - np.asarray(times_s)[first]) / gaps[first]
+        quaternions = rotation_between(quaternions[first], quaternions[first + 1], share).as_quat()
+        interval = float(at[1] - at[0])
     if quaternions[0, 3] < 0.0:
         quaternions = -quaternions
     return RigidTrack(float(times_s[0]), interval, shifts, continuous_quaternions(quaternions))
@@ -105,7 +106,7 @@ def track_times(track: RigidTrack) -> list[float]:
 def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
     """The motion of what moves inside a space that ``matrix`` places; None where that is not rigid."""
     times_s = track_times(track)
-    return rigid_motion([matrix @ pose_at(track, time_s) @ inverse(matrix) for time_s in times_s], times_s)
+    return rigid_motion([products(matrix, pose_at(track, time_s), inverse(matrix)) for time_s in times_s], times_s)
 
 
 class TransformStack:
@@ -142,7 +143,7 @@ class TransformStack:
 
     def apply(self, matrix: Matrix) -> None:
         """Applies a transform inside the current one, at the active keys."""
-        self.current = [old @ matrix if on else old for on, old in zip(self.active, self.current, strict=True)]
+        self.current = [product(old, matrix) if on else old for on, old in zip(self.active, self.current, strict=True)]
 
     def take(self, name: str) -> None:
         """Sets the transform to that of a name, at all keys; one with other keys is held at its first."""
