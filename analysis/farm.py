@@ -10,20 +10,25 @@ import contextlib
 import ctypes
 import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+import signal
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any
 
 from analysis import limits
 from analysis.cases import Case, Scale
 from analysis.cli import InputError
+from analysis.files import PARTIAL
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Future, LocalCluster
 
     from analysis.evaluation import Place
 
 _WAIT_S = 30
+LOOPBACK = "127.0.0.1"
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,9 @@ class FarmOptions:
     workers: int = 0
     """Processes of the local cluster; 0 takes one per core."""
     scheduler: str = ""
-    """Address of a running Dask scheduler, such as tcp://host:8786; empty starts a local cluster."""
+    """Address of a running Dask scheduler, such as tcp://host:8786; empty starts a local cluster, which listens on this
+    machine only. A scheduler of your own listens where it is told to, and whoever reaches it can run code: keep it in a
+    network that you trust, and have its dashboard on loopback (--dashboard-address 127.0.0.1:8787)."""
 
     def __post_init__(self) -> None:
         limits.within(self, workers=limits.WORKERS)
@@ -60,7 +67,7 @@ def connected(options: FarmOptions) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
     dask.config.set({"distributed.worker.profile.enabled": False})
-    logging.getLogger("distributed").setLevel(logging.ERROR)
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # reasons are told in a line
     if options.scheduler:
         try:
             client = Client(options.scheduler, timeout=_WAIT_S)
@@ -69,16 +76,46 @@ def connected(options: FarmOptions) -> Iterator[Client]:
         with client:
             yield client
         return
-    cluster = LocalCluster(
-        n_workers=options.processes,
-        threads_per_worker=1,
-        processes=True,
-        dashboard_address=":0",  # any free port, so that two studies do not meet
-        memory_limit=0,
-        silence_logs=logging.ERROR,
-    )
-    with cluster, Client(cluster) as client:
-        yield client
+    with contextlib.ExitStack() as held:
+        with _interrupts_blocked():
+            cluster = held.enter_context(
+                LocalCluster(
+                    n_workers=options.processes,
+                    threads_per_worker=1,
+                    processes=True,
+                    host=LOOPBACK,
+                    dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not meet
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        client = held.enter_context(Client(cluster))
+        try:
+            yield client
+        except KeyboardInterrupt:
+            _end_workers(cluster)
+            raise
+
+
+@contextlib.contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Has threads and processes that are started within not hear of Ctrl-C, which a terminal sends to all of them; this
+    thread hears of it after the block."""
+    resource_tracker.ensure_running()  # it unblocks interrupts where it is started, so it must not be started within
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_workers(cluster: LocalCluster) -> None:
+    """Ends workers in the middle of what they do: what counts is on disk, and to wait would take as long as a run."""
+    for nanny in cluster.workers.values():
+        nanny.auto_restart = False
+        if nanny.pid is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(nanny.pid, signal.SIGKILL)
 
 
 def run_cases(
@@ -104,18 +141,72 @@ def run_cases(
     on_done(done)
     if not missing:
         return keys, failures
-    with connected(options) as client:
-        client.run(_keep_freed_memory)
-        waiting = _submit(client, missing, keys, place)
-        from distributed import as_completed
-
-        for future in as_completed(list(waiting)):
-            error = future.exception()
-            if error is not None:
-                failures[waiting[future]] = _reason(error)
-            done += 1
-            on_done(done)
+    try:
+        with connected(options) as client:
+            client.run(_keep_freed_memory, on_error="ignore")
+            for case, reason in _outcomes(client, _submit(client, missing, keys, place)):
+                if reason is not None:
+                    failures[case] = reason
+                done += 1
+                on_done(done)
+    except KeyboardInterrupt:
+        if not options.scheduler:  # its workers cannot do it any more
+            for left in place.results.rglob(f"*{PARTIAL}*"):
+                left.unlink(missing_ok=True)
+        raise
     return keys, failures
+
+
+def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Case, str | None]]:
+    """Cases as they end, each with the reason why it failed, or None.
+
+    A scheduler that is gone, or that has had no worker for a while, fails all that are left.
+    """
+    from distributed import wait
+
+    pending, seen_s = set(waiting), time.monotonic()
+    while pending:
+        try:
+            done, pending = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
+        except TimeoutError:
+            done = set[Any]()
+        except Exception as error:  # of whatever library the connection is made of
+            yield from ((waiting[future], f"the scheduler is gone ({_reason(error)})") for future in pending)
+            return
+        for future in done:
+            yield waiting[future], _failure(future)
+        if done or _has_workers(client):
+            seen_s = time.monotonic()
+        elif time.monotonic() - seen_s > _WAIT_S:
+            yield from ((waiting[future], f"no worker was there for {_WAIT_S} s") for future in pending)
+            return
+
+
+def _failure(future: Future) -> str | None:
+    """Why a case has no result, or None where it has one."""
+    if future.status == "finished":
+        return None
+    if future.status == "error":
+        return _reason(future.exception())
+    return "the scheduler or its workers were ended"
+
+
+def _has_workers(client: Client) -> bool:
+    try:
+        return bool(client.scheduler_info(n_workers=1)["workers"])
+    except Exception:  # of whatever library the connection is made of
+        return False
+
+
+def describe_failures(failures: Mapping[str, str]) -> list[str]:
+    """A line for each reason, with the name of the first run that failed for it and how many others did."""
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in failures.items():
+        by_reason.setdefault(reason, []).append(name)
+    return [
+        f"failed: {names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {reason}"
+        for reason, names in by_reason.items()
+    ]
 
 
 def _keep_freed_memory() -> None:
@@ -133,7 +224,7 @@ def _keep_freed_memory() -> None:
         tune(option, value)
 
 
-def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Place) -> dict[Any, Case]:
+def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Place) -> dict[Future, Case]:
     """Futures of the cases, each behind that of its reference, in an order in which the references come early."""
     references = {_reference_of(case): None for case in missing}
     behind = {wanted: client.submit(_prepare, *wanted, place, pure=False) for wanted in references}
@@ -159,6 +250,6 @@ def _evaluate(case: Case, key: str, place: Place, reference: None) -> str:
     return evaluate(case, key, place)
 
 
-def _reason(error: BaseException) -> str:
+def _reason(error: BaseException | None) -> str:
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text[:300]}"

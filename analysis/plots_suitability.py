@@ -83,7 +83,7 @@ def _finest(results: Results, label: str, name: str) -> Result | None:
 
 def behaviour(results: Results) -> Figure | None:
     """Three refreshes of a framed renderer: least at a refresh (a, c), growing to the next (b)."""
-    name = "approach" if "approach" in results.inputs else results.inputs[0]
+    name = "approach" if "approach" in results.inputs else next(iter(results.inputs), "")
     framed = _finest(results, "framed", name)
     changes = np.flatnonzero(framed.times["refresh"].diff() > 0) if framed else np.array([])
     if framed is None or len(changes) < 3:
@@ -131,6 +131,8 @@ def _suits(results: Results, name: str) -> bool:
 
 def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     """A box per row of table 7.2, over the ratios of all repetitions; a column per input."""
+    if not names:
+        return None
     figure, axes = _axes(max(5.0, 3.1 * len(names)), 4.2, len(names), sharey=True)
     drawn, unbounded = False, 0
     for axis, name in zip(axes, names, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from analysis import plots_suitability as plots
 from analysis.cases import ROWS, SCALES, Case
 from analysis.cli import bad_input, full_disk
 from analysis.evaluation import ROOT, Place, broken, finished, times_of
-from analysis.farm import run_cases
+from analysis.farm import describe_failures, run_cases
 from analysis.files import atomic, own_folder, writable_folder, write_json
 from analysis.progress import bars
 from analysis.records import provenance
@@ -59,6 +60,9 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
         keys, failures = run_cases(
             [run.case for run in planned], place, options.farm, shown.task("runs", len({run.case for run in planned}))
         )
+    # said at once: what follows may fail for the same reasons, such as a full disk
+    for line in describe_failures({keys[case]: reason for case, reason in failures.items()}):
+        print(line, file=sys.stderr)
     results = Results(collect(planned, keys, place))
     tables = tables_of(options, results)
     with full_disk(out):

@@ -250,12 +250,12 @@ def rank_table(results: Results) -> pd.DataFrame:
     """Spearman's correlation between metrics of the ranks of all adaptive runs; 1 where they rank alike."""
     runs = run_table(results)
     lines = []
-    for one, other in itertools.combinations(METRICS, 2):
+    for one, other in itertools.combinations(METRICS, 2) if len(runs) else ():
         values = [METRICS[name] * runs[f"{name}_tsar"].to_numpy() for name in (one, other)]
         known = ~np.isnan(values[0]) & ~np.isnan(values[1])
         found: Any = spearmanr(values[0][known], values[1][known])[0] if known.sum() > 2 else math.nan
         lines.append({"metric": one, "and": other, "rank correlation": float(found), "runs": int(known.sum())})
-    return pd.DataFrame(lines)
+    return pd.DataFrame(lines, columns=["metric", "and", "rank correlation", "runs"])
 
 
 def cause_table(results: Results, row: int, side_px: int) -> pd.DataFrame:

@@ -30,7 +30,7 @@ def main() -> None:
     import pandas as pd
 
     from analysis.evaluation import ROOT, Place, broken, finished, times_of
-    from analysis.farm import run_cases
+    from analysis.farm import describe_failures, run_cases
     from analysis.plots_sensitivity import write_all
     from analysis.progress import bars
     from analysis.records import provenance
@@ -43,11 +43,13 @@ def main() -> None:
         keys, failures = run_cases([run.case for run in planned], place, options.farm, show.task("runs", len(planned)))
     summaries = {run: finished(keys[run.case], place) for run in planned}
     done = {run: keys[run.case] for run, found in summaries.items() if found}
+    missing = [run for run in planned if run not in done]
+    failed = {f"{run.case.name} {run.setting or ''}".strip(): failures.get(run.case, "no result") for run in missing}
+    for line in describe_failures(failed):  # at once: what follows may fail for the same reasons, such as a full disk
+        print(line, file=sys.stderr)
     results = {run.place: times_of(key, place) for run, key in done.items()}
     tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}
     stills = {run.setting: key for run, key in done.items() if run.place == (options.figure_input, run.setting, 0)}
-    missing = [run for run in planned if run not in done]
-    failed = {f"{run.case.name} {run.setting or ''}".strip(): failures.get(run.case, "no result") for run in missing}
     head = {"runs": len(planned), "runs_done": len(done), "failures": failed, "ledger": options.ledger}
     with full_disk(out):
         for name, lines in tables.items():
@@ -64,8 +66,6 @@ def main() -> None:
             shown = part[names].dropna(axis=1, how="all")
             text = shown.map(lambda value: f"{value:.3g}" if isinstance(value, float) else value).to_string(index=False)
             print(f"{sweep}, {title}\n{text}\n")
-    for name, reason in failed.items():
-        print(f"failed: {name}: {reason}")
     print(f"{len(done)} of {len(planned)} runs; written to {options.out}: summary.json, tables/, figures/")
     require_unbroken(broken(summaries.values()))
     sys.exit(1 if failed else 0)

@@ -31,8 +31,6 @@ def main() -> None:
     shown = console(max(110, console().width))
     for table in console_tables(tables):
         shown.print(table)
-    for name, reason in summary["failures"].items():
-        shown.print(f"failed: {name}: {reason}")
     done = summary["runs_done"]
     shown.print(
         f"{done} of {summary['runs']} runs; written to {options.out}: summary.json, tables/, figures/, report.html"

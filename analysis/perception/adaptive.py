@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pandas as pd
 from analysis.cases import ROWS, SCALES, Case, Policy, framed_config
 from analysis.cli import InputError, require_unbroken
 from analysis.evaluation import Place, broken, finished
-from analysis.farm import FarmOptions, run_cases
+from analysis.farm import FarmOptions, describe_failures, run_cases
 from analysis.perception.observers import Observer, correct_probability
 from analysis.perception.options import AdaptiveOptions
 from analysis.perception.psychometrics import THRESHOLD
@@ -45,7 +46,9 @@ def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFram
     place = Place(options.out / "runs", Path(options.cache))
     keys, failures = run_cases(list(cases.values()), place, FarmOptions(options.workers), done)
     if failures:
-        raise InputError(f"{len(failures)} runs failed: {next(iter(failures.values()))}")
+        for line in describe_failures({case.name: reason for case, reason in failures.items()}):
+            print(line, file=sys.stderr)
+        raise InputError(f"{len(failures)} runs failed; the same command makes what is missing")
     found = {at: finished(keys[case], place) for at, case in cases.items()}
     require_unbroken(broken(found.values()))
     table = []

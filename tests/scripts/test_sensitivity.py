@@ -116,11 +116,11 @@ def test_failures_are_listed_and_the_rest_is_shown(
     monkeypatch.setattr(farm, "run_cases", no_workers)
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
     assert status == 1
-    shown = capsys.readouterr().out
+    shown = capsys.readouterr()
     names = [f"{run.case.name} {run.setting}" for run in failed]
     reasons = dict(zip(names, ("RuntimeError: out of luck", "no result"), strict=True))
-    assert len(reasons) == 2 and all(f"failed: {name}: {reason}" in shown for name, reason in reasons.items())
-    assert "28 of 30 runs" in shown
+    assert len(reasons) == 2 and all(f"failed: {name}: {reason}" in shown.err for name, reason in reasons.items())
+    assert "28 of 30 runs" in shown.out
     found = summary(out)
     assert found["failures"] == reasons
     best = slopes(found)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
+import psutil
 import pytest
 
-from tests.scripts.commands import ROOT, assert_refused, call_script, nothing_in
+from analysis.cases import POLICIES, Case
+from analysis.suitability_tables import METRICS
+from tests.scripts.commands import ROOT, assert_refused, call_script, nothing_in, started_script
 
 SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-repetitions", "0")
 
@@ -79,3 +86,83 @@ def test_a_study_killed_twice_gives_the_tables_of_an_unbroken_one(tmp_path: Path
     assert summary["runs"] == summary["runs_done"] and not summary["failures"] and summary["invariants_ok"]
     assert (tmp_path / "broken" / "report.html").stat().st_size > 10_000
     assert list((tmp_path / "broken" / "figures").glob("fig_7_10.png"))
+
+
+REASONS = ("OSError: No space left on device", "KilledWorker: it died three times")
+MEASURED = {"reference_s": 0.0, "run_s": 1.0, "jod_s": 0.0, "threads": 1, "peak_memory_bytes": 1}
+SUMMARY = {"jod": None, "cycles": 9, "cycle_s": 0.01, "nonfinite_samples": 0, "machine": MEASURED, "regions": {},
+           "invariants": {"ok": True}}  # fmt: skip
+
+
+def let_fail(policies: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """In place of running cases: those of some policies fail, for two reasons, and the others have results."""
+
+    def run_cases(asked: list[Case], *rest: Any) -> tuple[dict[Case, str], dict[Case, str]]:
+        keys = {case: case.key("source") for case in asked}
+        failed = [case for case in keys if case.policy in policies]
+        return keys, {case: REASONS[number % 2] for number, case in enumerate(failed)}
+
+    def finished(key: str, place: Any) -> dict[str, Any] | None:
+        return None if key.startswith(tuple(f"{one}-chase".replace(" ", "-") for one in policies)) else SUMMARY
+
+    times = pd.DataFrame({"time_s": [0.0, 0.1], "refresh": [1, 2]} | {name: [0.5, 0.75] for name in METRICS})
+    times = times.assign(flicker=0.0, causes_known=0.0, aliasing=0.0)
+    for name, made in (("run_cases", run_cases), ("finished", finished), ("times_of", lambda *_: times)):
+        monkeypatch.setattr(f"analysis.suitability_report.{name}", made)
+
+
+@pytest.mark.parametrize("policies", [("tsar",), ("framed",), ("tsar", "framed"), POLICIES])
+@pytest.mark.parametrize("full", [False, True])
+def test_the_reasons_of_failures_are_said_whatever_is_left(
+    policies: tuple[str, ...],
+    full: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    let_fail(policies, monkeypatch)
+    if full:
+
+        def no_space(*_: Any, **__: Any) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device", "table.csv")
+
+        monkeypatch.setattr(pd.DataFrame, "to_csv", no_space)
+    arguments = (
+        "--inputs",
+        "chase",
+        "--rows",
+        "6",
+        "7",
+        "--repetitions",
+        "2",
+        "--out",
+        str(tmp_path),
+        "--cache",
+        str(tmp_path),
+    )
+    status = call_script("suitability.py", monkeypatch, *arguments)
+    shown = capsys.readouterr()
+    lines = [line for line in shown.err.splitlines() if line.startswith("failed: ")]
+    assert len(lines) == 2 and lines[0].endswith("more: OSError: No space left on device"), shown.err
+    assert lines[1].endswith("more: KilledWorker: it died three times") and "Traceback" not in shown.err
+    assert status == (2 if full else 1)
+    assert ("table.csv: cannot be written (No space left on device)" in shown.err) == full
+    if not full:
+        found = json.loads((tmp_path / "summary.json").read_text())
+        assert found["runs_done"] + len(found["failures"]) == found["runs"] and (tmp_path / "report.html").exists()
+
+
+def test_an_interrupt_ends_a_study_with_one_line(tmp_path: Path) -> None:
+    """As a terminal sends it: to the study and all of its workers, in the middle of a run."""
+    arguments = ("--inputs", "fly-by", "--rows", "0", "--workers", "2", "--out", str(tmp_path), "--cache", "cache")
+    with started_script("suitability.py", tmp_path, *arguments) as study:
+        deadline = time.monotonic() + 60
+        while len(psutil.Process(study.pid).children(recursive=True)) < 3 and time.monotonic() < deadline:
+            time.sleep(0.05)  # until both workers are there
+        time.sleep(2.0)
+        assert study.poll() is None and study.stderr is not None
+        os.killpg(study.pid, signal.SIGINT)
+        error = study.stderr.read()
+    lines = [line for line in error.splitlines() if line.strip() and not line.startswith("runs ")]
+    assert study.returncode == 130 and len(lines) == 1 and lines[0].startswith("interrupted; "), error
+    assert not list((tmp_path / "runs").rglob("*.partial*")) and not (tmp_path / "summary.json").exists()
