@@ -197,7 +197,7 @@ def test_pictures_that_memory_does_not_hold_are_refused_before_anything_is_writt
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, script: str, arguments: Place
 ) -> None:
     for module in ("analysis.cli", "renderer.checks"):
-        monkeypatch.setattr(f"{module}._free_memory_bytes", lambda: 1 << 30)
+        monkeypatch.setattr(f"{module}.free_memory_bytes", lambda: 1 << 30)
     monkeypatch.chdir(tmp_path)
     assert_refused(call_script(script, monkeypatch, *arguments), capsys, ("GiB of memory", "1.0 GiB are free"))
     assert nothing_in(tmp_path)
