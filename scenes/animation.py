@@ -70,8 +70,7 @@ def pose_at(track: RigidTrack, time_s: float) -> Matrix:
         matrix[:3, 3] = track.translation[0]
         return matrix
     first = min(int(key), last - 1)
-    pair = slice(first, first + 2)
-    matrix[:3, :3] = rotation_between(*track.rotation[pair], key - first).as_matrix()
+    matrix[:3, :3] = rotation_between(track.rotation[first], track.rotation[first + 1], key - first).as_matrix()
     matrix[:3, 3] = track.translation[first] + (key - first) * (track.translation[first + 1] - track.translation[first])
     return matrix
 
