@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float64
 from torch import Tensor
 
 from tsar.config import TsarConfig
@@ -33,14 +33,16 @@ class Account:
     nonfinite: int
 
 
-def account(densities: Densities, errors: Errors, newest_s: Float[Tensor, "side side"], config: TsarConfig) -> Account:
+def account(
+    densities: Densities, errors: Errors, newest_s: Float64[Tensor, "side side"], config: TsarConfig
+) -> Account:
     """Takes stock of densities and errors, and of the newest samples on show, raster order."""
     fields = densities.spatial, densities.temporal, errors.spatial, errors.temporal
     nonfinite = sum(int((~torch.isfinite(field)).sum()) for field in fields)
     return Account(total(densities.combined()), _age_spread(newest_s, densities, config), nonfinite)
 
 
-def _age_spread(newest_s: Float[Tensor, "side side"], densities: Densities, config: TsarConfig) -> float:
+def _age_spread(newest_s: Float64[Tensor, "side side"], densities: Densities, config: TsarConfig) -> float:
     side, repeat = config.sdf_side, config.sdf_side // newest_s.shape[0]
     field = newest_s.repeat_interleave(repeat, 0).repeat_interleave(repeat, 1).reshape(-1)
     fast = densities.temporal[raster_to_morton(side)] >= FAST_REFRESH

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from jaxtyping import Float
+from jaxtyping import Float64
 from torch import Tensor
 
 from tsar.clock import StageTimer
@@ -25,7 +25,7 @@ class Decision:
 
 
 def decide(
-    densities: Densities, errors: Errors, history: Float[Tensor, " e"], config: TsarConfig, stage: StageTimer
+    densities: Densities, errors: Errors, history: Float64[Tensor, " e"], config: TsarConfig, stage: StageTimer
 ) -> Decision:
     """The response to the errors, the tiling and the selection, one after the other.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Float64, Int64
 from torch import Tensor
 
 from tsar.config import TsarConfig
@@ -29,7 +29,7 @@ class Request:
     """
 
     selected: Int64[Tensor, " b"]
-    history: Float[Tensor, " e"]
+    history: Float64[Tensor, " e"]
     level: Int64[Tensor, " b"]
     index: Int64[Tensor, " b"]
     position: Float[Tensor, "b samples 2"]
@@ -39,7 +39,7 @@ class Request:
         return FrameletBatch(self.level, self.index, self.position, time_s, cycle=cycle, seed=config.seed)
 
 
-def initial_history(config: TsarConfig) -> Float[Tensor, " e"]:
+def initial_history(config: TsarConfig) -> Float64[Tensor, " e"]:
     """Credit of every element before the first cycle: a seeded permutation in [0, 1), so that tiles of equal temporal
     density fall due in an order that differs between seeds and is the same for equal seeds."""
     generator = torch.Generator().manual_seed(config.seed)
@@ -48,8 +48,8 @@ def initial_history(config: TsarConfig) -> Float[Tensor, " e"]:
 
 
 def select(
-    tiling: Tiling, temporal_density: Float[Tensor, " e"], history: Float[Tensor, " e"], config: TsarConfig
-) -> tuple[Int64[Tensor, " b"], Float[Tensor, " e"]]:
+    tiling: Tiling, temporal_density: Float64[Tensor, " e"], history: Float64[Tensor, " e"], config: TsarConfig
+) -> tuple[Int64[Tensor, " b"], Float64[Tensor, " e"]]:
     """The ``batch_size`` most overdue tiles.
 
     Each element gathers its temporal density every cycle, a tile is as overdue as the mean credit of the elements it
@@ -105,7 +105,7 @@ def sample_positions(level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], sid
 
 
 def request(
-    tiling: Tiling, temporal_density: Float[Tensor, " e"], history: Float[Tensor, " e"], config: TsarConfig
+    tiling: Tiling, temporal_density: Float64[Tensor, " e"], history: Float64[Tensor, " e"], config: TsarConfig
 ) -> Request:
     """The most overdue tiles by :func:`select`, and where their samples lie."""
     selected, credit = select(tiling, temporal_density, history, config)

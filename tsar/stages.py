@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from jaxtyping import Float
+from jaxtyping import Float64
 from torch import Tensor
 
 from tsar.accounting import Account, account
@@ -21,7 +21,7 @@ from tsar.observation import Observation, observe
 from tsar.reconstruction import Reconstruction, reconstruct
 from tsar.types import Densities, Errors, FrameletBatch
 
-Field = Float[Tensor, " e"]
+Field = Float64[Tensor, " e"]
 
 
 @dataclass(frozen=True)

@@ -88,11 +88,11 @@ class Densities:
         surplus: C, combined density not handed out, carried over cycles.
     """
 
-    spatial: Float[Tensor, " e"]
-    temporal: Float[Tensor, " e"]
+    spatial: Float64[Tensor, " e"]
+    temporal: Float64[Tensor, " e"]
     surplus: float = 0.0
 
-    def combined(self) -> Float[Tensor, " e"]:
+    def combined(self) -> Float64[Tensor, " e"]:
         """θ = θ_s θ_t, samples per element per cycle (Stephens 2011, eq. 6.5)."""
         return self.spatial * self.temporal
 
@@ -115,7 +115,7 @@ class SampleMap:
         level: quad level of the framelet it came in, which tells how densely it was sampled there.
     """
 
-    newest_s: Float[Tensor, "side side"]
+    newest_s: Float64[Tensor, "side side"]
     level: Int64[Tensor, "side side"]
 
 

@@ -68,6 +68,6 @@ def grey(value: float, side: int = 8) -> torch.Tensor:
 
 def view(time_s: float = 0.0, reference: float = 0.0, framed: float = 0.5, adaptive: float = 1.0) -> View:
     """Plain images over a uniform tiling and fields, of samples 0.125 s old."""
-    densities = Densities(torch.full((ELEMENTS,), 1.0), torch.full((ELEMENTS,), 0.5))
+    densities = Densities(*torch.tensor([[1.0], [0.5]], dtype=torch.float64).expand(2, ELEMENTS))
     tiles, newest_s = tiling(*((1, i) for i in range(4))), torch.full((2, 2), time_s - 0.125, dtype=torch.float64)
     return View(time_s, grey(reference), grey(framed), grey(adaptive), tiles, densities, newest_s)

@@ -89,7 +89,7 @@ def test_each_part_against_its_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     images, shown = [picture(seed + k) for k in range(4)], picture(seed + 9)
     number, level = rng.integers(0, 4, (4, 4)), rng.integers(0, 3, (4, 4))
-    tiles = SampleMap(START + torch.from_numpy(number) / RATE, torch.from_numpy(level))
+    tiles = SampleMap(START + torch.from_numpy(number).to(torch.float64) / RATE, torch.from_numpy(level))
     found = split(shown, tiles, 3, truths(images), FRAMELET, 1)
 
     age = number.repeat(16, 0).repeat(16, 1)

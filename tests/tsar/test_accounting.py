@@ -13,7 +13,7 @@ def spread(elements):
     field that is refreshed seldom and shows what is old."""
     config = TsarConfig(batch_size=32, resolution_px=256)
     count = config.sdf_side**2
-    temporal, newest = torch.full((count,), 0.01, dtype=torch.float64), torch.full((count,), -99.0)
+    temporal, newest = torch.full((count,), 0.01, dtype=torch.float64), torch.full((count,), -99.0, dtype=torch.float64)
     order = raster_to_morton(config.sdf_side)
     for number, (density, time_s) in elements.items():
         temporal[order[number]], newest[number] = density, time_s

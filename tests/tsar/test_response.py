@@ -376,3 +376,11 @@ def test_elements_outside_the_batch_keep_their_bits():
     after = respond(densities, Errors(errors, -errors), config)
     assert torch.equal(after.spatial[64:], densities.spatial[64:])
     assert isinstance(after, Densities)
+
+
+@pytest.mark.parametrize("field", ["spatial", "temporal"])
+def test_densities_of_single_precision_are_no_densities(field: str) -> None:
+    """Native code reads them as float64."""
+    fields = {"spatial": torch.ones(4, dtype=torch.float64), "temporal": torch.ones(4, dtype=torch.float64)}
+    with pytest.raises(jaxtyping.TypeCheckError, match=field):
+        Densities(**{**fields, field: torch.ones(4)})
