@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.files import atomic, locked
+from analysis.journal import Journal, warn
 from analysis.source import code_hash
-from analysis.store import Journal, warn
 
 _HALF_MAX = float(np.finfo(np.float16).max)
 

@@ -14,8 +14,8 @@ import pytest
 import torch
 from torch import Tensor
 
+from analysis.journal import Journal
 from analysis.reference import Reference, ReferenceSpec, obtain
-from analysis.store import Journal
 
 SPEC = ReferenceSpec("scene", "s" * 8, "r" * 8, start_s=0.5, rate_hz=10.0, count=5, resolution_px=4, samples_per_axis=2)
 

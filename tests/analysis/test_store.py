@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.store import JOURNAL, Journal, Store, read_json
+from analysis.journal import Journal
+from analysis.store import JOURNAL, Store, read_json
 
 
 def write(store: Store, name: str, content: bytes, **facts: Any) -> None:
