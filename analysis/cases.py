@@ -6,13 +6,12 @@ import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass, field
-from typing import Literal, get_args
 
 from analysis import limits
 from analysis.cost_model import (
     CostParameters,
     Ledger,
-    cycle_seconds,
+    adaptive_flops,
     expected_ledger,
     nonadaptive_flops,
     parameters_of,
@@ -20,9 +19,7 @@ from analysis.cost_model import (
 from analysis.display_model import DisplayModel
 from analysis.files import plain
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
-
-Policy = Literal["tsar", "framed", "framed supersampled", "frameless", "afr", "oracle"]
-POLICIES: tuple[Policy, ...] = get_args(Policy)
+from tsar.policies import POLICIES
 
 INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
 """The five test inputs by number."""
@@ -120,7 +117,7 @@ class Case:
     """
 
     input: str
-    policy: Policy
+    policy: str
     tsar: TsarConfig
     scale: Scale
     phase: float = 0.0
@@ -134,10 +131,11 @@ class Case:
 
     def __post_init__(self) -> None:
         require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
+        POLICIES.require(self.policy)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
         if not self.policy.startswith("framed"):
-            cycle_s = cycle_seconds(expected_ledger(self.ledger), self.capacity, self.cost)({}, 0.0)
+            cycle_s = float(adaptive_flops(self.cost, expected_ledger(self.ledger))) / self.capacity
             pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
             limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
         span = self.jod_span_s
@@ -166,5 +164,8 @@ class Case:
 
     def key(self, source: str) -> str:
         """Name of its files: for people first, then a hash of all that decides it and of the source code."""
-        text = json.dumps([plain(self), source], sort_keys=True)
+        origin = POLICIES.origin(self.policy)
+        # the source does not cover what other distributions bring
+        foreign = [] if str(origin["module"]).startswith("tsar.") else [origin]
+        text = json.dumps([plain(self), source, *foreign], sort_keys=True)
         return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from analysis.progress import Bars
     from renderer.trace import Renderer
     from scenes.canonical import Scene
+    from tsar.policy import Policy
 
 _BYTES_PER_PIXEL = 320  # images and age fields in flight, and the framed image
 _FEWEST_BATCHES, _FEWEST_RESOLUTIONS = 3, 3
@@ -167,6 +168,15 @@ def measure(options: MeasurementOptions, ready: tuple[Scene, Mapping[int, Render
     return Measurement(cells, memory, options.device, threads, torch.get_num_threads(), load)
 
 
+def _policy(config: TsarConfig, renderer: Renderer) -> Policy:
+    """The adaptive pipeline on all threads of a renderer."""
+    from renderer.control import stages
+    from tsar.policies.adaptive import Adaptive
+    from tsar.policy import Setting
+
+    return Adaptive(Setting(config, lambda config: stages(config, threads=renderer.threads)))
+
+
 @dataclass
 class _Adaptive:
     """A pipeline that goes on a few cycles at each call. Changes in place."""
@@ -179,12 +189,11 @@ class _Adaptive:
 
     def __post_init__(self) -> None:
         from analysis.records import unbroken
-        from renderer.control import stages
         from tsar.clock import fixed_clock
-        from tsar.pipeline import run
+        from tsar.policy import run
 
-        clock, chosen = fixed_clock(self.options.cycle_s), stages(self.config, threads=self.renderer.threads)
-        self._cycles = unbroken(run(self.config, self.renderer.trace, clock, 0.0, math.inf, chosen))
+        clock = fixed_clock(self.options.cycle_s)
+        self._cycles = unbroken(run(_policy(self.config, self.renderer), self.renderer.trace, clock, 0.0, math.inf))
 
     def warm_up(self) -> None:
         for _ in islice(self._cycles, self.config.warmup_cycles):
@@ -208,17 +217,17 @@ class _Framed:
     counters: list[dict[str, int]] = field(default_factory=list)
 
     def __call__(self) -> None:
-        from tsar.baselines.framed import frame_batch, frame_image
         from tsar.clock import StageTimer
+        from tsar.policies.framed import Framed
+        from tsar.policy import Moment, Setting
 
-        number, stage = len(self.image_s), StageTimer()
-        time_s = number * self.options.cycles_per_turn * self.options.cycle_s
+        number, stage, policy = len(self.image_s), StageTimer(), Framed(Setting(self.config))
+        moment = Moment(number * self.options.cycles_per_turn * self.options.cycle_s, number, self.options.cycle_s)
         with stage("batch"):
-            batch = frame_batch(self.config, time_s, number, 1)
+            state, batch = policy.request(policy.start(), moment)
         with stage("tracing"):
             samples = self.renderer.trace(batch)
-        with stage("image"):
-            frame_image(samples, self.config, 1)
+        policy.observe(state, batch, samples, moment, stage)
         self.image_s.append(stage.total)
         self.trace_s.append(stage.seconds["tracing"])
         self.counters.append(samples.counters)
@@ -279,15 +288,14 @@ def watch_memory(
     import psutil
 
     from analysis.records import unbroken
-    from renderer.control import stages
     from tsar.clock import fixed_clock
-    from tsar.pipeline import run
+    from tsar.policy import run
 
     resident, config = psutil.Process().memory_info, options.pipeline(*options.centre)
     before = resident().rss
     clock = fixed_clock(min(options.cycle_s, span_s / options.memory_cycles if span_s > 0 else math.inf))
     cycles, bytes_ = [], []
-    endless = run(config, renderer.trace, clock, 0.0, math.inf, stages(config, threads=renderer.threads))
+    endless = run(_policy(config, renderer), renderer.trace, clock, 0.0, math.inf)
     for record in islice(unbroken(endless), _total(config, options)):
         if record.cycle >= 0 and record.cycle % options.memory_every == 0:
             cycles.append(record.cycle)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from tsar.config import TsarConfig
+    from tsar.policy import Price
 
     Value = float | Tensor
 else:
@@ -240,48 +241,50 @@ def work_flops(p: CostParameters, counters: Mapping[str, int]) -> float:
     return float(sum(rays) * per_segment(p))
 
 
+def policy_flops(p: CostParameters, price: Price, ledger: Ledger = "thesis") -> Value:
+    """FLOPs of one cycle of a policy: its samples, the adaptive stages if it has them, and what it names beside."""
+    return price.samples * naive_per_pixel(p, ledger) + control_flops(p, price, ledger)
+
+
+def control_flops(p: CostParameters, price: Price, ledger: Ledger = "thesis") -> Value:
+    """FLOPs of one cycle of a policy without its samples."""
+    stages = stage_flops(p, ledger) if price.adaptive_stages else {}
+    control = sum(value for name, value in stages.items() if name != "tracing")
+    return control + price.pixel_flops * p.recon_res + price.sample_flops * price.samples
+
+
 Seconds = Callable[[Mapping[str, int], float], float]
 
 
-def _checked_capacity(capacity: float) -> float:
-    if not 0.0 < capacity < math.inf:
-        raise ValueError(f"capacity: expected a positive, finite number of FLOP/s, got {capacity!r}")
-    return capacity
+def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters, price: Price) -> Seconds:
+    """Clock of a policy: ``(counters, wall_s) -> seconds`` of one cycle.
 
+    Args:
+        ledger: how cost is counted; ``wall`` returns the measured seconds, ``work`` the counted rays and what is
+            modelled beside them.
+        capacity: FLOP/s of the simulated machine.
+        p: scalars.
+        price: of a cycle of the policy.
 
-def _seconds(ledger: Ledger, capacity: float, p: CostParameters, modelled: float, control: float) -> Seconds:
+    Raises:
+        ValueError: the ledger is not known, or the capacity is not positive and finite.
+    """
     if ledger not in LEDGERS:
         raise ValueError(f"ledger: expected one of {', '.join(LEDGERS)}, got {ledger!r}")
-    capacity = _checked_capacity(capacity)
+    if not 0.0 < capacity < math.inf:
+        raise ValueError(f"capacity: expected a positive, finite number of FLOP/s, got {capacity!r}")
     if ledger == "wall":
         return lambda counters, wall_s: wall_s
     if ledger == "work":
+        control = float(control_flops(p, price))
         return lambda counters, wall_s: (work_flops(p, counters) + control) / capacity
+    modelled = float(policy_flops(p, price, ledger))
     return lambda counters, wall_s: modelled / capacity
-
-
-def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters) -> Seconds:
-    """Clock of the adaptive pipeline: ``(counters, wall_s) -> seconds`` of one cycle.
-
-    Args:
-        ledger: how cost is counted; ``wall`` returns the measured seconds, ``work`` the counted rays and the modelled
-            control stages.
-        capacity: FLOP/s of the simulated machine.
-        p: scalars.
-    """
-    stages = stage_flops(p, ledger)
-    control = sum(value for name, value in stages.items() if name != "tracing")
-    return _seconds(ledger, capacity, p, float(adaptive_flops(p, ledger)), float(control))
 
 
 def expected_ledger(ledger: Ledger) -> Ledger:
     """The ledger that tells before a run about what this one will count: rays to come are taken from ``thesis``."""
     return "thesis" if ledger == "work" else ledger
-
-
-def frame_seconds(ledger: Ledger, capacity: float, p: CostParameters, samples_per_axis: int = 1) -> Seconds:
-    """Clock of the framed renderer, as :func:`cycle_seconds`."""
-    return _seconds(ledger, capacity, p, float(nonadaptive_flops(p, ledger, samples_per_axis)), 0.0)
 
 
 def parameters_of(config: TsarConfig, trace_segments: float) -> CostParameters:

@@ -8,11 +8,10 @@ machines, except the entry ``machine`` of the JSON file, which holds measured se
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import resource
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -26,24 +25,22 @@ from PIL import Image
 
 from analysis.cases import Case, Scale
 from analysis.causes import Truths
-from analysis.cost_model import cycle_seconds, frame_seconds
 from analysis.files import locked
-from analysis.observation import Seen, Shown, observe
+from analysis.observation import Measuring, Seen, View, watch
 from analysis.perceptual import jod, one_thread
-from analysis.pictures import Pixels
+from analysis.pictures import Pixels, tiling_image
+from analysis.policy_runs import Machine, PolicyRun, Totals, begin
 from analysis.quality import reference_times
-from analysis.records import InvariantCheck, RecordLimits
 from analysis.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
 from analysis.source import code_hash
 from analysis.store import Store
+from analysis.video import to_pixels
 
 if TYPE_CHECKING:
     from renderer.trace import Renderer
-    from tsar.types import Trace
 
 ROOT = Path(__file__).resolve().parent.parent
 
-_ORACLE_WARMUP = 16  # its first cycles already go where the error is
 
 
 @dataclass(frozen=True)
@@ -197,7 +194,7 @@ def _run(case: Case, key: str, place: Place) -> None:
     reference = render_reference(case.input, case.phase, case.start_s, case.scale, place)
     truths = _truths(case, reference)
     began_run = time.perf_counter()
-    check, store, stills = _Check(case), place.store(key), list[str]()
+    store, stills = place.store(key), list[str]()
 
     def keep(number: int, pictures: dict[str, Pixels]) -> None:
         for what, pixels in pictures.items():
@@ -205,10 +202,21 @@ def _run(case: Case, key: str, place: Place) -> None:
             with store.make(stills[-1]) as made:
                 Image.fromarray(pixels).save(made.path)
 
-    seen = observe(case, truths, check.passing(_displays(case, place, truths)), keep)
-    table = pd.DataFrame(seen.rows)
-    with store.make(place.files(key)["times"].name) as made:
-        table.to_parquet(made.path)
+    scale, config = case.scale, case.tsar
+    times_s = reference_times(case.start_s, case.start_s + scale.seconds, scale.reference_rate_hz)
+    made = _begin(case, place, truths)
+    measuring = Measuring(
+        metrics=("ssim", "flip"),
+        stride=scale.stride,
+        causes=True,
+        framelet_side=config.framelet_side,
+        kept=_scored(case),
+    )
+    stills_of = _Stills(case, len(times_s), keep)
+    seen = watch({case.policy: made.images}, truths, times_s, measuring, [stills_of])[case.policy]
+    table, totals = pd.DataFrame(seen.rows), made.totals
+    with store.make(place.files(key)["times"].name) as file:
+        table.to_parquet(file.path)
     scored = time.perf_counter()
     found = {
         "key": key,
@@ -219,7 +227,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "jod": _score(case, seen),
         "regions": seen.regions(),
         "stills": stills,
-        **check.result(),
+        **(_cycles(totals) if totals.cycles else {}),
         "machine": {
             "reference_s": began_run - began,
             "run_s": scored - began_run,
@@ -232,6 +240,41 @@ def _run(case: Case, key: str, place: Place) -> None:
     store.write_json(place.files(key)["summary"].name, found)
 
 
+def _cycles(totals: Totals) -> dict[str, Any]:
+    return {
+        "cycles": totals.cycles,
+        "cycle_s": totals.simulated_s / totals.cycles,
+        "age_spread_s": totals.age_spread_s / totals.cycles,
+        "nonfinite_samples": totals.nonfinite,
+        "invariants": totals.invariants,
+    }
+
+
+def _scored(case: Case) -> tuple[int, int]:
+    """Numbers of the reference times, from and to, that a metric of sequences scores."""
+    low, high = (round(at * case.scale.reference_rate_hz) for at in case.jod_span_s or (0.0, 0.0))
+    return low, high
+
+
+class _Stills:
+    """Hands on the pictures of some times, by the number of the still."""
+
+    def __init__(self, case: Case, count: int, keep: Callable[[int, dict[str, Pixels]], None]) -> None:
+        rate_hz = case.scale.reference_rate_hz
+        self._case, self._keep = case, keep
+        self._numbers = {min(round(at * rate_hz), count - 1): number for number, at in enumerate(case.stills_s)}
+
+    def __call__(self, view: View) -> None:
+        if view.number in self._numbers:
+            record, display = view.shown[self._case.policy]
+            pictures = {"shown": to_pixels(display.image), "reference": to_pixels(view.reference)}
+            if record is not None:
+                config = self._case.tsar
+                side, bounds = max(256, config.resolution_px), config.temporal_bounds
+                pictures["tiling"] = tiling_image(record.tiling, record.densities.temporal, side, bounds)
+            self._keep(self._numbers[view.number], pictures)
+
+
 def _score(case: Case, seen: Seen) -> float | None:
     if case.jod_span_s is None:
         return None
@@ -239,57 +282,10 @@ def _score(case: Case, seen: Seen) -> float | None:
     return jod(shown, reference, case.scale.reference_rate_hz, case.display)
 
 
-def _displays(case: Case, place: Place, truths: Truths) -> Iterator[Shown]:
-    """Records, where the policy makes any, and images of a run."""
-    from renderer.control import stages
-    from tsar import pipeline
-    from tsar.baselines import afr, framed, frameless, oracle
+def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
+    def renderer_of(footprint: int) -> Renderer:
+        return _renderer(case.input, case.phase, case.tsar.resolution_px * footprint, place.threads)
 
-    config, span = case.tsar, (case.start_s, case.start_s + case.scale.seconds)
-
-    def trace(factor: int = 1) -> Trace:
-        return _renderer(case.input, case.phase, config.resolution_px * factor, place.threads).trace
-
-    clock = cycle_seconds(case.ledger, case.capacity, case.cost)
-    if case.policy == "tsar":
-        return pipeline.run(config, trace(), clock, *span, stages(config, threads=place.threads))
-    if case.policy in ("framed", "framed supersampled"):
-        axis = 1 if case.policy == "framed" else 2
-        price = frame_seconds(case.ledger, case.capacity, case.cost, axis)
-        return ((None, shown) for shown in framed.run(config, trace(axis), price, *span, samples_per_axis=axis))
-    if case.policy == "oracle":
-        early = dataclasses.replace(config, warmup_cycles=_ORACLE_WARMUP)
-        return ((None, shown) for shown in oracle.run(early, trace(), clock, *span, truth=truths.at))
-    other = {"frameless": frameless, "afr": afr}[case.policy]
-    return ((None, shown) for shown in other.run(config, trace(), clock, *span))
-
-
-class _Check:
-    """Invariants and counts of the cycles of an adaptive run. Changes in place."""
-
-    def __init__(self, case: Case) -> None:
-        c = case.tsar
-        self._check = InvariantCheck(RecordLimits(c.batch_size, c.budget, c.spatial_bounds, c.temporal_bounds))
-        self._cycles, self._spread_s, self._simulated_s, self._nonfinite = 0, 0.0, 0.0, 0
-
-    def passing(self, displays: Iterator[Shown]) -> Iterator[Shown]:
-        for record, display in displays:
-            if record is not None:
-                self._check.add(record)
-                if record.cycle >= 0:
-                    self._cycles += 1
-                    self._simulated_s += record.cost_s
-                    self._spread_s += record.age_spread_s
-                    self._nonfinite += record.nonfinite
-            yield record, display
-
-    def result(self) -> dict[str, Any]:
-        if self._cycles == 0:
-            return {}
-        return {
-            "cycles": self._cycles,
-            "cycle_s": self._simulated_s / self._cycles,
-            "age_spread_s": self._spread_s / self._cycles,
-            "nonfinite_samples": self._nonfinite,
-            "invariants": self._check.result(),
-        }
+    machine = Machine(case.ledger, case.capacity, case.cost)
+    span_s = case.start_s, case.start_s + case.scale.seconds
+    return begin(case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads)

@@ -8,32 +8,35 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.cli import InputError, bad_input, full_disk, require_memory
-from analysis.cost_model import cycle_seconds, frame_seconds
 from analysis.files import own_folder, writable_folder
 from analysis.run_options import RunOptions
 from analysis.start import first_imports, first_made
 from analysis.store import Store
 
 if TYPE_CHECKING:
-    from analysis.compare import Meter, Streams, Totals
-    from analysis.records import StepWriter
+    from analysis.causes import Truths
+    from analysis.observation import Seen, View
+    from analysis.policy_runs import PolicyRun
+    from analysis.progress import Bars
+    from analysis.quality import Floats
+    from analysis.records import RecordLimits, StepWriter
     from analysis.reference import Reference
+    from analysis.summary import Measured
     from renderer.trace import Renderer
     from scenes.canonical import Scene
-    from tsar.types import Display, StepRecord
 
 ROOT = Path(__file__).resolve().parent.parent
 _SUMMARY = "summary.json"
 _FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
-_BYTES_PER_PIXEL = 260  # images, age fields and films in flight at output resolution
+_BYTES_PER_PIXEL = 260  # images, age fields and samples of a run in flight
 _BYTES_PER_CACHED_SAMPLE = 20  # colours and wavelet coefficients
-_BYTES_PER_SAMPLE = 64  # positions, times and colours of a framed image
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,8 @@ class Setup:
     """What a run needs before it starts."""
 
     scene: Scene
-    renderer: Renderer
+    renderer_of: Callable[[int], Renderer]
+    """A renderer that filters textures for so many samples along a pixel's side."""
     losses: tuple[str, ...] = ()
 
 
@@ -52,8 +56,7 @@ def prepare(options: RunOptions) -> Setup:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        pixels, finest = options.tsar.resolution_px**2, max(options.framed.values())
-        need = pixels * (_BYTES_PER_PIXEL + _BYTES_PER_SAMPLE * finest**2)
+        need = options.tsar.resolution_px**2 * _BYTES_PER_PIXEL * (1 + len(options.rivals))
         require_memory(need, f"resolution_px: {options.tsar.resolution_px}")
         slots = options.tsar.cache_slots
         require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
@@ -66,7 +69,9 @@ def prepare(options: RunOptions) -> Setup:
         scene, losses = catalog.load_any(options.input, options.phase, options.camera_path)
         for loss in losses:
             print(loss)
-        return Setup(scene, _renderer(options, scene, 1), losses)
+        renderer_of = lru_cache(maxsize=4)(partial(_renderer, options, scene))
+        renderer_of(1)  # what it refuses is bad input
+        return Setup(scene, renderer_of, losses)
 
 
 def _renderer(options: RunOptions, scene: Scene, axis: int) -> Renderer:
@@ -95,33 +100,33 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
     setup = prepare(options)
     with first_imports():
         from analysis import progress
-        from analysis.compare import Streams, Totals
         from analysis.quality import reference_times
-        from analysis.records import RecordLimits, StepWriter, check_invariants
-        from analysis.summary import Measured
+        from analysis.records import StepWriter
         from renderer.film import FilmError
 
     for name in (_SUMMARY, *_FILES):
         (options.out / name).unlink(missing_ok=True)  # of an earlier run
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
     with progress.bars() as bars, full_disk(options.out, FilmError):
-        limits = RecordLimits(
-            options.tsar.batch_size, options.tsar.budget, options.tsar.spatial_bounds, options.tsar.temporal_bounds
-        )
-        totals = Totals()
-        with StepWriter(options.out / "steps.parquet", limits) as writer:
-            adaptive, first_cycle_s = first_made(_adaptive(options, setup, totals, writer), began_s, bars.say)
+        with StepWriter(options.out / "steps.parquet", _limits(options)) as writer:
+            runs = _runs(options, setup, writer)
+            own, first_cycle_s = first_made(runs[options.policy].images, began_s, bars.say)
+            runs[options.policy] = dataclasses.replace(runs[options.policy], images=own)
             reference = _reference(options, setup, len(times_s), bars)
-            framed, meters = _framed(options, setup)
-            comparison = _compare(options, times_s, reference, Streams(adaptive, framed), bars)
-    if totals.cycles == 0:
-        (options.out / "steps.parquet").unlink()
+            measured = _compare(options, times_s, reference, runs, bars)
+    if measured.seen[options.policy].images == 0 or (measured.totals.recorded and measured.totals.cycles == 0):
+        (options.out / "steps.parquet").unlink(missing_ok=True)
         (options.out / "comparison.mp4").unlink(missing_ok=True)
         raise InputError(f"seconds: expected time for a cycle before the last reference image, got {options.seconds:g}")
     with full_disk(options.out):
-        invariants = check_invariants(options.out / "steps.parquet")
-        measured = Measured(comparison, totals, meters, options.framed, invariants, reference.nonfinite, options.cost)
         return _write(options, setup, measured, first_cycle_s)
+
+
+def _limits(options: RunOptions) -> RecordLimits:
+    from analysis.records import RecordLimits
+
+    c = options.tsar
+    return RecordLimits(c.batch_size, c.budget, c.spatial_bounds, c.temporal_bounds)
 
 
 def finished(options: RunOptions) -> dict[str, Any] | None:
@@ -138,7 +143,7 @@ def finished(options: RunOptions) -> dict[str, Any] | None:
     with bad_input():
         scene, _ = catalog.load_any(options.input, options.phase, options.camera_path)
         store = Store(options.out, content_of(options, scene))
-        found = store.read_json(_SUMMARY, {"provenance": dict, "invariants": {"ok": bool}, "files": list[str]})
+        found = store.read_json(_SUMMARY, {"provenance": dict, "policy": str, "files": list[str]})
     return found if found and all(store.find(name) is not None for name in found["files"]) else None
 
 
@@ -174,7 +179,7 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
     spec = ReferenceSpec(
         scene=f"{options.input} phase {options.phase:g}",
         scene_hash=content_hash(setup.scene),
-        renderer_hash=renderer_hash(setup.renderer, options.device),
+        renderer_hash=renderer_hash(setup.renderer_of(1), options.device),
         start_s=options.start_s,
         rate_hz=options.reference_rate_hz,
         count=count,
@@ -183,67 +188,93 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
     )
     show = bars.task("reference", count)
     with bad_input():
+        renderer = setup.renderer_of(1)
         return obtain(
-            options.cache, spec, lambda t: setup.renderer.render_frame(t, side, side, axis), lambda done, _: show(done)
+            options.cache, spec, lambda t: renderer.render_frame(t, side, side, axis), lambda done, _: show(done)
         )
 
 
-def _adaptive(
-    options: RunOptions, setup: Setup, totals: Totals, writer: StepWriter
-) -> Iterator[tuple[StepRecord, Display]]:
-    """The adaptive run, recorded cycle by cycle."""
+def _runs(options: RunOptions, setup: Setup, writer: StepWriter) -> dict[str, PolicyRun]:
+    """All runs, not started yet; the cycles of the run's own are written."""
     with first_imports():
-        from renderer.control import stages
-        from tsar.pipeline import run
+        from analysis.policy_runs import Machine, begin
 
-    chosen = stages(options.tsar, options.stages, setup.renderer.threads)
-    clock = cycle_seconds(options.counted, options.capacity, options.cost)
-    span = options.start_s, options.start_s + options.seconds
-    for record, display in run(options.tsar, setup.renderer.trace, clock, *span, chosen):
-        writer.add(record)
-        totals.add(record)
-        yield record, display
-
-
-def _framed(options: RunOptions, setup: Setup) -> tuple[dict[str, Iterator[Display]], dict[str, Meter]]:
-    """The framed runs, not started yet, and their meters."""
-    from analysis.compare import Meter
-    from tsar.baselines.framed import run as run_framed
-
-    span = options.start_s, options.start_s + options.seconds
-    meters, framed = {}, {}
-    for name, axis in options.framed.items():
-        with bad_input():
-            chosen = _renderer(options, setup.scene, axis) if name != "framed" else setup.renderer
-        meters[name] = Meter(chosen.trace)
-        clock = frame_seconds(options.counted, options.capacity, options.cost, axis)
-        framed[name] = run_framed(options.tsar, meters[name], clock, *span, samples_per_axis=axis)
-    return framed, meters
+    machine = Machine(options.counted, options.capacity, options.cost)
+    span_s = options.start_s, options.start_s + options.seconds
+    with bad_input():
+        return {
+            name: begin(
+                name,
+                options.tsar,
+                setup.renderer_of,
+                machine,
+                span_s,
+                stages=options.stages,
+                threads=setup.renderer_of(1).threads,
+                on_record=writer.add if name == options.policy else lambda record: None,
+            )
+            for name in (options.policy, *options.rivals)
+        }
 
 
-def _compare(options: RunOptions, times_s: Any, reference: Reference, streams: Streams, bars: Any) -> Any:
+def _compare(
+    options: RunOptions, times_s: Floats, reference: Reference, runs: dict[str, PolicyRun], bars: Bars
+) -> Measured:
     from contextlib import nullcontext
 
-    from analysis.compare import compare
+    from analysis.compare import Filming, Steps
+    from analysis.metrics import METRICS
+    from analysis.observation import Measuring, watch
+    from analysis.summary import Measured
     from analysis.video import ComparisonFilm, Scales
     from renderer.film import Mp4Writer, write_exr
 
     scales = Scales(options.tsar.spatial_bounds, options.tsar.temporal_bounds)
     stride = max(1, round(options.reference_rate_hz / 60.0))
-    film = ComparisonFilm(
-        min(options.tsar.resolution_px, 512), scales, (options.start_s, options.start_s + options.seconds)
-    )
-    fps = options.reference_rate_hz / stride
-    place = options.out / "comparison.mp4"
-    show = bars.task("comparison", len(times_s))
+    span_s = options.start_s, options.start_s + options.seconds
+    film = ComparisonFilm(min(options.tsar.resolution_px, 512), scales, span_s, list(runs), options.policy)
+    steps, show = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
 
-    def on_view(number: int, view: Any) -> None:
-        show(number + 1)
+    def on_view(view: View) -> None:
+        show(view.number + 1)
         if options.frames:
-            write_exr(options.out / "frames" / f"{number:06d}.exr", view.adaptive)
+            write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
 
+    place, fps = options.out / "comparison.mp4", options.reference_rate_hz / stride
     with Mp4Writer(place, fps, film.width_px, film.height_px) if options.film else nullcontext() as sink:
-        return compare(times_s, reference.images, streams, scales, film, sink, on_view, stride)
+        viewers = [on_view, steps, *([Filming(film, sink, stride)] if sink else [])]
+        images = {name: run.images for name, run in runs.items()}
+        of_images = tuple(name for name in options.metrics if METRICS[name].image)
+        kept = (0, len(times_s)) if len(of_images) < len(options.metrics) else (0, 0)
+        measuring = Measuring(metrics=of_images, stride=options.metric_stride, kept=kept)
+        seen = watch(images, _truths(options, reference), times_s, measuring, viewers)
+    sequences = {name: _scored(options, name, seen) for name in options.metrics if METRICS[name].sequence}
+    return Measured(options.policy, times_s, seen, runs, steps.made, reference.nonfinite, options.cost, sequences)
+
+
+def _scored(options: RunOptions, metric: str, seen: dict[str, Seen]) -> dict[str, float]:
+    """A metric of sequences for every run."""
+    import numpy as np
+
+    from analysis.metrics import METRICS
+
+    measured, found = METRICS[metric], {}
+    for name, one in seen.items():
+        shown, reference = (np.stack(frames) for frames in one.frames)
+        found[name] = measured.of_sequence(shown, reference, options.reference_rate_hz, options.display)
+    return found
+
+
+def _truths(options: RunOptions, reference: Reference) -> Truths:
+    import numpy as np
+    import torch
+
+    from analysis.causes import Truths
+
+    def image(number: int) -> torch.Tensor:
+        return torch.from_numpy(reference.images[number].astype(np.float32))
+
+    return Truths(image, options.start_s, options.reference_rate_hz, reference.spec.count)
 
 
 def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: float) -> dict[str, Any]:
@@ -260,7 +291,7 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
         phase=options.phase,
         seed=options.tsar.seed,
         device=options.device,
-        threads=setup.renderer.threads,
+        threads=setup.renderer_of(1).threads,
         content=content_of(options, setup.scene),
     )
     derived = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}

@@ -1,38 +1,98 @@
-"""What a display shows, measured at every reference time as it goes by."""
+"""What displays show, measured at every reference time: the one engine that compares runs with a reference.
+
+All runs go side by side; two images of each are held at a time, whatever the length.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from analysis.cases import Case
 from analysis.causes import CAUSES, REGIONS, Split, Truths, flicker, split
-from analysis.perceptual import flip, ssim
-from analysis.pictures import Pixels, tiling_image
-from analysis.quality import Hold, encode, pixel_errors, reference_times
+from analysis.metrics import METRICS
+from analysis.pictures import Pixels
+from analysis.quality import Floats, Hold, encode, pixel_errors
 from tsar.types import Display, StepRecord
 
 Shown = tuple[StepRecord | None, Display]
 """A record, where the policy makes any, and its image."""
 
-Keep = Callable[[int, dict[str, Pixels]], None]
-"""Takes the number of a still and its pictures by name: shown, reference, and tiling where there is one."""
-
 _MOTION_S = 0.1  # motion is judged over this long
 
 
-class Seen:
-    """What the display showed, measured. Changes in place."""
+@dataclass(frozen=True)
+class View:
+    """What all displays show at one reference time.
 
-    def __init__(self) -> None:
-        self.rows: list[dict[str, Any]] = []
-        self.splits: list[Split] = []
-        self.frames: tuple[list[Pixels], list[Pixels]] = ([], [])
-        self.images, self.nonfinite = 0, 0
+    Attributes:
+        number: of the reference time.
+        time_s: simulated time.
+        reference: ``(h, w, 3)`` linear RGB.
+        shown: by name of the run; records and images of the cycles whose images are on the displays.
+        mse: mean squared error of each.
+    """
+
+    number: int
+    time_s: float
+    reference: Tensor
+    shown: Mapping[str, Shown]
+    mse: Mapping[str, float]
+
+
+Viewer = Callable[[View], None]
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """What is measured beside both mean squared errors.
+
+    Attributes:
+        metrics: names of image metrics, each taken every ``stride`` reference times.
+        stride: reference times from one to the next at which they are taken.
+        causes: whether the causes of the error are told apart, at the same times, and its flicker at all.
+        framelet_side: samples along a framelet's side, for the causes.
+        kept: numbers of reference times, from and to, whose encoded images are kept for metrics of sequences.
+    """
+
+    metrics: tuple[str, ...] = ()
+    stride: int = 1
+    causes: bool = False
+    framelet_side: int = 16
+    kept: tuple[int, int] = (0, 0)
+
+
+@dataclass
+class Seen:
+    """What one display showed, measured. Changes in place.
+
+    Attributes:
+        rows: a line a reference time: ``time_s``, ``mse``, ``log_mse``, how many images had been shown, and metrics.
+        refresh_s: display times of the images that have been shown.
+        nonfinite: values of the images shown that were not finite, each image counted once.
+        splits: causes of the error.
+        frames: encoded images of the display and of the reference that were kept.
+    """
+
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    refresh_s: list[float] = field(default_factory=list)
+    nonfinite: int = 0
+    splits: list[Split] = field(default_factory=list)
+    frames: tuple[list[Pixels], list[Pixels]] = field(default_factory=lambda: ([], []))
+
+    @property
+    def images(self) -> int:
+        """How many images have been shown."""
+        return len(self.refresh_s)
+
+    def column(self, name: str) -> Floats:
+        """One value a reference time; NaN where it was not measured."""
+        return np.array([row.get(name, np.nan) for row in self.rows], np.float64)
 
     def regions(self) -> dict[str, dict[str, float]]:
         """Mean over the times of each cause in each region, as a part of the whole error, and the region's share; times
@@ -51,49 +111,75 @@ class Seen:
         }
 
 
-def observe(
-    case: Case,
+def watch(
+    runs: Mapping[str, Iterable[Shown]],
     truths: Truths,
-    displays: Iterator[Shown],
-    keep: Keep,
-) -> Seen:
-    scale, seen, hold = case.scale, Seen(), Hold(displays)
-    times = reference_times(case.start_s, case.start_s + scale.seconds, scale.reference_rate_hz)
-    stills = {min(round(at * scale.reference_rate_hz), len(times) - 1): k for k, at in enumerate(case.stills_s)}
-    step = max(1, round(_MOTION_S * scale.reference_rate_hz))
-    scored = [round(at * scale.reference_rate_hz) for at in case.jod_span_s or (0.0, 0.0)]
-    before: tuple[Any, Any] | None = None
-    for number, time_s in enumerate(times.tolist()):
-        record, display = hold.at(time_s)
+    times_s: NDArray[np.float64],
+    measuring: Measuring,
+    viewers: Sequence[Viewer] = (),
+) -> dict[str, Seen]:
+    """Holds what each display shows at every reference time and measures it.
+
+    Args:
+        runs: streams of images by name.
+        truths: reference images.
+        times_s: reference times.
+        measuring: what is measured.
+        viewers: each is told what all displays show at every reference time.
+
+    Raises:
+        ValueError: nothing is shown yet at the first time.
+    """
+    holds = {name: Hold(run) for name, run in runs.items()}
+    watchers = {name: _Watcher(truths, times_s, measuring, hold) for name, hold in holds.items()}
+    for number, time_s in enumerate(times_s.tolist()):
         truth = truths.image(number)
-        errors = pixel_errors(display.image, truth)
-        image = display.image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0)
-        shown, wanted = encode(image), encode(truth)
-        row = {"time_s": time_s, "mse": errors.mse, "log_mse": errors.log_mse, "refresh": len(hold.refresh_s)}
-        row["flicker"] = flicker(shown - wanted, before[0], wanted, before[1]) if before else np.nan
-        before = shown - wanted, wanted
-        if number % scale.stride == 0:
-            row |= {"ssim": ssim(shown, wanted), "flip": flip(shown, wanted)}
-            if display.samples is not None:
-                found = split(image, display.samples, number, truths, case.tsar.framelet_side, step)
-                seen.splits.append(found)
-                row |= {**found.causes, "causes_mse": found.mse} if found.known else {}
-                row["causes_known"] = found.known
-        if scored[0] <= number < scored[1]:
+        wanted = encode(truth)
+        shown = {name: hold.at(time_s) for name, hold in holds.items()}
+        mse = {name: watchers[name].measure(number, display, truth, wanted) for name, (_, display) in shown.items()}
+        view = View(number, time_s, truth, shown, mse)
+        for viewer in viewers:
+            viewer(view)
+    return {name: watcher.seen for name, watcher in watchers.items()}
+
+
+class _Watcher:
+    """Measures one display. Changes in place."""
+
+    def __init__(self, truths: Truths, times_s: Floats, measuring: Measuring, hold: Hold) -> None:
+        self.seen = Seen(refresh_s=hold.refresh_s)
+        self._truths, self._times_s, self._measuring = truths, times_s, measuring
+        self._before: tuple[Tensor, Tensor] | None = None
+        self._last: Display | None = None
+        rate_hz = 1.0 / (times_s[1] - times_s[0]) if len(times_s) > 1 else 0.0
+        self._step = max(1, round(_MOTION_S * rate_hz))
+
+    def measure(self, number: int, display: Display, truth: Tensor, wanted: Tensor) -> float:
+        """One reference time: the image shown, its linear and its encoded truth. Returns the mean squared error."""
+        seen, asked = self.seen, self._measuring
+        errors, shown = pixel_errors(display.image, truth, wanted)
+        row = {"time_s": float(self._times_s[number]), "mse": errors.mse, "log_mse": errors.log_mse}
+        row["refresh"] = seen.images
+        if asked.causes:
+            before = self._before
+            row["flicker"] = flicker(shown - wanted, before[0], wanted, before[1]) if before else np.nan
+            self._before = shown - wanted, wanted
+        if number % asked.stride == 0:
+            row |= {name: METRICS[name].of_image(shown, wanted) for name in asked.metrics}
+            if asked.causes and display.samples is not None:
+                row |= self._causes(number, display)
+        if asked.kept[0] <= number < asked.kept[1]:
             for kept, one in zip(seen.frames, (shown, wanted), strict=True):
                 kept.append((one * 255.0 + 0.5).to(torch.uint8).numpy())
-        if number in stills:
-            keep(stills[number], _pictures(case, shown, wanted, record))
-        seen.nonfinite += errors.nonfinite
+        seen.nonfinite += errors.nonfinite if display is not self._last else 0
+        self._last = display
         seen.rows.append(row)
-    seen.images = len(hold.refresh_s)
-    return seen
+        return errors.mse
 
-
-def _pictures(case: Case, shown: Tensor, wanted: Tensor, record: StepRecord | None) -> dict[str, Pixels]:
-    encoded = {"shown": shown, "reference": wanted}
-    pictures = {name: (image * 255.0 + 0.5).to(torch.uint8).numpy() for name, image in encoded.items()}
-    if record is not None:
-        side = max(256, case.tsar.resolution_px)
-        pictures["tiling"] = tiling_image(record.tiling, record.densities.temporal, side, case.tsar.temporal_bounds)
-    return pictures
+    def _causes(self, number: int, display: Display) -> dict[str, float]:
+        assert display.samples is not None
+        image = display.image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0)
+        found = split(image, display.samples, number, self._truths, self._measuring.framelet_side, self._step)
+        self.seen.splits.append(found)
+        known = {**found.causes, "causes_mse": found.mse} if found.known else {}
+        return {**known, "causes_known": found.known}

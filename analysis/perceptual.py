@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.display_model import DisplayModel
+from analysis.metrics import Metric
 
 Frames = NDArray[np.uint8]
 """``(count, height, width, 3)`` display-encoded images."""
@@ -82,3 +83,8 @@ def ssim(test: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"]) -> flo
     with one_thread():
         planes = [image.permute(2, 0, 1)[None] for image in (test, reference)]
         return float(measure(*planes, window_size=11).mean(dtype=torch.float64))
+
+
+FLIP = Metric("lower", image=flip)
+SSIM = Metric("higher", image=ssim)
+JOD = Metric("higher", sequence=jod, unit="JOD")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from analysis.files import atomic
 Floats = NDArray[np.float64]
 
 ADAPTIVE, FRAMED, OTHER = "#c9570c", "#1f6fb4", "#5a8f29"
+_RIVALS = (FRAMED, OTHER, "#8a56ac", "#b8860b", "#2a9d8f", "#b5485d", "#6b6b6b")
 _GRID = {"color": "0.85", "linewidth": 0.6}
 
 
@@ -24,6 +26,12 @@ def save(figure: Figure, path: Path, dpi: int = 130) -> None:
     FigureCanvasAgg(figure)
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=dpi, format="png")
+
+
+def inks(runs: Sequence[str], own: str) -> dict[str, str]:
+    """A colour for each run; the rivals' repeat where there are many."""
+    rivals = itertools.cycle(_RIVALS)
+    return {name: ADAPTIVE if name == own else next(rivals) for name in runs}
 
 
 def _new(width: float, height: float, rows: int = 1, **kwargs) -> tuple[Figure, NDArray]:
@@ -38,33 +46,35 @@ def _new(width: float, height: float, rows: int = 1, **kwargs) -> tuple[Figure, 
 
 def error_figure(
     times_s: Floats,
-    adaptive: Floats,
-    framed: Mapping[str, Floats],
+    errors: Mapping[str, Floats],
+    own: str,
     ratio: Floats,
     refresh_s: Sequence[float],
     title: str,
 ) -> Figure:
-    """Errors over time above their ratio (figs 7.14 and 7.15).
+    """Errors over time above the ratio of two of them (figs 7.14 and 7.15).
 
     Args:
         times_s: reference times.
-        adaptive: MSE of the adaptive run.
-        framed: MSE of framed runs by name; the first is the one the ratio is taken to.
-        ratio: adaptive over framed; infinite values are marked along the upper edge.
-        refresh_s: times at which the framed display changes.
+        errors: MSE of every run by name; the ratio is taken to the first that is not ``own``.
+        own: the run whose ratio is shown.
+        ratio: its error over that of the rival; infinite values are marked along the upper edge.
+        refresh_s: times at which the rival's display changes.
         title: above the figure.
     """
+    rivals = [name for name in errors if name != own]
     figure, (upper, lower) = _new(9.0, 5.6, 2, sharex=True, height_ratios=(3, 2))
     for axis in (upper, lower):
         axis.vlines(refresh_s, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
-    for (name, values), ink in zip(framed.items(), (FRAMED, OTHER), strict=False):
-        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, linewidth=1.8, label=name)
-    upper.plot(times_s, np.where(adaptive > 0, adaptive, np.nan), color=ADAPTIVE, linewidth=1.2, label="TSAR")
+    for name, ink in inks(list(errors), own).items():
+        values = errors[name]
+        width = 1.2 if name == own else 1.8
+        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, linewidth=width, label=name)
     upper.set_yscale("log")
     upper.set_ylabel("mean squared error")
     upper.set_title(title, fontsize=10, loc="left", parse_math=False)
     upper.margins(y=0.15)
-    upper.legend(frameon=False, fontsize=8, ncols=3, loc="upper left")
+    upper.legend(frameon=False, fontsize=8, ncols=min(len(errors), 5), loc="upper left")
     shown = np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan)
     lower.plot(times_s, shown, color="0.2", linewidth=1.1)
     infinite = np.isinf(ratio)
@@ -76,8 +86,9 @@ def error_figure(
     lower.axhline(1.0, color="0.0", linewidth=0.8)
     lower.set_yscale("log")
     _widen(lower, shown)
-    lower.set_ylabel("TSAR / framed")
-    lower.set_xlabel("simulated time, s   (dotted: the framed display changes)")
+    lower.set_ylabel(f"{own} / {rivals[0]}" if rivals else own)
+    marked = f"   (dotted: the display of {rivals[0]} changes)" if rivals else ""
+    lower.set_xlabel(f"simulated time, s{marked}")
     lower.set_xlim(times_s[0], times_s[-1])
     return figure
 

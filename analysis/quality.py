@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -95,10 +95,20 @@ class PixelErrors:
     nonfinite: int
 
 
-def pixel_errors(image: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"]) -> PixelErrors:
+def pixel_errors(
+    image: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"], encoded: Float[Tensor, "h w 3"] | None = None
+) -> tuple[PixelErrors, Float[Tensor, "h w 3"]]:
     """Mean squared errors of an image against the reference, both linear. Source: Stephens 2011, eq. 7.1.
 
     Deviation: the mean runs over pixels and channels; the printed ``1 / N`` before ``N²`` terms would scale with size.
+
+    Args:
+        image: what is shown.
+        reference: the truth.
+        encoded: the truth as :func:`encode` gives it, where that is known already.
+
+    Returns:
+        The errors, and the image as :func:`encode` gives it.
 
     Raises:
         ValueError: the shapes differ.
@@ -108,23 +118,10 @@ def pixel_errors(image: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"
     bad = int((~torch.isfinite(image)).sum())
     if bad:
         image = torch.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
-    mse = float((encode(image) - encode(reference)).square().mean(dtype=torch.float64))
+    shown = encode(image)
+    mse = float((shown - (encode(reference) if encoded is None else encoded)).square().mean(dtype=torch.float64))
     compressed = image.clamp(min=0).log1p() - reference.clamp(min=0).log1p()
-    return PixelErrors(mse, float(compressed.square().mean(dtype=torch.float64)), bad)
-
-
-@dataclass
-class ErrorTrace:
-    """Errors of one run at the reference times. Grows by one number of each kind a time."""
-
-    mse: list[float] = field(default_factory=list)
-    log_mse: list[float] = field(default_factory=list)
-    nonfinite: int = 0
-
-    def add(self, errors: PixelErrors) -> None:
-        self.mse.append(errors.mse)
-        self.log_mse.append(errors.log_mse)
-        self.nonfinite += errors.nonfinite
+    return PixelErrors(mse, float(compressed.square().mean(dtype=torch.float64)), bad), shown
 
 
 def ratio(adaptive: Floats, framed: Floats) -> Floats:

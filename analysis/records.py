@@ -230,7 +230,7 @@ class InvariantCheck:
         return {**self._found, "ok": bool(ok)}
 
 
-def unbroken(cycles: Iterable[tuple[StepRecord, Display]]) -> Iterator[StepRecord]:
+def unbroken(cycles: Iterable[tuple[StepRecord | None, Display]]) -> Iterator[StepRecord]:
     """Records of cycles as they come, checked by what the pipeline itself counted: measurements of time go on
     undisturbed.
 
@@ -238,6 +238,8 @@ def unbroken(cycles: Iterable[tuple[StepRecord, Display]]) -> Iterator[StepRecor
         BrokenInvariants: density is lost or gained, or a density or an error is not finite.
     """
     for record, _ in cycles:
+        if record is None:
+            continue
         residual, nonfinite = record.conservation_residual, record.nonfinite_fields
         if not residual <= _CONSERVATION or nonfinite:
             found = f"conservation residual {residual:g}, {nonfinite} values not finite"

@@ -74,7 +74,7 @@ class InputsOptions:
 def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
     """What a table over runs shows of one of them."""
     names = ("ratio_median", "ratio_quartiles", "share_suitable", "suitable_percentile", "cycles", "age_spread_s")
-    beside = summary.get("ratio_statistics_framed_supersampled") or {}
+    beside = summary["ratio_statistics"].get("framed supersampled") or {}
     return {
         "run": run.out.name,
         "input": run.input,

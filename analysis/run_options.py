@@ -1,4 +1,4 @@
-"""Options of one comparison of the adaptive renderer with the framed one."""
+"""Options of one comparison of policies."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ from analysis.cost_model import (
     CAPACITY_DEFAULT,
     CostParameters,
     Ledger,
-    cycle_seconds,
+    adaptive_flops,
     expected_ledger,
-    frame_seconds,
+    nonadaptive_flops,
     parameters_of,
 )
+from analysis.display_model import DisplayModel
+from analysis.metrics import METRICS
 from tsar.config import StagesName, TsarConfig, closed_choices, require
+from tsar.policies import POLICIES
 
 
 @dataclass(frozen=True)
 @closed_choices()
 class RunOptions:
-    """One comparison of the adaptive renderer with the framed one at equal cost."""
+    """One comparison of a policy with its rivals at equal cost."""
 
     input: Annotated[str, tyro.conf.Positional]
     """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
@@ -46,10 +49,16 @@ class RunOptions:
     """Speed of the simulated machine, FLOP/s. The default shows 8 framed images a second at 512²."""
     trace_segments: float = 4.0
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
-    framed_samples_per_axis: int = 1
-    """Samples along a pixel's side of the framed renderer; it shows fewer images as it takes more."""
-    supersampled_samples_per_axis: int = 2
-    """The same for a second, supersampled framed renderer at equal cost; 0 leaves it out."""
+    policy: str = "tsar"
+    """Who decides what is sampled: a policy by name."""
+    rivals: tuple[str, ...] = ("framed", "framed supersampled")
+    """Policies that it is compared with at equal cost; ratios are to the first."""
+    metrics: tuple[str, ...] = ()
+    """Metrics beside the squared errors, such as flip, ssim or jod."""
+    display: DisplayModel = field(default_factory=DisplayModel)
+    """The display that perceptual metrics of sequences hold for."""
+    metric_stride: int = 6
+    """Reference images from one to the next at which they are taken."""
     reference_rate_hz: float = 60.0
     """Reference images per simulated second."""
     reference_samples_per_axis: int = 3
@@ -78,13 +87,16 @@ class RunOptions:
             capacity=(1e-12, 1e24),
             trace_segments=limits.SEGMENTS,
             reference_rate_hz=limits.RATES_HZ,
-            framed_samples_per_axis=(1, 16),
             reference_samples_per_axis=(1, 16),
+            metric_stride=(1, 10**6),
             threads=limits.THREADS,
         )
-        for name in ("framed_samples_per_axis", "supersampled_samples_per_axis"):
-            value = getattr(self, name)
-            require(0 <= value <= 16 and value & (value - 1) == 0, name, "a power of two up to 16", value)
+        runs = self.policy, *self.rivals
+        for name in runs:
+            POLICIES.require(name, "policy" if name == self.policy else "rivals")
+        require(len(runs) == len(set(runs)), "rivals", "names that differ, and from the policy's", runs)
+        for name in self.metrics:
+            METRICS.require(name, "metrics")
         warmup = self.tsar.warmup_cycles
         require(warmup >= 4, "warmup_cycles", "at least 4 (the latency and one)", warmup)
         images = self.seconds * self.reference_rate_hz
@@ -92,9 +104,9 @@ class RunOptions:
         limits.require_count("seconds", self.seconds, images, "reference images")
         if self.counted != "wall":
             priced = expected_ledger(self.counted)
-            cycle_s = cycle_seconds(priced, self.capacity, self.cost)({}, 0.0)
+            cycle_s = float(adaptive_flops(self.cost, priced)) / self.capacity
             limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
-            frame_s = frame_seconds(priced, self.capacity, self.cost)({}, 0.0)
+            frame_s = float(nonadaptive_flops(self.cost, priced)) / self.capacity
             limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
 
     @property
@@ -106,11 +118,3 @@ class RunOptions:
     def cost(self) -> CostParameters:
         """Parameters of the cost model for this run."""
         return parameters_of(self.tsar, self.trace_segments)
-
-    @property
-    def framed(self) -> dict[str, int]:
-        """Framed renderers by name and their samples along a pixel's side; the first is the one compared to."""
-        runs = {"framed": self.framed_samples_per_axis}
-        if self.supersampled_samples_per_axis > 0:
-            runs["framed supersampled"] = self.supersampled_samples_per_axis
-        return runs

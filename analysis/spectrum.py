@@ -115,10 +115,10 @@ class SpectrumOptions:
 
     def cycle_s(self) -> float:
         """Seconds of a cycle at the simulated machine's default speed, by the thesis' ledger."""
-        from analysis.cost_model import CAPACITY_DEFAULT, cycle_seconds
+        from analysis.cost_model import CAPACITY_DEFAULT, adaptive_flops
         from analysis.experiment import RunOptions
 
-        return cycle_seconds("thesis", CAPACITY_DEFAULT, RunOptions(self.input, tsar=self.tsar).cost)({}, 0.0)
+        return float(adaptive_flops(RunOptions(self.input, tsar=self.tsar).cost)) / CAPACITY_DEFAULT
 
 
 @dataclass(frozen=True)

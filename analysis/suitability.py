@@ -15,11 +15,12 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis import limits
-from analysis.cases import INPUTS, POLICIES, ROWS, SCALES, Case, Policy, framed_config
+from analysis.cases import INPUTS, ROWS, SCALES, Case, framed_config
 from analysis.cost_model import Ledger
 from analysis.display_model import DisplayModel
 from analysis.farm import FarmOptions
 from tsar.config import Solver, TsarConfig, closed_choices, require
+from tsar.policies import POLICIES
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class SuitabilityOptions:
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
-    policies: tuple[Policy, ...] = ("framed supersampled", "frameless", "afr", "oracle")
+    policies: tuple[str, ...] = ("framed supersampled", "frameless", "afr", "oracle")
     """Policies that are compared beside TSAR and the framed renderer, at one row."""
     solvers: tuple[Solver, ...] = ("trivial",)
     """Solvers of TSAR that are compared beside the chosen one, at that row."""
@@ -66,9 +67,10 @@ class SuitabilityOptions:
     """Folder for references, shared by all runs."""
 
     def __post_init__(self) -> None:
-        for name, known in (("inputs", INPUTS), ("policies", POLICIES)):
-            unknown = [one for one in getattr(self, name) if one not in known]
-            require(not unknown, name, f"names out of {', '.join(known)}", unknown)
+        unknown = [one for one in self.inputs if one not in INPUTS]
+        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        for one in self.policies:
+            POLICIES.require(one, "policies")
         for name in ("inputs", "rows"):
             chosen = getattr(self, name)
             require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
@@ -122,7 +124,7 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
     at_row = scale.config(options.policy_row, dataclasses.replace(options.tsar, seed=repetition))
     compared = [] if options.policy_row not in options.rows else options.policies
 
-    def run(label: str, row: int | None, policy: Policy, config: TsarConfig) -> Run:
+    def run(label: str, row: int | None, policy: str, config: TsarConfig) -> Run:
         case = Case(
             input=name,
             policy=policy,

@@ -1,9 +1,10 @@
-"""The comparison film: reference, framed and adaptive side by side, with what the adaptive pipeline decided."""
+"""The comparison film: the reference and all runs side by side, with what one of them decided."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,6 +12,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 from torch import Tensor
 
+from analysis.observation import View
 from analysis.pictures import (
     AGE_MAP,
     DENSITY_MAP,
@@ -24,39 +26,23 @@ from analysis.pictures import (
     with_scale,
 )
 from analysis.quality import encode
-from tsar.types import Densities, Tiling
 
 INK, PAPER = (235, 235, 235), (24, 24, 24)
-ADAPTIVE, FRAMED = (255, 176, 64), (96, 176, 255)
+OWN = (255, 176, 64)
+RIVALS = ((96, 176, 255), (140, 205, 95), (225, 130, 215), (240, 225, 90), (110, 220, 210), (235, 115, 105))
+_MAPS = ("tiling by refresh rate", "spatial density", "temporal density", "age of samples")
 
-PHOTOGRAPHS = ("reference", "framed", "TSAR")
-"""The panels that are images of the scene; the others are maps."""
+
+def inks(runs: Sequence[str], own: str) -> list[tuple[int, int, int]]:
+    """A colour for the curve of each run; colours repeat where there are many."""
+    rivals = itertools.cycle(RIVALS)
+    return [OWN if name == own else next(rivals) for name in runs]
 
 
 class FrameSink(Protocol):
     """Where finished frames go, such as an MP4 writer."""
 
     def add(self, pixels: Pixels) -> None: ...
-
-
-@dataclass(frozen=True)
-class View:
-    """What all displays show at one time.
-
-    Attributes:
-        time_s: simulated time.
-        reference, framed, adaptive: ``(h, w, 3)`` linear RGB.
-        tiling, densities: of the cycle whose image is on the display.
-        newest_s: animation time of the newest sample in each part of the adaptive image, ``(s, s)``; None: not known.
-    """
-
-    time_s: float
-    reference: Tensor
-    framed: Tensor
-    adaptive: Tensor
-    tiling: Tiling
-    densities: Densities
-    newest_s: Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -74,56 +60,72 @@ def to_pixels(image: Tensor) -> Pixels:
     return (encode(finite) * 255.0 + 0.5).clamp(0, 255).byte().contiguous().numpy()
 
 
-def panels(view: View, scales: Scales, side_px: int) -> dict[str, Pixels | None]:
-    """Every picture of a view by its label, ``side_px`` wide; None where the view lacks what it shows."""
-    spatial = density_image(view.densities.spatial, scales.spatial, side_px)
-    temporal = density_image(view.densities.temporal, scales.temporal, side_px, RATE_MAP)
-    tiling = tiling_image(view.tiling, view.densities.temporal, side_px, scales.temporal)
-    age, age_ms = None, (1e3 * scales.age_s[0], 1e3 * scales.age_s[1])
-    if view.newest_s is not None:
-        age = with_scale(age_image(view.newest_s, view.time_s, scales.age_s, side_px), age_ms, "ms", AGE_MAP)
+def photographs(view: View, side_px: int) -> dict[str, Pixels]:
+    """The reference and what every display shows, by label."""
+    images = {"reference": view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
+    return {label: enlarge(to_pixels(image), side_px) for label, image in images.items()}
+
+
+def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels | None]:
+    """What the run ``own`` decided and how old its samples are, by label; None where it does not say."""
+    record, display = view.shown[own]
+    tiling = spatial = temporal = age = None
+    if record is not None:
+        rates, densities = record.densities.temporal, record.densities
+        tiling = tiling_image(record.tiling, rates, side_px, scales.temporal)
+        tiling = with_scale(tiling, scales.temporal, "refreshes per cycle", RATE_MAP)
+        spatial = density_image(densities.spatial, scales.spatial, side_px)
+        spatial = with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP)
+        temporal = density_image(rates, scales.temporal, side_px, RATE_MAP)
+        temporal = with_scale(temporal, scales.temporal, "refreshes per cycle", RATE_MAP)
+    if display.samples is not None:
+        age = age_image(display.samples.newest_s, view.time_s, scales.age_s, side_px)
+        age = with_scale(age, (1e3 * scales.age_s[0], 1e3 * scales.age_s[1]), "ms", AGE_MAP)
     return {
-        "reference": enlarge(to_pixels(view.reference), side_px),
-        "framed": enlarge(to_pixels(view.framed), side_px),
-        "TSAR": enlarge(to_pixels(view.adaptive), side_px),
-        "tiling by refresh rate": with_scale(tiling, scales.temporal, "refreshes per cycle", RATE_MAP),
-        "spatial density": with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP),
-        "temporal density": with_scale(temporal, scales.temporal, "refreshes per cycle", RATE_MAP),
+        "tiling by refresh rate": tiling,
+        "spatial density": spatial,
+        "temporal density": temporal,
         "age of samples": age,
     }
 
 
 class ComparisonFilm:
-    """Composes frames of two rows of four panels; the last holds the error so far. Keeps no images.
+    """Composes frames of two rows of panels: the reference, every run, what the run ``own`` decided, and in the last
+    panel the errors so far. Keeps no images.
 
     Attributes:
         width_px, height_px: size of a frame, even.
     """
 
-    def __init__(self, side_px: int, scales: Scales, span_s: tuple[float, float]) -> None:
-        """Takes the width of a panel, the colour scales and the span of time on the error panel's axis."""
+    def __init__(
+        self, side_px: int, scales: Scales, span_s: tuple[float, float], runs: Sequence[str], own: str
+    ) -> None:
+        """Takes the width of a panel, the colour scales, the span of time on the error panel's axis, and the runs."""
         self._side = max(96, side_px - side_px % 2)
         self._strip = 2 * max(9, self._side // 24)
-        self._scales, self._span = scales, span_s
-        self.width_px, self.height_px = 4 * self._side, 2 * (self._side + self._strip)
+        self._scales, self._span, self._own = scales, span_s, own
+        self._inks = dict(zip(runs, inks(runs, own), strict=True))
+        self._columns = (1 + len(runs) + len(_MAPS) + 1 + 1) // 2
+        self.width_px, self.height_px = self._columns * self._side, 2 * (self._side + self._strip)
 
-    def frame(self, view: View, times_s: Sequence[float], adaptive: Sequence[float], framed: Sequence[float]) -> Pixels:
-        """One frame; ``adaptive`` and ``framed`` are the errors up to now, at ``times_s``."""
+    def frame(self, view: View, times_s: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Pixels:
+        """One frame; ``errors`` of each run up to now, at ``times_s``."""
         canvas = Image.new("RGB", (self.width_px, self.height_px), PAPER)
         draw = ImageDraw.Draw(canvas)
-        for slot, (label, pixels) in enumerate(panels(view, self._scales, self._side).items()):
+        shown = photographs(view, self._side) | maps(view, self._own, self._scales, self._side)
+        for slot, (label, pixels) in enumerate(shown.items()):
             left, top = self._corner(slot)
             if pixels is not None:
                 canvas.paste(Image.fromarray(pixels), (left, top + self._strip))
             self._label(draw, left, top, label if pixels is not None else f"{label}: missing")
-        left, top = self._corner(7)
+        left, top = self._corner(2 * self._columns - 1)
         self._label(draw, left, top, f"squared error, t = {view.time_s:.3f} s")
         box = (left, top + self._strip, left + self._side, top + self._strip + self._side)
-        draw_errors(draw, box, self._span, times_s, {"framed": (framed, FRAMED), "TSAR": (adaptive, ADAPTIVE)})
+        draw_errors(draw, box, self._span, times_s, {name: (errors[name], ink) for name, ink in self._inks.items()})
         return np.asarray(canvas)
 
     def _corner(self, slot: int) -> tuple[int, int]:
-        return slot % 4 * self._side, slot // 4 * (self._side + self._strip)
+        return slot % self._columns * self._side, slot // self._columns * (self._side + self._strip)
 
     def _label(self, draw: ImageDraw.ImageDraw, left: int, top: int, text: str) -> None:
         size = self._strip * 2 // 3

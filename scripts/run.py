@@ -1,4 +1,4 @@
-"""Compare temporally and spatially adaptive rendering with a framed renderer at equal cost.
+"""Compare a policy, by default temporally and spatially adaptive rendering, with its rivals at equal cost.
 
 Example: python scripts/run.py fly-by --seconds 2 --out out/fly-by
 """
@@ -25,24 +25,30 @@ def main() -> None:
 
     from analysis.tables import console
 
-    statistics = summary["ratio_statistics"]
-    table = Table(title=f"{options.input}, ledger {summary['ledger']}", show_header=False, title_justify="left")
-    rows = {
-        "MSE ratio TSAR / framed, median": f"{statistics.median:.3f}",
-        "quartiles": f"{statistics.quartile_low:.3f} – {statistics.quartile_high:.3f}",
-        "at most 1": f"{100 * statistics.share_suitable:.0f} % of the time",
-        "greatest suitable percentile": f"{statistics.suitable_percentile:.0f}",
+    title = f"{options.input}: {summary['policy']}, ledger {summary['ledger']}"
+    table = Table(title=title, show_header=False, title_justify="left")
+    rows = {}
+    for rival, statistics in summary.get("ratio_statistics", {}).items():
+        low, high = statistics.quartile_low, statistics.quartile_high
+        rows[f"MSE ratio to {rival}, median"] = f"{statistics.median:.3f} (quartiles {low:.3f} – {high:.3f})"
+        rows[f"at most that of {rival}"] = f"{100 * statistics.share_suitable:.0f} % of the time"
+        rows[f"greatest suitable percentile to {rival}"] = f"{statistics.suitable_percentile:.0f}"
+    for metric, values in summary["metrics"].items():
+        rows[metric] = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
+    checked = summary["invariants"]
+    holds = {True: "hold in every cycle", False: f"BROKEN: {checked}", None: "not recorded by these policies"}
+    rows |= {
         "cycles": f"{summary['cycles']}, {1e3 * summary['cycle_s']:.2f} ms each",
         "samples traced": f"{summary['samples_traced']:,}",
-        "invariants": "hold in every cycle" if summary["invariants"]["ok"] else f"BROKEN: {summary['invariants']}",
+        "invariants": holds[checked and checked["ok"]],
         "non-finite values": str(sum(summary["nonfinite"].values())),
     }
     for name, value in rows.items():
         table.add_row(name, value)
     shown = console()
     shown.print(table)
-    shown.print(f"written to {options.out}: summary.json, report.html, error.png, comparison.mp4, steps.parquet")
-    require_unbroken([] if summary["invariants"]["ok"] else [options.input])
+    shown.print(f"written to {options.out}: {', '.join(['summary.json', *summary['files']])}")
+    require_unbroken([] if checked is None or checked["ok"] else [options.input])
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.cases import ROWS, SCALES, Case, Policy, framed_config
+from analysis.cases import ROWS, SCALES, Case, framed_config
 from analysis.cli import InputError, require_unbroken
 from analysis.evaluation import Place, broken, finished
 from analysis.farm import FarmOptions, describe_failures, run_cases
@@ -39,7 +39,7 @@ def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFram
         for row in rows:
             config = scale.config(row, TsarConfig(seed=options.seed))
             framed = framed_config(config.resolution_px)
-            pair: tuple[tuple[Policy, TsarConfig], ...] = (("tsar", config), ("framed", framed))
+            pair: tuple[tuple[str, TsarConfig], ...] = (("tsar", config), ("framed", framed))
             for policy, chosen in pair:
                 case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
                 cases[name, row, policy] = case

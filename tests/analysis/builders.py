@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from analysis.observation import View
 from analysis.records import RecordLimits
-from analysis.video import Scales, View
-from tsar.types import Densities, Errors, StepRecord, Tiling
+from analysis.video import Scales
+from tsar.types import Densities, Display, Errors, SampleMap, StepRecord, Tiling
 
 SPATIAL, TEMPORAL = (0.25, 64.0), (1 / 64, 1.0)
 SCALES = Scales(SPATIAL, TEMPORAL)
@@ -66,8 +67,22 @@ def grey(value: float, side: int = 8) -> torch.Tensor:
     return torch.full((side, side, 3), value)
 
 
-def view(time_s: float = 0.0, reference: float = 0.0, framed: float = 0.5, adaptive: float = 1.0) -> View:
-    """Plain images over a uniform tiling and fields, of samples 0.125 s old."""
+def view(time_s: float = 0.0, reference: float = 0.0, own: float = 1.0, framed: float = 0.5, number: int = 0) -> View:
+    """Plain images of two runs, the first over a uniform tiling and fields, of samples 0.125 s old."""
     densities = Densities(*torch.tensor([[1.0], [0.5]], dtype=torch.float64).expand(2, ELEMENTS))
-    tiles, newest_s = tiling(*((1, i) for i in range(4))), torch.full((2, 2), time_s - 0.125, dtype=torch.float64)
-    return View(time_s, grey(reference), grey(framed), grey(adaptive), tiles, densities, newest_s)
+    record = good_record(densities=densities, tiling=tiling(*((1, i) for i in range(4))))
+    newest_s = torch.full((2, 2), time_s - 0.125, dtype=torch.float64)
+    ages = SampleMap(newest_s, torch.zeros(2, 2, dtype=torch.int64))
+    displays = Display(time_s, time_s, grey(own), ages), Display(time_s, 0.0, grey(framed))
+    shown = {"own": (record, displays[0]), "framed": (None, displays[1])}
+    return View(number, time_s, grey(reference), shown, {"own": 0.1, "framed": 0.2})
+
+
+class Sink:
+    """Keeps frames."""
+
+    def __init__(self) -> None:
+        self.frames: list[np.ndarray] = []
+
+    def add(self, pixels: np.ndarray) -> None:
+        self.frames.append(pixels)

@@ -12,14 +12,16 @@ from analysis.cost_model import (
     adaptive_flops,
     admitted,
     advantage,
+    control_flops,
     cycle_seconds,
     error_per_framelet,
-    frame_seconds,
     naive_per_pixel,
     nonadaptive_flops,
     per_segment,
+    policy_flops,
     stage_flops,
 )
+from tsar.policy import Price
 
 DEFAULT = CostParameters()
 
@@ -88,20 +90,39 @@ def test_more_segments_approach_the_ratio_of_samples() -> None:
     assert advantage(CostParameters(trace_segments=0)) == 0
 
 
+CYCLE = Price(128 * 256, adaptive_stages=True)
+
+
+def frame(p: CostParameters, samples_per_axis: int = 1) -> Price:
+    return Price(int(p.recon_res) * samples_per_axis**2)
+
+
 def test_default_capacity_gives_eight_frames_a_second() -> None:
     p = CostParameters(trace_segments=4)
-    assert 1 / frame_seconds("thesis", CAPACITY_DEFAULT, p)({}, 9.0) == pytest.approx(8, rel=0.01)
+    assert 1 / cycle_seconds("thesis", CAPACITY_DEFAULT, p, frame(p))({}, 9.0) == pytest.approx(8, rel=0.01)
+
+
+@pytest.mark.parametrize("ledger", ["thesis", "printed", "summed"])
+def test_a_price_says_what_the_thesis_does_of_both_renderers(ledger) -> None:
+    p = CostParameters()
+    assert policy_flops(p, CYCLE, ledger) == adaptive_flops(p, ledger)
+    assert policy_flops(p, frame(p, 2), ledger) == nonadaptive_flops(p, ledger, 2)
+
+
+def test_what_a_policy_names_beside_its_samples_is_charged() -> None:
+    p, price = CostParameters(), Price(1000, pixel_flops=300.0, sample_flops=200.0)
+    assert control_flops(p, price) == 300.0 * 512**2 + 200.0 * 1000
+    assert policy_flops(p, price) == 1000 * naive_per_pixel(p) + control_flops(p, price)
 
 
 def test_clocks() -> None:
     p = CostParameters()
-    assert cycle_seconds("thesis", 2e9, p)({}, 9.0) == adaptive_flops(p) / 2e9
-    assert cycle_seconds("wall", 2e9, p)({}, 9.0) == 9.0
-    assert frame_seconds("printed", 1e9, p, 2)({}, 9.0) == 4 * nonadaptive_flops(p, "printed") / 1e9
+    assert cycle_seconds("thesis", 2e9, p, CYCLE)({}, 9.0) == adaptive_flops(p) / 2e9
+    assert cycle_seconds("wall", 2e9, p, CYCLE)({}, 9.0) == 9.0
     rays = {"primary_rays": 100, "shadow_rays": 50, "cached": 7}
-    assert frame_seconds("work", 1e6, p)(rays, 9.0) == pytest.approx(150 * per_segment(p) / 1e6)
+    assert cycle_seconds("work", 1e6, p, frame(p))(rays, 9.0) == pytest.approx(150 * per_segment(p) / 1e6)
     control = adaptive_flops(p) - stage_flops(p)["tracing"]
-    assert cycle_seconds("work", 1e6, p)(rays, 9.0) == pytest.approx((150 * per_segment(p) + control) / 1e6)
+    assert cycle_seconds("work", 1e6, p, CYCLE)(rays, 9.0) == pytest.approx((150 * per_segment(p) + control) / 1e6)
 
 
 def test_bad_values_name_the_field() -> None:
@@ -110,8 +131,8 @@ def test_bad_values_name_the_field() -> None:
     with pytest.raises(ValueError, match=r"recon_res"):
         CostParameters(recon_res=torch.tensor([1.0, 0.0]))
     with pytest.raises(ValueError, match=r"capacity.*0"):
-        cycle_seconds("thesis", 0, CostParameters())
+        cycle_seconds("thesis", 0, CostParameters(), CYCLE)
     with pytest.raises(ValueError, match=r"ledger.*nope"):
-        cycle_seconds("nope", 1.0, CostParameters())  # type: ignore[arg-type]
+        cycle_seconds("nope", 1.0, CostParameters(), CYCLE)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"primary_rays"):
-        frame_seconds("work", 1.0, CostParameters())({}, 1.0)
+        cycle_seconds("work", 1.0, CostParameters(), CYCLE)({}, 1.0)

@@ -52,12 +52,12 @@ def test_hold_before_the_first_image() -> None:
 
 def test_mse_of_constants() -> None:
     one, zero = torch.ones(4, 4, 3), torch.zeros(4, 4, 3)
-    errors = quality.pixel_errors(one, zero)
+    errors, _ = quality.pixel_errors(one, zero)
     assert errors.mse == pytest.approx(1.0, abs=1e-6)
     assert errors.log_mse == pytest.approx(math.log(2.0) ** 2, rel=1e-5)
     # beyond white the display shows no difference, the log-compressed error does
-    assert quality.pixel_errors(7 * one, 3 * one).mse == 0.0
-    assert quality.pixel_errors(7 * one, 3 * one).log_mse == pytest.approx(math.log(2.0) ** 2, rel=1e-5)
+    assert quality.pixel_errors(7 * one, 3 * one)[0].mse == 0.0
+    assert quality.pixel_errors(7 * one, 3 * one)[0].log_mse == pytest.approx(math.log(2.0) ** 2, rel=1e-5)
     with pytest.raises(ValueError, match="shapes"):
         quality.pixel_errors(one, torch.zeros(2, 2, 3))
 
@@ -70,7 +70,7 @@ def test_encoding_is_srgb() -> None:
 def test_nonfinite_is_counted() -> None:
     image = torch.zeros(2, 2, 3)
     image[0, 0, 0], image[1, 1, 1] = float("nan"), float("inf")
-    errors = quality.pixel_errors(image, torch.zeros(2, 2, 3))
+    errors, _ = quality.pixel_errors(image, torch.zeros(2, 2, 3))
     assert (errors.nonfinite, errors.mse) == (2, 0.0)
 
 

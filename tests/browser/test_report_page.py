@@ -15,12 +15,12 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from analysis.player import Curve, Player, Step, data
 from analysis.report import Report, Table, png_bytes, write_report
-from analysis.video import panels
+from analysis.video import maps, photographs
 from tests.analysis.builders import SCALES, view
 from tests.analysis.test_report import EVIL
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
-LABELS = list(panels(view(), SCALES, 96))
+LABELS = [*photographs(view(), 96), *maps(view(), "own", SCALES, 96)]
 STEPS, TIMES = 7, 13
 LOST, BROKEN = 2, 4
 """Steps at which the second view has no picture, and one that does not decode."""

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from renderer.control import compiled_stages
-from tests.oracles import pictures
+from tests.oracles import pictures, runs
 from tsar.config import ErrorConfig, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
-from tsar.pipeline import Outcome, State, initial_state, step
+from tsar.policies.adaptive import State
+from tsar.policy import Cycle, step
+from tsar.policy import Moment as When
 
 CYCLE_S = 1 / 60
 
@@ -45,16 +47,18 @@ class Moment:
 
     number: int
     before: State
-    outcome: Outcome
+    outcome: Cycle[State]
     after: State
 
 
 def moments(config: TsarConfig, first: int, cycles: int, picture=pictures.textured_motion) -> Iterator[Moment]:
     """Cycles from number ``first`` on; those before, in which cache and densities take shape, are compiled ones."""
-    state, trace, fast = initial_state(config), pictures.tracer(picture), compiled_stages(config)
+    trace, plain = pictures.tracer(picture), runs.made("tsar", config)
+    fast, state = runs.made("tsar", config, compiled_stages(config)), plain.start()
     for number in range(first):
-        state, _ = step(state, config, trace, number * CYCLE_S, number, CYCLE_S, fast)
+        state = step(fast, state, trace, When(number * CYCLE_S, number, CYCLE_S)).after
     for number in range(first, first + cycles):
         before = replace(state, cache=copy.deepcopy(state.cache))
-        state, outcome = step(state, config, trace, number * CYCLE_S, number, CYCLE_S)
+        outcome = step(plain, state, trace, When(number * CYCLE_S, number, CYCLE_S))
+        state = outcome.after
         yield Moment(number, before, outcome, state)

@@ -16,7 +16,7 @@ import tsar.reconstruction
 from renderer.control import Control, compiled_stages
 from renderer.coverage import _KNOWN, StageName, covers
 from renderer.display import Display
-from tests.oracles import pictures
+from tests.oracles import pictures, runs
 from tests.renderer.control_builders import CONFIGS, CYCLE_S, small
 from tsar.config import (
     ErrorConfig,
@@ -27,7 +27,8 @@ from tsar.config import (
     TsarConfig,
     closed_choices,
 )
-from tsar.pipeline import Outcome, State, initial_state, step
+from tsar.policies.adaptive import State
+from tsar.policy import Cycle, Moment, step
 from tsar.response.transport import SOLVERS, Waterfill
 from tsar.stages import REFERENCE, Stages
 
@@ -61,11 +62,12 @@ class MoreSettings(TsarConfig):
     unheard_of: int = 0
 
 
-def replay(config: TsarConfig, stages: Stages, cycles: int = 3) -> list[tuple[State, Outcome]]:
-    state, trace, found = initial_state(config), pictures.tracer(pictures.textured_motion), []
+def replay(config: TsarConfig, stages: Stages, cycles: int = 3) -> list[Cycle[State]]:
+    policy, trace, found = runs.made("tsar", config, stages), pictures.tracer(pictures.textured_motion), []
+    state = policy.start()
     for number in range(cycles):
-        state, outcome = step(state, config, trace, number * CYCLE_S, number, CYCLE_S, stages)
-        found.append((state, outcome))
+        found.append(step(policy, state, trace, Moment(number * CYCLE_S, number, CYCLE_S)))
+        state = found[-1].after
     return found
 
 
@@ -76,9 +78,9 @@ def assert_handed_over(config: TsarConfig, known: TsarConfig, stage: StageName, 
     ours, theirs, other = (replay(*case) for case in ((config, compiled_stages(config)), (config, REFERENCE),
                                                       (known, compiled_stages(known))))  # fmt: skip
     seen = {
-        "observe": lambda at: at[1].errors.spatial,
-        "respond": lambda at: at[0].densities.spatial,
-        "reconstruct": lambda at: at[1].reconstruction.image,
+        "observe": lambda at: at.after.errors.spatial,
+        "respond": lambda at: at.after.densities.spatial,
+        "reconstruct": lambda at: at.shown.image,
     }[stage]
     close = {"rtol": 0.0, "atol": 0.0} if exact else {"rtol": 1e-4, "atol": 1e-4}
     for one, two in zip(ours, theirs, strict=True):

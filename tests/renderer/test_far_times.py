@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 import torch
 
-from analysis.cases import SCALES, Case
+from analysis.cases import SCALES
 from analysis.causes import Truths
-from analysis.observation import observe
+from analysis.observation import Measuring, watch
 from renderer.control import stages
 from renderer.frames import render_image
 from renderer.sampling import SamplePlan
 from renderer.trace import Renderer
 from scenes.canonical import Scene
+from tests.oracles import runs
 from tests.renderer.builders import driving_scene
-from tsar import pipeline
-from tsar.baselines import afr, framed, frameless, oracle
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
+from tsar.stages import REFERENCE
 
 CYCLE_S, CYCLES, RATE_HZ = 37 / 1024, 6, 32.0
 LATE_S = (1e5, 1e6, 1e9)
@@ -57,19 +57,16 @@ def truths_of(renderer: Renderer, start_s: float) -> Truths:
 
 
 def play(policy: str, renderer: Renderer, start_s: float) -> list:
-    span, clock = (start_s, start_s + CYCLES * CYCLE_S), fixed_clock(CYCLE_S)
-    if policy in ("compiled", "reference"):
-        return list(pipeline.run(CONFIG, renderer.trace, clock, *span, stages(CONFIG, policy, 1)))
-    if policy == "oracle":
-        shown = oracle.run(CONFIG, renderer.trace, clock, *span, truth=truths_of(renderer, start_s).at)
-    elif policy.startswith("framed"):
-        shown = framed.run(CONFIG, renderer.trace, clock, *span, samples_per_axis=int(policy[-1]))
-    else:
-        shown = {"afr": afr, "frameless": frameless}[policy].run(CONFIG, renderer.trace, clock, *span)
-    return [(None, display) for display in shown]
+    chosen = stages(CONFIG, policy, 1) if policy in ("compiled", "reference") else REFERENCE
+    name = "tsar" if policy in ("compiled", "reference") else policy
+    truth, end_s = truths_of(renderer, start_s).at, start_s + CYCLES * CYCLE_S
+    return list(runs.play(name, CONFIG, renderer.trace, fixed_clock(CYCLE_S), start_s, end_s, chosen, truth))
 
 
-@pytest.mark.parametrize("policy", ["compiled", "reference", "framed 1", "framed 2", "frameless", "afr", "oracle"])
+POLICIES = ("compiled", "reference", "framed", "framed supersampled", "frameless", "afr", "oracle")
+
+
+@pytest.mark.parametrize("policy", POLICIES)
 def test_a_run_far_from_time_zero_is_the_run_at_time_zero(renderers, policy: str) -> None:
     near = play(policy, renderers[0.0], 0.0)
     assert any(not torch.equal(one[1].image, near[-1][1].image) for one in near[:-1])
@@ -92,9 +89,10 @@ def test_errors_far_from_time_zero_are_those_at_time_zero(renderers, policy: str
     scale = dataclasses.replace(SCALES["quick"], seconds=0.25, reference_rate_hz=RATE_HZ)
     found = {}
     for later in (0.0, *LATE_S):
-        case = Case("chase", policy, CONFIG, scale, start_s=later)
-        shown = play({"tsar": "compiled", "framed": "framed 1"}[policy], renderers[later], later)
-        seen = observe(case, truths_of(renderers[later], later), iter(shown), lambda number, pictures: None)
+        shown = play({"tsar": "compiled", "framed": "framed"}[policy], renderers[later], later)
+        times_s = later + np.arange(4) / RATE_HZ
+        measuring = Measuring(metrics=("ssim", "flip"), stride=scale.stride, causes=True)
+        seen = watch({policy: shown}, truths_of(renderers[later], later), times_s, measuring)[policy]
         found[later] = [{name: value for name, value in row.items() if name != "time_s"} for row in seen.rows]
     assert sum(row["mse"] for row in found[0.0]) > 0
     for later in LATE_S:

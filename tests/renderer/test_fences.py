@@ -11,12 +11,12 @@ import pytest
 import torch
 
 from renderer import control, display
-from tests.oracles import pictures
+from tests.oracles import pictures, runs
 from tests.renderer.control_builders import CONFIGS, CYCLE_S
 from tests.renderer.fences import Fences, Replaced
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
-from tsar.pipeline import State, initial_state
+from tsar.policies.adaptive import State
 from tsar.types import Densities, Errors, FrameletBatch
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -30,7 +30,7 @@ def replay(config: TsarConfig, fences: Fences | None, cycles: int = 10) -> str:
         fence(fences)
     keep = fences.tensor if fences is not None else lambda values: values
     found, trace = hashlib.sha256(), pictures.tracer(pictures.textured_motion)
-    stages, state = control.compiled_stages(config, threads=2), initial_state(config)
+    stages, state = control.compiled_stages(config, threads=2), runs.made("tsar", config).start()
     if fences is not None:
         fences.around_cache(state.cache)
     for number in range(cycles):

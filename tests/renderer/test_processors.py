@@ -141,10 +141,9 @@ PIPELINE = (
 from renderer.control import compiled_stages
 from renderer.trace import Renderer
 from scenes import catalog
-from tsar.baselines import afr, framed, frameless
+from tests.oracles.runs import play
 from tsar.clock import fixed_clock
 from tsar.config import TsarConfig
-from tsar.pipeline import run
 from tsar.stages import REFERENCE
 
 renderer = Renderer(catalog.load("moving-camera"), threads=1)
@@ -152,17 +151,16 @@ config = TsarConfig(batch_size=32, resolution_px=64, warmup_cycles=2)
 found = {}
 
 def shown(name, displays):
-    for number, pair in enumerate(displays):
-        record, display = pair if isinstance(pair, tuple) else (None, pair)
+    for number, (record, display) in enumerate(displays):
         hashes(display.image.numpy(), f"{name} image {number}", found, set())
         if record is not None:
             hashes([part.numpy() for part in (record.densities.spatial, record.densities.temporal)],
                    f"{name} densities {number}", found, set())
 
 for name, stages in (("compiled", compiled_stages(config)), ("reference", REFERENCE)):
-    shown(name, run(config, renderer.trace, fixed_clock(0.02), 0.0, 0.2, stages))
-for module in (afr, frameless):
-    shown(module.__name__, module.run(config, renderer.trace, fixed_clock(0.02), 0.0, 0.06))
+    shown(name, play("tsar", config, renderer.trace, fixed_clock(0.02), 0.0, 0.2, stages))
+for name in ("afr", "frameless"):
+    shown(name, play(name, config, renderer.trace, fixed_clock(0.02), 0.0, 0.06))
 print(json.dumps(found))
 """
 )

@@ -20,6 +20,8 @@ from tsar.config import ConfigError, TsarConfig
 FOUND = {
     "ratio_median": 0.5,
     "ratio_quartiles": [0.4, 0.6],
+    "policy": "tsar",
+    "ratio_statistics": {},
     "share_suitable": 1.0,
     "suitable_percentile": 100.0,
     "cycles": 7,
@@ -67,7 +69,7 @@ def test_a_row_says_which_run_it_was(tmp_path: Path) -> None:
     assert (found["run"], found["input"], found["seed"], found["phase"]) == ("chase-seed4", "chase", 4, 0.5)
     assert found["ratio_median"] == 0.5 and found["invariants_ok"] is True
     assert found["ratio_median_supersampled"] is None
-    beside = {**FOUND, "ratio_statistics_framed_supersampled": {"median": 0.8}}
+    beside = {**FOUND, "ratio_statistics": {"framed supersampled": {"median": 0.8}}}
     assert row(run, beside)["ratio_median_supersampled"] == 0.8
 
 

@@ -9,21 +9,21 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.oracles import pictures
+from tests.oracles import pictures, runs
 from tests.oracles.batches import make_batch
-from tsar import pipeline
-from tsar.baselines import oracle
 from tsar.cache import FrameletCache
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
 from tsar.haar import state_size
+from tsar.policies import oracle
+from tsar.policies.oracle import Oracle
 from tsar.reconstruction import reconstruct
 from tsar.tiling import uniform
 from tsar.types import Display, SampleBatch
 
-CYCLE = 0.02
+CYCLE, WARMUP = 0.02, 4
 CONFIG = TsarConfig(
-    batch_size=16, resolution_px=64, sdf_side=32, warmup_cycles=4, tiling=TilingConfig(tile_count_max=64)
+    batch_size=16, resolution_px=64, sdf_side=32, warmup_cycles=WARMUP, tiling=TilingConfig(tile_count_max=64)
 )
 EDGE = pictures.moving_edge(0.5, 0.2)
 
@@ -160,7 +160,7 @@ def truth_of(picture, side=CONFIG.resolution_px, per_axis=2):
 
 def play(picture=EDGE, cycles=10, config=CONFIG, clock=None, truth=None, trace=None):
     trace, truth = trace or pictures.tracer(picture), truth or truth_of(picture, config.resolution_px)
-    return list(oracle.run(config, trace, clock or fixed_clock(CYCLE), 0.0, cycles * CYCLE, truth))
+    return list(runs.images("oracle", config, trace, clock or fixed_clock(CYCLE), 0.0, cycles * CYCLE, truth=truth))
 
 
 def newest_of(shown):
@@ -171,13 +171,13 @@ def newest_of(shown):
 def play_uniform(picture, cycles):
     """The same number of framelets, one for every tile of the coarsest level: each is new in every cycle."""
     cache, tiling, side = FrameletCache(CONFIG), uniform(CONFIG.level_min), CONFIG.framelet_side
-    for cycle in range(-CONFIG.warmup_cycles, cycles):
+    for cycle in range(-WARMUP, cycles):
         batch = make_batch(tiling, torch.arange(tiling.tile_count), cycle * CYCLE, cycle, CONFIG)
         assert tiling.tile_count == CONFIG.batch_size
         color = pictures.tracer(picture)(batch).color
         cache.insert(batch, color, torch.zeros(tiling.tile_count, state_size(side**2)))
         shown = reconstruct(cache, CONFIG, CYCLE)
-        display_s = (cycle + pipeline.LATENCY_CYCLES) * CYCLE
+        display_s = (cycle + Oracle.latency_cycles) * CYCLE
         yield Display(display_s, cycle * CYCLE, shown.image, shown.samples)
 
 
@@ -191,7 +191,7 @@ def error(displays, picture):
 @pytest.mark.parametrize("picture", [EDGE, pictures.textured_motion], ids=["edge", "texture"])
 def test_seeing_the_answer_beats_uniform_and_estimated_allocation(picture):
     found = error(play(picture), picture)
-    estimated = [shown for _, shown in pipeline.run(CONFIG, pictures.tracer(picture), fixed_clock(CYCLE), 0.0, 0.2)]
+    estimated = list(runs.images("tsar", CONFIG, pictures.tracer(picture), fixed_clock(CYCLE), 0.0, 0.2))
     assert 0.0 < found <= error(play_uniform(picture, 10), picture)
     assert found <= error(estimated, picture)
 
@@ -208,7 +208,7 @@ def test_batches_are_disjoint_new_and_no_larger_than_paid_for(monkeypatch):
 
     monkeypatch.setattr(oracle, "FrameletCache", Spy)
     displays, levels = play(picture, 6), range(CONFIG.level_min, CONFIG.level_max + 1)
-    assert list(batches) == list(range(-CONFIG.warmup_cycles, 6))
+    assert list(batches) == list(range(-WARMUP, 6))
     for cycle, shown in zip(batches, displays, strict=True):
         taken = [
             torch.cat([b.index[b.level == level] for b in batches[cycle]]) for level in range(CONFIG.level_max + 1)
@@ -221,7 +221,7 @@ def test_batches_are_disjoint_new_and_no_larger_than_paid_for(monkeypatch):
         assert float((newest_of(shown) == now_s).double().mean()) == share
 
 
-def test_every_cycle_costs_as_much_as_a_full_batch_and_is_judged_when_it_is_shown():
+def test_a_cycle_costs_what_its_batch_does_and_is_judged_when_it_is_shown():
     """A clock that counts sees the rays of a batch, not those of the looking around."""
     bills, asked, truth = [], [], truth_of(EDGE)
 
@@ -235,12 +235,12 @@ def test_every_cycle_costs_as_much_as_a_full_batch_and_is_judged_when_it_is_show
 
     displays = play(clock=clock, truth=seen, cycles=4)
     assert len(bills) == len(displays) + 1, "one to learn how long a cycle is"
-    assert all(counters == {"primary_rays": int(CONFIG.budget)} and wall_s > 0.0 for counters, wall_s in bills)
+    assert all(0 < counters["primary_rays"] <= CONFIG.budget and wall_s > 0.0 for counters, wall_s in bills)
     assert asked == pytest.approx([shown.display_time_s for shown in displays])
     assert all(after.sample_time_s - now.sample_time_s == pytest.approx(0.03) for now, after in pairwise(displays))
     latency = [shown.display_time_s - shown.sample_time_s for shown in displays]
-    assert latency == pytest.approx([pipeline.LATENCY_CYCLES * 0.03] * len(displays))
-    assert displays[0].sample_time_s == pytest.approx(-CONFIG.warmup_cycles * 0.03)
+    assert latency == pytest.approx([Oracle.latency_cycles * 0.03] * len(displays))
+    assert displays[0].sample_time_s == pytest.approx(-WARMUP * 0.03)
     with pytest.raises(ValueError, match="finite, positive cycle time"):
         play(clock=fixed_clock(0.0))
 
@@ -251,7 +251,7 @@ def test_runs_repeat_on_any_number_of_threads():
     table = [truth_of(pictures.textured_motion, 128, 1)(cycle * CYCLE) for cycle in range(8)]
     for threads in (1, 1, 2, 3):
         torch.set_num_threads(threads)
-        runs.append(play(pictures.textured_motion, 1, config, truth=lambda time_s: table[round(time_s / CYCLE)]))
+        runs.append(play(pictures.textured_motion, 1, config, truth=lambda time_s: table[round(time_s / CYCLE) % 8]))
     for other in runs[1:]:
         for shown, expected in zip(other, runs[0], strict=True):
             assert torch.equal(shown.image, expected.image)

@@ -3,12 +3,12 @@ from itertools import pairwise
 import pytest
 import torch
 
-from tests.oracles import pictures
-from tsar.baselines.framed import run as run_framed
+from tests.oracles import pictures, runs
 from tsar.clock import StageTimer, fixed_clock, wall_clock
 from tsar.config import ConfigError, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
-from tsar.pipeline import run
+from tsar.policies.framed import Framed
+from tsar.policy import Setting
 from tsar.response.transport import SOLVERS
 from tsar.types import SampleBatch
 
@@ -20,7 +20,9 @@ def small(**more):
 
 
 def play(config, picture, cycles, start_s=0.0):
-    return list(run(config, pictures.tracer(picture), fixed_clock(CYCLE), start_s, start_s + cycles * CYCLE))
+    return list(
+        runs.play("tsar", config, pictures.tracer(picture), fixed_clock(CYCLE), start_s, start_s + cycles * CYCLE)
+    )
 
 
 def element_grid(field, side=128):
@@ -85,7 +87,7 @@ def test_bounds_conservation_coverage_and_full_batches_on_every_cycle():
 def test_latency_is_three_cycles_and_two_frames():
     for record, display in play(small(), pictures.constant, 2):
         assert display.display_time_s - record.sim_time_s == pytest.approx(3 * CYCLE)
-    frames = list(run_framed(small(), pictures.tracer(pictures.constant), fixed_clock(0.1), 0.0, 0.5))
+    frames = list(runs.images("framed", small(), pictures.tracer(pictures.constant), fixed_clock(0.1), 0.0, 0.5))
     assert frames[0].display_time_s <= 0.0, "something is on the display when measurement begins"
     assert all(f.display_time_s - f.sample_time_s == pytest.approx(0.2) for f in frames)
     assert frames[1].sample_time_s - frames[0].sample_time_s == pytest.approx(0.1)
@@ -93,15 +95,23 @@ def test_latency_is_three_cycles_and_two_frames():
 
 def test_framed_image_is_the_picture_at_pixel_centres():
     config = small()
-    frame = next(iter(run_framed(config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5)))
+    frame = next(
+        iter(runs.images("framed", config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5))
+    )
     centre = (torch.arange(256) + 0.5) / 256
     time = torch.tensor(frame.sample_time_s, dtype=torch.float32)
     expected = pictures.textured_motion(centre[None].expand(256, 256), centre[:, None].expand(256, 256), time)
     assert torch.allclose(frame.image, expected, atol=1e-6)
-    fine = next(iter(run_framed(config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5, 2)))
+    fine = next(
+        iter(
+            runs.images(
+                "framed supersampled", config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5
+            )
+        )
+    )
     assert fine.image.shape == (256, 256, 3) and (fine.image - expected).abs().mean() < 0.02
     with pytest.raises(ConfigError, match="samples_per_axis: expected a power of two, got 3"):
-        next(iter(run_framed(config, pictures.tracer(pictures.constant), fixed_clock(0.1), 0.0, 0.5, 3)))
+        Framed(Setting(config), 3)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +156,7 @@ def test_nonfinite_samples_are_counted_and_never_shown():
         color[:, ::17] = float("nan")
         return SampleBatch(color, {})
 
-    for record, display in run(small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
+    for record, display in runs.play("tsar", small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
         assert record.nonfinite == 32 * 16 and bool(torch.isfinite(display.image).all())
 
 
@@ -156,13 +166,13 @@ def test_radiance_at_the_end_of_float32_reaches_neither_image_nor_densities():
         color[:, ::31] = torch.finfo(torch.float32).max
         return SampleBatch(color, {})
 
-    for record, display in run(small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
+    for record, display in runs.play("tsar", small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
         assert record.nonfinite == 32 * 9 and bool(torch.isfinite(display.image).all()) and display.image.max() <= 1.0
         assert bool(torch.isfinite(record.densities.spatial).all())
 
 
 def test_wall_clock_time_advances_by_what_a_cycle_took():
-    run_ = run(small(warmup_cycles=2), pictures.tracer(pictures.constant), wall_clock, 0.0, 1e9)
+    run_ = runs.play("tsar", small(warmup_cycles=2), pictures.tracer(pictures.constant), wall_clock, 0.0, 1e9)
     records = [next(run_)[0] for _ in range(5)]
     for now, after in pairwise(records):
         assert after.sim_time_s == pytest.approx(now.sim_time_s + now.cost_s)
@@ -203,7 +213,7 @@ def test_temporal_density_gathers_where_a_moving_edge_is_and_leaves_where_it_was
 def test_a_clock_that_stops_time_is_refused():
     for seconds in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="finite, positive cycle time"):
-            next(run(small(), pictures.tracer(pictures.constant), fixed_clock(seconds), 0.0, 1.0))
+            next(runs.play("tsar", small(), pictures.tracer(pictures.constant), fixed_clock(seconds), 0.0, 1.0))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What the single-sample baselines share: scattered requests, a buffer of the newest sample per pixel, its display."""
+"""What policies of single samples share: scattered requests, a buffer of the newest sample per pixel, its display."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from torch import Tensor
 
 from tsar.config import TsarConfig
 from tsar.error import replace_nonfinite
-from tsar.types import FrameletBatch, SampleMap, Trace
+from tsar.policy import Moment
+from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,19 @@ def generator(config: TsarConfig, cycle: int) -> torch.Generator:
     return torch.Generator().manual_seed((config.seed * 1_000_003 + cycle + 500_000) % 2**63)
 
 
-def render_pixels(
-    pixel: Int64[Tensor, " samples"], config: TsarConfig, trace: Trace, time_s: float, cycle: int
-) -> tuple[Float[Tensor, "samples 3"], dict[str, int]]:
-    """Trace the centres of output pixels (raster indices), grouped into as many framelets as fit; their count must be a
-    multiple of ``config.samples``. Non-finite samples are replaced as in the adaptive pipeline."""
+def pixel_batch(pixel: Int64[Tensor, " samples"], config: TsarConfig, moment: Moment) -> FrameletBatch:
+    """The centres of output pixels (raster indices), grouped into as many framelets as fit; their count must be a
+    multiple of ``config.samples``."""
     resolution = config.resolution_px
     position = torch.stack((pixel % resolution, pixel // resolution), dim=1).to(torch.float32).add_(0.5) / resolution
     position = position.reshape(-1, config.samples, 2)
     nothing = torch.zeros(position.shape[0], dtype=torch.int64)
-    answer = trace(FrameletBatch(nothing, nothing, position, time_s, cycle=cycle, seed=config.seed))
-    color, _ = replace_nonfinite(answer.color, config.framelet_side)
-    return color.reshape(-1, 3), answer.counters
+    return FrameletBatch(nothing, nothing, position, moment.time_s, cycle=moment.cycle, seed=config.seed)
+
+
+def pixel_colors(samples: SampleBatch, config: TsarConfig) -> Float[Tensor, "samples 3"]:
+    """Colours of such a batch, one row a pixel; non-finite samples are replaced as in the adaptive pipeline."""
+    return replace_nonfinite(samples.color, config.framelet_side)[0].reshape(-1, 3)
 
 
 def write(

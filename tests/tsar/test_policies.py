@@ -2,37 +2,37 @@ import pytest
 import torch
 import torch.nn.functional as F
 
-from tests.oracles import pictures
-from tsar.baselines import afr, framed, frameless
-from tsar.baselines.scatter import PixelBuffer, double_width, pull_push, write
+from tests.oracles import pictures, runs
 from tsar.clock import fixed_clock
 from tsar.config import TsarConfig
 from tsar.morton import floor_log2
+from tsar.policies import afr
+from tsar.policies.scatter import PixelBuffer, double_width, pull_push, write
 
 CONFIG = TsarConfig(batch_size=32, resolution_px=128, warmup_cycles=6)
 
 
-def play(module, picture, cycles=4, config=CONFIG):
-    return list(module.run(config, pictures.tracer(picture), fixed_clock(0.02), 0.0, cycles * 0.02))
+def play(name, picture, cycles=4, config=CONFIG):
+    return list(runs.images(name, config, pictures.tracer(picture), fixed_clock(0.02), 0.0, cycles * 0.02))
 
 
-@pytest.mark.parametrize("module", [frameless, afr])
-def test_constant_picture_is_shown_exactly_and_runs_repeat(module):
-    shown = play(module, pictures.constant)[-1]
+@pytest.mark.parametrize("name", ["frameless", "afr"])
+def test_constant_picture_is_shown_exactly_and_runs_repeat(name):
+    shown = play(name, pictures.constant)[-1]
     assert torch.allclose(shown.image, torch.full((128, 128, 3), 0.4), atol=1e-5)
     assert shown.display_time_s - shown.sample_time_s == pytest.approx(0.02)
-    again = [play(module, pictures.textured_motion)[-1].image for _ in range(2)]
+    again = [play(name, pictures.textured_motion)[-1].image for _ in range(2)]
     assert torch.equal(*again) and bool(torch.isfinite(again[0]).all())
 
 
-@pytest.mark.parametrize("module", [frameless, afr, framed])
-def test_baselines_do_not_depend_on_the_thread_count(module):
+@pytest.mark.parametrize("name", ["frameless", "afr", "framed"])
+def test_baselines_do_not_depend_on_the_thread_count(name):
     config = TsarConfig(batch_size=128, warmup_cycles=1)
     before, runs = torch.get_num_threads(), []
     try:
         for threads in (1, 2, 3):
             torch.set_num_threads(threads)
-            runs.append(play(module, pictures.textured_motion, 2, config))
+            runs.append(play(name, pictures.textured_motion, 2, config))
     finally:
         torch.set_num_threads(before)
     for other in runs[1:]:
@@ -51,7 +51,7 @@ def test_frameless_visits_every_pixel_once_a_sweep():
     """A static picture is complete after one sweep: 128² pixels at 32 * 256 a cycle are two cycles."""
     centre = (torch.arange(128) + 0.5) / 128
     exact = pictures.static_stripes(centre[None].expand(128, 128), centre[:, None].expand(128, 128), None)
-    assert torch.equal(play(frameless, pictures.static_stripes)[2].image, exact)
+    assert torch.equal(play("frameless", pictures.static_stripes)[2].image, exact)
 
 
 def test_afr_keeps_its_leaf_count_and_a_cut_that_covers_the_image():
@@ -61,7 +61,7 @@ def test_afr_keeps_its_leaf_count_and_a_cut_that_covers_the_image():
         node, pixel = afr.draw(tree, 8192, depth, CONFIG, cycle)
         x, y = (pixel % 128 + 0.5) / 128, (pixel // 128 + 0.5) / 128
         luminance = pictures.moving_edge(0.0, 0.3)(x, y, torch.zeros(8192))[:, 0]
-        tree = afr.adapt(afr.observe(tree, node, luminance), depth)
+        tree = afr.adapt(afr.gather(tree, node, luminance), depth)
         leaves = tree.leaf.nonzero().squeeze(1)
         assert leaves.numel() == afr.LEAVES
         assert float(torch.exp2(-floor_log2(leaves).double()).sum()) == 1.0
@@ -98,10 +98,10 @@ def pixel_truth(picture, time_s):
     return picture(centre[None].expand(128, 128), centre[:, None].expand(128, 128), time_s.to(torch.float32))
 
 
-@pytest.mark.parametrize("module", [frameless, afr])
-def test_a_pixel_shows_the_picture_of_the_age_it_claims(module):
+@pytest.mark.parametrize("name", ["frameless", "afr"])
+def test_a_pixel_shows_the_picture_of_the_age_it_claims(name):
     """Frameless: every pixel that has been sampled. AFR blends older ones: those of this cycle."""
-    displays = play(module, pictures.textured_motion, 1)
+    displays = play(name, pictures.textured_motion, 1)
     ages = set()
     for shown in displays:
         newest_s, level = map_of(shown)
@@ -109,7 +109,7 @@ def test_a_pixel_shows_the_picture_of_the_age_it_claims(module):
         assert bool((level == 3).all()), "128 pixels are 2^3 framelets of 16 samples wide"
         fresh = newest_s == shown.sample_time_s
         assert 0 < int(fresh.sum()) <= CONFIG.budget and float(newest_s.max()) == shown.sample_time_s
-        exact = torch.isfinite(newest_s) if module is frameless else fresh
+        exact = torch.isfinite(newest_s) if name == "frameless" else fresh
         expected = pixel_truth(pictures.textured_motion, newest_s)
         assert torch.allclose(shown.image[exact], expected[exact], atol=1e-6)
         ages |= set(newest_s.unique().tolist())
@@ -119,15 +119,15 @@ def test_a_pixel_shows_the_picture_of_the_age_it_claims(module):
 
 
 def test_maps_of_earlier_images_stay_as_they_were():
-    first, *_, last = play(frameless, pictures.constant)
+    first, *_, last = play("frameless", pictures.constant)
     assert float(map_of(first)[0].max()) == first.sample_time_s < last.sample_time_s
 
 
 @pytest.mark.parametrize(("per_axis", "level"), [(1, 3), (2, 4)])
 def test_a_frame_is_of_one_age_and_density(per_axis, level):
     """128 pixels are 2^3 framelets of 16 samples wide, 256 samples 2^4."""
-    run = framed.run(CONFIG, pictures.tracer(pictures.textured_motion), fixed_clock(0.02), 0.0, 0.1, per_axis)
-    for shown in run:
+    name = {1: "framed", 2: "framed supersampled"}[per_axis]
+    for shown in play(name, pictures.textured_motion, 5):
         assert [field.tolist() for field in map_of(shown)] == [[[shown.sample_time_s]], [[level]]]
         expected = pixel_truth(pictures.textured_motion, torch.tensor(shown.sample_time_s))
         assert float((shown.image - expected).abs().mean()) < (1e-6 if per_axis == 1 else 0.02)

@@ -13,8 +13,6 @@ samples, each weighted down with its age in units of its leaf's refresh interval
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import exp
 
@@ -22,14 +20,14 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
-from tsar.baselines.scatter import PixelBuffer, generator, pull_push, render_pixels, sample_map, write
-from tsar.clock import CycleSeconds, checked
+from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
 from tsar.morton import floor_log2, morton_to_raster
-from tsar.types import Display, Trace
+from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
+from tsar.policy import Moment, Picture, Policy
+from tsar.types import FrameletBatch, SampleBatch
 
-LATENCY_CYCLES = 1
 LEAVES = 1024
 CHANGES_PER_CYCLE = 64
 _MEMORY_CYCLES = 8.0
@@ -48,25 +46,47 @@ class Tree:
     moments: Float[Tensor, "3 nodes"]
 
 
-def run(
-    config: TsarConfig, trace: Trace, cycle_seconds: CycleSeconds, start_s: float, end_s: float
-) -> Iterator[Display]:
-    """Cycles of ``batch_size * s²`` samples. Arguments as :func:`tsar.pipeline.run`; warm-up cycles are yielded too."""
-    count, depth = int(config.budget), 2 * (config.resolution_px.bit_length() - 1)
-    tree, buffer = _initial(depth), PixelBuffer.empty(config)
-    _, counters = render_pixels(torch.zeros(count, dtype=torch.int64), config, trace, start_s, 0)
-    cycle_s = checked(cycle_seconds, counters, 1.0)
-    cycle, time_s = -config.warmup_cycles, start_s - config.warmup_cycles * cycle_s
-    while time_s < end_s:
-        began = time.perf_counter()
-        node, pixel = draw(tree, count, depth, config, cycle)
-        color, counters = render_pixels(pixel, config, trace, time_s, cycle)
-        write(buffer, pixel, color, time_s)
-        tree = adapt(observe(tree, node, compressed_luminance(color)), depth)
-        image = _image(tree, buffer, config, depth, time_s, cycle_s)
-        cycle_s = checked(cycle_seconds, counters, time.perf_counter() - began)
-        yield Display(time_s + LATENCY_CYCLES * cycle_s, time_s, image, sample_map(buffer, config))
-        cycle, time_s = cycle + 1, time_s + cycle_s
+@dataclass(frozen=True)
+class Scattered:
+    """The tree, the newest sample of each pixel, and the leaves and pixels that were asked for.
+
+    Frozen, but the buffer within changes in place.
+    """
+
+    tree: Tree
+    buffer: PixelBuffer
+    node: Int64[Tensor, " samples"] | None = None
+    pixel: Int64[Tensor, " samples"] | None = None
+
+
+class Afr(Policy[Scattered]):
+    """Cycles of ``batch_size * s²`` samples, as many in every leaf."""
+
+    @property
+    def _depth(self) -> int:
+        return 2 * (self.config.resolution_px.bit_length() - 1)
+
+    def start(self) -> Scattered:
+        return Scattered(_initial(self._depth), PixelBuffer.empty(self.config))
+
+    def request(self, state: Scattered, moment: Moment) -> tuple[Scattered, FrameletBatch]:
+        node, pixel = draw(state.tree, int(self.config.budget), self._depth, self.config, moment.cycle)
+        return replace(state, node=node, pixel=pixel), pixel_batch(pixel, self.config, moment)
+
+    def observe(
+        self, state: Scattered, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
+    ) -> Scattered:
+        assert state.node is not None and state.pixel is not None
+        color = pixel_colors(samples, self.config)
+        with timer("cache"):
+            write(state.buffer, state.pixel, color, moment.time_s)
+        with timer("response"):
+            gathered = gather(state.tree, state.node, compressed_luminance(color))
+            return replace(state, tree=adapt(gathered, self._depth))
+
+    def image(self, state: Scattered, moment: Moment) -> Picture:
+        image = _image(state.tree, state.buffer, self.config, self._depth, moment.time_s, moment.cycle_s)
+        return Picture(image, sample_map(state.buffer, self.config))
 
 
 def _initial(depth: int) -> Tree:
@@ -89,7 +109,7 @@ def draw(
     return node, morton_to_raster(config.resolution_px)[cell]
 
 
-def observe(tree: Tree, node: Int64[Tensor, " samples"], luminance: Float[Tensor, " samples"]) -> Tree:
+def gather(tree: Tree, node: Int64[Tensor, " samples"], luminance: Float[Tensor, " samples"]) -> Tree:
     """Fade the moments of all leaves by one cycle and add the new samples."""
     moments = tree.moments * exp(-1.0 / _MEMORY_CYCLES)
     for row, value in enumerate((torch.ones_like(luminance), luminance, luminance.square())):

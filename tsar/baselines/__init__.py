@@ -1,1 +1,0 @@
-"""Renderers to compare with, over the same ``trace`` and the same clock as the adaptive pipeline."""

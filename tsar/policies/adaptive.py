@@ -1,0 +1,92 @@
+"""Temporally and spatially adaptive rendering: the pipeline of the dissertation as a recipe.
+
+Contains no mathematics; every stage is a function of its own module.
+
+Source: Stephens 2011, sec. 3.4.4 and fig. 3.13.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tsar.cache import FrameletCache
+from tsar.clock import StageTimer
+from tsar.policy import Cycle, Moment, Picture, Policy, Setting
+from tsar.response import initial_densities
+from tsar.selection import Request, initial_history, request
+from tsar.tiling import build
+from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, StepRecord, Tiling
+
+
+@dataclass(frozen=True)
+class State:
+    """What one cycle hands to the next. Frozen, but the cache within changes in place.
+
+    Attributes:
+        densities, tiling: sample densities, and the tiling built from them.
+        due: what is rendered next.
+        cache: framelets that the display is made of.
+        errors, nonfinite: of the last batch; None and 0 before the first.
+    """
+
+    densities: Densities
+    tiling: Tiling
+    due: Request
+    cache: FrameletCache
+    errors: Errors | None = None
+    nonfinite: int = 0
+
+
+class Adaptive(Policy[State]):
+    """The faithful pipeline: render, estimate, cache, respond, re-tile, select, reconstruct."""
+
+    latency_cycles = 3
+    """What was sampled three cycles ago is shown (sec. 3.4.4)."""
+
+    def __init__(self, setting: Setting) -> None:
+        super().__init__(setting)
+        self._stages = setting.stages_of(setting.config)
+
+    def start(self) -> State:
+        """A uniform field, its tiling, what is due at first, and an empty cache."""
+        densities = initial_densities(self.config)
+        tiling = build(densities.spatial, self.config)
+        due = request(tiling, densities.temporal, initial_history(self.config), self.config)
+        return State(densities, tiling, due, FrameletCache(self.config))
+
+    def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
+        return state, state.due.at(moment.time_s, moment.cycle, self.config)
+
+    def observe(
+        self, state: State, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
+    ) -> State:
+        seen = self._stages.observe(batch, samples.color, state.cache, self.config, timer)
+        made = self._stages.decide(state.densities, seen.errors, state.due.history, self.config, timer)
+        return State(made.densities, made.tiling, made.due, state.cache, seen.errors, seen.nonfinite)
+
+    def image(self, state: State, moment: Moment) -> Picture:
+        made = self._stages.reconstruct(state.cache, self.config, moment.cycle_s)
+        return Picture(made.image, made.samples)
+
+    def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord:
+        before, after, config = cycle.before, cycle.after, self.config
+        assert after.errors is not None and cycle.shown.sample_map is not None
+        newest_s = cycle.shown.sample_map.newest_s
+        account = self._stages.account(after.densities, after.errors, newest_s, config)
+        surplus = after.densities.surplus
+        return StepRecord(
+            cycle=moment.cycle,
+            sim_time_s=moment.time_s,
+            cost_s=cost_s,
+            tiling=before.tiling,
+            selected=before.due.selected,
+            densities=after.densities,
+            errors=after.errors,
+            surplus=surplus,
+            conservation_residual=abs(account.combined + surplus - config.budget) / config.budget,
+            stage_s=dict(cycle.timer.seconds),
+            counters=dict(cycle.samples.counters),
+            nonfinite=after.nonfinite,
+            nonfinite_fields=account.nonfinite,
+            age_spread_s=account.age_spread_s,
+        )

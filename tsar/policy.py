@@ -1,0 +1,211 @@
+"""What decides where and when samples are spent: the interface of all renderers that are compared, and their one loop.
+
+A policy is asked for a batch, told what the renderer answered, and asked for the image to show. State goes in and comes
+out; what it costs and how late it shows what it sampled are declared beside it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Generic, TypeVar
+
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.clock import CycleSeconds, StageTimer, checked
+from tsar.config import TsarConfig
+from tsar.stages import REFERENCE, Stages
+from tsar.types import Display, FrameletBatch, SampleBatch, SampleMap, StepRecord, Trace
+
+State = TypeVar("State")
+
+Truth = Callable[[float], Float[Tensor, "h w 3"]]
+"""``time_s -> image``: the picture as it should be, linear RGB at output resolution."""
+
+
+@dataclass(frozen=True)
+class Price:
+    """What the cost model charges a cycle of a policy.
+
+    Attributes:
+        samples: samples traced a cycle.
+        adaptive_stages: whether selection, error estimate, response, tiling and reconstruction come on top, as table
+            7.1 of Stephens 2011 prices them.
+        pixel_flops, sample_flops: further operations per output pixel and per sample.
+    """
+
+    samples: int
+    adaptive_stages: bool = False
+    pixel_flops: float = 0.0
+    sample_flops: float = 0.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a policy is made from.
+
+    Attributes:
+        config: of the run.
+        stages_of: what runs the stages around tracing of the adaptive pipeline, made when they are needed.
+        truth: the picture at any time; None where nothing may look at it.
+        trace: a renderer that is not charged, for policies that look at the truth.
+    """
+
+    config: TsarConfig
+    stages_of: Callable[[TsarConfig], Stages] = lambda config: REFERENCE
+    truth: Truth | None = None
+    trace: Trace | None = None
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When a cycle takes place.
+
+    Attributes:
+        time_s: animation time at its start, seconds.
+        cycle: its number, negative during warm-up.
+        cycle_s: length of the cycle before it, seconds: the unit of age.
+    """
+
+    time_s: float
+    cycle: int
+    cycle_s: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a policy puts on the display.
+
+    Attributes:
+        image: ``(height, width, 3)`` float32 linear RGB.
+        sample_map: age and density of its samples; None where the policy cannot tell.
+    """
+
+    image: Float[Tensor, "h w 3"]
+    sample_map: SampleMap | None = None
+
+
+@dataclass(frozen=True)
+class Cycle(Generic[State]):
+    """One cycle as it went, for its record.
+
+    Attributes:
+        before, after: state at its start and at its end.
+        samples: what the renderer answered.
+        shown: image at its end.
+        timer: measured seconds of its stages.
+    """
+
+    before: State
+    after: State
+    samples: SampleBatch
+    shown: Picture
+    timer: StageTimer
+
+
+class Policy(ABC, Generic[State]):
+    """Who decides what is sampled.
+
+    Attributes:
+        latency_cycles: cycles between sampling and display.
+        probe_cycles: throw-away cycles before a run, the last of which tells how long a cycle takes; the first may
+            compile kernels.
+        footprint: samples along a pixel's side that textures are filtered for.
+        price: what a cycle costs.
+    """
+
+    latency_cycles: ClassVar[int] = 1
+    probe_cycles: ClassVar[int] = 2
+
+    def __init__(self, setting: Setting) -> None:
+        """Takes what the run is made from."""
+        self.config = setting.config
+
+    @property
+    def footprint(self) -> int:
+        return 1
+
+    @property
+    def warmup_cycles(self) -> int:
+        """Cycles before the start time, so that measurement begins in the steady state."""
+        return self.config.warmup_cycles
+
+    @property
+    def price(self) -> Price:
+        """By default that of a cycle of the adaptive pipeline."""
+        return Price(self.config.batch_size * self.config.samples, adaptive_stages=True)
+
+    @abstractmethod
+    def start(self) -> State:
+        """The state before the first cycle."""
+
+    @abstractmethod
+    def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
+        """What is to be rendered in a cycle."""
+
+    @abstractmethod
+    def observe(
+        self, state: State, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
+    ) -> State:
+        """Takes in what the renderer answered; ``timer`` takes the seconds of the stages by name."""
+
+    @abstractmethod
+    def image(self, state: State, moment: Moment) -> Picture:
+        """The image at the end of a cycle."""
+
+    def probe(self, trace: Trace, time_s: float) -> tuple[Mapping[str, int], float]:
+        """What a cycle takes, from throw-away ones before a run: work counted, and wall seconds."""
+        state = self.start()
+        for cycle in range(self.probe_cycles):
+            done = step(self, state, trace, Moment(time_s, cycle, 1.0))
+            state = done.after
+        return done.samples.counters, done.timer.total
+
+    def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord | None:
+        """What is kept of a cycle; None where there is nothing to keep."""
+        return None
+
+
+def run(
+    policy: Policy[State], trace: Trace, cycle_seconds: CycleSeconds, start_s: float, end_s: float
+) -> Iterator[tuple[StepRecord | None, Display]]:
+    """Cycles from a warm start until the animation time passes ``end_s``.
+
+    Warm-up cycles before ``start_s`` have negative numbers and are yielded too: the first images on the display come
+    from them.
+
+    Args:
+        policy: who decides.
+        trace: the renderer.
+        cycle_seconds: the clock.
+        start_s, end_s: span of animation time to cover, seconds.
+
+    Raises:
+        ValueError: the clock returned a value that is not finite and positive.
+    """
+    cycle_s = checked(cycle_seconds, *policy.probe(trace, start_s))
+    state, cycle = policy.start(), -policy.warmup_cycles
+    time_s = start_s + cycle * cycle_s
+    while time_s < end_s:
+        moment = Moment(time_s, cycle, cycle_s)
+        done = step(policy, state, trace, moment)
+        cycle_s = checked(cycle_seconds, done.samples.counters, done.timer.total)
+        record = policy.record(done, moment, cycle_s)
+        shown = done.shown
+        yield record, Display(time_s + policy.latency_cycles * cycle_s, time_s, shown.image, shown.sample_map)
+        state, cycle, time_s = done.after, cycle + 1, time_s + cycle_s
+
+
+def step(policy: Policy[State], state: State, trace: Trace, moment: Moment) -> Cycle[State]:
+    """One cycle of a policy."""
+    timer = StageTimer()
+    with timer("selection"):
+        asked, batch = policy.request(state, moment)
+    with timer("tracing"):
+        samples = trace(batch)
+    after = policy.observe(asked, batch, samples, moment, timer)
+    with timer("reconstruction"):
+        shown = policy.image(after, moment)
+    return Cycle(state, after, samples, shown, timer)
