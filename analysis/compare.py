@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from analysis.observation import View
 from analysis.pictures import webp_bytes
 from analysis.player import Step
+from analysis.quality import View
 from analysis.video import ComparisonFilm, FrameSink, Scales, maps, photographs
 
 STEPS_MAX = 60

@@ -26,11 +26,11 @@ from PIL import Image
 from analysis.cases import Case, Scale
 from analysis.causes import Truths
 from analysis.files import locked
-from analysis.observation import Measuring, Seen, View, watch
+from analysis.observation import Measuring, Seen, watch
 from analysis.perceptual import jod, one_thread
 from analysis.pictures import Pixels, tiling_image
 from analysis.policy_runs import Machine, PolicyRun, Totals, begin
-from analysis.quality import reference_times
+from analysis.quality import View, reference_times
 from analysis.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
 from analysis.source import code_hash
 from analysis.store import Store

@@ -22,10 +22,10 @@ from analysis.store import Store
 
 if TYPE_CHECKING:
     from analysis.causes import Truths
-    from analysis.observation import Seen, View
+    from analysis.observation import Seen
     from analysis.policy_runs import PolicyRun
     from analysis.progress import Bars
-    from analysis.quality import Floats
+    from analysis.quality import Floats, View
     from analysis.records import RecordLimits, StepWriter
     from analysis.reference import Reference
     from analysis.summary import Measured

@@ -17,32 +17,10 @@ from torch import Tensor
 from analysis.causes import CAUSES, REGIONS, Split, Truths, flicker, split
 from analysis.metrics import METRICS
 from analysis.pictures import Pixels
-from analysis.quality import Floats, Hold, encode, pixel_errors
-from tsar.types import Display, StepRecord
-
-Shown = tuple[StepRecord | None, Display]
-"""A record, where the policy makes any, and its image."""
+from analysis.quality import Floats, Hold, Shown, View, encode, pixel_errors
+from tsar.types import Display
 
 _MOTION_S = 0.1  # motion is judged over this long
-
-
-@dataclass(frozen=True)
-class View:
-    """What all displays show at one reference time.
-
-    Attributes:
-        number: of the reference time.
-        time_s: simulated time.
-        reference: ``(h, w, 3)`` linear RGB.
-        shown: by name of the run; records and images of the cycles whose images are on the displays.
-        mse: mean squared error of each.
-    """
-
-    number: int
-    time_s: float
-    reference: Tensor
-    shown: Mapping[str, Shown]
-    mse: Mapping[str, float]
 
 
 Viewer = Callable[[View], None]

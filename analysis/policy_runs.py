@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from analysis.cost_model import CostParameters, Ledger, cycle_seconds
-from analysis.observation import Shown
+from analysis.quality import Shown
 from analysis.records import InvariantCheck, RecordLimits
 from tsar.config import StagesName, TsarConfig, closed_choices
 from tsar.policies import POLICIES

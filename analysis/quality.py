@@ -10,7 +10,7 @@ Source: Stephens 2011, sec. 7.2.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -22,13 +22,36 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.cli import InputError
-from tsar.types import Display
+from tsar.types import Display, StepRecord
 
 WHISKERS = 1.5
 """Interquartile ranges beyond the box at which whiskers end at the latest, in tables and figures."""
 
 Floats = NDArray[np.float64]
 Payload = TypeVar("Payload")
+
+
+Shown = tuple[StepRecord | None, Display]
+"""A record, where the policy makes any, and its image."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What all displays show at one reference time.
+
+    Attributes:
+        number: of the reference time.
+        time_s: simulated time.
+        reference: ``(h, w, 3)`` linear RGB.
+        shown: by name of the run; records and images of the cycles whose images are on the displays.
+        mse: mean squared error of each.
+    """
+
+    number: int
+    time_s: float
+    reference: Tensor
+    shown: Mapping[str, Shown]
+    mse: Mapping[str, float]
 
 
 def reference_times(start_s: float, end_s: float, rate_hz: float) -> Floats:

@@ -12,7 +12,6 @@ import numpy as np
 from PIL import Image, ImageDraw
 from torch import Tensor
 
-from analysis.observation import View
 from analysis.pictures import (
     AGE_MAP,
     DENSITY_MAP,
@@ -25,7 +24,7 @@ from analysis.pictures import (
     tiling_image,
     with_scale,
 )
-from analysis.quality import encode
+from analysis.quality import View, encode
 
 INK, PAPER = (235, 235, 235), (24, 24, 24)
 OWN = (255, 176, 64)

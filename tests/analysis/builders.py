@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from analysis.observation import View
+from analysis.quality import View
 from analysis.records import RecordLimits
 from analysis.video import Scales
 from tsar.types import Densities, Display, Errors, SampleMap, StepRecord, Tiling

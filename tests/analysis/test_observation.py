@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.causes import Truths
-from analysis.observation import Measuring, Seen, Shown, View, watch
+from analysis.observation import Measuring, Seen, watch
+from analysis.quality import Shown, View
 from tests.analysis.builders import good_record
 from tsar.types import Display, SampleMap
 

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
-from analysis.observation import View
 from analysis.pictures import AGE_MAP, palette
+from analysis.quality import View
 from analysis.video import OWN, PAPER, RIVALS, ComparisonFilm, draw_errors, inks, maps, photographs, to_pixels
 from renderer.film import Mp4Writer
 from tests.analysis.builders import SCALES, grey, view
