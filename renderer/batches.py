@@ -9,11 +9,12 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from renderer import kernels, packets
-from renderer.buffers import SceneBuffers
-from renderer.launching import Command, address
-from renderer.structs import ViewData
-from renderer.team import TEAM
+from renderer.compute.launching import Command, address
+from renderer.compute.team import TEAM
+from renderer.kernels import entry as kernels
+from renderer.kernels import packets
+from renderer.layout.structs import ViewData
+from renderer.tables.buffers import SceneBuffers
 
 
 class PacketBatches:

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 from torch import Tensor
 
-from renderer.sampling import SamplePlan
+from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 from tsar.morton import deinterleave
 from tsar.types import FrameletBatch

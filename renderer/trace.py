@@ -11,19 +11,20 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from renderer import device as devices
-from renderer import kernels
-from renderer import packets as packet_kernels
-from renderer.accelerators import STRUCTURES, Structure
 from renderer.batches import PacketBatches
-from renderer.buffers import build_buffers
-from renderer.checks import check_frame_size
-from renderer.features import ALL, PACKETS, Feature, required
-from renderer.launching import shared
-from renderer.origin import near_origin
-from renderer.shading import stack_size
-from renderer.structs import Ray, ViewData
-from renderer.viewing import camera_view, check_camera
+from renderer.compute import device as devices
+from renderer.compute.launching import shared
+from renderer.kernels import entry as kernels
+from renderer.kernels import packets as packet_kernels
+from renderer.kernels.shading import stack_size
+from renderer.layout.features import ALL, PACKETS, Feature
+from renderer.layout.structs import Ray, ViewData
+from renderer.tables.accelerators import STRUCTURES, Structure
+from renderer.tables.buffers import build_buffers
+from renderer.tables.checks import check_frame_size
+from renderer.tables.origin import near_origin
+from renderer.tables.requirements import required
+from renderer.tables.viewing import camera_view, check_camera
 from scenes.canonical import Scene
 from tsar.types import FrameletBatch, SampleBatch
 

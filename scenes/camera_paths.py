@@ -9,8 +9,8 @@ import numpy as np
 
 from scenes.arithmetic import cos, norm, product, rotation_about
 from scenes.canonical import Mesh, PerspectiveCamera, Scene, SceneError
-from scenes.formats.meshed import as_mesh
-from scenes.values import RigidTrack
+from scenes.canonical.values import RigidTrack
+from scenes.formats.geometry.meshed import as_mesh
 
 CameraPath = Literal["turntable", "fly-through"]
 TURN_S = 8.0

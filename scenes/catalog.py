@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scenes import effects, report
 from scenes.canonical import Scene, SceneError
-from scenes.driving import ANIMATIONS
-from scenes.driving import load as load_driving
+from scenes.driving.animations import ANIMATIONS
+from scenes.driving.animations import load as load_driving
+from scenes.effects import report_images as report
+from scenes.effects import scenes as effects
 from scenes.loading import asset
 
 NAMES: tuple[str, ...] = tuple(ANIMATIONS)
@@ -47,8 +48,8 @@ def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]
         SceneError: it cannot be read.
     """
     from scenes.camera_paths import on_a_path
-    from scenes.formats.approximation import drawable
     from scenes.formats.conversion import load_scene_file
+    from scenes.formats.drawable import drawable
     from scenes.formats.losses import LossReport
 
     losses = LossReport()
@@ -72,7 +73,7 @@ def load(name: str, phase: float = 0.0) -> Scene:
 
     Args:
         name: one of :func:`all_names`, or the place of a driving scene among :data:`NAMES`.
-        phase: of the animation of a driving scene, for repetitions; see :func:`scenes.driving.load`.
+        phase: of the animation of a driving scene, for repetitions; see :func:`scenes.driving.animations.load`.
 
     Raises:
         SceneError: there is none of that name, or the phase is not in [0, 1) or another than 0 for a scene without.
@@ -87,7 +88,7 @@ def load(name: str, phase: float = 0.0) -> Scene:
     if phase != 0.0:
         raise SceneError(f"phase: expected 0 for the scene {found}, which has no phases, got {phase}")
     if found in BLUR_SCENES:
-        from scenes.formats.blocks import load_blocks
+        from scenes.formats.blocks.read import load_blocks
 
         return load_blocks(blur_scene_file(found))[0]
     return report.load(found) if found in report.IMAGES else effects.load(found)

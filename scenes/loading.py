@@ -13,7 +13,7 @@ from PIL import Image
 
 from scenes.arithmetic import power
 from scenes.canonical import Mesh, SceneError
-from scenes.values import vertices_of
+from scenes.canonical.values import vertices_of
 
 ASSETS = Path(__file__).parent / "assets"
 

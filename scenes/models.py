@@ -22,8 +22,8 @@ from scenes.canonical import (
     SceneError,
     Texture,
 )
+from scenes.canonical.values import vertices_of
 from scenes.loading import FileState, decode_srgb, one_line, state_of
-from scenes.values import vertices_of
 
 MODEL_ENDINGS = (".obj", ".ply", ".stl", ".glb", ".gltf")
 _DEFAULT = Phong(ConstantTexture((0.5, 0.5, 0.5)))

@@ -13,25 +13,26 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import atomic, own_folder, write_json
-from analysis.tracer_options import AcceleratorOptions
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.ownership import own_folder
+from analysis.storage.files import atomic, write_json
+from analysis.tracer.options import AcceleratorOptions
 
 
 def main() -> None:
     """Parses, measures or renders, prints a table or what each image took."""
 
     options = parse(AcceleratorOptions, __doc__ or "")
-    from analysis.accelerators import lines, render_report_image, table
+    from analysis.tracer.accelerators import lines, render_report_image, table
 
     with bad_input():
         own_folder(options.out, "out")
-    from analysis.plots import save
-    from analysis.plots_accelerators import tests_figure
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from analysis.tables import frame_table
-    from renderer.film import FilmError, write_image
+    from analysis.command.console import frame_table
+    from analysis.command.progress import bars
+    from analysis.page.figures import save
+    from analysis.storage.records import provenance
+    from analysis.tracer.plots_accelerators import tests_figure
+    from renderer.film.files import FilmError, write_image
 
     config = dataclasses.asdict(options)
     found: dict = {"config": config, "provenance": provenance(Path(__file__).parent.parent, config, seed=options.seed)}

@@ -12,21 +12,21 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.bench import BenchOptions
-from analysis.cli import bad_input, parse, run_cli
+from analysis.bench.turns import BenchOptions
+from analysis.command.cli import bad_input, parse, run_cli
 
 
 def main() -> None:
     """Parses, measures or compares, and prints one table."""
     options = parse(BenchOptions, __doc__ or "")
-    from analysis.bench_table import comparison_table, console, rows_table
+    from analysis.bench.table import comparison_table, console, rows_table
 
     if options.compare is not None:
         with bad_input():
             table = comparison_table(*options.compare)
         console().print(table)
         return
-    from analysis.bench_run import run_bench
+    from analysis.bench.run import run_bench
 
     found = run_bench(options)
     shown = console()

@@ -13,10 +13,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, parse, run_cli
-from analysis.conversion_check import CheckOptions
-from analysis.extras import require_extra
-from analysis.files import atomic, own_folder, write_json
+from analysis.command.cli import bad_input, parse, run_cli
+from analysis.command.extras import require_extra
+from analysis.command.ownership import own_folder
+from analysis.conversion.check import CheckOptions
+from analysis.storage.files import atomic, write_json
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -29,10 +30,10 @@ def main() -> None:
         own_folder(options.out, "out")
     import pandas as pd
 
-    from analysis.conversion_check import checked
-    from analysis.conversion_markers import marker_offsets
-    from analysis.progress import bars
-    from analysis.records import provenance
+    from analysis.command.progress import bars
+    from analysis.conversion.check import checked
+    from analysis.conversion.markers import marker_offsets
+    from analysis.storage.records import provenance
 
     config = dataclasses.asdict(options)
     with bad_input(), bars() as shown:

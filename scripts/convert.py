@@ -13,9 +13,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, parse, run_cli
-from analysis.convert_options import ConvertOptions
-from analysis.files import write_json
+from analysis.command.cli import bad_input, parse, run_cli
+from analysis.conversion.options import ConvertOptions
+from analysis.storage.files import write_json
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def main() -> None:
     """Parses, reads, writes, and prints what was lost."""
     options = parse(ConvertOptions, __doc__ or "")
-    from analysis.records import provenance
+    from analysis.storage.records import provenance
     from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
     from scenes.formats.losses import LossReport
 

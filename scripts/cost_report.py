@@ -11,21 +11,21 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import parse, run_cli
-from analysis.cost_options import CostReportOptions
+from analysis.command.cli import parse, run_cli
+from analysis.cost_report.options import CostReportOptions
 
 
 def main() -> None:
     """Parses, evaluates, measures, prints tables and where the files are."""
     options = parse(CostReportOptions, __doc__ or "")
-    from analysis.cost_report import write_report
+    from analysis.cost_report.run import write_report
 
     summary = write_report(options)
 
     from rich.table import Table
 
-    from analysis.cost_tables import tables
-    from analysis.tables import console
+    from analysis.command.console import console
+    from analysis.cost_report.tables import tables
 
     shown = console()
     for found in tables(summary):

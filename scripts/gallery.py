@@ -11,23 +11,24 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import own_folder, write_json
-from analysis.tracer_options import GalleryOptions
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.ownership import own_folder
+from analysis.storage.files import write_json
+from analysis.tracer.options import GalleryOptions
 
 
 def main() -> None:
     """Parses, renders, prints what each picture took."""
 
     options = parse(GalleryOptions, __doc__ or "")
-    from analysis.gallery import render_gallery, sample_plan
+    from analysis.tracer.gallery import render_gallery, sample_plan
 
     with bad_input():
         plan = sample_plan(options)
         own_folder(options.out, "out")
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from renderer.film import FilmError
+    from analysis.command.progress import bars
+    from analysis.storage.records import provenance
+    from renderer.film.files import FilmError
 
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
         found = render_gallery(options, plan, shown.task)

@@ -12,10 +12,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, parse, require_unbroken, run_cli
-from analysis.experiment import ROOT, finished, run_experiment
-from analysis.files import own_folder, plain, write_json
-from analysis.repetitions import InputsOptions, row
+from analysis.command.cli import bad_input, parse, require_unbroken, run_cli
+from analysis.command.ownership import own_folder
+from analysis.comparison.experiment import ROOT, finished, run_experiment
+from analysis.comparison.repetitions import InputsOptions, row
+from analysis.storage.files import plain, write_json
 
 
 def main() -> None:
@@ -31,7 +32,7 @@ def main() -> None:
         percentile = f"{rows[-1]['suitable_percentile']:.0f}"
         print(f"| {rows[-1]['run']} | {rows[-1]['ratio_median']:.3f} | {low:.3f} – {high:.3f} | {percentile} |")
 
-    from analysis.records import provenance
+    from analysis.storage.records import provenance
 
     config = dataclasses.asdict(options)
     source = provenance(ROOT, config, seed=options.tsar.seed, device="cpu")

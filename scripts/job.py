@@ -13,23 +13,24 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import own_folder, write_json
-from analysis.tracer_options import JobOptions
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.ownership import own_folder
+from analysis.storage.files import write_json
+from analysis.tracer.options import JobOptions
 
 
 def main() -> None:
     """Parses, renders what is missing, prints how much that was."""
 
     options = parse(JobOptions, __doc__ or "")
-    from analysis.jobs import prepare, run_job
+    from analysis.tracer.jobs import prepare, run_job
 
     with bad_input():
         work = prepare(options)
         own_folder(options.out, "out")
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from renderer.film import FilmError
+    from analysis.command.progress import bars
+    from analysis.storage.records import provenance
+    from renderer.film.files import FilmError
 
     config = dataclasses.asdict(options)
     source = provenance(Path(__file__).parent.parent, config, scene=work.settings.name, seed=options.seed)

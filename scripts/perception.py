@@ -16,9 +16,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.extras import require_extra
-from analysis.files import own_folder, write_json
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.extras import require_extra
+from analysis.command.ownership import own_folder
 from analysis.perception.options import (
     AdaptiveOptions,
     RecoverOptions,
@@ -27,6 +27,7 @@ from analysis.perception.options import (
     Step,
     StimuliOptions,
 )
+from analysis.storage.files import write_json
 
 ROOT = Path(__file__).resolve().parent.parent
 NEEDS = {SimulateOptions: ("perception",), AdaptiveOptions: ("study", "perception")}
@@ -38,10 +39,10 @@ def main() -> None:
     require_extra(*NEEDS.get(type(options), ()))
     with bad_input():
         own_folder(options.out, "out")
+    from analysis.command.progress import bars
     from analysis.perception import steps
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from renderer.film import FilmError
+    from analysis.storage.records import provenance
+    from renderer.film.files import FilmError
 
     config = dataclasses.asdict(options)
     source = provenance(ROOT, config, seed=options.seed)

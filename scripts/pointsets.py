@@ -12,29 +12,30 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import atomic, own_folder, write_json
-from analysis.tracer_options import PointSetOptions
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.ownership import own_folder
+from analysis.storage.files import atomic, write_json
+from analysis.tracer.options import PointSetOptions
 
 
 def main() -> None:
     """Parses, measures, draws, prints tables."""
 
     options = parse(PointSetOptions, __doc__ or "")
-    from analysis.point_sets import INTEGRANDS, SETS, blurred_frames, mean_errors, measure, slopes
+    from analysis.tracer.point_sets import INTEGRANDS, SETS, blurred_frames, mean_errors, measure, slopes
 
     with bad_input():
         own_folder(options.out, "out")
     import numpy as np
 
-    from analysis import plots_point_sets as plots
-    from analysis.plots import save
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from analysis.tables import frame_table
-    from renderer.film import encode_srgb
-    from renderer.point_sets import point_set
-    from renderer.sampling import box_warp, gaussian_warp, triangle_warp
+    from analysis.command.console import frame_table
+    from analysis.command.progress import bars
+    from analysis.page.figures import save
+    from analysis.storage.records import provenance
+    from analysis.tracer import plots_point_sets as plots
+    from renderer.film.files import encode_srgb
+    from renderer.sampling.plan import box_warp, gaussian_warp, triangle_warp
+    from renderer.sampling.point_sets import point_set
 
     config, count = dataclasses.asdict(options), itertools.count(1)
     with full_disk(options.out), bars() as shown:

@@ -14,16 +14,17 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.files import own_folder, write_json
-from analysis.render_options import RenderOptions
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.ownership import own_folder
+from analysis.storage.files import write_json
+from analysis.tracer.render_options import RenderOptions
 
 
 def main() -> None:
     """Parses, renders, prints what was written where."""
     options = parse(RenderOptions, __doc__ or "")
-    from renderer.checks import check_frame_size
-    from renderer.kernels import explanation
+    from renderer.kernels.entry import explanation
+    from renderer.tables.checks import check_frame_size
     from scenes import catalog
 
     with bad_input():
@@ -36,15 +37,15 @@ def main() -> None:
         check_frame_size(options.width_px, options.height_px, 1 if options.samples else options.samples_per_axis)
         own_folder(options.out, "out")
 
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from analysis.reference import content_hash
-    from analysis.source import code_hash
-    from analysis.stills import render_stills
-    from renderer.film import FilmError
+    from analysis.command.progress import bars
+    from analysis.storage.records import provenance
+    from analysis.storage.reference import content_hash
+    from analysis.storage.source import code_hash
+    from analysis.tracer.stills import render_stills
+    from renderer.film.files import FilmError
+    from renderer.film.sequence import still_path, write_film
     from renderer.frames import pictures
-    from renderer.sampling import SamplePlan
-    from renderer.sequence import still_path, write_film
+    from renderer.sampling.plan import SamplePlan
     from renderer.trace import Renderer
 
     with bad_input():

@@ -10,10 +10,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import parse, require_unbroken, run_cli
-from analysis.experiment import run_experiment
-from analysis.run_options import RunOptions
-from analysis.start import process_began_s
+from analysis.command.cli import parse, require_unbroken, run_cli
+from analysis.command.start import process_began_s
+from analysis.comparison.experiment import run_experiment
+from analysis.comparison.options import RunOptions
 
 
 def main() -> None:
@@ -23,7 +23,7 @@ def main() -> None:
 
     from rich.table import Table
 
-    from analysis.tables import console
+    from analysis.command.console import console
 
     title = f"{options.input}: {summary['policy']}, ledger {summary['ledger']}"
     table = Table(title=title, show_header=False, title_justify="left")

@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import tyro
 
-from analysis.cli import bad_input, parse, run_cli
-from analysis.sameness import compare_folders
+from analysis.command.cli import bad_input, parse, run_cli
+from analysis.storage.sameness import compare_folders
 
 EXIT_DIFFERENT = 1
 

@@ -13,10 +13,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, require_unbroken, run_cli
-from analysis.extras import require_extra
-from analysis.files import atomic, own_folder, writable_folder, write_json
-from analysis.sensitivity import AXES, BEST, SensitivityOptions, optimum_table, runs, setting_table, sweeps
+from analysis.command.cli import bad_input, full_disk, parse, require_unbroken, run_cli
+from analysis.command.extras import require_extra
+from analysis.command.ownership import own_folder, writable_folder
+from analysis.sensitivity.study import AXES, BEST, SensitivityOptions, optimum_table, runs, setting_table, sweeps
+from analysis.storage.files import atomic, write_json
 
 
 def main() -> None:
@@ -29,11 +30,11 @@ def main() -> None:
         writable_folder(options.cache, "cache")
     import pandas as pd
 
-    from analysis.evaluation import ROOT, Place, broken, finished, times_of
-    from analysis.farm import describe_failures, run_cases
-    from analysis.plots_sensitivity import write_all
-    from analysis.progress import bars
-    from analysis.records import provenance
+    from analysis.command.progress import bars
+    from analysis.sensitivity.plots import write_all
+    from analysis.storage.records import provenance
+    from analysis.study.evaluation import ROOT, Place, broken, finished, times_of
+    from analysis.study.farm import describe_failures, run_cases
 
     out, config = options.out.resolve(), dataclasses.asdict(options)
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)

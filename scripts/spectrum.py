@@ -15,20 +15,20 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import parse, run_cli
-from analysis.spectrum import SpectrumOptions
+from analysis.command.cli import parse, run_cli
+from analysis.spectrum.spectra import SpectrumOptions
 
 
 def main() -> None:
     """Parses, measures, prints what came out and where it is."""
     options = parse(SpectrumOptions, __doc__ or "")
-    from analysis.spectrum_study import run_study
+    from analysis.spectrum.run import run_study
 
     summary = run_study(options)
 
     from rich.table import Table
 
-    from analysis.tables import console
+    from analysis.command.console import console
 
     shown = console()
     for title, columns, rows in tables(summary):

@@ -12,21 +12,21 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import parse, require_unbroken, run_cli
-from analysis.extras import require_extra
-from analysis.suitability import SuitabilityOptions
+from analysis.command.cli import parse, require_unbroken, run_cli
+from analysis.command.extras import require_extra
+from analysis.suitability.study import SuitabilityOptions
 
 
 def main() -> None:
     """Runs what is missing; prints the tables."""
     options = parse(SuitabilityOptions, __doc__ or "")
     require_extra("study", "perception")
-    from analysis.suitability_report import study
+    from analysis.suitability.run import study
 
     summary, tables = study(options)
 
-    from analysis.suitability_report import console_tables
-    from analysis.tables import console
+    from analysis.command.console import console
+    from analysis.suitability.run import console_tables
 
     shown = console(max(110, console().width))
     for table in console_tables(tables):

@@ -14,30 +14,31 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.cli import bad_input, full_disk, parse, run_cli
-from analysis.extras import require_extra
-from analysis.farm import FarmOptions, connected
-from analysis.files import own_folder, write_json
-from analysis.tracer_options import TileOptions
+from analysis.command.cli import bad_input, full_disk, parse, run_cli
+from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.extras import require_extra
+from analysis.command.ownership import own_folder
+from analysis.storage.files import write_json
+from analysis.tracer.options import TileOptions
 
 
 def main() -> None:
     """Parses, renders or measures, prints what it took."""
     options = parse(TileOptions, __doc__ or "")
     require_extra("study")
-    from analysis.tiles import chunks_of, picture_of, render_resumed
+    from analysis.tracer.tiles import chunks_of, picture_of, render_resumed
 
-    farm = FarmOptions(workers=max(options.study)) if options.study else options.farm
+    farm = ClusterOptions(workers=max(options.study)) if options.study else options.farm
     with bad_input():
         picture = picture_of(options, 1 if options.study else farm.threads)
         own_folder(options.out, "out")
     import pandas as pd
 
-    from analysis.progress import bars
-    from analysis.records import provenance
-    from analysis.tables import frame_table
-    from analysis.tile_speedup import study
-    from renderer.film import FilmError, write_image
+    from analysis.command.console import frame_table
+    from analysis.command.progress import bars
+    from analysis.storage.records import provenance
+    from analysis.tracer.tile_speedup import study
+    from renderer.film.files import FilmError, write_image
 
     root, config = Path(__file__).parent.parent, dataclasses.asdict(options)
     chunks = chunks_of(picture, options.chunk_tiles)

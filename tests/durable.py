@@ -49,7 +49,7 @@ def call(name: str, *arguments: str) -> int:
     """Runs the main function of a script, as from the command line; the exit status."""
     import importlib
 
-    from analysis.cli import run_cli
+    from analysis.command.cli import run_cli
 
     module = importlib.import_module(f"scripts.{name}")
     with patch.object(sys, "argv", [name, *arguments]):
@@ -96,7 +96,7 @@ def _image(time_s: float) -> torch.Tensor:
 
 
 def _obtained(folder: Path, render: Callable[[float], torch.Tensor] = _image) -> Any:
-    from analysis.reference import ReferenceSpec, obtain
+    from analysis.storage.reference import ReferenceSpec, obtain
 
     spec = ReferenceSpec("s", "h", "r", start_s=0.5, rate_hz=10.0, count=8, resolution_px=8, samples_per_axis=1)
     return obtain(folder / "cache", spec, render, lambda done, count: None)
@@ -124,14 +124,14 @@ def _half_a_reference(folder: Path) -> None:
 
 
 def _case() -> Any:
-    from analysis.cases import Case, Scale, framed_config
+    from analysis.study.cases import Case, Scale, framed_config
 
     scale = Scale(4, seconds=0.2, reference_rate_hz=30.0, reference_samples_per_axis=1, stride=2)
     return Case("fly-by", "framed", framed_config(64), scale, stills_s=(0.1,))
 
 
 def _evaluated(folder: Path) -> int:
-    from analysis import evaluation
+    from analysis.study import evaluation
 
     evaluation._store.cache_clear()  # as in a new process
     place = evaluation.Place(folder / "runs", folder / "cache")
@@ -144,7 +144,7 @@ _TINY = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", "16", "--w
 
 
 def _inputs(folder: Path) -> int:
-    from analysis import records
+    from analysis.storage import records
 
     provenance = records.provenance
 
@@ -154,13 +154,13 @@ def _inputs(folder: Path) -> int:
     with ExitStack() as stack:
         stack.enter_context(patch.object(records, "provenance", committed))
         runs = _in_cache(folder)
-        stack.enter_context(patch("analysis.repetitions.InputsOptions.runs", runs))
+        stack.enter_context(patch("analysis.comparison.repetitions.InputsOptions.runs", runs))
         return call("inputs", "fly-by", "--repetitions", "2", *_TINY, "--out", str(folder / "out"))
 
 
 def _in_cache(folder: Path) -> Callable[[Any], list[Any]]:
     """The runs of a table, with small references in the folder."""
-    from analysis.repetitions import InputsOptions
+    from analysis.comparison.repetitions import InputsOptions
 
     listed = InputsOptions.runs
     small = {"cache": folder / "cache", "reference_samples_per_axis": 1}
@@ -196,13 +196,14 @@ def _stimuli(folder: Path) -> int:
 
 def _tiles(folder: Path) -> int:
     """Without a cluster: chunks come from this process."""
-    from analysis.tiles import render_chunk
+    from analysis.tracer.tiles import render_chunk
 
     def rendered(client: Any, picture: Any, chunks: list[range]) -> Iterator[tuple[int, Any]]:
         yield from ((number, render_chunk(picture, chunk)) for number, chunk in enumerate(chunks))
 
     size = ("--width-px", "48", "--height-px", "32", "--samples", "4", "--chunk-tiles", "1")
-    with patch("scripts.tiles.connected", lambda farm: nullcontext()), patch("analysis.tiles.rendered", rendered):
+    alone = patch("scripts.tiles.connected", lambda farm: nullcontext())
+    with alone, patch("analysis.tracer.tiles.rendered", rendered):
         return call("tiles", "plain", *size, "--out", str(folder / "out"))
 
 
@@ -214,7 +215,7 @@ def _session_files(folder: Path) -> None:
 
 def _session(folder: Path) -> int:
     """Shows every stimulus, and answers the trials that are open."""
-    from analysis.cli import InputError, bad_input
+    from analysis.command.cli import InputError, bad_input
     from analysis.perception.protocol import Session
 
     try:

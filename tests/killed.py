@@ -56,13 +56,14 @@ def main(name: str, root: Path, kills: int, seed: int) -> None:
     """Makes, kills, goes on."""
     # imported once, before anything runs that starts threads: a fork has none of them
     for module in (
-        "analysis.evaluation",
-        "analysis.jobs",
+        "analysis.study.evaluation",
+        "analysis.tracer.jobs",
         "analysis.perception.stimuli",
         "analysis.perception.protocol",
     ):
         importlib.import_module(module)
-    for module in ("analysis.tiles", "analysis.video", "renderer.frames", "renderer.trace", "scenes.catalog"):
+    heavy = "analysis.tracer.tiles", "analysis.page.video", "renderer.frames", "renderer.trace", "scenes.catalog"
+    for module in heavy:
         importlib.import_module(module)
 
     def fresh(folder: Path) -> Path:

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.cases import ROWS, SCALES, Case, framed_config
-from analysis.cli import InputError, require_unbroken
-from analysis.evaluation import Place, broken, finished
-from analysis.farm import FarmOptions, describe_failures, run_cases
+from analysis.command.cli import InputError, require_unbroken
+from analysis.command.cluster import ClusterOptions
 from analysis.perception.observers import Observer, correct_probability
 from analysis.perception.options import AdaptiveOptions
 from analysis.perception.psychometrics import THRESHOLD
+from analysis.study.cases import ROWS, SCALES, Case, framed_config
+from analysis.study.evaluation import Place, broken, finished
+from analysis.study.farm import describe_failures, run_cases
 from tsar.config import TsarConfig
 
 SIDE_PX = 512
@@ -44,7 +45,7 @@ def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFram
                 case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
                 cases[name, row, policy] = case
     place = Place(options.out / "runs", Path(options.cache))
-    keys, failures = run_cases(list(cases.values()), place, FarmOptions(options.workers), done)
+    keys, failures = run_cases(list(cases.values()), place, ClusterOptions(options.workers), done)
     if failures:
         for line in describe_failures({case.name: reason for case, reason in failures.items()}):
             print(line, file=sys.stderr)

@@ -18,8 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from analysis.cli import InputError
-from analysis.files import atomic
+from analysis.command.cli import InputError
+from analysis.storage.files import atomic
 
 _TABLES = """
 create table session (id integer primary key, identity text not null, token text not null,

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 import tyro
 
-from analysis import limits
-from analysis.cases import INPUTS
-from analysis.display_model import DisplayModel
+from analysis.command import limits
+from analysis.metrics.display_model import DisplayModel
+from analysis.study.cases import INPUTS
 from tsar.config import closed_choices, require
 
 _ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"

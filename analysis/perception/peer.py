@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.cli import InputError
-from analysis.extras import require_extra
+from analysis.command.cli import InputError
+from analysis.command.extras import require_extra
 from analysis.perception.psychometrics import THRESHOLD
 
 

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.cli import InputError
-from analysis.files import atomic, owned
+from analysis.command.cli import InputError
+from analysis.command.ownership import owned
 from analysis.perception.answers import Answers, answers_of_lines
 from analysis.perception.observers import COLUMNS
 from analysis.perception.stimuli import COLUMNS as STIMULUS
 from analysis.perception.stimuli import check_frames, png_of, read_manifest
+from analysis.storage.files import atomic
 
 HUMAN_TASK = "dual pair"
 TABLE = "trials-human.parquet"

@@ -24,7 +24,7 @@ from tornado.iostream import IOStream
 from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 
-from analysis.cli import InputError
+from analysis.command.cli import InputError
 from analysis.perception.protocol import Session
 
 HOST = "127.0.0.1"

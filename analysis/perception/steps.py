@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.cli import InputError
-from analysis.files import atomic
+from analysis.command.cli import InputError
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
 from analysis.perception.observers import TASK, drawn_observers, simulated_trials
@@ -27,7 +26,8 @@ from analysis.perception.protocol import Session
 from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, read_manifest, render_stimuli
 from analysis.perception.trials import CONDITIONS, checked_trials
-from analysis.tracer_options import LEVELS
+from analysis.storage.files import atomic
+from analysis.tracer.options import LEVELS
 
 Task = Callable[[str, int], Callable[[int], None]]
 Found = tuple[dict[str, Any], str]
@@ -67,7 +67,7 @@ def simulate(options: SimulateOptions, task: Task) -> Found:
     table = pd.DataFrame(sweep)
     with atomic(options.out / "sigma_sweep.csv") as path:
         table.to_csv(path, index=False)
-    from analysis.plots import save
+    from analysis.page.figures import save
 
     save(plots.sweep_figure(table, list(dict.fromkeys(jod["scene"]))), options.out / "sigma_sweep.png")
     found = {
@@ -179,7 +179,7 @@ def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame
     """Figures 19 and 20 by scene, 21 to 23 by set, 24 and 25 of all of both; all of the first filter alone, and one of
     the filters where there are several.
     """
-    from analysis.plots import save
+    from analysis.page.figures import save
 
     filters = list(dict.fromkeys(trials["time_filter"]))
     alone = trials.loc[trials["time_filter"] == filters[0]]

@@ -15,15 +15,15 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image
 
-from analysis.cli import InputError
-from analysis.display_model import DisplayModel
-from analysis.files import write_json
-from analysis.jobs import prepare, run_job
+from analysis.command.cli import InputError
+from analysis.metrics.display_model import DisplayModel
 from analysis.perception.options import StimuliOptions
-from analysis.reference import content_hash
-from analysis.source import code_hash
-from analysis.store import Store
-from analysis.tracer_options import JobOptions
+from analysis.storage.files import write_json
+from analysis.storage.reference import content_hash
+from analysis.storage.source import code_hash
+from analysis.storage.store import Store
+from analysis.tracer.jobs import prepare, run_job
+from analysis.tracer.options import JobOptions
 
 MANIFEST = "manifest.json"
 COLUMNS = ("scene", "point_set", "time_filter", "samples", "folder", "files", "sha256")
@@ -82,7 +82,7 @@ def render_stimuli(options: StimuliOptions, task: Callable[[str, int], Callable[
 
 def _film(files: Sequence[Path], rate_hz: float) -> dict[str, str]:
     """Joins frames into a film that keeps every value, unless it is on disk; its name and hash."""
-    from renderer.sequence import write_lossless
+    from renderer.film.sequence import write_lossless
 
     code = code_hash(write_lossless, read_frame)
     store, name = Store(files[0].parent, content_hash((hash_of(files), rate_hz, code))), "stimulus.mkv"
@@ -132,7 +132,7 @@ def read_frame(file: Path) -> NDArray[np.uint8]:
     if file.suffix == ".exr":
         import torch
 
-        from renderer.film import encode_srgb, read_exr
+        from renderer.film.files import encode_srgb, read_exr
 
         return encode_srgb(torch.as_tensor(read_exr(file)))
     return np.asarray(Image.open(file).convert("RGB"))
@@ -188,7 +188,7 @@ def differences(
         tick: called after each.
         total: told how many there are.
     """
-    from analysis.perceptual import jod
+    from analysis.metrics.perceptual import jod
 
     manifest, code = read_manifest(folder), code_hash(jod)
     kept_file = folder / "jod.json"

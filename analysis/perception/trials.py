@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.cli import InputError
+from analysis.command.cli import InputError
 from analysis.perception.observers import COLUMNS
 
 CONDITIONS = ("scene", "point_set", "time_filter")

@@ -8,13 +8,13 @@ from typing import Literal
 
 from scenes.canonical import Scene, SceneError
 from scenes.formats.losses import LossReport
-from scenes.formats.luxrender import load_luxrender
-from scenes.formats.luxrender_export import save_luxrender
-from scenes.formats.mitsuba import load_mitsuba
-from scenes.formats.mitsuba_export import save_mitsuba, save_mitsuba3
-from scenes.formats.output import Output
-from scenes.formats.pbrt import load_pbrt
-from scenes.formats.pbrt_export import save_pbrt
+from scenes.formats.luxrender.read import load_luxrender
+from scenes.formats.luxrender.write import save_luxrender
+from scenes.formats.mitsuba.read import load_mitsuba
+from scenes.formats.mitsuba.write import save_mitsuba, save_mitsuba3
+from scenes.formats.pbrt.read import load_pbrt
+from scenes.formats.pbrt.write import save_pbrt
+from scenes.formats.text.output import Output
 
 FormatName = Literal["pbrt", "luxrender", "mitsuba", "mitsuba3"]
 

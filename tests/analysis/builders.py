@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from analysis.quality import View
-from analysis.records import RecordLimits
-from analysis.video import Scales
+from analysis.metrics.quality import View
+from analysis.page.video import Scales
+from analysis.storage.records import RecordLimits
 from tsar.types import Densities, Display, Errors, SampleMap, StepRecord, Tiling
 
 SPATIAL, TEMPORAL = (0.25, 64.0), (1 / 64, 1.0)

@@ -13,11 +13,11 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from analysis.player import Curve, Player, Step, data
-from analysis.report import Report, Table, png_bytes, write_report
-from analysis.video import maps, photographs
+from analysis.page.player import Curve, Player, Step, data
+from analysis.page.report import Report, Table, png_bytes, write_report
+from analysis.page.video import maps, photographs
 from tests.analysis.builders import SCALES, view
-from tests.analysis.test_report import EVIL
+from tests.analysis.page.test_report import EVIL
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 LABELS = [*photographs(view(), 96), *maps(view(), "own", SCALES, 96)]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from renderer import device, kernels, packets
+from renderer.compute import device
+from renderer.kernels import entry as kernels
+from renderer.kernels import packets
 from renderer.trace import Renderer
 from tests.renderer.builders import driving_scene
 

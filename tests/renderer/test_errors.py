@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from renderer import device
+from renderer.compute import device
 from renderer.trace import Renderer
 from scenes.canonical import (
     CheckerboardTexture,

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import torch
 
-from analysis.cases import SCALES
-from analysis.causes import Truths
-from analysis.observation import Measuring, watch
-from renderer.control import stages
+from analysis.metrics.causes import Truths
+from analysis.study.cases import SCALES
+from analysis.study.displays import Measuring, watch
 from renderer.frames import render_image
-from renderer.sampling import SamplePlan
+from renderer.sampling.plan import SamplePlan
+from renderer.stages.control import stages
 from renderer.trace import Renderer
 from scenes.canonical import Scene
 from tests.oracles import runs

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from renderer.features import Feature
 from renderer.frames import TILE_PX, place_tiles, render_image, render_tiles, tile_count, tile_pixels
-from renderer.sampling import SamplePlan
+from renderer.layout.features import Feature
+from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
-from scenes import effects
 from scenes.canonical import Emissive, Instance, PerspectiveCamera, Rectangle, RigidTrack, Scene
+from scenes.effects import scenes as effects
 from tests.renderer.builders import place
 from tsar.types import FrameletBatch
 
@@ -31,7 +31,7 @@ def lens():
 def packets():
     """A scene that packets can trace."""
     renderer = Renderer(effects.load("moving-object"))
-    assert renderer.packets
+    assert renderer.kernels.packets
     yield renderer
     renderer.close()
 

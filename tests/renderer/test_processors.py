@@ -106,8 +106,8 @@ from scenes.canonical import SunSky
 from scenes.daylight import sky_map, sun_light
 from scenes.loading import decode_srgb
 from scenes.models import read_model
-from renderer import sampling
-from renderer.film import encode_srgb
+from renderer.sampling import plan as sampling
+from renderer.film.files import encode_srgb
 from renderer.materials import mip_levels
 from typing import get_args
 from renderer.point_sets import PointSet, point_set
@@ -138,7 +138,7 @@ def test_a_scene_its_tables_daylight_points_and_pictures_are_of_the_same_bits() 
 PIPELINE = (
     HASHED
     + """
-from renderer.control import compiled_stages
+from renderer.stages.control import compiled_stages
 from renderer.trace import Renderer
 from scenes import catalog
 from tests.oracles.runs import play

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from scenes.animation import pose_at
 from scenes.canonical import Instance, Matrix, Mesh, PerspectiveCamera, RigidTrack, Scene
-from scenes.meshing import Surface
+from scenes.driving.meshing import Surface
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ ANGLES = np.random.default_rng(0).uniform(-20.0, 20.0, 1000)
 SHARES = np.random.default_rng(1).uniform(-1.0, 1.0, 1000)
 
 TABLES = "blue_noise buffers light_table materials merging meshes origin point_sets sampling tracks viewing".split()
-LEFT = ("scenes/formats/recognition.py", "scenes/arithmetic.py")
+LEFT = ("scenes/formats/geometry/recognition.py", "scenes/arithmetic.py")
 """The one finds shapes in meshes of files by least squares, the other is what all others are to use."""
 
 BANNED = {

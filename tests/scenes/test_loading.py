@@ -52,7 +52,7 @@ def test_a_picture_is_read_once_and_again_when_it_changes(tmp_path: Path) -> Non
 
 
 def test_a_changed_asset_changes_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from scenes import world
+    from scenes.driving import world
 
     before = world.sky()
     assert world.sky() is before

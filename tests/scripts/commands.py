@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.cli import run_cli
+from analysis.command.cli import run_cli
 
 ROOT = Path(__file__).resolve().parents[2]
 

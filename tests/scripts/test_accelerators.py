@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from scenes import report
+from scenes.effects import report_images as report
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-import analysis.records
-from analysis.bench_cycles import cycles, synthetic_trace
-from analysis.cases import SCALES
-from analysis.cli import BrokenInvariants
-from analysis.cost_measurement import MeasurementOptions, measure_cells, prepare, watch_memory
+import analysis.storage.records
+from analysis.bench.cycles import cycles, synthetic_trace
+from analysis.command.cli import BrokenInvariants
+from analysis.cost_report.measurement import MeasurementOptions, measure_cells, prepare, watch_memory
 from analysis.perception import adaptive
 from analysis.perception.options import AdaptiveOptions
+from analysis.study.cases import SCALES
 from tests.scripts.commands import call_script
 from tsar.config import TsarConfig
 
@@ -26,7 +26,7 @@ BROKEN = {"ok": False, "conservation_residual": 0.74}
 @pytest.fixture
 def strict(monkeypatch: pytest.MonkeyPatch) -> None:
     """No residual is small enough."""
-    monkeypatch.setattr(analysis.records, "_CONSERVATION", -1.0)
+    monkeypatch.setattr(analysis.storage.records, "_CONSERVATION", -1.0)
 
 
 def last_line(capsys: pytest.CaptureFixture) -> str:
@@ -59,7 +59,7 @@ def test_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.
 
 
 def test_a_suitability_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    import analysis.suitability_report as report
+    import analysis.suitability.run as report
 
     summary = {"failures": {}, "runs": 1, "runs_done": 1, "broken_invariants": ["tsar-fly-by"]}
     monkeypatch.setattr(report, "study", lambda options: (summary, {}))

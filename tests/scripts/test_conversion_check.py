@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.conversion_check import plain
-from analysis.conversion_markers import MARKERS, SIZES, SOURCES, expected_px, farthest_px, marker_offsets
-from analysis.peer_renderers import rendered
+from analysis.conversion.check import plain
+from analysis.conversion.markers import MARKERS, SIZES, SOURCES, expected_px, farthest_px, marker_offsets
+from analysis.conversion.peers import rendered
 from renderer.frames import render_image
-from renderer.sampling import SamplePlan
+from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 from scenes.canonical import (
     Bumped,

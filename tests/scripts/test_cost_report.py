@@ -10,7 +10,7 @@ import pytest
 import pyvista
 from PIL import Image
 
-from tests.analysis.test_cost_report import TABLE_7_2
+from tests.analysis.cost_report.test_run import TABLE_7_2
 from tests.scripts.commands import assert_refused, call_script, nothing_in, run_script
 
 

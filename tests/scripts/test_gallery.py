@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from renderer.film import read_exr
-from scenes import effects
+from renderer.film.files import read_exr
+from scenes.effects import scenes as effects
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 SIZE = ("--width-px", "32", "--height-px", "24", "--samples", "4")

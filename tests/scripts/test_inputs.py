@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-import analysis.source
+import analysis.storage.source
 import scripts.inputs as script
-from analysis.cases import INPUTS
-from analysis.experiment import RunOptions, content_of, finished, write_summary
-from analysis.repetitions import InputsOptions, row
+from analysis.comparison.experiment import RunOptions, content_of, finished, write_summary
+from analysis.comparison.repetitions import InputsOptions, row
+from analysis.study.cases import INPUTS
 from scenes import catalog
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import ConfigError, TsarConfig
@@ -114,7 +114,7 @@ def test_finished_runs_are_not_repeated(
 def test_runs_by_other_code_are_repeated(made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ("fly-by", "--repetitions", "1", "--out", str(tmp_path))
     assert call_script("inputs.py", monkeypatch, *arguments) == 0
-    monkeypatch.setattr(analysis.source, "code_hash", lambda *makers: "upgraded")
+    monkeypatch.setattr(analysis.storage.source, "code_hash", lambda *makers: "upgraded")
     for _ in range(2):
         assert call_script("inputs.py", monkeypatch, *arguments) == 0
     assert made == ["fly-by-seed0"] * 2

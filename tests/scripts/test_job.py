@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from renderer.frames import render_image
-from renderer.sampling import SamplePlan
+from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 from scenes import catalog
-from scenes.formats.blocks import load_blocks
+from scenes.formats.blocks.read import load_blocks
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 JOB = "Spheres_scene\n2\n1 8\n2\nhammersley stratifiedmc\n1\nbox\n"
@@ -58,7 +58,7 @@ def test_a_frame_is_that_of_its_plan_over_its_time(job: Path, tmp_path: Path, mo
     plan = SamplePlan(8, "hammersley", 0, "gaussian", 0.5, "box", 0.5)
     image = render_image(renderer, plan, 24, 24, settings.frame_start_s(90), (0.0, 1.0 / 30.0), 90)
     renderer.close()
-    from renderer.film import encode_srgb
+    from renderer.film.files import encode_srgb
 
     with Image.open(out / "hammersley-box-0008" / "frame00090.png") as found:
         assert np.array_equal(np.asarray(found), encode_srgb(image))

@@ -9,9 +9,11 @@ from typing import Any
 
 import pytest
 
-from analysis.bench import BenchOptions
-from analysis.conversion_check import CheckOptions
-from analysis.cost_options import CostReportOptions
+from analysis.bench.turns import BenchOptions
+from analysis.comparison.options import RunOptions
+from analysis.comparison.repetitions import InputsOptions
+from analysis.conversion.check import CheckOptions
+from analysis.cost_report.options import CostReportOptions
 from analysis.perception.options import (
     AdaptiveOptions,
     AnalyseOptions,
@@ -20,13 +22,11 @@ from analysis.perception.options import (
     SimulateOptions,
     StimuliOptions,
 )
-from analysis.render_options import RenderOptions
-from analysis.repetitions import InputsOptions
-from analysis.run_options import RunOptions
-from analysis.sensitivity import SensitivityOptions
-from analysis.spectrum import SpectrumOptions
-from analysis.suitability import SuitabilityOptions
-from analysis.tracer_options import AcceleratorOptions, GalleryOptions, JobOptions, PointSetOptions, TileOptions
+from analysis.sensitivity.study import SensitivityOptions
+from analysis.spectrum.spectra import SpectrumOptions
+from analysis.suitability.study import SuitabilityOptions
+from analysis.tracer.options import AcceleratorOptions, GalleryOptions, JobOptions, PointSetOptions, TileOptions
+from analysis.tracer.render_options import RenderOptions
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -196,7 +196,7 @@ def test_what_never_ended_ends(tmp_path: Path, arguments: Place) -> None:
 def test_pictures_that_memory_does_not_hold_are_refused_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, script: str, arguments: Place
 ) -> None:
-    for module in ("analysis.cli", "renderer.checks"):
+    for module in ("analysis.command.cli", "renderer.tables.checks"):
         monkeypatch.setattr(f"{module}.free_memory_bytes", lambda: 1 << 30)
     monkeypatch.chdir(tmp_path)
     assert_refused(call_script(script, monkeypatch, *arguments), capsys, ("GiB of memory", "1.0 GiB are free"))

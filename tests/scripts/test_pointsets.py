@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.point_sets import SETS
+from analysis.tracer.point_sets import SETS
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import analysis.source
-from renderer.film import read_exr
+import analysis.storage.source
+from renderer.film.files import read_exr
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 MESH = """
@@ -149,8 +149,8 @@ def test_an_edited_scene_gives_the_new_picture_beside_the_users_own_files(render
 
 def test_an_upgraded_renderer_renders_again(render, monkeypatch: pytest.MonkeyPatch) -> None:
     assert render("plain", *SIZE) == 1 and render("plain", *SIZE) == 0
-    real = analysis.source.version_of
-    monkeypatch.setattr(analysis.source, "version_of", lambda name: "9" if name == "warp" else real(name))
+    real = analysis.storage.source.version_of
+    monkeypatch.setattr(analysis.storage.source, "version_of", lambda name: "9" if name == "warp" else real(name))
     assert render("plain", *SIZE) == 1 and render("plain", *SIZE) == 0
 
 

@@ -15,12 +15,12 @@ import pyarrow.parquet as pq
 import pytest
 from PIL import Image
 
-import analysis.reference
-from analysis import cli
-from analysis.cli import InputError
-from analysis.experiment import RunOptions, prepare, run_experiment
-from analysis.files import plain
-from renderer.film import read_exr
+import analysis.storage.reference
+from analysis.command import cli
+from analysis.command.cli import InputError
+from analysis.comparison.experiment import RunOptions, prepare, run_experiment
+from analysis.storage.files import plain
+from renderer.film.files import read_exr
 from scenes import loading
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 from tsar.config import TsarConfig
@@ -76,7 +76,7 @@ def summary(folder: Path, printed: str) -> dict[str, Any]:
 def again(folder: Path, printed: str) -> Iterator[tuple[dict[str, Any], int]]:
     """Summary of the run on one thread, and how many reference images it rendered."""
     rendered = []
-    obtain = analysis.reference.obtain
+    obtain = analysis.storage.reference.obtain
 
     def counting(*arguments: Any) -> Any:
         found = obtain(*arguments)
@@ -84,7 +84,7 @@ def again(folder: Path, printed: str) -> Iterator[tuple[dict[str, Any], int]]:
         return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(analysis.reference, "obtain", counting)
+        patch.setattr(analysis.storage.reference, "obtain", counting)
         found = run_experiment(options(folder, "again", threads=1))
     assert len(rendered) == 1
     yield plain(found), rendered[0]
@@ -155,7 +155,7 @@ def test_the_first_cycle_does_not_wait_for_the_reference(
     def obtain(*arguments: Any) -> None:
         raise ValueError("no room for the reference")
 
-    monkeypatch.setattr(analysis.reference, "obtain", obtain)
+    monkeypatch.setattr(analysis.storage.reference, "obtain", obtain)
     with pytest.raises(InputError, match="no room for the reference"):
         run_experiment(options(tmp_path, "out", threads=1))
     assert "first cycle after" in capsys.readouterr().err and nothing_in(tmp_path / "out")

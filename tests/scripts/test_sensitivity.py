@@ -12,11 +12,12 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from analysis import cases, farm, sensitivity
-from analysis.cases import Case, Scale
-from analysis.cli import parse
-from analysis.evaluation import Place, finished, source_of_results
-from analysis.sensitivity import Run, SensitivityOptions, Setting, runs
+from analysis.command.cli import parse
+from analysis.sensitivity import study as sensitivity
+from analysis.sensitivity.study import Run, SensitivityOptions, Setting, runs
+from analysis.study import cases, farm
+from analysis.study.cases import Case, Scale
+from analysis.study.evaluation import Place, finished, source_of_results
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 from tsar.config import TsarConfig
 

@@ -11,7 +11,7 @@ import pytest
 import torch
 from PIL import Image
 
-from renderer.film import write_exr
+from renderer.film.files import write_exr
 from tests.scripts.commands import assert_refused, call_script, nothing_in, run_script
 
 SLOPES = ("--frames-per-input", "1", "--samples-per-axis", "2")

@@ -16,8 +16,8 @@ import pandas as pd
 import psutil
 import pytest
 
-from analysis.cases import POLICIES, Case
-from analysis.suitability_tables import METRICS
+from analysis.study.cases import POLICIES, Case
+from analysis.suitability.tables import METRICS
 from tests.scripts.commands import ROOT, assert_refused, call_script, nothing_in, started_script
 
 SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-repetitions", "0")
@@ -51,7 +51,7 @@ def test_bad_input_ends_with_one_line(
 def test_a_scheduler_that_does_not_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr("analysis.farm._WAIT_S", 1)
+    monkeypatch.setattr("analysis.command.cluster._WAIT_S", 1)
     arguments = (*SMALL, "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path), "--cache", str(tmp_path / "cache"))
     assert call_script("suitability.py", monkeypatch, *arguments) == 2
     error = capsys.readouterr().err
@@ -108,7 +108,7 @@ def let_fail(policies: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None
     times = pd.DataFrame({"time_s": [0.0, 0.1], "refresh": [1, 2]} | {name: [0.5, 0.75] for name in METRICS})
     times = times.assign(flicker=0.0, causes_known=0.0, aliasing=0.0)
     for name, made in (("run_cases", run_cases), ("finished", finished), ("times_of", lambda *_: times)):
-        monkeypatch.setattr(f"analysis.suitability_report.{name}", made)
+        monkeypatch.setattr(f"analysis.suitability.run.{name}", made)
 
 
 @pytest.mark.parametrize("policies", [("tsar",), ("framed",), ("tsar", "framed"), POLICIES])

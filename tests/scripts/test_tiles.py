@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from renderer.film import read_exr
+from renderer.film.files import read_exr
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from analysis.files import write_json
 from analysis.perception.stimuli import MANIFEST, hash_of
+from analysis.storage.files import write_json
 
 LEVELS = (1, 8, 64)
 

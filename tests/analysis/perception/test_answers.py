@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.cli import InputError
+from analysis.command.cli import InputError
 from analysis.perception.answers import Answers, answers_of_lines
 
 IDENTITY = {"observer": "anna", "seed": 3}

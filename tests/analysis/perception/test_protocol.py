@@ -12,11 +12,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.cli import InputError
-from analysis.files import write_json
+from analysis.command.cli import InputError
 from analysis.perception.observers import COLUMNS
 from analysis.perception.protocol import Session
 from analysis.perception.stimuli import MANIFEST
+from analysis.storage.files import write_json
 from tests.analysis.perception.builders import LEVELS, write_stimuli
 
 

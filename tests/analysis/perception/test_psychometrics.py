@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from analysis.cli import InputError
+from analysis.command.cli import InputError
 from analysis.perception.analysis import recovery
 from analysis.perception.peer import peer_fit
 from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples

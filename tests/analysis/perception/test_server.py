@@ -15,7 +15,7 @@ import pandas as pd
 import psutil
 import pytest
 
-from analysis.cli import InputError
+from analysis.command.cli import InputError
 from analysis.perception.protocol import TABLE, Session
 from analysis.perception.server import BODY_MAX, CONNECTIONS_MAX, serving
 from tests.analysis.perception.builders import write_stimuli

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.cli import InputError
+from analysis.command.cli import InputError
 from analysis.perception.analysis import comparisons, fits, strongest
 from analysis.perception.observers import drawn_observers, simulated_trials
 from analysis.perception.trials import checked_trials

@@ -8,7 +8,7 @@ import pytest
 
 from scenes.formats.conversion import load_scene_file
 from scenes.formats.losses import LossReport
-from scenes.formats.mitsuba import load_mitsuba
+from scenes.formats.mitsuba.read import load_mitsuba
 from scenes.loading import ASSETS
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "scenes"

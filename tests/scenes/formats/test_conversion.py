@@ -31,12 +31,12 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.formats.appearance.spectra import METALS, blackbody_rgb, sampled_rgb
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.recognition import recognised_rectangle
 from scenes.formats.losses import LossReport
-from scenes.formats.meshed import as_mesh
-from scenes.formats.recognition import recognised_rectangle
-from scenes.formats.spectra import METALS, blackbody_rgb, sampled_rgb
 from tests.scenes.formats.files import DELIVERED, HEAD, REAL, needs_data, pbrt, real
 
 
@@ -234,7 +234,7 @@ def test_environment_maps_keep_their_directions(tmp_path: Path) -> None:
     """A texel of PBRT's map at u, θ lies along (cos 2πu sin θ, sin 2πu sin θ, cos θ), by our axes as by its."""
     from torch import rand
 
-    from renderer.film import write_exr
+    from renderer.film.files import write_exr
 
     write_exr(tmp_path / "sky.exr", rand(8, 16, 3))
     body = 'Rotate 30 0 1 0\nLightSource "infinite" "string mapname" "sky.exr"\n'

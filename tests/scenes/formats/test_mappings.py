@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.peer_renderers import rendered
+from analysis.conversion.peers import rendered
 from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
@@ -35,16 +35,16 @@ from scenes.canonical import (
     Sphere,
     SpotLight,
 )
+from scenes.formats.appearance.folding import folded
+from scenes.formats.appearance.spectra import METALS
+from scenes.formats.appearance.spot_profiles import flux, reshaped
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
-from scenes.formats.folding import folded
+from scenes.formats.geometry.meshed import FLIPPED, as_mesh
+from scenes.formats.geometry.ply_files import read_ply
+from scenes.formats.geometry.revolution import area, lamp_sphere
 from scenes.formats.losses import LossReport
-from scenes.formats.meshed import FLIPPED, as_mesh
-from scenes.formats.mitsuba_surface_export import BLUNT
-from scenes.formats.ply_files import read_ply
-from scenes.formats.revolution import area, lamp_sphere
-from scenes.formats.spectra import METALS
-from scenes.formats.spot_profiles import flux, reshaped
+from scenes.formats.mitsuba.write_materials import BLUNT
 
 RED, HALF = ConstantTexture((0.6, 0.1, 0.1)), ConstantTexture((0.5, 0.5, 0.5))
 CHECKS = CheckerboardTexture(ConstantTexture((0.2, 0.2, 0.2)), ConstantTexture((1.0, 1.0, 1.0)), (4.0, 2.0))

@@ -11,8 +11,8 @@ from scenes.animation import pose_at
 from scenes.canonical import Mesh, Scene, SceneError
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.geometry.transform_stack import moved_by, rigid_motion, rotation, translation
 from scenes.formats.losses import LossReport
-from scenes.formats.transform_stack import moved_by, rigid_motion, rotation, translation
 
 TRIANGLES = '"integer indices" [0 1 2 0 2 3 0 3 1] "point P" [0 0 0 1 0 0 0 1 0 0 0 1]'
 ENDINGS = (".pbrt", ".lxs", ".xml")

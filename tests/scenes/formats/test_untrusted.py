@@ -17,9 +17,9 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.geometry.ply_files import ply_bytes
 from scenes.formats.losses import LossReport
-from scenes.formats.ply_files import ply_bytes
-from scenes.formats.scene_files import SceneFiles
+from scenes.formats.text.scene_files import SceneFiles
 from tests.scenes.formats.files import DATA, DELIVERED, HEAD, MITSUBA, REAL, SENSOR, pbrt
 
 

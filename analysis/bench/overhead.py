@@ -1,0 +1,184 @@
+"""Group overhead: what the stages around tracing take of a cycle, and the wavelet transform beside PyWavelets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
+from statistics import median
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import torch
+
+from analysis.bench.cycles import cycles, default_stages, steady
+from analysis.bench.machine import installed
+from analysis.bench.scenes import driving_scenes, morton_batches, renderer_of
+from analysis.bench.turns import FRAMELET_SIDE, NOT_INSTALLED, BenchOptions, Row, counted, limit_row, rate_row
+from analysis.command.timing import take_turns
+from analysis.metrics.cost_model import RAYS, parameters_of, stage_flops
+from tsar.cache import FrameletCache
+from tsar.clock import StageTimer
+from tsar.config import TsarConfig
+from tsar.error import compressed_luminance
+from tsar.morton import raster_to_morton
+from tsar.stages import REFERENCE
+from tsar.types import FrameletBatch, Trace
+
+if TYPE_CHECKING:
+    from analysis.command.progress import Bars
+
+CONTROL = ("selection", "error", "cache", "response", "tiling")
+CONTROL_LIMIT, RECONSTRUCTION_LIMIT = 0.15, 0.60
+DWT_TARGET = 5.0
+MEASURED_CYCLES = 60
+
+
+class Cycle(NamedTuple):
+    """Wall seconds of every stage of a cycle, and its rays."""
+
+    stage_s: Mapping[str, float]
+    counters: Mapping[str, int]
+
+
+def overhead(options: BenchOptions, bars: Bars) -> Iterator[Row]:
+    """Shares of the stages on the driving scenes, and framelets per second of the transform."""
+    config = pipeline_config(options)
+    scenes = driving_scenes(options)
+    tick = counted(bars.task("overhead", len(scenes) * MEASURED_CYCLES + options.repetitions))
+    everything = []
+    for name, scene in scenes.items():
+        renderer = renderer_of(scene, options)
+        found = measured_cycles(config, renderer.trace, tick)
+        renderer.close()
+        yield from limit_rows(name, found)
+        everything += found
+    yield from stage_rows(config, everything)
+    yield transform_row(options, tick)
+
+
+def measured_cycles(config: TsarConfig, trace: Trace, tick: Callable[..., None] = lambda: None) -> list[Cycle]:
+    """Cycles of a run that has filled its cache."""
+    found = []
+    config = steady(config)
+    for record in islice(cycles(config, trace), config.warmup_cycles, config.warmup_cycles + MEASURED_CYCLES):
+        found.append(Cycle(record.stage_s, record.counters))
+        tick()
+    return found
+
+
+def seconds_of(cycle: Cycle, names: Sequence[str]) -> float:
+    """Seconds of some stages together."""
+    return sum(cycle.stage_s[name] for name in names)
+
+
+def limit_rows(name: str, found: Sequence[Cycle]) -> Iterator[Row]:
+    """Control stages and reconstruction of one scene against what they may take of the time of tracing."""
+    traced_ms = 1e3 * median(cycle.stage_s["tracing"] for cycle in found)
+    for what, stages, limit in (
+        ("control stages", CONTROL, CONTROL_LIMIT),
+        ("reconstruction", ("reconstruction",), RECONSTRUCTION_LIMIT),
+    ):
+        taken_ms = 1e3 * median(seconds_of(cycle, stages) for cycle in found)
+        note = f"{taken_ms:.2f} ms beside {traced_ms:.2f} ms of tracing"
+        row = Row("overhead", f"{name}, {what}", "share of tracing", 0.0, "limit", note=note)
+        yield limit_row(row, [seconds_of(cycle, stages) / cycle.stage_s["tracing"] for cycle in found], limit)
+
+
+def stage_rows(config: TsarConfig, found: Sequence[Cycle]) -> Iterator[Row]:
+    """Each stage's share of a cycle, over all scenes, beside the share that the cost model gives it."""
+    rays = sum(cycle.counters.get(name, 0) for cycle in found for name in RAYS)
+    segments = rays / sum(cycle.counters["primary_rays"] for cycle in found)
+    flops = stage_flops(parameters_of(config, segments))
+    modelled = {name: float(value) / float(sum(flops.values())) for name, value in flops.items()}
+    for name in found[0].stage_s:
+        measured = [cycle.stage_s[name] / sum(cycle.stage_s.values()) for cycle in found]
+        note = "" if name in modelled else "the model has no such stage"
+        yield Row(
+            "overhead",
+            f"all scenes, {name}",
+            "share of a cycle",
+            median(measured),
+            "cost model",
+            modelled.get(name),
+            repetitions=len(measured),
+            less_is_better=True,
+            note=f"{segments:.2f} segments a sample" if name == "tracing" else note,
+        )
+
+
+class PyWaveletsStream:
+    """The streaming transform of a batch by PyWavelets: rows and columns of the new tiles, then each coefficient with
+    that of the update before. Changes in place.
+
+    Whole batches go through each call; ``zero`` is its fastest way to end a signal, and with two values all are alike.
+    """
+
+    def __init__(self, tiles: int, side: int) -> None:
+        import pywt
+
+        self._pywt: Any = pywt
+        sides = [side >> octave for octave in range(1, side.bit_length())]
+        self._before = [np.zeros((4, tiles, half, half), np.float32) for half in sides]
+
+    def update(self, tiles: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Low and high pass along time ``(4, n, h, w)`` of each octave; the four are LL, LH, HL, HH by rows, columns.
+
+        Args:
+            tiles: ``(n, side, side)`` float32, raster order.
+        """
+        octaves, field = [], tiles
+        for octave, before in enumerate(self._before):
+            now = np.stack(self._spatial(field))
+            low, high = self._pywt.dwt(np.stack([now, before], axis=-1), "haar", mode="zero", axis=-1)
+            octaves.append((low[..., 0], high[..., 0]))
+            self._before[octave] = now
+            # orthonormal steps along three axes, where ours are means
+            field = low[0, ..., 0] * np.float32(8.0**-0.5)
+        return octaves
+
+    def _spatial(self, field: np.ndarray) -> list[np.ndarray]:
+        low, (horizontal, vertical, both) = self._pywt.dwt2(field, "haar", mode="zero", axes=(1, 2))
+        return [low, horizontal, vertical, both]
+
+
+def transform_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
+    """The streaming transform of one batch, ours beside PyWavelets, on the same framelets.
+
+    Ours cannot be had alone: from colours on, it is one pass with the norms and errors that are made of it, and with
+    the batch's way into the cache. All of that is timed.
+    """
+    batch, color, cache = estimated_batch(options)
+    config = pipeline_config(options)
+    observe, tiles = default_stages(config).observe, batch.level.shape[0]
+    cases: dict[str, Callable[[], object]] = {
+        "ours": lambda: [observe(batch, color, cache, config, StageTimer()) for _ in range(_CALLS)]
+    }
+    note = NOT_INSTALLED
+    if installed("pywt"):
+        raster = compressed_luminance(color)[:, raster_to_morton(FRAMELET_SIDE)]
+        images = raster.reshape(tiles, FRAMELET_SIDE, FRAMELET_SIDE).numpy()
+        stream = PyWaveletsStream(tiles, FRAMELET_SIDE)
+        cases["peer"] = lambda: [stream.update(images) for _ in range(_CALLS)]
+        note = "ours with luminance, norms, errors, cache; peer: one call of each filter for all framelets of an octave"
+    seconds = take_turns(cases, options.repetitions, tick)
+    row = Row("overhead", f"wavelet transform of {tiles} framelets", "k framelets/s", 0.0, "PyWavelets", note=note)
+    return rate_row(row, _CALLS * tiles / 1e3, seconds["ours"], seconds.get("peer"), DWT_TARGET)
+
+
+def pipeline_config(options: BenchOptions) -> TsarConfig:
+    """The default configuration with the batches and pictures asked for."""
+    return TsarConfig(batch_size=options.batch_size, resolution_px=options.resolution_px)
+
+
+def estimated_batch(options: BenchOptions) -> tuple[FrameletBatch, torch.Tensor, FrameletCache]:
+    """A batch, its colours, and a cache that holds an earlier batch of the same tiles, so that all have a past."""
+    config = pipeline_config(options)
+    cache = FrameletCache(config)
+    batch = morton_batches(options, 0.0)[0]
+    generator = torch.Generator().manual_seed(0)
+    earlier, color = torch.rand(2, *batch.times.shape, 3, generator=generator).unbind(0)
+    REFERENCE.observe(batch, earlier, cache, config, StageTimer())
+    return batch, color, cache
+
+
+_CALLS = 20

@@ -1,0 +1,84 @@
+"""Runs the groups of the benchmark that are asked for and writes what they measured."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from analysis.bench.conversion import conversion
+from analysis.bench.features import features
+from analysis.bench.growth import growth
+from analysis.bench.machine import machine, versions
+from analysis.bench.overhead import overhead
+from analysis.bench.rays import coherent, incoherent
+from analysis.bench.scenes import driving_scenes
+from analysis.bench.shading import shaded
+from analysis.bench.start import start_rows
+from analysis.bench.threads import cores, order
+from analysis.bench.turns import ON_CPU_ONLY, SPREAD, BenchOptions, Group, Row
+from analysis.command import progress
+from analysis.command.cli import bad_input, full_disk
+from analysis.command.ownership import own_folder
+from analysis.storage.files import write_json
+from analysis.storage.records import provenance
+
+ROOT = Path(__file__).resolve().parents[2]
+
+MEASURED_BY: Mapping[str, Group] = {
+    "coherent": coherent,
+    "incoherent": incoherent,
+    "shaded": shaded,
+    "cores": cores,
+    "order": order,
+    "features": features,
+    "overhead": overhead,
+    "growth": growth,
+    "conversion": conversion,
+    "start": start_rows,
+}
+
+
+def run_bench(options: BenchOptions) -> dict[str, Any]:
+    """Measures and writes ``bench.json`` after each group, ``summary.json`` at the end.
+
+    Returns:
+        What ``bench.json`` holds: ``rows``, and the machine and versions that they belong to.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    with bad_input():
+        own_folder(options.out, "out")
+        driving_scenes(options)
+        from renderer.compute.device import pick
+
+        pick(options.device)
+    ending = options.file_ending
+    summary = options.out / f"summary{ending}.json"
+    summary.unlink(missing_ok=True)
+    place = {"device": options.device, "machine": machine(options.device), "versions": versions(), "spread": SPREAD}
+    rows: list[Row] = []
+    found: dict[str, Any] = {**place, "rows": []}
+    with progress.bars() as bars, full_disk(options.out):
+        for name in options.groups:
+            if options.device != "cpu" and name in ON_CPU_ONLY:
+                continue
+            rows += MEASURED_BY[name](options, bars)
+            found = {**place, "rows": [row.record() for row in rows]}
+            write_json(options.out / f"bench{ending}.json", found)
+        write_json(summary, _summary(options, rows))
+    return found
+
+
+def _summary(options: BenchOptions, rows: list[Row]) -> dict[str, Any]:
+    config = dataclasses.asdict(options)
+    return {
+        "groups": options.groups,
+        "rows": len(rows),
+        "targets_met": sum(row.met is True for row in rows),
+        "targets_missed": [f"{row.group}: {row.name}" for row in rows if row.met is False],
+        "config": config,
+        "provenance": provenance(ROOT, config, device=options.device),
+    }

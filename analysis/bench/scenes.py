@@ -1,0 +1,125 @@
+"""What the benchmark renders: the bumpy sphere, the driving scenes, and batches of framelets over their pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from math import log2
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from analysis.bench.turns import FRAMELET_SIDE, BenchOptions
+from scenes.canonical import (
+    ConstantTexture,
+    Instance,
+    Integrator,
+    Matte,
+    Mesh,
+    PerspectiveCamera,
+    PointLight,
+    Scene,
+    identity,
+)
+from tsar.morton import deinterleave
+from tsar.types import FrameletBatch
+
+if TYPE_CHECKING:
+    from renderer.trace import Renderer
+
+EYE = (0.0, 0.0, 3.2)
+FOV_DEG = 38.0
+LIGHT = (1.5, 2.5, 4.5)
+_INTENSITY = (60.0, 57.0, 51.0)
+_ALBEDO = (0.62, 0.5, 0.4)
+SHADED_SUBDIVISIONS = 5
+"""Of the mesh that is shaded: 20,480 triangles."""
+
+
+@lru_cache(maxsize=8)
+def bumpy_sphere(subdivisions: int) -> Mesh:
+    """A closed mesh of ``20 * 4^subdivisions`` triangles: a sphere of radius 1 with bumps that shadow each other.
+
+    Args:
+        subdivisions: of an icosahedron.
+    """
+    import trimesh
+
+    sphere = trimesh.creation.icosphere(subdivisions=subdivisions)
+    x, y, z = np.asarray(sphere.vertices).T
+    radius = 1.0 + 0.035 * (np.sin(9.0 * x + 2.0 * y) + np.sin(8.0 * y - 3.0 * z) + np.sin(10.0 * z + 2.5 * x))
+    sphere.vertices = np.asarray(sphere.vertices) * radius[:, None]
+    normals = np.asarray(sphere.vertex_normals, np.float32)
+    return Mesh(np.asarray(sphere.vertices, np.float32), np.asarray(sphere.faces, np.int32), normals, source="bumpy")
+
+
+def bumpy_scene(subdivisions: int = SHADED_SUBDIVISIONS) -> Scene:
+    """The bumpy sphere, diffuse, under one point light and nothing else."""
+    pose = identity()
+    pose[:3, 3] = EYE
+    return Scene(
+        camera=PerspectiveCamera(pose, FOV_DEG),
+        instances=(Instance(bumpy_sphere(subdivisions), Matte(ConstantTexture(_ALBEDO)), name="bumpy"),),
+        lights=(PointLight(LIGHT, _INTENSITY),),
+        integrator=Integrator("direct", depth=0),
+        name="bumpy sphere",
+    )
+
+
+def driving_scenes(options: BenchOptions) -> dict[str, Scene]:
+    """The scenes asked for, by name.
+
+    Raises:
+        SceneError: there is none of that name.
+    """
+    from scenes import catalog
+
+    return {name: catalog.load(name) for name in options.scenes or catalog.NAMES}
+
+
+def renderer_of(scene: Scene, options: BenchOptions, threads: int | None = None) -> Renderer:
+    """Our renderer for pictures of the size asked for, by default on all cores."""
+    from renderer.trace import Renderer
+
+    return Renderer(scene, options.device, threads, options.resolution_px)
+
+
+def morton_batches(options: BenchOptions, duration_s: float) -> list[FrameletBatch]:
+    """Batches that cover the picture once between them, each spread over all of it as the pipeline's are.
+
+    Args:
+        options: size of the picture and of a batch.
+        duration_s: length of the animation, over which the batches are spread too.
+    """
+    side = FRAMELET_SIDE
+    level = int(log2(options.resolution_px // side))
+    number_of = -(-(4**level) // options.batch_size)
+    offset = (torch.stack(deinterleave(torch.arange(side * side)), dim=1) + 0.5) / side
+    batches = []
+    for number in range(number_of):
+        index = torch.arange(number, 4**level, number_of)
+        corner = torch.stack(deinterleave(index), dim=1)
+        position = ((corner[:, None, :] + offset) * 0.5**level).to(torch.float32)
+        time_s = duration_s * (number + 0.5) / number_of
+        batches.append(FrameletBatch(torch.full_like(index, level), index, position, time_s))
+    return batches
+
+
+def in_rows(batch: FrameletBatch) -> FrameletBatch:
+    """The same samples, of one time, in the order of reading: row by row across all tiles of the batch."""
+    flat = batch.position.reshape(-1, 2)
+    order = torch.argsort(flat[:, 0], stable=True)
+    order = order[torch.argsort(flat[order, 1], stable=True)]
+    return replace(batch, position=flat[order].reshape(batch.position.shape))
+
+
+def camera_rays(batch: FrameletBatch) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Origins and directions ``(n, 3)`` of a batch's rays at the bumpy sphere, a framelet after the other."""
+    position = batch.position.reshape(-1, 2).numpy()
+    tangent = np.float32(np.tan(np.radians(FOV_DEG / 2.0)))
+    x, y = (2.0 * position[:, 0] - 1.0) * tangent, (1.0 - 2.0 * position[:, 1]) * tangent
+    direction = np.stack([x, y, -np.ones_like(x)], axis=1).astype(np.float32)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return np.broadcast_to(np.asarray(EYE, np.float32), direction.shape).copy(), direction

@@ -1,0 +1,68 @@
+"""Groups cores and order: two threads against one, and Morton order against reading order, of framelet batches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from analysis.bench.scenes import bumpy_scene, driving_scenes, in_rows, morton_batches, renderer_of
+from analysis.bench.turns import BenchOptions, Row, counted, rate_row
+from analysis.command.timing import take_turns
+from scenes.canonical import Scene
+from tsar.types import FrameletBatch, Trace
+
+if TYPE_CHECKING:
+    from analysis.command.progress import Bars
+
+_CORES_SCENE = "fly-by"
+_CORES_TARGET = 1.8
+
+
+def _scenes(options: BenchOptions) -> dict[str, Scene]:
+    return {**driving_scenes(options), "bumpy sphere": bumpy_scene()}
+
+
+def _tracing(trace: Trace, batches: list[FrameletBatch]) -> Callable[[], object]:
+    return lambda: [trace(batch) for batch in batches]
+
+
+def _samples(batches: list[FrameletBatch]) -> float:
+    return sum(batch.times.numel() for batch in batches) / 1e6
+
+
+def cores(options: BenchOptions, bars: Bars) -> Iterator[Row]:
+    """Batches on two threads against one; nothing where this process may use one core only."""
+    from renderer.compute.device import core_count
+
+    if core_count() < 2:
+        return
+    scenes = _scenes(options)
+    chosen = _CORES_SCENE if _CORES_SCENE in scenes else next(iter(scenes))
+    tick = counted(bars.task("cores", 2 * options.repetitions))
+    for name in dict.fromkeys((chosen, "bumpy sphere")):
+        scene = scenes[name]
+        batches = morton_batches(options, scene.duration_s)
+        renderers = {threads: renderer_of(scene, options, threads) for threads in (1, 2)}
+        cases = {str(threads): _tracing(renderer.trace, batches) for threads, renderer in renderers.items()}
+        seconds = take_turns(cases, options.repetitions, tick, lead_in=True)
+        for renderer in renderers.values():
+            renderer.close()
+        row = Row("cores", f"{name}, 2 threads", "M samples/s", 0.0, "1 thread")
+        yield rate_row(row, _samples(batches), seconds["2"], seconds["1"], _CORES_TARGET)
+
+
+def order(options: BenchOptions, bars: Bars) -> Iterator[Row]:
+    """The same batches in Morton order and row by row, on all cores."""
+    scenes = _scenes(options)
+    tick = counted(bars.task("order", len(scenes) * options.repetitions))
+    for name, scene in scenes.items():
+        batches = morton_batches(options, scene.duration_s)
+        renderer = renderer_of(scene, options)
+        cases = {
+            "Morton": _tracing(renderer.trace, batches),
+            "rows": _tracing(renderer.trace, [in_rows(batch) for batch in batches]),
+        }
+        seconds = take_turns(cases, options.repetitions, tick, lead_in=True)
+        renderer.close()
+        row = Row("order", f"{name}, Morton order", "M samples/s", 0.0, "row order")
+        yield rate_row(row, _samples(batches), seconds["Morton"], seconds["rows"])

@@ -1,0 +1,177 @@
+"""What all command lines share: one clear line for bad input, a clean end on Ctrl-C."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import re
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NoReturn, TypeVar
+
+from analysis.command.ownership import release_folders
+from tsar.memory import free_memory_bytes
+
+Options = TypeVar("Options")
+
+EXIT_BAD_INPUT = 2
+EXIT_BROKEN = 3
+EXIT_INTERRUPTED = 130
+
+_SPINNING = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
+_SPINS = "1000"  # from 300 to 3000 cycles were measured to take alike
+_NO_MEMORY = re.compile(r"can't allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread|out of memory")
+_FRAME = re.compile(r"[╭╮╰╯│─]+|-{3,}")
+
+
+class InputError(ValueError):
+    """Bad input; the message says what was expected, what arrived, and where."""
+
+
+class BrokenInvariants(RuntimeError):
+    """Runs of the adaptive pipeline broke an invariant: what they say cannot be relied on."""
+
+
+def require_unbroken(broken: Sequence[str]) -> None:
+    """Raises BrokenInvariants unless the list of runs that broke an invariant is empty."""
+    if broken:
+        raise BrokenInvariants(f"invariants are broken in {len(broken)} runs: {', '.join(broken)}")
+
+
+@contextlib.contextmanager
+def bad_input() -> Iterator[None]:
+    """Marks a block in which a ValueError, an OSError or a lack of memory is the fault of the input."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (MemoryError, RuntimeError) as error:
+        lack = _lack_of_memory(error)
+        if lack is None:
+            raise
+        raise lack from error
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        raise _lack_of_memory(error) or InputError(f"{where}{error.strerror or error}") from error
+    except ValueError as error:
+        raise InputError(str(error) or type(error).__name__) from error
+
+
+def _lack_of_memory(error: BaseException) -> InputError | None:
+    """What to say of an error that means that memory ran out; None of any other."""
+    text = " ".join(str(error).split())
+    if not (
+        isinstance(error, MemoryError)
+        or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
+        or (isinstance(error, RuntimeError) and _NO_MEMORY.search(text))
+    ):
+        return None
+    free = free_memory_bytes() / 2**30
+    return InputError(f"out of memory ({text or type(error).__name__}); {free:.1f} GiB are free now: ask for less")
+
+
+@contextlib.contextmanager
+def full_disk(folder: Path, *writer_errors: type[Exception]) -> Iterator[None]:
+    """Marks a block in which an OSError, or an error of a file writer, means that results cannot be written to
+    ``folder``, such as to a full disk."""
+    try:
+        yield
+    except writer_errors as error:
+        raise InputError(str(error)) from error
+    except OSError as error:
+        reason = f"{error.filename or folder}: cannot be written ({error.strerror or error})"
+        raise _lack_of_memory(error) or InputError(reason) from error
+
+
+def parse(options: type[Options], description: str, arguments: list[str] | None = None) -> Options:
+    """Options from the command line; help goes to standard output.
+
+    Raises:
+        InputError: something cannot be parsed or is out of range.
+    """
+    import tyro
+
+    caught = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(caught), bad_input():
+            return tyro.cli(options, description=description, args=arguments)
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        raise InputError(_one_line(caught.getvalue())) from None
+
+
+def require_memory(need_bytes: float, what: str) -> None:
+    """Raises InputError where less memory is free than ``what`` needs."""
+    have = free_memory_bytes()
+    if need_bytes > have:
+        raise InputError(f"{what} needs about {need_bytes / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free")
+
+
+def _one_line(box: str) -> str:
+    """The message inside the frame that the parser draws, without its title and its advice."""
+    inside = (re.sub(r"Error parsing \w+: ", "", line) for line in box.splitlines() if line[:1] != "╭")
+    lines = [re.sub(r"\s+", " ", _FRAME.sub(" ", line)).strip() for line in inside]
+    text = " ".join(line for line in lines if line)
+    return text.partition(" For full helptext")[0] or "the command line cannot be parsed"
+
+
+def run_cli(main: Callable[[], None]) -> None:
+    """Runs a script's main function and ends the process.
+
+    Bad input, and a package that is not installed or in a version that does not serve, end with one line on standard
+    error and status 2, broken invariants with one line and status 3, Ctrl-C with one line and status 130.
+    """
+    _spin_briefly()
+    warnings.showwarning = _one_warning
+    try:
+        main()
+    except InputError as error:
+        _end(error, EXIT_BAD_INPUT)
+    except BrokenInvariants as error:
+        _end(error, EXIT_BROKEN)
+    except ModuleNotFoundError as error:
+        from analysis.command.extras import extra_of
+
+        missing = extra_of(error)
+        if missing is None:
+            raise
+        _end(missing, EXIT_BAD_INPUT)
+    except ImportError as error:
+        _end(error, EXIT_BAD_INPUT)
+    except (MemoryError, RuntimeError, OSError) as error:
+        lack = _lack_of_memory(error)
+        if lack is None:
+            raise
+        _end(lack, EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
+        sys.exit(EXIT_INTERRUPTED)
+    finally:
+        release_folders()
+
+
+def _end(error: Exception, status: int) -> NoReturn:
+    message = re.sub(r"\s+", " ", str(error)).strip()
+    print(f"error: {message}", file=sys.stderr)
+    sys.exit(status)
+
+
+def _one_warning(message: Warning | str, *_: object) -> None:
+    """A warning in one line, without the place in the code that a user has nothing of."""
+    text = re.sub(r"\s+", " ", str(message)).strip()
+    print(f"warning: {text}", file=sys.stderr)
+
+
+def _spin_briefly() -> None:
+    """Has torch's idle threads sleep soon, unless the user has said what they should do.
+
+    By default they spin for milliseconds after every operation, on the cores that trace rays then; with another busy
+    process beside this one, operations wait for threads that wait for a core. Heeded only before torch is imported.
+    """
+    if not any(name in os.environ for name in _SPINNING):
+        os.environ[_SPINNING[0]] = _SPINS

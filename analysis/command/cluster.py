@@ -1,0 +1,111 @@
+"""Processes and machines that share work: a Dask cluster on this machine by default, or any other by its address.
+
+Workers of another cluster must see the same folders and run the same source.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from typing import TYPE_CHECKING
+
+from analysis.command import limits
+from analysis.command.cli import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client, LocalCluster
+
+_WAIT_S = 30
+LOOPBACK = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class ClusterOptions:
+    """Where cases are run."""
+
+    workers: int = 0
+    """Processes of the local cluster; 0 takes one per core."""
+    scheduler: str = ""
+    """Address of a running Dask scheduler, such as tcp://host:8786; empty starts a local cluster, which listens on this
+    machine only. A scheduler of your own listens where it is told to, and whoever reaches it can run code: keep it in a
+    network that you trust, and have its dashboard on loopback (--dashboard-address 127.0.0.1:8787)."""
+
+    def __post_init__(self) -> None:
+        limits.within(self, workers=limits.WORKERS)
+
+    @property
+    def processes(self) -> int:
+        """Processes of the local cluster."""
+        return self.workers or len(os.sched_getaffinity(0))
+
+    @property
+    def threads(self) -> int:
+        """Threads that each of them traces with."""
+        return max(1, len(os.sched_getaffinity(0)) // self.processes)
+
+
+@contextlib.contextmanager
+def connected(options: ClusterOptions) -> Iterator[Client]:
+    """A client of the cluster; a local one ends with the block.
+
+    Raises:
+        InputError: nothing answers at the address.
+    """
+    import dask.config
+    from distributed import Client, LocalCluster
+
+    dask.config.set({"distributed.worker.profile.enabled": False})
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # reasons are told in a line
+    if options.scheduler:
+        try:
+            client = Client(options.scheduler, timeout=_WAIT_S)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({error})") from error
+        with client:
+            yield client
+        return
+    with contextlib.ExitStack() as held:
+        with _interrupts_blocked():
+            cluster = held.enter_context(
+                LocalCluster(
+                    n_workers=options.processes,
+                    threads_per_worker=1,
+                    processes=True,
+                    host=LOOPBACK,
+                    dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not meet
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        client = held.enter_context(Client(cluster))
+        try:
+            yield client
+        except KeyboardInterrupt:
+            _end_workers(cluster)
+            raise
+
+
+@contextlib.contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Has threads and processes that are started within not hear of Ctrl-C, which a terminal sends to all of them; this
+    thread hears of it after the block."""
+    resource_tracker.ensure_running()  # it unblocks interrupts where it is started, so it must not be started within
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_workers(cluster: LocalCluster) -> None:
+    """Ends workers in the middle of what they do: what counts is on disk, and to wait would take as long as a run."""
+    for nanny in cluster.workers.values():
+        nanny.auto_restart = False
+        if nanny.pid is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(nanny.pid, signal.SIGKILL)

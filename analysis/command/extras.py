@@ -1,0 +1,51 @@
+"""The extras of the distribution, and the line that a command prints where one is not installed."""
+
+from __future__ import annotations
+
+import importlib.util
+
+from analysis.command.cli import InputError
+
+DISTRIBUTION = "tsar-render"
+"""Name under which the packages are installed; they are imported as tsar, renderer, scenes and analysis."""
+
+EXTRAS: dict[str, dict[str, str]] = {
+    "study": {"dask": "dask", "distributed": "distributed"},
+    "perception": {"pycvvdp": "cvvdp", "torchvision": "torchvision", "flip_evaluator": "flip-evaluator"},
+    "formats": {"astral": "astral", "defusedxml": "defusedxml"},
+    "peers": {"embreex": "embreex", "mitsuba": "mitsuba", "pyluxcore": "pyluxcore", "pywt": "PyWavelets"},
+    "psignifit": {"psignifit": "psignifit"},
+}
+"""Of each extra the modules that it brings, and the distribution of each, as the project file has them."""
+
+
+def require_extra(*extras: str) -> None:
+    """Checks that everything of the extras can be imported, and imports nothing.
+
+    Args:
+        extras: names in :data:`EXTRAS`.
+
+    Raises:
+        InputError: a module is missing; the message names its distribution and the extra.
+    """
+    for extra in extras:
+        for module, distribution in EXTRAS[extra].items():
+            if importlib.util.find_spec(module) is None:
+                raise InputError(_missing(distribution, extra))
+
+
+def extra_of(error: ModuleNotFoundError) -> InputError | None:
+    """What to tell the user about an import that failed; None where the module belongs to no extra."""
+    root = (error.name or "").partition(".")[0]
+    for extra, modules in EXTRAS.items():
+        for module, distribution in modules.items():
+            if root in (module, distribution):
+                return InputError(_missing(distribution, extra))
+    return None
+
+
+def _missing(distribution: str, extra: str) -> str:
+    return (
+        f"expected the package {distribution}, found none; the extra '{extra}' of {DISTRIBUTION} installs it "
+        f"(in a checkout: pip install --editable '.[{extra}]')"
+    )

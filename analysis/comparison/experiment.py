@@ -1,0 +1,309 @@
+"""Wiring of one run: scene, renderer, adaptive pipeline, framed renderer, clocks, reference, records.
+
+The only module of this package that knows the others; heavy imports wait until a run begins, so that the command line
+answers at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from analysis.command.cli import InputError, bad_input, full_disk, require_memory
+from analysis.command.ownership import own_folder, writable_folder
+from analysis.command.start import first_imports, first_made
+from analysis.comparison.options import RunOptions
+from analysis.storage.store import Store
+
+if TYPE_CHECKING:
+    from analysis.command.progress import Bars
+    from analysis.comparison.summary import Measured
+    from analysis.metrics.causes import Truths
+    from analysis.metrics.quality import Floats, View
+    from analysis.storage.records import RecordLimits, StepWriter
+    from analysis.storage.reference import Reference
+    from analysis.study.displays import Seen
+    from analysis.study.runs import PolicyRun
+    from renderer.trace import Renderer
+    from scenes.canonical import Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+_SUMMARY = "summary.json"
+_FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
+_BYTES_PER_PIXEL = 260  # images, age fields and samples of a run in flight
+_BYTES_PER_CACHED_SAMPLE = 20  # colours and wavelet coefficients
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a run needs before it starts."""
+
+    scene: Scene
+    renderer_of: Callable[[int], Renderer]
+    """A renderer that filters textures for so many samples along a pixel's side."""
+    losses: tuple[str, ...] = ()
+
+
+def prepare(options: RunOptions) -> Setup:
+    """Checks the machine, loads the scene and builds the renderer of the adaptive run.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    with bad_input():
+        need = options.tsar.resolution_px**2 * _BYTES_PER_PIXEL * (1 + len(options.rivals))
+        require_memory(need, f"resolution_px: {options.tsar.resolution_px}")
+        slots = options.tsar.cache_slots
+        require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
+        own_folder(options.out, "out")
+        writable_folder(options.cache, "cache")
+    with first_imports():
+        from scenes import catalog
+
+    with bad_input():
+        scene, losses = catalog.load_any(options.input, options.phase, options.camera_path)
+        for loss in losses:
+            print(loss)
+        renderer_of = lru_cache(maxsize=4)(partial(_renderer, options, scene))
+        renderer_of(1)  # what it refuses is bad input
+        return Setup(scene, renderer_of, losses)
+
+
+def _renderer(options: RunOptions, scene: Scene, axis: int) -> Renderer:
+    """A renderer that filters textures for ``axis`` samples along a pixel's side."""
+    with first_imports():
+        from renderer.trace import Renderer
+
+    side = options.tsar.resolution_px * axis
+    return Renderer(scene, options.device, options.threads or None, footprint_resolution_px=side)
+
+
+def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[str, Any]:
+    """Runs the comparison and writes everything to ``options.out``.
+
+    Args:
+        options: what to run.
+        began_s: since when the first cycle is waited for, on the clock of :func:`time.monotonic`; by default now.
+
+    Returns:
+        The summary that is also in ``summary.json``.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    began_s = time.monotonic() if began_s is None else began_s
+    setup = prepare(options)
+    with first_imports():
+        from analysis.command import progress
+        from analysis.metrics.quality import reference_times
+        from analysis.storage.records import StepWriter
+        from renderer.film.files import FilmError
+
+    for name in (_SUMMARY, *_FILES):
+        (options.out / name).unlink(missing_ok=True)  # of an earlier run
+    times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
+    with progress.bars() as bars, full_disk(options.out, FilmError):
+        with StepWriter(options.out / "steps.parquet", _limits(options)) as writer:
+            runs = _runs(options, setup, writer)
+            own, first_cycle_s = first_made(runs[options.policy].images, began_s, bars.say)
+            runs[options.policy] = dataclasses.replace(runs[options.policy], images=own)
+            reference = _reference(options, setup, len(times_s), bars)
+            measured = _compare(options, times_s, reference, runs, bars)
+    if measured.seen[options.policy].images == 0 or (measured.totals.recorded and measured.totals.cycles == 0):
+        (options.out / "steps.parquet").unlink(missing_ok=True)
+        (options.out / "comparison.mp4").unlink(missing_ok=True)
+        raise InputError(f"seconds: expected time for a cycle before the last reference image, got {options.seconds:g}")
+    with full_disk(options.out):
+        return _write(options, setup, measured, first_cycle_s)
+
+
+def _limits(options: RunOptions) -> RecordLimits:
+    from analysis.storage.records import RecordLimits
+
+    c = options.tsar
+    return RecordLimits(c.batch_size, c.budget, c.spatial_bounds, c.temporal_bounds)
+
+
+def finished(options: RunOptions) -> dict[str, Any] | None:
+    """The summary of a run of these options, by this code and of this scene as they are now; or None.
+
+    It is complete where all of its files are as they were written; those that are damaged are named.
+
+    Raises:
+        InputError: the scene cannot be read.
+    """
+    with first_imports():
+        from scenes import catalog
+
+    with bad_input():
+        scene, _ = catalog.load_any(options.input, options.phase, options.camera_path)
+        store = Store(options.out, content_of(options, scene))
+        found = store.read_json(_SUMMARY, {"provenance": dict, "policy": str, "files": list[str]})
+    return found if found and all(store.find(name) is not None for name in found["files"]) else None
+
+
+def content_of(options: RunOptions, scene: Scene) -> str:
+    """Hash of all that decides what a run gives: options, the scene's content, and the code."""
+    from analysis.storage.files import plain
+    from analysis.storage.reference import content_hash
+    from analysis.storage.source import code_hash
+
+    kept = {name: value for name, value in plain(options).items() if name not in ("out", "cache")}
+    return content_hash((kept, scene, code_hash(run_experiment)))
+
+
+def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
+    """Lists the files of a run that has ended, and writes its summary last: from then on the run is complete.
+
+    Returns:
+        What is in the summary: what was given, and the files.
+    """
+    store = Store(options.out, summary["provenance"]["content"])
+    files = [name for name in _FILES if (options.out / name).exists()]
+    for name in files:
+        store.add(name)
+    summary = {**summary, "files": files}
+    store.write_json(_SUMMARY, summary)
+    return summary
+
+
+def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:
+    from analysis.storage.reference import ReferenceSpec, content_hash, obtain, renderer_hash
+
+    side, axis = options.tsar.resolution_px, options.reference_samples_per_axis
+    spec = ReferenceSpec(
+        scene=f"{options.input} phase {options.phase:g}",
+        scene_hash=content_hash(setup.scene),
+        renderer_hash=renderer_hash(setup.renderer_of(1), options.device),
+        start_s=options.start_s,
+        rate_hz=options.reference_rate_hz,
+        count=count,
+        resolution_px=side,
+        samples_per_axis=axis,
+    )
+    show = bars.task("reference", count)
+    with bad_input():
+        renderer = setup.renderer_of(1)
+        return obtain(
+            options.cache, spec, lambda t: renderer.render_frame(t, side, side, axis), lambda done, _: show(done)
+        )
+
+
+def _runs(options: RunOptions, setup: Setup, writer: StepWriter) -> dict[str, PolicyRun]:
+    """All runs, not started yet; the cycles of the run's own are written."""
+    with first_imports():
+        from analysis.study.runs import Machine, begin
+
+    machine = Machine(options.counted, options.capacity, options.cost)
+    span_s = options.start_s, options.start_s + options.seconds
+    with bad_input():
+        return {
+            name: begin(
+                name,
+                options.tsar,
+                setup.renderer_of,
+                machine,
+                span_s,
+                stages=options.stages,
+                threads=setup.renderer_of(1).threads,
+                on_record=writer.add if name == options.policy else lambda record: None,
+            )
+            for name in (options.policy, *options.rivals)
+        }
+
+
+def _compare(
+    options: RunOptions, times_s: Floats, reference: Reference, runs: dict[str, PolicyRun], bars: Bars
+) -> Measured:
+    from contextlib import nullcontext
+
+    from analysis.comparison.summary import Measured
+    from analysis.comparison.viewers import Filming, Steps
+    from analysis.metrics import METRICS
+    from analysis.page.video import ComparisonFilm, Scales
+    from analysis.study.displays import Measuring, watch
+    from renderer.film.files import Mp4Writer, write_exr
+
+    scales = Scales(options.tsar.spatial_bounds, options.tsar.temporal_bounds)
+    stride = max(1, round(options.reference_rate_hz / 60.0))
+    span_s = options.start_s, options.start_s + options.seconds
+    film = ComparisonFilm(min(options.tsar.resolution_px, 512), scales, span_s, list(runs), options.policy)
+    steps, show = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
+
+    def on_view(view: View) -> None:
+        show(view.number + 1)
+        if options.frames:
+            write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
+
+    place, fps = options.out / "comparison.mp4", options.reference_rate_hz / stride
+    with Mp4Writer(place, fps, film.width_px, film.height_px) if options.film else nullcontext() as sink:
+        viewers = [on_view, steps, *([Filming(film, sink, stride)] if sink else [])]
+        images = {name: run.images for name, run in runs.items()}
+        of_images = tuple(name for name in options.metrics if METRICS[name].image)
+        kept = (0, len(times_s)) if len(of_images) < len(options.metrics) else (0, 0)
+        measuring = Measuring(metrics=of_images, stride=options.metric_stride, kept=kept)
+        seen = watch(images, _truths(options, reference), times_s, measuring, viewers)
+    sequences = {name: _scored(options, name, seen) for name in options.metrics if METRICS[name].sequence}
+    return Measured(options.policy, times_s, seen, runs, steps.made, reference.nonfinite, options.cost, sequences)
+
+
+def _scored(options: RunOptions, metric: str, seen: dict[str, Seen]) -> dict[str, float]:
+    """A metric of sequences for every run."""
+    import numpy as np
+
+    from analysis.metrics import METRICS
+
+    measured, found = METRICS[metric], {}
+    for name, one in seen.items():
+        shown, reference = (np.stack(frames) for frames in one.frames)
+        found[name] = measured.of_sequence(shown, reference, options.reference_rate_hz, options.display)
+    return found
+
+
+def _truths(options: RunOptions, reference: Reference) -> Truths:
+    import numpy as np
+    import torch
+
+    from analysis.metrics.causes import Truths
+
+    def image(number: int) -> torch.Tensor:
+        return torch.from_numpy(reference.images[number].astype(np.float32))
+
+    return Truths(image, options.start_s, options.reference_rate_hz, reference.spec.count)
+
+
+def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: float) -> dict[str, Any]:
+    """Figures, report and summary."""
+    from analysis.comparison import results
+    from analysis.comparison.summary import summarise
+    from analysis.storage.records import provenance
+
+    config = dataclasses.asdict(options)
+    source = provenance(
+        ROOT,
+        config,
+        scene=setup.scene.name or options.input,
+        phase=options.phase,
+        seed=options.tsar.seed,
+        device=options.device,
+        threads=setup.renderer_of(1).threads,
+        content=content_of(options, setup.scene),
+    )
+    derived = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}
+    summary = {
+        "ledger": options.counted,
+        "capacity_flops": options.capacity,
+        **summarise(measured),
+        "start": {"first_cycle_s": first_cycle_s},
+        "cost_parameters": options.cost,
+        "config": {**config, "resolved": derived},
+        "provenance": source,
+    }
+    results.write_figures(options.out, summary, measured)
+    results.write_page(options.out, summary, measured)
+    return write_summary(options, summary)

@@ -1,0 +1,120 @@
+"""Options of one comparison of policies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from analysis.command import limits
+from analysis.metrics import METRICS
+from analysis.metrics.cost_model import (
+    CAPACITY_DEFAULT,
+    CostParameters,
+    Ledger,
+    adaptive_flops,
+    expected_ledger,
+    nonadaptive_flops,
+    parameters_of,
+)
+from analysis.metrics.display_model import DisplayModel
+from tsar.config import StagesName, TsarConfig, closed_choices, require
+from tsar.policies import POLICIES
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class RunOptions:
+    """One comparison of a policy with its rivals at equal cost."""
+
+    input: Annotated[str, tyro.conf.Positional]
+    """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
+    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    """The adaptive pipeline."""
+    seconds: float = 2.0
+    """Simulated time to measure, seconds."""
+    start_s: float = 0.0
+    """Where in the animation the measurement starts, seconds."""
+    phase: float = 0.0
+    """Phase of the animation, for repetitions."""
+    camera_path: Literal["", "turntable", "fly-through"] = ""
+    """Motion of the camera of a scene file that has none."""
+    clock: Literal["simulated", "wall"] = "simulated"
+    """Simulated time by the cost model, or measured time (the same as the ledger wall)."""
+    ledger: Ledger = "thesis"
+    """How cost is counted."""
+    capacity: float = CAPACITY_DEFAULT
+    """Speed of the simulated machine, FLOP/s. The default shows 8 framed images a second at 512²."""
+    trace_segments: float = 4.0
+    """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
+    policy: str = "tsar"
+    """Who decides what is sampled: a policy by name."""
+    rivals: tuple[str, ...] = ("framed", "framed supersampled")
+    """Policies that it is compared with at equal cost; ratios are to the first."""
+    metrics: tuple[str, ...] = ()
+    """Metrics beside the squared errors, such as flip, ssim or jod."""
+    display: DisplayModel = field(default_factory=DisplayModel)
+    """The display that perceptual metrics of sequences hold for."""
+    metric_stride: int = 6
+    """Reference images from one to the next at which they are taken."""
+    reference_rate_hz: float = 60.0
+    """Reference images per simulated second."""
+    reference_samples_per_axis: int = 3
+    """Samples along a pixel's side of the reference."""
+    device: Literal["cpu", "cuda:0"] = "cpu"
+    """Where rays are traced."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    stages: StagesName = "compiled"
+    """What runs the stages around tracing: kernels, or the tensor operations that they are checked against."""
+    frames: bool = False
+    """Also write what the adaptive display shows at every reference time to frames/, as EXR."""
+    film: bool = True
+    """Write comparison.mp4."""
+    out: Path = Path("out/run")
+    """Folder for the results."""
+    cache: Path = Path(".cache/reference")
+    """Folder for references, shared by all runs."""
+
+    def __post_init__(self) -> None:
+        limits.within(
+            self,
+            seconds=limits.SPANS_S,
+            start_s=limits.TIMES_S,
+            phase=(0.0, 1.0),
+            capacity=(1e-12, 1e24),
+            trace_segments=limits.SEGMENTS,
+            reference_rate_hz=limits.RATES_HZ,
+            reference_samples_per_axis=(1, 16),
+            metric_stride=(1, 10**6),
+            threads=limits.THREADS,
+        )
+        runs = self.policy, *self.rivals
+        for name in runs:
+            POLICIES.require(name, "policy" if name == self.policy else "rivals")
+        require(len(runs) == len(set(runs)), "rivals", "names that differ, and from the policy's", runs)
+        for name in self.metrics:
+            METRICS.require(name, "metrics")
+        warmup = self.tsar.warmup_cycles
+        require(warmup >= 4, "warmup_cycles", "at least 4 (the latency and one)", warmup)
+        images = self.seconds * self.reference_rate_hz
+        require(images >= 1e-6, "seconds", f"time for a reference image at {self.reference_rate_hz:g} Hz", self.seconds)
+        limits.require_count("seconds", self.seconds, images, "reference images")
+        if self.counted != "wall":
+            priced = expected_ledger(self.counted)
+            cycle_s = float(adaptive_flops(self.cost, priced)) / self.capacity
+            limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
+            frame_s = float(nonadaptive_flops(self.cost, priced)) / self.capacity
+            limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
+
+    @property
+    def counted(self) -> Ledger:
+        """The ledger in force."""
+        return "wall" if self.clock == "wall" else self.ledger
+
+    @property
+    def cost(self) -> CostParameters:
+        """Parameters of the cost model for this run."""
+        return parameters_of(self.tsar, self.trace_segments)

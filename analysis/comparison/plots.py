@@ -1,0 +1,112 @@
+"""Figures of a comparison; computes nothing but positions on the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+from numpy.typing import NDArray
+
+from analysis.page.figures import ADAPTIVE, FRAMED, Floats, inks, new_figure
+
+
+def error_figure(
+    times_s: Floats,
+    errors: Mapping[str, Floats],
+    own: str,
+    ratio: Floats,
+    refresh_s: Sequence[float],
+    title: str,
+) -> Figure:
+    """Errors over time above the ratio of two of them (figs 7.14 and 7.15).
+
+    Args:
+        times_s: reference times.
+        errors: MSE of every run by name; the ratio is taken to the first that is not ``own``.
+        own: the run whose ratio is shown.
+        ratio: its error over that of the rival; infinite values are marked along the upper edge.
+        refresh_s: times at which the rival's display changes.
+        title: above the figure.
+    """
+    rivals = [name for name in errors if name != own]
+    figure, (upper, lower) = new_figure(9.0, 5.6, 2, sharex=True, height_ratios=(3, 2))
+    for axis in (upper, lower):
+        axis.vlines(refresh_s, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
+    for name, ink in inks(list(errors), own).items():
+        values = errors[name]
+        width = 1.2 if name == own else 1.8
+        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, linewidth=width, label=name)
+    upper.set_yscale("log")
+    upper.set_ylabel("mean squared error")
+    upper.set_title(title, fontsize=10, loc="left", parse_math=False)
+    upper.margins(y=0.15)
+    upper.legend(frameon=False, fontsize=8, ncols=min(len(errors), 5), loc="upper left")
+    shown = np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan)
+    lower.plot(times_s, shown, color="0.2", linewidth=1.1)
+    infinite = np.isinf(ratio)
+    if infinite.any():
+        transform = lower.get_xaxis_transform()
+        lower.plot(
+            times_s[infinite], np.full(infinite.sum(), 0.97), "^", color="0.2", markersize=4, transform=transform
+        )
+    lower.axhline(1.0, color="0.0", linewidth=0.8)
+    lower.set_yscale("log")
+    _widen(lower, shown)
+    lower.set_ylabel(f"{own} / {rivals[0]}" if rivals else own)
+    marked = f"   (dotted: the display of {rivals[0]} changes)" if rivals else ""
+    lower.set_xlabel(f"simulated time, s{marked}")
+    lower.set_xlim(times_s[0], times_s[-1])
+    return figure
+
+
+def _widen(axis, values: Floats) -> None:
+    """Shows at least the factor 3 about one on a ratio axis."""
+    finite = values[np.isfinite(values)]
+    low, high = (finite.min(), finite.max()) if finite.size else (1.0, 1.0)
+    axis.set_ylim(min(low * 0.8, 1 / 3), max(high * 1.25, 3.0))
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+
+
+def density_figure(quantiles: Mapping[str, NDArray], bounds: Mapping[str, tuple[float, float]]) -> Figure:
+    """Bands of the densities over time: 5–95 %, 25–75 % and the median over the elements."""
+    figure, axes = new_figure(9.0, 4.6, 2, sharex=True)
+    labels = {
+        "density_spatial": "spatial density,\nsamples per element",
+        "density_temporal": "temporal density,\nper cycle",
+    }
+    time = quantiles["sim_time_s"]
+    for axis, (name, label), ink in zip(axes, labels.items(), (FRAMED, ADAPTIVE), strict=True):
+        q = quantiles[name]
+        axis.fill_between(time, q[:, 0], q[:, 4], color=ink, alpha=0.18, linewidth=0, label="5–95 %")
+        axis.fill_between(time, q[:, 1], q[:, 3], color=ink, alpha=0.38, linewidth=0, label="25–75 %")
+        axis.plot(time, q[:, 2], color=ink, linewidth=1.3, label="median")
+        axis.set_yscale("log", base=2)
+        axis.set_ylim(bounds[name][0] / 1.3, bounds[name][1] * 1.3)
+        axis.set_ylabel(label)
+        axis.margins(x=0.0)
+    axes[0].legend(frameon=False, fontsize=8, ncols=3, loc="upper left", bbox_to_anchor=(0.0, 1.18))
+    axes[1].set_xlabel("simulated time, s (negative: warm-up)")
+    return figure
+
+
+def stage_figure(modelled: Mapping[str, float], measured: Mapping[str, float]) -> Figure:
+    """Share of a cycle each stage takes by the cost model beside what was measured."""
+    names = list(dict.fromkeys((*modelled, *measured)))
+    figure, (axis,) = new_figure(9.0, 2.8)
+    place = np.arange(len(names))
+    for shift, (values, ink, label) in zip(
+        (-0.2, 0.2), ((modelled, FRAMED, "modelled operations"), (measured, ADAPTIVE, "measured seconds")), strict=True
+    ):
+        total = sum(values.values()) or 1.0
+        share = [100.0 * values.get(name, 0.0) / total for name in names]
+        bars = axis.bar(place + shift, share, 0.38, color=ink, label=label)
+        axis.bar_label(bars, fmt="%.1f", fontsize=7, padding=1)
+    axis.set_xticks(place, names)
+    axis.set_ylabel("share of a cycle, %")
+    axis.set_ylim(0, 108)
+    axis.legend(frameon=False, fontsize=8)
+    return figure

@@ -1,0 +1,87 @@
+"""Repetitions of a comparison over inputs, and over seeds or animation phases."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from analysis.command import limits
+from analysis.comparison.experiment import RunOptions
+from analysis.metrics.cost_model import CAPACITY_DEFAULT, Ledger
+from analysis.study.cases import INPUTS
+from tsar.config import TsarConfig, closed_choices, require
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class InputsOptions:
+    """Which inputs, and how often. Runs that are complete in the folder are not repeated."""
+
+    inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
+    """Built-in inputs."""
+    vary: Literal["seed", "phase"] = "seed"
+    """What differs between repetitions: the seed (0, 1, …) or the phase (0, 1/n, …)."""
+    repetitions: int = 3
+    """Runs of each input."""
+    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    """The adaptive pipeline; its seed is set here where seeds vary."""
+    seconds: float = 2.0
+    """Simulated time to measure, seconds."""
+    ledger: Ledger = "thesis"
+    """How cost is counted."""
+    capacity: float = CAPACITY_DEFAULT
+    """Speed of the simulated machine, FLOP/s."""
+    reference_rate_hz: float = 30.0
+    """Reference images per simulated second; half of run.py's, for the references take most of the time."""
+    out: Path = Path("out/inputs")
+    """Folder for the results, one folder a run within."""
+
+    def __post_init__(self) -> None:
+        limits.within(self, repetitions=limits.REPETITIONS)
+        require(len(self.inputs) >= 1, "inputs", "at least one", self.inputs)
+        unknown = [name for name in self.inputs if name not in INPUTS]
+        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        self.runs()
+
+    def runs(self) -> list[RunOptions]:
+        """Every run, resolved."""
+        found = []
+        for name in self.inputs:
+            for number in range(self.repetitions):
+                out = self.out / f"{name}-{self.vary}{number}"
+                by_phase = self.vary == "phase"
+                found.append(
+                    RunOptions(
+                        input=name,
+                        tsar=self.tsar if by_phase else dataclasses.replace(self.tsar, seed=number),
+                        phase=number / self.repetitions if by_phase else 0.0,
+                        seconds=self.seconds,
+                        ledger=self.ledger,
+                        capacity=self.capacity,
+                        reference_rate_hz=self.reference_rate_hz,
+                        film=False,
+                        out=out,
+                    )
+                )
+        return found
+
+
+def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """What a table over runs shows of one of them."""
+    names = ("ratio_median", "ratio_quartiles", "share_suitable", "suitable_percentile", "cycles", "age_spread_s")
+    beside = summary["ratio_statistics"].get("framed supersampled") or {}
+    return {
+        "run": run.out.name,
+        "input": run.input,
+        "seed": run.tsar.seed,
+        "phase": run.phase,
+        **{name: summary[name] for name in names},
+        "ratio_median_supersampled": beside.get("median"),
+        "invariants_ok": summary["invariants"]["ok"],
+        "stage_wall_s": summary["stage_wall_s"],
+    }

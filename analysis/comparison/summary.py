@@ -1,0 +1,263 @@
+"""From what a comparison measured to the tables of its summary and report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from analysis.metrics.cost_model import (
+    LEDGERS,
+    MODELLED,
+    CostParameters,
+    control_flops,
+    per_segment,
+    policy_flops,
+    stage_flops,
+    work_flops,
+)
+from analysis.metrics.quality import Floats, RatioStatistics, ratio, ratio_statistics
+from analysis.page.player import Step
+from analysis.page.report import Table
+from analysis.study.displays import Seen
+from analysis.study.runs import PolicyRun, Totals
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Everything a comparison measured.
+
+    Attributes:
+        own: name of the run that the others are rivals of.
+        times_s: reference times.
+        seen: what every display showed, by name; the first rival is the one compared to.
+        runs: the runs that showed it.
+        steps: pictures of evenly spaced times, for the page.
+        reference_nonfinite: non-finite values in the reference.
+        cost: parameters of the cost model, scalars.
+        sequences: values of metrics of sequences, by metric and run.
+    """
+
+    own: str
+    times_s: Floats
+    seen: Mapping[str, Seen]
+    runs: Mapping[str, PolicyRun]
+    steps: list[Step]
+    reference_nonfinite: int
+    cost: CostParameters
+    sequences: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def rivals(self) -> list[str]:
+        """Names of the other runs."""
+        return [name for name in self.seen if name != self.own]
+
+    @property
+    def rival(self) -> str | None:
+        """The one compared to; None where the run is alone."""
+        return self.rivals[0] if self.rivals else None
+
+    @property
+    def totals(self) -> Totals:
+        """Sums over the cycles of the run's own."""
+        return self.runs[self.own].totals
+
+    @cached_property
+    def invariants(self) -> dict[str, Any] | None:
+        """What was checked in every recorded cycle of the run, and whether all hold in every run; None where no run
+        records its cycles."""
+        found = {name: run.totals.invariants for name, run in self.runs.items() if run.totals.recorded}
+        if not found:
+            return None
+        return {**found.get(self.own, {}), "ok": all(one["ok"] for one in found.values())}
+
+    @cached_property
+    def mse(self) -> dict[str, Floats]:
+        """Mean squared errors at the reference times, by name."""
+        return {name: seen.column("mse") for name, seen in self.seen.items()}
+
+    def ratio(self) -> Floats:
+        """The run's error over the rival's at the reference times; empty where it is alone."""
+        return ratio(self.mse[self.own], self.mse[self.rival]) if self.rival else np.empty(0)
+
+    def statistics(self, rival: str, column: str = "mse") -> RatioStatistics:
+        """Statistics of the error ratio to a rival."""
+        return ratio_statistics(self.seen[self.own].column(column), self.seen[rival].column(column))
+
+    def period_s(self, name: str) -> float:
+        """Mean time between images of a display, seconds; NaN where it showed one."""
+        refresh = self.seen[name].refresh_s
+        return (refresh[-1] - refresh[0]) / (len(refresh) - 1) if len(refresh) > 1 else float("nan")
+
+
+def ledger_costs(measured: Measured) -> dict[str, dict[str, float]]:
+    """Cost of a cycle of every run under every ledger; FLOPs, except under ``wall``, which is seconds."""
+    costs: dict[str, dict[str, float]] = {ledger: {} for ledger in LEDGERS}
+    for name, run in measured.runs.items():
+        for ledger in MODELLED:
+            costs[ledger][name] = float(policy_flops(measured.cost, run.price, ledger))
+        totals, meter = run.totals, run.meter
+        # the cycles of the span where they are recorded, all that were traced elsewhere
+        counters, cycles = (totals.counters, totals.cycles) if totals.cycles else (meter.counters, max(meter.calls, 1))
+        if counters:
+            control = float(control_flops(measured.cost, run.price))
+            # means of counts are not whole, which the price does not mind
+            costs["work"][name] = work_flops(measured.cost, counters) / cycles + control
+        costs["wall"][name] = (sum(totals.stage_s.values()) if totals.cycles else meter.wall_s) / cycles
+    return {ledger: found for ledger, found in costs.items() if found}
+
+
+def cycles_per_image(measured: Measured) -> dict[str, float]:
+    """How many cycles of the run cost as much as one of the rival's, under every ledger."""
+    own, rival = measured.own, measured.rival
+    return {
+        ledger: found[rival] / found[own] if found[own] > 0 else float("inf")
+        for ledger, found in ledger_costs(measured).items()
+        if rival and own in found and rival in found
+    }
+
+
+def segments(counters: Mapping[str, float]) -> float:
+    """Ray segments per sample that were counted."""
+    primary = counters.get("primary_rays", 0)
+    return sum(value for name, value in counters.items() if name.endswith("_rays")) / primary if primary else 0.0
+
+
+def summarise(measured: Measured) -> dict[str, Any]:
+    """The results part of ``summary.json``."""
+    totals, own, seen = measured.totals, measured.own, measured.seen
+    found: dict[str, Any] = {
+        "policy": own,
+        "rivals": measured.rivals,
+        "reference_time_s": measured.times_s,
+        "mse": measured.mse,
+        "log_mse": {name: one.column("log_mse") for name, one in seen.items()},
+        "metrics": _metrics(measured),
+        "images": {name: one.images for name, one in seen.items()},
+        "refresh_s": {name: one.refresh_s for name, one in seen.items()},
+        **_ratios(measured),
+        "cycles": totals.cycles,
+        "warmup_cycles": totals.warmup_cycles,
+        "cycle_s": totals.simulated_s / max(totals.cycles, 1),
+        "age_spread_s": totals.age_spread_s / max(totals.cycles, 1),
+        "samples_traced": totals.counters.get("primary_rays", 0),
+        "samples_per_s": totals.counters.get("primary_rays", 0) / totals.simulated_s if totals.simulated_s else 0.0,
+        "counters": dict(totals.counters),
+        "segments_counted": segments(totals.counters),
+        "segments_modelled": measured.cost.trace_segments,
+        "stage_wall_s": dict(totals.stage_s),
+        "stage_flops": {name: float(v) * totals.cycles for name, v in stage_flops(measured.cost).items()},
+        "ledgers": ledger_costs(measured),
+        "cycles_per_image": cycles_per_image(measured),
+        "conclusion_changes_with_ledger": len({n >= 1 for n in cycles_per_image(measured).values()}) > 1,
+        "invariants": measured.invariants,
+        "nonfinite": {
+            **{name: one.nonfinite + measured.runs[name].totals.nonfinite for name, one in seen.items()},
+            "fields": sum(run.totals.nonfinite_fields for run in measured.runs.values()),
+            "reference": measured.reference_nonfinite,
+        },
+    }
+    return found
+
+
+def _metrics(measured: Measured) -> dict[str, dict[str, float]]:
+    """Mean over the times of what was measured beside the squared errors, by metric and run."""
+    known = ("time_s", "mse", "log_mse", "refresh")
+    names = dict.fromkeys(name for seen in measured.seen.values() for row in seen.rows for name in row)
+    means = {
+        metric: {name: float(np.nanmean(seen.column(metric))) for name, seen in measured.seen.items()}
+        for metric in names
+        if metric not in known
+    }
+    return means | {metric: dict(values) for metric, values in measured.sequences.items()}
+
+
+def _ratios(measured: Measured) -> dict[str, Any]:
+    if measured.rival is None:
+        return {}
+    statistics = {name: measured.statistics(name) for name in measured.rivals}
+    first = statistics[measured.rival]
+    return {
+        "ratio": measured.ratio(),
+        "ratio_median": first.median,
+        "ratio_quartiles": [first.quartile_low, first.quartile_high],
+        "share_suitable": first.share_suitable,
+        "suitable_percentile": first.suitable_percentile,
+        "ratio_statistics": statistics,
+        "log_ratio_statistics": {name: measured.statistics(name, "log_mse") for name in measured.rivals},
+    }
+
+
+def key_table(measured: Measured) -> Table:
+    """The numbers to look at first."""
+    totals, own = measured.totals, measured.own
+    checked = measured.invariants or {"ok": None}
+    holds = {True: "yes", False: f"NO: {checked}", None: "not recorded"}[checked["ok"]]
+    rows = [
+        (f"median MSE, {own}", f"{np.median(measured.mse[own]):.3e}"),
+        (f"cycles of {own}", f"{totals.cycles}, {1e3 * totals.simulated_s / max(totals.cycles, 1):.2f} ms each"),
+        (f"samples per cycle of {own}", f"{totals.counters.get('primary_rays', 0) / max(totals.cycles, 1):,.0f}"),
+        ("non-finite samples replaced", str(totals.nonfinite)),
+        ("non-finite densities and errors", str(totals.nonfinite_fields)),
+        ("invariants hold in every cycle", holds),
+        ("spread of ages in moving regions", f"{1e3 * totals.age_spread_s / max(totals.cycles, 1):.0f} ms"),
+    ]
+    for name in measured.rivals:
+        s = measured.statistics(name)
+        rows += [
+            (f"median MSE, {name}", f"{np.median(measured.mse[name]):.3e}"),
+            (f"period of {name}", f"{1e3 * measured.period_s(name):.1f} ms"),
+            (f"ratio to {name}: median", f"{s.median:.3f}"),
+            (f"ratio to {name}: quartiles", f"{s.quartile_low:.3f} – {s.quartile_high:.3f}"),
+            (f"ratio to {name}: at most 1", f"{100 * s.share_suitable:.0f} % of the time"),
+            (f"ratio to {name}: greatest suitable percentile", f"{s.suitable_percentile:.0f}"),
+            (f"ratio to {name}: outliers, infinite", f"{s.outliers}, {s.infinite}"),
+        ]
+    note = ""
+    if measured.rival is not None:
+        log, plain = (measured.statistics(measured.rival, column).median for column in ("log_mse", "mse"))
+        rows.append((f"ratio of log-compressed MSE to {measured.rival}: median", f"{log:.3f}"))
+        if (log > 1) != (plain > 1):
+            note = "The two measures disagree on which run is better."
+    return Table("Key numbers", ("", "value"), rows, note)
+
+
+def metric_table(measured: Measured) -> Table | None:
+    """Metrics of every run; None where none was asked for."""
+    found = _metrics(measured)
+    rows = [(name, *(f"{found[metric][name]:.4f}" for metric in found)) for name in measured.seen]
+    return Table("Metrics, mean over the times", ("run", *found), rows) if found else None
+
+
+def stage_table(measured: Measured) -> Table:
+    """Per stage: share by the model beside what was measured."""
+    flops, wall, cycles = stage_flops(measured.cost), measured.totals.stage_s, max(measured.totals.cycles, 1)
+    total, total_s = sum(float(v) for v in flops.values()), sum(wall.values()) or 1.0
+    rows = []
+    for name in dict.fromkeys((*flops, *wall)):
+        cost, seconds = float(flops.get(name, 0.0)), wall.get(name, 0.0)
+        shares = (f"{100 * cost / total:.1f} %", f"{1e3 * seconds / cycles:.2f}", f"{100 * seconds / total_s:.1f} %")
+        rows.append((name, f"{cost / 1e6:,.2f}", *shares))
+    header = ("stage", "modelled, MFLOP a cycle", "modelled share", "measured, ms a cycle", "measured share")
+    counted = segments(measured.totals.counters)
+    note = f"Segments per sample: {counted:.2f} counted, {measured.cost.trace_segments} modelled."
+    return Table(f"Stages of {measured.own}: model against measurement", header, rows, note)
+
+
+def ledger_table(measured: Measured) -> Table:
+    """Cost of a cycle of every run under every ledger."""
+    rows, per_image = [], cycles_per_image(measured)
+    for ledger, costs in ledger_costs(measured).items():
+        scale, unit = (1e3, "ms") if ledger == "wall" else (1e-9, "GFLOP")
+        values = (f"{costs[name] * scale:,.3f} {unit}" if name in costs else "—" for name in measured.runs)
+        rows.append((ledger, *values, f"{per_image[ledger]:.2f}" if ledger in per_image else "—"))
+    header = ("ledger", *measured.runs, f"{measured.rival} / {measured.own}")
+    note = (
+        "Equal cost depends on how cost is counted. Where the last column is below 1, a cycle costs more than a whole "
+        "image of the rival, and the comparison does not favour the run. The ledger work prices every counted ray at "
+        f"{per_segment(measured.cost):,.0f} FLOP."
+    )
+    return Table("Cost of a cycle by ledger", header, rows, note)

@@ -1,0 +1,175 @@
+"""Converted scenes rendered by the renderers that they were converted for, side by side."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import tyro
+
+from analysis.command import limits
+from analysis.conversion.peers import Picture, rendered
+from tsar.config import require
+
+if TYPE_CHECKING:
+    from scenes.canonical import Instance, Scene
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """Renders scene files as converted for Mitsuba 3 and for LuxCore, and compares the pictures."""
+
+    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
+    markers: bool = False
+    """Where lamps at known places appear in the picture, from every format to every other."""
+    plain: bool = False
+    """Compare both renderers on each scene with every surface matte, too: what differs then is not materials."""
+    width_px: int = 160
+    """Width, pixels; the height follows the film."""
+    samples: int = 256
+    """Samples per pixel."""
+    root: Path | None = None
+    """Folder that scenes may read from; by default their own."""
+    limit_s: float = 240.0
+    """Seconds for each picture at most."""
+    out: Path = Path("out/conversion-check")
+    """Folder for the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
+
+    def __post_init__(self) -> None:
+        limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))
+        require(bool(self.scenes) or self.markers, "scenes", "scene files, or --markers", "neither")
+        for scene in self.scenes:
+            require(scene.is_file(), "scenes", "scene files", scene)
+
+
+def flip(first: Picture, second: Picture) -> float:
+    """Mean FLIP of two pictures, as shown on a display."""
+    import flip_evaluator
+
+    shown = [one.astype(np.float32) / 255.0 for one in (shown_as(first), shown_as(second))]
+    return float(flip_evaluator.evaluate(shown[0], shown[1], "LDR")[1])
+
+
+def shown_as(picture: Picture) -> np.ndarray:
+    """A picture as a display shows it, 8 bits."""
+    import torch
+
+    from renderer.film.files import encode_srgb
+
+    return encode_srgb(torch.as_tensor(np.ascontiguousarray(picture)))
+
+
+def checked(options: CheckOptions, tick: Callable[[], None]) -> list[dict[str, Any]]:
+    """A row for each pair of pictures of each scene, the source's own rendering first where there is one."""
+    rows: list[dict[str, Any]] = []
+    shown: list[tuple[str, Picture]] = []
+    for number, source in enumerate(options.scenes):
+        name = f"{source.parent.name}/{source.name}"
+        folder = options.out / f"{number:02d}-{source.parent.name}-{source.stem}"
+        scene, pictures, again, lost = _pictures(options, source, folder)
+        first = next(iter(pictures))
+        for other in [other for other in pictures if other != first]:
+            rows.append(_row(name, (first, other), pictures, again, lost))
+        if options.plain:
+            rows.append(_plain_row(options, name, scene, folder))
+        shown += [(f"{name}: {what}", one) for what, one in pictures.items() if not isinstance(one, str)]
+        tick()
+    if shown:
+        _sheet(options.out / "pictures.jpg", shown)
+    return rows
+
+
+def _pictures(
+    options: CheckOptions, source: Path, folder: Path
+) -> tuple[Scene, dict[str, Picture | str], Picture | str, dict[str, list[str]]]:
+    """A scene, its pictures by what rendered them, the first once more with other noise, and what was lost for each."""
+    from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
+    from scenes.formats.losses import LossReport
+
+    read = LossReport()
+    scene = load_scene_file(source, options.root, read)
+    size = _size(options, scene)
+    targets = {"mitsuba": ("mitsuba3", folder / "mitsuba3.xml"), "luxcore": ("luxrender", folder / "luxrender.lxs")}
+    own = {"luxrender": "luxcore", "mitsuba": "mitsuba"}.get(format_of(source))
+    jobs = [(f"{own}, as it is", own, source)] if own else []
+    lost = {"": [str(loss) for loss in read.losses]}
+    for program, (kind, file) in targets.items():
+        report = LossReport()
+        save_scene_file(scene, file, kind, report)  # type: ignore[arg-type]
+        lost[program] = [str(loss) for loss in report.losses]
+        jobs.append((program, program, file))
+
+    def picture(name: str, program: str, file: Path, seed: int) -> Picture | str:
+        out = folder / f"{name.replace(', ', '-').replace(' ', '-')}-{seed}.npy"
+        return rendered(program, file, out, size, options.samples, options.limit_s, seed)
+
+    return scene, {job[0]: picture(*job, 0) for job in jobs}, picture(*jobs[0], 1), lost
+
+
+def _size(options: CheckOptions, scene: Scene) -> tuple[int, int]:
+    return options.width_px, max(1, round(options.width_px * scene.film.height_px / scene.film.width_px))
+
+
+def plain(scene: Scene) -> Scene:
+    """The scene with every surface matte, of the colour that it has most of."""
+    from scenes.canonical import ConstantTexture, Matte
+    from scenes.formats.pbrt.read_materials import mean_of
+
+    def matte(instance: Instance) -> Instance:
+        material: Any = instance.material
+        while hasattr(material, "base"):
+            material = material.base
+        texture = getattr(material, "reflectance", None) or getattr(material, "diffuse", None)
+        color = (0.5, 0.5, 0.5) if texture is None else mean_of(texture)
+        return dataclasses.replace(instance, material=Matte(ConstantTexture(color)))
+
+    return dataclasses.replace(scene, instances=tuple(matte(one) for one in scene.instances), materials={})
+
+
+def _plain_row(options: CheckOptions, name: str, scene: Scene, folder: Path) -> dict[str, Any]:
+    from scenes.formats.conversion import save_scene_file
+
+    made, size = plain(scene), _size(options, scene)
+    pictures: dict[str, Picture | str] = {}
+    for program, kind, file in (("mitsuba", "mitsuba3", "plain.xml"), ("luxcore", "luxrender", "plain.lxs")):
+        save_scene_file(made, folder / file, kind)  # type: ignore[arg-type]
+        out = folder / f"plain-{program}.npy"
+        pictures[program] = rendered(program, folder / file, out, size, options.samples, options.limit_s)
+    again = rendered(
+        "mitsuba", folder / "plain.xml", folder / "plain-again.npy", size, options.samples, options.limit_s, 1
+    )
+    return _row(f"{name}, matte", ("mitsuba", "luxcore"), pictures, again, {"": []})
+
+
+def _row(
+    scene: str,
+    names: tuple[str, str],
+    pictures: dict[str, Picture | str],
+    again: Picture | str,
+    lost: dict[str, list[str]],
+) -> dict[str, Any]:
+    losses = lost[""] + [loss for name in names for loss in lost.get(name, [])]
+    row: dict[str, Any] = {"scene": scene, "first": names[0], "second": names[1], "losses": losses}
+    first, second = (pictures[name] for name in names)
+    for name, one in zip(names, (first, second), strict=True):
+        if isinstance(one, str):
+            return {**row, "note": f"{name}: {one}"}
+    assert not isinstance(first, str) and not isinstance(second, str)
+    means = first.mean(axis=(0, 1)), second.mean(axis=(0, 1))
+    for name, value in zip("rgb", means[1] / np.maximum(means[0], 1e-9), strict=True):
+        row[f"mean_{name}"] = float(value)
+    noise = float("nan") if isinstance(again, str) else flip(first, again)
+    return {**row, "flip": flip(first, second), "flip_noise": noise, "note": ""}
+
+
+def _sheet(path: Path, shown: list[tuple[str, Picture]]) -> None:
+    from analysis.tracer.gallery import write_sheet
+
+    height = max(one.shape[0] for _, one in shown)
+    padded = [np.pad(shown_as(one), ((0, height - one.shape[0]), (0, 0), (0, 0))) for _, one in shown]
+    write_sheet(path, padded, [name for name, _ in shown])

@@ -1,0 +1,102 @@
+"""Options of the cost report: table 7.1 as numbers, what may be admitted, what is measured."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from analysis.command import limits
+from analysis.cost_report.measurement import MeasurementOptions
+from analysis.metrics.cost_model import CostParameters
+from tsar.config import closed_choices, require
+
+
+@dataclass(frozen=True)
+class TableParameters:
+    """Table 7.1: the cost model's parameters as numbers."""
+
+    batch_size: float = 128
+    """Framelets rendered per pipeline cycle."""
+    sdf_size: float = 128**2
+    """Elements of the density and error fields."""
+    framelet_size: float = 16**2
+    """Samples in a framelet."""
+    recon_res: float = 512**2
+    """Output resolution, pixels."""
+    cache_size: float = 2048
+    """Framelets in the cache."""
+    recon_age_support: float = 128
+    """Width of the age smoothing operator, pixels."""
+    recon_spa_support: float = 3**2
+    """Size of the spatial reconstruction filter, pixels."""
+    trace_segments: float = 5
+    """Ray segments per sample."""
+    tiling_size: float = 512
+    """Framelets in the tiling."""
+    dwt_coeffs: float = 448
+    """Coefficients of one framelet that contribute to the localised levelwise norm."""
+    tree_size: float = 1024
+    """Nodes of the spatial structure that rays traverse."""
+    avg_recon_overdraw: float | None = None
+    """Framelets drawn per output pixel; not printed in the thesis. None means cache_size / tiling_size."""
+    per_bvh_node: float = 16
+    """FLOPs per node visited."""
+    per_triangle: float = 64
+    """FLOPs per triangle test."""
+    per_shader: float = 96
+    """FLOPs per shading of a ray's end point."""
+
+    def __post_init__(self) -> None:
+        bounds = dict.fromkeys((item.name for item in dataclasses.fields(self)), (1e-6, 1e15))
+        limits.within(self, **{**bounds, "trace_segments": (0.0, limits.SEGMENTS[1])})
+        for name in ("tree_size", "tiling_size"):
+            require(getattr(self, name) > 1, name, "more than 1, for its logarithm counts", getattr(self, name))
+        _ = self.model
+
+    @property
+    def model(self) -> CostParameters:
+        return CostParameters(**dataclasses.asdict(self))
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class CostReportOptions:
+    """Cost of an adaptive cycle and of a framed image: the model under every ledger, and this machine."""
+
+    parameters: Annotated[TableParameters, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
+        default_factory=TableParameters
+    )
+    """The model's parameters."""
+    measurement: Annotated[MeasurementOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
+        default_factory=MeasurementOptions
+    )
+    """What is measured."""
+    ledger: Literal["thesis", "printed", "summed"] = "thesis"
+    """How the model counts; figures are drawn under it, tables show all."""
+    batches: tuple[int, ...] = (32, 64, 128, 256, 512, 768, 1024)
+    """Batch sizes that may be admitted."""
+    resolutions: tuple[int, ...] = (256, 512, 1024)
+    """Output sides that may be admitted, pixels."""
+    admitted_segments: float = 4
+    """Ray segments per sample at which they are; about what the thesis' inputs have."""
+    measure: bool = True
+    """Run the pipeline on this machine and refit the model to it."""
+    out: Path = Path("out/cost")
+    """Folder for the results."""
+
+    def __post_init__(self) -> None:
+        for name in ("batches", "resolutions"):
+            values = getattr(self, name)
+            require(len(values) > 0, name, "at least one number", values)
+        segments = (0.0, limits.SEGMENTS[1])
+        limits.within(self, batches=(1, 1 << 20), resolutions=limits.SIDES_PX, admitted_segments=segments)
+        _ = self.admitting
+
+    @property
+    def admitting(self) -> CostParameters:
+        """The parameters with the segments at which combinations are admitted."""
+        return dataclasses.replace(self.parameters.model, trace_segments=self.admitted_segments)

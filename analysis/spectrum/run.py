@@ -1,0 +1,129 @@
+"""Runs the parts of ``scripts/spectrum.py`` and writes what they find."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from analysis.command.cli import bad_input, full_disk, require_memory
+from analysis.command.ownership import own_folder
+from analysis.command.progress import Bars, bars
+from analysis.comparison.experiment import ROOT
+from analysis.page.figures import save
+from analysis.spectrum import plots
+from analysis.spectrum.estimate_check import check_estimate, measure_example, measure_input
+from analysis.spectrum.spectra import (
+    PHOTOGRAPHS,
+    Spectrum,
+    SpectrumOptions,
+    group_statistics,
+    input_spectra,
+    open_input,
+    picture_spectrum,
+    shown,
+)
+from analysis.storage.files import write_json
+from analysis.storage.records import provenance
+
+_BYTES_PER_SAMPLE = 32  # of a tile's volume; 27 were measured, its transform and a windowed copy included
+_BYTES_PER_PIXEL = 400
+_EXAMPLES = 4
+_FRAMES_SHOWN = 3
+
+
+def run_study(options: SpectrumOptions) -> dict[str, Any]:
+    """Runs the parts that are wanted and writes figures and ``summary.json`` to ``options.out``.
+
+    Raises:
+        InputError: a picture cannot be used, or a size does not fit into memory.
+    """
+    if options.does("slopes"):
+        require_memory(_BYTES_PER_PIXEL * options.tsar.resolution_px**2, f"resolution_px: {options.tsar.resolution_px}")
+    if options.does("ideal"):
+        need = _BYTES_PER_SAMPLE * options.samples**2 * options.frames
+        require_memory(need, f"samples, frames: a tile of {options.samples}² samples at {options.frames} times")
+    if options.does("agreement"):
+        need = 16 * _BYTES_PER_SAMPLE * options.agreement_samples**2 * options.agreement_frames
+        require_memory(need, f"agreement_samples: {options.agreement_samples}")
+    with bad_input():
+        own_folder(options.out, "out")
+        pictures = _pictures(options) if options.does("slopes") else []
+    (options.out / "summary.json").unlink(missing_ok=True)
+    found: dict[str, Any] = {}
+    with bars() as shown_bars, full_disk(options.out):
+        if options.does("slopes"):
+            found["slopes"] = _slopes(options, pictures, shown_bars)
+        if options.does("ideal"):
+            found["ideal"] = _ideal(options, shown_bars)
+        if options.does("agreement"):
+            found["agreement"] = _agreement(options, shown_bars)
+        config = dataclasses.asdict(options)
+        source = provenance(ROOT, config, scene=", ".join(options.inputs), seed=options.tsar.seed, device="cpu")
+        derived = {"level_max": options.tsar.level_max, "cycle_s": options.cycle_s()}
+        summary = {**found, "config": {**config, "resolved": derived}, "provenance": source}
+        write_json(options.out / "summary.json", summary)
+    return summary
+
+
+def _pictures(options: SpectrumOptions) -> list[Spectrum]:
+    from scenes.loading import asset
+
+    photographs = [picture_spectrum(asset(name), "photographs") for name in PHOTOGRAPHS]
+    return photographs + [picture_spectrum(path, "pictures given") for path in options.images]
+
+
+def _counter(show: Callable[[int], None]) -> Callable[[], None]:
+    """Moves a bar on by one at each call."""
+    steps = iter(range(1, 1 << 62))
+    return lambda: show(next(steps))
+
+
+def _slopes(options: SpectrumOptions, pictures: list[Spectrum], shown_bars: Bars) -> dict[str, Any]:
+    levels = options.tsar.level_max - options.tsar.level_min + 1
+    done = _counter(shown_bars.task("slopes", len(options.inputs) * (2 * options.frames_per_input + levels)))
+    own = [spectrum for name in options.inputs for spectrum in input_spectra(options, name, done)]
+    groups = list(dict.fromkeys(spectrum.group for spectrum in own))
+    ordered = pictures + sorted(own, key=lambda spectrum: groups.index(spectrum.group))
+    save(plots.slope_figure(ordered), options.out / "slopes.png")
+    one_each = list({s.source: s for s in reversed(own) if s.group == groups[1]}.values())[::-1]
+    examples = [*pictures[:_EXAMPLES], *one_each][: 2 * _EXAMPLES]
+    save(plots.example_spectra_figure(examples), options.out / "spectra.png")
+    rows = [
+        {"name": s.name, "group": s.group, "source": s.source, "slope": s.slope, "slope_linear": s.slope_linear}
+        for s in ordered
+    ]
+    return {"groups": group_statistics(ordered), "spectra": rows}
+
+
+def _ideal(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:
+    renderer, _ = open_input(options, options.input)
+    done = _counter(shown_bars.task("ideal", options.frames))
+    example = measure_example(options, renderer.trace, done)
+    times_s = [options.start_s + options.span_s * i / (_FRAMES_SHOWN - 1) for i in range(_FRAMES_SHOWN)]
+    side = options.tsar.resolution_px
+    frames = [shown(renderer.render_frame(time_s, side, side, 2).numpy()) for time_s in times_s]
+    renderer.close()
+    save(plots.tile_figure(frames, times_s, example), options.out / "ideal_tile.png")
+    save(plots.norm_figure(example), options.out / "ideal_norm.png")
+    save(plots.surface_figure(example), options.out / "ideal_surface.png")
+    save(plots.estimate_figure(example), options.out / "ideal_estimate.png")
+    return example.summary()
+
+
+def _agreement(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:
+    batches = -(-(options.tiles_per_input // 4) // 16)
+    show = shown_bars.task("agreement", 4 * batches * options.agreement_frames * len(options.inputs))
+    done, tiles = _counter(show), {}
+    for number, name in enumerate(options.inputs):
+        renderer, duration_s = open_input(options, name)
+        tiles[name] = measure_input(options, number, renderer.trace, duration_s, done)
+        renderer.close()
+    found = check_estimate(tiles, options.tau)
+    save(plots.agreement_figure(tiles, found, options.tau), options.out / "agreement.png")
+    density = tiles[options.inputs[0]].theta.numpy()
+    pixels = options.tsar.resolution_px / 2**options.agreement_level
+    rates = [
+        {"samples_per_pixel_side": space / pixels, "refresh_ms": 1e3 * options.span_s / time} for space, time in density
+    ]
+    return {"rates": rates, **found}

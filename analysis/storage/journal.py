@@ -1,0 +1,84 @@
+"""Rows that are appended to a file one by one, each with its own checksum."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from analysis.storage.files import plain, sync
+
+_CHECK_BYTES = 8
+_LINE_CHECK = 2 * _CHECK_BYTES
+
+
+def warn(line: str) -> None:
+    """Says on standard error what is damaged."""
+    print(line, file=sys.stderr, flush=True)
+
+
+class Journal:
+    """Rows that are appended to a file, each on the disk before it counts; a row is a dictionary that JSON can hold.
+
+    Every line begins with its own checksum, so that one that was cut off or has changed is noticed and does not count.
+    Several processes may append to one journal.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._rows: list[dict[str, Any]] = []
+        self._read = 0
+        self._file: tuple[int, int] | None = None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """All rows, oldest first; those that others have appended since are among them."""
+        try:
+            with self.path.open("rb") as file:
+                found = os.fstat(file.fileno())
+                if (found.st_dev, found.st_ino) != self._file or found.st_size < self._read:
+                    self._rows, self._read, self._file = [], 0, (found.st_dev, found.st_ino)
+                file.seek(self._read)
+                fresh = file.read()
+        except FileNotFoundError:
+            self._rows, self._read, self._file = [], 0, None
+            return []
+        # without an end it is being written, or was cut off
+        whole = fresh[: fresh.rfind(b"\n") + 1]
+        for line in whole.split(b"\n"):
+            row = _row(line)
+            if row is not None:
+                self._rows.append(row)
+            elif line:
+                warn(f"{self.path}: holds a damaged line; what it told of is made again")
+        self._read += len(whole)
+        return self._rows
+
+    def append(self, row: Mapping[str, Any]) -> None:
+        """Adds a row; it is on the disk when this returns."""
+        body = json.dumps(plain(row), allow_nan=False).encode()
+        line = _check(body) + b" " + body + b"\n"
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        created = not self.path.exists()
+        with self.path.open("a+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if file.seek(0, os.SEEK_END) and os.pread(file.fileno(), 1, file.tell() - 1) != b"\n":
+                line = b"\n" + line  # behind one that was cut off
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+        if created:
+            sync(self.path.parent)
+
+
+def _check(body: bytes) -> bytes:
+    return hashlib.blake2b(body, digest_size=_CHECK_BYTES).hexdigest().encode()
+
+
+def _row(line: bytes) -> dict[str, Any] | None:
+    body = line[_LINE_CHECK + 1 :]
+    return json.loads(body) if line[: _LINE_CHECK + 1] == _check(body) + b" " else None

@@ -1,0 +1,263 @@
+"""Reference images at a high rate in space and time, rendered once and kept on disk.
+
+A reference is named by a hash of everything that decides its content. It is written image by image, each with its
+checksum and the count of its values that were not finite: an interrupted rendering goes on where it stopped, and what
+is damaged is noticed and rendered again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from analysis.storage.files import atomic, locked
+from analysis.storage.journal import Journal, warn
+from analysis.storage.source import code_hash
+
+_HALF_MAX = float(np.finfo(np.float16).max)
+
+
+@dataclass(frozen=True)
+class ReferenceSpec:
+    """Everything that decides the content of a reference.
+
+    Attributes:
+        scene: name and phase of the scene, for people.
+        scene_hash: :func:`content_hash` of the scene.
+        renderer_hash: :func:`renderer_hash` of the renderer.
+        start_s: time of the first image, seconds.
+        rate_hz: images per second.
+        count: number of images.
+        resolution_px: width and height, pixels.
+        samples_per_axis: the average of a grid of this many samples squared is one pixel.
+    """
+
+    scene: str
+    scene_hash: str
+    renderer_hash: str
+    start_s: float
+    rate_hz: float
+    count: int
+    resolution_px: int
+    samples_per_axis: int
+
+    def __post_init__(self) -> None:
+        for name in ("rate_hz", "count", "resolution_px", "samples_per_axis"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"reference {name}: expected a positive number, got {getattr(self, name)!r}")
+
+    @property
+    def key(self) -> str:
+        """Name of the reference on disk."""
+        text = json.dumps(dataclasses.asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        return self.count, self.resolution_px, self.resolution_px, 3
+
+    @property
+    def bytes(self) -> int:
+        """Size on disk."""
+        return 2 * int(np.prod(self.shape))
+
+
+def content_hash(value: Any) -> str:
+    """Hash of a tree of dataclasses, containers, numbers and arrays, such as a scene with its meshes and textures."""
+    digest = hashlib.sha256()
+    known: dict[int, bytes] = {}
+
+    def leaf(item: Any) -> bytes:
+        # meshes and textures are shared by many instances: each is hashed once
+        if id(item) not in known:
+            part = hashlib.sha256(f"{item.dtype}{item.shape}".encode())
+            part.update(np.ascontiguousarray(item).tobytes())
+            known[id(item)] = part.digest()
+        return known[id(item)]
+
+    def visit(item: Any) -> None:
+        if isinstance(item, np.ndarray):
+            digest.update(leaf(item))
+        elif dataclasses.is_dataclass(item) and not isinstance(item, type):
+            digest.update(type(item).__name__.encode())
+            for entry in dataclasses.fields(item):
+                digest.update(entry.name.encode())
+                visit(getattr(item, entry.name))
+        elif isinstance(item, Mapping):
+            digest.update(f"map{len(item)}".encode())
+            for key in sorted(item, key=repr):
+                digest.update(repr(key).encode())
+                visit(item[key])
+        elif isinstance(item, (list, tuple)):
+            digest.update(f"list{len(item)}".encode())
+            for entry in item:
+                visit(entry)
+        else:
+            digest.update(f"{type(item).__name__}:{item!r};".encode())
+
+    visit(value)
+    return digest.hexdigest()
+
+
+def renderer_hash(renderer: object, device: str) -> str:
+    """Hash of the code that makes the images of a reference, and the kind of device."""
+    return f"{code_hash(type(renderer), ReferenceSpec)}-{device.partition(':')[0]}"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Reference images on disk.
+
+    Attributes:
+        spec: what they are.
+        images: ``(count, height, width, 3)`` float16 linear RGB, mapped into memory as it is read.
+        nonfinite: values of the rendering that were not finite; they are stored as 0.
+        rendered: images rendered now rather than found on disk.
+    """
+
+    spec: ReferenceSpec
+    images: NDArray[np.float16]
+    nonfinite: int
+    rendered: int
+
+
+Render = Callable[[float], Tensor]
+"""``time_s -> (height, width, 3)`` linear RGB, already down-filtered to the resolution of the reference."""
+
+
+def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[[int, int], None]) -> Reference:
+    """The reference from disk, where every image is checked; what is missing or damaged is rendered now.
+
+    Two processes that want the same reference do not both render it: the second waits.
+
+    Args:
+        cache: folder of references.
+        spec: what is wanted.
+        render: called for each image that is not on disk.
+        progress: called with images done and images in all.
+
+    Raises:
+        ValueError: the disk has no room for it, or the renderer returns another shape.
+        OSError: it cannot be written.
+    """
+    cache.mkdir(parents=True, exist_ok=True)
+    stored, rendered = _Images(cache, spec), 0
+    nonfinite = stored.checked(say=lambda line: None)
+    if len(nonfinite) < spec.count:
+        with locked(cache / f"{spec.key}.lock"):
+            nonfinite = stored.checked(say=warn)
+            missing = [number for number in range(spec.count) if number not in nonfinite]
+            with stored.opened(fresh=len(missing) == spec.count) as file:
+                for number in missing:
+                    progress(len(nonfinite), spec.count)
+                    nonfinite[number] = stored.write(file, number, render(spec.start_s + number / spec.rate_hz))
+                    rendered += 1
+    progress(spec.count, spec.count)
+    images = np.load(stored.path, mmap_mode="r")
+    return Reference(spec, images, sum(nonfinite.values()), rendered)
+
+
+class _Images:
+    """The images of a reference in a file, and the journal that says which of them are there.
+
+    The file has its full length from the beginning. An image counts where the journal has a row with its checksum.
+    """
+
+    def __init__(self, cache: Path, spec: ReferenceSpec) -> None:
+        self.path, self._spec = cache / f"{spec.key}.npy", spec
+        self._journal = Journal(cache / f"{spec.key}.journal")
+        header = io.BytesIO()
+        empty = {"descr": np.lib.format.dtype_to_descr(np.dtype(np.float16)), "fortran_order": False}
+        np.lib.format.write_array_header_1_0(header, {**empty, "shape": spec.shape})
+        self._header, self._image_bytes = header.getvalue(), spec.bytes // spec.count
+
+    def checked(self, say: Callable[[str], None]) -> dict[int, int]:
+        """Values that were not finite, of each image that is on disk as it was rendered. Says what is damaged."""
+        rows: dict[int, dict[str, Any]] = {}
+        for row in self._journal.rows():
+            if "image" in row:
+                rows[row["image"]] = row
+            else:
+                rows.clear()  # a new file begins
+        try:
+            with self.path.open("rb") as file:
+                whole = os.fstat(file.fileno()).st_size == len(self._header) + self._spec.bytes
+                if file.read(len(self._header)) != self._header or not whole:
+                    if rows:
+                        say(f"{self.path}: is damaged: expected float16 {self._spec.shape}; it is rendered again")
+                    return {}
+                found = {
+                    number: row["nonfinite"]
+                    for number, row in sorted(rows.items())
+                    if self._digest(number, self._read(file, number)) == row["sha256"]
+                }
+        except FileNotFoundError:
+            return {}
+        damaged = sorted(rows.keys() - found.keys())
+        if damaged:
+            say(f"{self.path}: images {', '.join(map(str, damaged))} are damaged and are rendered again")
+        return found
+
+    @contextmanager
+    def opened(self, fresh: bool) -> Iterator[BinaryIO]:
+        """The file, to write images to; a fresh one has room for them all."""
+        if fresh:
+            self._allocate()
+            self._journal.append({"key": self._spec.key, **dataclasses.asdict(self._spec)})
+        with self.path.open("r+b") as file:
+            yield file
+
+    def write(self, file: BinaryIO, number: int, rendered: Tensor) -> int:
+        """Puts an image on the disk; returns how many of its values were not finite."""
+        image = np.asarray(rendered.cpu())
+        if image.shape != self._spec.shape[1:]:
+            raise ValueError(f"reference: expected images {self._spec.shape[1:]}, got {image.shape}")
+        nonfinite = int((~np.isfinite(image)).sum())
+        image = np.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
+        content = np.clip(image, 0.0, _HALF_MAX).astype("<f2").tobytes()
+        # not through mapped memory: a full disk would end the process there
+        file.seek(self._offset(number))
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+        self._journal.append({"image": number, "nonfinite": nonfinite, "sha256": self._digest(number, content)})
+        return nonfinite
+
+    def _offset(self, number: int) -> int:
+        return len(self._header) + number * self._image_bytes
+
+    def _read(self, file: BinaryIO, number: int) -> bytes:
+        file.seek(self._offset(number))
+        return file.read(self._image_bytes)
+
+    def _digest(self, number: int, content: bytes) -> str:
+        # an image of another reference, or in another place of this one, is no image of this place
+        digest = hashlib.sha256(f"{self._spec.key} {number} ".encode())
+        digest.update(content)
+        return digest.hexdigest()
+
+    def _allocate(self) -> None:
+        """Makes the file with all its room on the disk."""
+        need = self._spec.bytes + len(self._header)
+        self.path.unlink(missing_ok=True)  # its blocks count as free
+        free = shutil.disk_usage(self.path.parent).free
+        if need > free:
+            where = self.path.parent
+            raise ValueError(f"{where}: the reference needs {need / 1e9:.1f} GB, {free / 1e9:.1f} GB are free")
+        with atomic(self.path) as temporary, temporary.open("wb") as file:
+            file.write(self._header)
+            file.flush()
+            os.posix_fallocate(file.fileno(), 0, need)

@@ -1,0 +1,171 @@
+"""What a study is made of: one policy on one input at one setting, as data that can be sent anywhere and named."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass, field
+
+from analysis.command import limits
+from analysis.metrics.cost_model import (
+    CostParameters,
+    Ledger,
+    adaptive_flops,
+    expected_ledger,
+    nonadaptive_flops,
+    parameters_of,
+)
+from analysis.metrics.display_model import DisplayModel
+from analysis.storage.files import plain
+from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
+from tsar.policies import POLICIES
+
+INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
+"""The five test inputs by number."""
+
+ROWS = (
+    (32, 256), (32, 512), (32, 1024), (64, 256), (64, 512), (64, 1024), (128, 256), (128, 512), (128, 1024),
+    (256, 512), (256, 1024), (512, 512), (512, 1024), (768, 512), (768, 1024), (1024, 1024),
+)  # fmt: skip
+"""Batch size and output side of the rows of table 7.2, in its order. Source: Stephens 2011, table 7.2."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How large a study is.
+
+    ``divisor`` makes everything that is counted in pixels or samples smaller alike: the side of the image and of the
+    fields by it, batch, cache, tiles and the machine's speed by its square. A row is then the same row seen through a
+    smaller window: samples per pixel, cycles per framed image and the tiling stay as they are.
+
+    Attributes:
+        divisor: 1 is the thesis' own size, a power of two.
+        seconds: simulated time measured.
+        reference_rate_hz: reference images per second.
+        reference_samples_per_axis: samples along a pixel's side of the finest output resolution.
+        stride: reference images from one to the next at which FLIP, SSIM and the causes are taken.
+    """
+
+    divisor: int
+    seconds: float
+    reference_rate_hz: float
+    reference_samples_per_axis: int
+    stride: int
+
+    @property
+    def reference_px(self) -> int:
+        """Side of the reference: of the finest row. Coarser rows see it averaged (Stephens 2011, sec. 7.2.3)."""
+        return max(side for _, side in ROWS) // self.divisor
+
+    def config(self, row: int, base: TsarConfig) -> TsarConfig:
+        """Configuration of a row of table 7.2: batch and resolution from the row, the rest from ``base``.
+
+        A bound on the tiles that is too low for a row's batch is raised to the smallest tiling that holds it.
+        """
+        batch, side = ROWS[row]
+        area, divisor = self.divisor**2, self.divisor
+        level_min = max(1, base.tiling.level_min - (divisor.bit_length() - 1))
+        support = base.reconstruction.age_support_px // divisor
+        small = dataclasses.replace(
+            base,
+            batch_size=batch // area,
+            resolution_px=side // divisor,
+            sdf_side=base.sdf_side // divisor,
+            cache_size=base.cache_size // area,
+            tiling=dataclasses.replace(base.tiling, level_min=level_min, tile_count_max=0),
+            reconstruction=ReconstructionConfig(age_support_px=support + 1 - support % 2),
+        )
+        if divisor == 1 and not base.tiling.tile_count_max:
+            return small
+        tiles = min((base.tiling.tile_count_max or max(512, 4 * batch)) // area, 4**small.level_max)
+        tiles = max(tiles, tiles_at_least(small.batch_size, level_min))
+        return dataclasses.replace(small, tiling=dataclasses.replace(small.tiling, tile_count_max=tiles))
+
+
+def framed_config(side_px: int) -> TsarConfig:
+    """What a framed renderer reads of a configuration is the resolution; the rest is the same for all that share it."""
+    return TsarConfig(batch_size=16, resolution_px=side_px, tiling=TilingConfig(tile_count_max=16))
+
+
+SCALES: dict[str, Scale] = {
+    "thesis": Scale(1, seconds=2.0, reference_rate_hz=60.0, reference_samples_per_axis=2, stride=6),
+    "half": Scale(2, seconds=2.0, reference_rate_hz=60.0, reference_samples_per_axis=3, stride=6),
+    "quick": Scale(4, seconds=2.0, reference_rate_hz=30.0, reference_samples_per_axis=3, stride=6),
+}
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class Case:
+    """One policy on one input at one setting. Everything that decides its result.
+
+    Attributes:
+        input: built-in input.
+        phase: of the animation.
+        policy: who decides what is sampled.
+        tsar: configuration; framed renderers read its resolution.
+        scale: sizes of the study it belongs to.
+        ledger: how cost is counted.
+        framed_rate_hz: images a second of the framed renderer with one sample a pixel; sets the machine's speed.
+        trace_segments: ray segments per sample in the cost model.
+        start_s: where in the animation the measurement starts.
+        jod_span_s: part of the run, from and to, seconds after its start, that ColorVideoVDP scores, which costs more a
+            second than all the rest; None for no score.
+        display: the display it is scored for.
+        stills_s: times whose pictures are kept, seconds after the start.
+    """
+
+    input: str
+    policy: str
+    tsar: TsarConfig
+    scale: Scale
+    phase: float = 0.0
+    ledger: Ledger = "thesis"
+    framed_rate_hz: float = 8.0
+    trace_segments: float = 4.0
+    start_s: float = 0.0
+    jod_span_s: tuple[float, float] | None = None
+    display: DisplayModel = field(default_factory=DisplayModel)
+    stills_s: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
+        POLICIES.require(self.policy)
+        require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
+        require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
+        if not self.policy.startswith("framed"):
+            cycle_s = float(adaptive_flops(self.cost, expected_ledger(self.ledger))) / self.capacity
+            pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
+            limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
+        span = self.jod_span_s
+        ok = span is None or 0 <= span[0] < span[1] <= self.scale.seconds
+        require(ok, "jod_span_s", f"from and to within the {self.scale.seconds:g} s of a run", span)
+        require(self.scale.reference_px % self.tsar.resolution_px == 0, "resolution_px", "a divisor of the reference's",
+                self.tsar.resolution_px)  # fmt: skip
+
+    @property
+    def cost(self) -> CostParameters:
+        """Parameters of the cost model."""
+        return parameters_of(self.tsar, self.trace_segments)
+
+    @property
+    def capacity(self) -> float:
+        """FLOP/s of the machine on which the framed renderer keeps its rate at this resolution."""
+        return float(nonadaptive_flops(self.cost, expected_ledger(self.ledger))) * self.framed_rate_hz
+
+    @property
+    def name(self) -> str:
+        """For people: policy, input, batch, resolution, seed and phase."""
+        c = self.tsar
+        batch = "" if self.policy.startswith("framed") else f"-b{c.batch_size}"
+        text = f"{self.policy}-{self.input}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
+        return text.replace(" ", "-")
+
+    def key(self, source: str) -> str:
+        """Name of its files: for people first, then a hash of all that decides it and of the source code."""
+        origin = POLICIES.origin(self.policy)
+        # the source does not cover what other distributions bring
+        foreign = [] if str(origin["module"]).startswith("tsar.") else [origin]
+        text = json.dumps([plain(self), source, *foreign], sort_keys=True)
+        return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"

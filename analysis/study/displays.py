@@ -1,0 +1,163 @@
+"""What displays show, measured at every reference time: the one engine that compares runs with a reference.
+
+All runs go side by side; two images of each are held at a time, whatever the length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from analysis.metrics import METRICS
+from analysis.metrics.causes import CAUSES, REGIONS, Split, Truths, flicker, split
+from analysis.metrics.quality import Floats, Hold, Shown, View, encode, pixel_errors
+from analysis.page.pictures import Pixels
+from tsar.types import Display
+
+_MOTION_S = 0.1  # motion is judged over this long
+
+
+Viewer = Callable[[View], None]
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """What is measured beside both mean squared errors.
+
+    Attributes:
+        metrics: names of image metrics, each taken every ``stride`` reference times.
+        stride: reference times from one to the next at which they are taken.
+        causes: whether the causes of the error are told apart, at the same times, and its flicker at all.
+        framelet_side: samples along a framelet's side, for the causes.
+        kept: numbers of reference times, from and to, whose encoded images are kept for metrics of sequences.
+    """
+
+    metrics: tuple[str, ...] = ()
+    stride: int = 1
+    causes: bool = False
+    framelet_side: int = 16
+    kept: tuple[int, int] = (0, 0)
+
+
+@dataclass
+class Seen:
+    """What one display showed, measured. Changes in place.
+
+    Attributes:
+        rows: a line a reference time: ``time_s``, ``mse``, ``log_mse``, how many images had been shown, and metrics.
+        refresh_s: display times of the images that have been shown.
+        nonfinite: values of the images shown that were not finite, each image counted once.
+        splits: causes of the error.
+        frames: encoded images of the display and of the reference that were kept.
+    """
+
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    refresh_s: list[float] = field(default_factory=list)
+    nonfinite: int = 0
+    splits: list[Split] = field(default_factory=list)
+    frames: tuple[list[Pixels], list[Pixels]] = field(default_factory=lambda: ([], []))
+
+    @property
+    def images(self) -> int:
+        """How many images have been shown."""
+        return len(self.refresh_s)
+
+    def column(self, name: str) -> Floats:
+        """One value a reference time; NaN where it was not measured."""
+        return np.array([row.get(name, np.nan) for row in self.rows], np.float64)
+
+    def regions(self) -> dict[str, dict[str, float]]:
+        """Mean over the times of each cause in each region, as a part of the whole error, and the region's share; times
+        count by the pixels whose truth is known."""
+        weight = [found.known for found in self.splits]
+        if not sum(weight):
+            return {}
+
+        def mean(values: list[float]) -> float:
+            return float(np.average(values, weights=weight))
+
+        return {
+            region: {cause: mean([found.regions[region][cause] for found in self.splits]) for cause in CAUSES}
+            | {"share": mean([found.share[region] for found in self.splits])}
+            for region in REGIONS
+        }
+
+
+def watch(
+    runs: Mapping[str, Iterable[Shown]],
+    truths: Truths,
+    times_s: NDArray[np.float64],
+    measuring: Measuring,
+    viewers: Sequence[Viewer] = (),
+) -> dict[str, Seen]:
+    """Holds what each display shows at every reference time and measures it.
+
+    Args:
+        runs: streams of images by name.
+        truths: reference images.
+        times_s: reference times.
+        measuring: what is measured.
+        viewers: each is told what all displays show at every reference time.
+
+    Raises:
+        ValueError: nothing is shown yet at the first time.
+    """
+    holds = {name: Hold(run) for name, run in runs.items()}
+    watchers = {name: _Watcher(truths, times_s, measuring, hold) for name, hold in holds.items()}
+    for number, time_s in enumerate(times_s.tolist()):
+        truth = truths.image(number)
+        wanted = encode(truth)
+        shown = {name: hold.at(time_s) for name, hold in holds.items()}
+        mse = {name: watchers[name].measure(number, display, truth, wanted) for name, (_, display) in shown.items()}
+        view = View(number, time_s, truth, shown, mse)
+        for viewer in viewers:
+            viewer(view)
+    return {name: watcher.seen for name, watcher in watchers.items()}
+
+
+class _Watcher:
+    """Measures one display. Changes in place."""
+
+    def __init__(self, truths: Truths, times_s: Floats, measuring: Measuring, hold: Hold) -> None:
+        self.seen = Seen(refresh_s=hold.refresh_s)
+        self._truths, self._times_s, self._measuring = truths, times_s, measuring
+        self._before: tuple[Tensor, Tensor] | None = None
+        self._last: Display | None = None
+        rate_hz = 1.0 / (times_s[1] - times_s[0]) if len(times_s) > 1 else 0.0
+        self._step = max(1, round(_MOTION_S * rate_hz))
+
+    def measure(self, number: int, display: Display, truth: Tensor, wanted: Tensor) -> float:
+        """One reference time: the image shown, its linear and its encoded truth. Returns the mean squared error."""
+        seen, asked = self.seen, self._measuring
+        errors, shown = pixel_errors(display.image, truth, wanted)
+        row = {"time_s": float(self._times_s[number]), "mse": errors.mse, "log_mse": errors.log_mse}
+        row["refresh"] = seen.images
+        if asked.causes:
+            before = self._before
+            row["flicker"] = flicker(shown - wanted, before[0], wanted, before[1]) if before else np.nan
+            self._before = shown - wanted, wanted
+        if number % asked.stride == 0:
+            row |= {name: METRICS[name].of_image(shown, wanted) for name in asked.metrics}
+            if asked.causes and display.samples is not None:
+                row |= self._causes(number, display)
+        if asked.kept[0] <= number < asked.kept[1]:
+            for kept, one in zip(seen.frames, (shown, wanted), strict=True):
+                kept.append((one * 255.0 + 0.5).to(torch.uint8).numpy())
+        seen.nonfinite += errors.nonfinite if display is not self._last else 0
+        self._last = display
+        seen.rows.append(row)
+        return errors.mse
+
+    def _causes(self, number: int, display: Display) -> dict[str, float]:
+        assert display.samples is not None
+        image = display.image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0)
+        found = split(image, display.samples, number, self._truths, self._measuring.framelet_side, self._step)
+        self.seen.splits.append(found)
+        known = {**found.causes, "causes_mse": found.mse} if found.known else {}
+        return {**known, "causes_known": found.known}

@@ -1,0 +1,290 @@
+"""Runs one case of a study and puts its result on disk.
+
+Beside ``experiment.py`` the one module of this package that wires scenes, renderer and pipeline. A result is a table
+over the reference times (Parquet), stills, and what was measured of the whole run (JSON), which is written last. The
+case is done where all of them are as they were written. Nothing in them depends on the number of threads, processes or
+machines, except the entry ``machine`` of the JSON file, which holds measured seconds and memory.
+"""
+
+from __future__ import annotations
+
+import io
+import resource
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import torch
+import torch.nn.functional as F
+from PIL import Image
+
+from analysis.metrics.causes import Truths
+from analysis.metrics.perceptual import jod, one_thread
+from analysis.metrics.quality import View, reference_times
+from analysis.page.pictures import Pixels, tiling_image
+from analysis.page.video import to_pixels
+from analysis.storage.files import locked
+from analysis.storage.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
+from analysis.storage.source import code_hash
+from analysis.storage.store import Store
+from analysis.study.cases import Case, Scale
+from analysis.study.displays import Measuring, Seen, watch
+from analysis.study.runs import Machine, PolicyRun, Totals, begin
+
+if TYPE_CHECKING:
+    from renderer.trace import Renderer
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where results and references are kept, and how many threads trace.
+
+    Attributes:
+        results: folder of results, one for all studies of a kind.
+        references: folder of references, shared with all other runs.
+        threads: for tracing and reconstruction; everything else runs on one.
+    """
+
+    results: Path
+    references: Path
+    threads: int = 1
+
+    def files(self, key: str) -> dict[str, Path]:
+        """Files of a result."""
+        return {"summary": self.results / f"{key}.json", "times": self.results / f"{key}.parquet"}
+
+    def still(self, key: str, what: str, number: int) -> Path:
+        """Picture number ``number`` of ``what``: shown, reference, or tiling."""
+        return self.results / "stills" / f"{key}-{number}-{what}.png"
+
+    def store(self, key: str) -> Store:
+        """Where the files of a result are checked."""
+        return _store(self.results).under(key)
+
+
+@lru_cache(maxsize=4)
+def _store(results: Path) -> Store:
+    return Store(results, "")
+
+
+@lru_cache(maxsize=1)
+def source_of_results() -> str:
+    """Hash of the source, assets and libraries that decide a result.
+
+    It is taken once in a process, for the process goes on with what it has imported and read: a worker that is older
+    than a change must not pass for one that knows it.
+    """
+    return code_hash(evaluate)
+
+
+def finished(key: str, place: Place) -> dict[str, Any] | None:
+    """The summary of a result whose files are all on disk as they were written, or None. Names those that are damaged.
+
+    Raises:
+        ValueError: the summary is none of a result.
+    """
+    store, files = place.store(key), place.files(key)
+    found = store.read_json(files["summary"].name, {"key": str, "case": dict, "stills": list[str]})
+    names = [files["times"].name, *found["stills"]] if found else []
+    return found if names and all(store.find(name) is not None for name in names) else None
+
+
+def times_of(key: str, place: Place) -> pd.DataFrame:
+    """The table over the reference times of a result that is finished.
+
+    Raises:
+        ValueError: it is not on disk as it was written.
+    """
+    file = place.files(key)["times"]
+    content = place.store(key).read(file.name)
+    if content is None:
+        raise ValueError(f"{file}: expected the table of a finished run, found none or another")
+    return pd.read_parquet(io.BytesIO(content))
+
+
+def broken(found: Iterable[dict[str, Any] | None]) -> list[str]:
+    """Names of the results, of some summaries, whose cycles broke an invariant; only adaptive runs have any."""
+    return [one["key"] for one in found if one and not one.get("invariants", {"ok": True})["ok"]]
+
+
+def evaluate(case: Case, key: str, place: Place) -> str:
+    """Runs a case unless its result is on disk; two processes that want the same do not both run it.
+
+    Args:
+        case: what to run.
+        key: the name of its result, which tells the source that is meant to make it.
+        place: where it goes.
+
+    Returns:
+        The key.
+
+    Raises:
+        ValueError: this process runs another source than the one that asked.
+    """
+    if key != case.key(source_of_results()):
+        raise ValueError(f"{case.name}: expected source {key}, this worker runs another one")
+    (place.results / "stills").mkdir(parents=True, exist_ok=True)
+    if finished(key, place) is not None:
+        return key
+    with locked(place.results / f"{key}.lock"), one_thread():
+        if finished(key, place) is None:
+            _run(case, key, place)
+    (place.results / f"{key}.lock").unlink(missing_ok=True)
+    return key
+
+
+def render_reference(input: str, phase: float, start_s: float, scale: Scale, place: Place) -> Reference:
+    """The reference of an input, from disk or rendered now, on all threads of the place."""
+    with one_thread():
+        renderer = _renderer(input, phase, scale.reference_px, place.threads)
+        spec = ReferenceSpec(
+            scene=f"{input} phase {phase:g}",
+            scene_hash=_scene_hash(input, phase),
+            renderer_hash=renderer_hash(renderer, "cpu"),
+            start_s=start_s,
+            rate_hz=scale.reference_rate_hz,
+            count=len(reference_times(start_s, start_s + scale.seconds, scale.reference_rate_hz)),
+            resolution_px=scale.reference_px,
+            samples_per_axis=scale.reference_samples_per_axis,
+        )
+        side, axis = scale.reference_px, scale.reference_samples_per_axis
+        return obtain(
+            place.references, spec, lambda t: renderer.render_frame(t, side, side, axis), lambda done, count: None
+        )
+
+
+@lru_cache(maxsize=4)
+def _renderer(input: str, phase: float, footprint_px: int, threads: int) -> Renderer:
+    from renderer.trace import Renderer
+    from scenes import catalog
+
+    return Renderer(catalog.load(input, phase), "cpu", threads, footprint_resolution_px=footprint_px)
+
+
+@lru_cache(maxsize=16)
+def _scene_hash(input: str, phase: float) -> str:
+    from scenes import catalog
+
+    return content_hash(catalog.load(input, phase))
+
+
+def _truths(case: Case, reference: Reference) -> Truths:
+    """Reference images averaged down to the resolution of the case."""
+    factor = case.scale.reference_px // case.tsar.resolution_px
+
+    def image(number: int) -> torch.Tensor:
+        found = torch.from_numpy(reference.images[number].astype(np.float32))
+        if factor == 1:
+            return found
+        return F.avg_pool2d(found.permute(2, 0, 1)[None], factor)[0].permute(1, 2, 0).contiguous()
+
+    return Truths(image, case.start_s, case.scale.reference_rate_hz, reference.spec.count)
+
+
+def _run(case: Case, key: str, place: Place) -> None:
+    began = time.perf_counter()
+    reference = render_reference(case.input, case.phase, case.start_s, case.scale, place)
+    truths = _truths(case, reference)
+    began_run = time.perf_counter()
+    store, stills = place.store(key), list[str]()
+
+    def keep(number: int, pictures: dict[str, Pixels]) -> None:
+        for what, pixels in pictures.items():
+            stills.append(place.still(key, what, number).relative_to(place.results).as_posix())
+            with store.make(stills[-1]) as made:
+                Image.fromarray(pixels).save(made.path)
+
+    scale, config = case.scale, case.tsar
+    times_s = reference_times(case.start_s, case.start_s + scale.seconds, scale.reference_rate_hz)
+    made = _begin(case, place, truths)
+    measuring = Measuring(
+        metrics=("ssim", "flip"),
+        stride=scale.stride,
+        causes=True,
+        framelet_side=config.framelet_side,
+        kept=_scored(case),
+    )
+    stills_of = _Stills(case, len(times_s), keep)
+    seen = watch({case.policy: made.images}, truths, times_s, measuring, [stills_of])[case.policy]
+    table, totals = pd.DataFrame(seen.rows), made.totals
+    with store.make(place.files(key)["times"].name) as file:
+        table.to_parquet(file.path)
+    scored = time.perf_counter()
+    found = {
+        "key": key,
+        "case": case,
+        "images": seen.images,
+        "nonfinite": seen.nonfinite,
+        "reference_nonfinite": reference.nonfinite,
+        "jod": _score(case, seen),
+        "regions": seen.regions(),
+        "stills": stills,
+        **(_cycles(totals) if totals.cycles else {}),
+        "machine": {
+            "reference_s": began_run - began,
+            "run_s": scored - began_run,
+            "jod_s": time.perf_counter() - scored,
+            "threads": place.threads,
+            # of the process, so of the largest case it has run
+            "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        },
+    }
+    store.write_json(place.files(key)["summary"].name, found)
+
+
+def _cycles(totals: Totals) -> dict[str, Any]:
+    return {
+        "cycles": totals.cycles,
+        "cycle_s": totals.simulated_s / totals.cycles,
+        "age_spread_s": totals.age_spread_s / totals.cycles,
+        "nonfinite_samples": totals.nonfinite,
+        "invariants": totals.invariants,
+    }
+
+
+def _scored(case: Case) -> tuple[int, int]:
+    """Numbers of the reference times, from and to, that a metric of sequences scores."""
+    low, high = (round(at * case.scale.reference_rate_hz) for at in case.jod_span_s or (0.0, 0.0))
+    return low, high
+
+
+class _Stills:
+    """Hands on the pictures of some times, by the number of the still."""
+
+    def __init__(self, case: Case, count: int, keep: Callable[[int, dict[str, Pixels]], None]) -> None:
+        rate_hz = case.scale.reference_rate_hz
+        self._case, self._keep = case, keep
+        self._numbers = {min(round(at * rate_hz), count - 1): number for number, at in enumerate(case.stills_s)}
+
+    def __call__(self, view: View) -> None:
+        if view.number in self._numbers:
+            record, display = view.shown[self._case.policy]
+            pictures = {"shown": to_pixels(display.image), "reference": to_pixels(view.reference)}
+            if record is not None:
+                config = self._case.tsar
+                side, bounds = max(256, config.resolution_px), config.temporal_bounds
+                pictures["tiling"] = tiling_image(record.tiling, record.densities.temporal, side, bounds)
+            self._keep(self._numbers[view.number], pictures)
+
+
+def _score(case: Case, seen: Seen) -> float | None:
+    if case.jod_span_s is None:
+        return None
+    shown, reference = (np.stack(frames) for frames in seen.frames)
+    return jod(shown, reference, case.scale.reference_rate_hz, case.display)
+
+
+def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
+    def renderer_of(footprint: int) -> Renderer:
+        return _renderer(case.input, case.phase, case.tsar.resolution_px * footprint, place.threads)
+
+    machine = Machine(case.ledger, case.capacity, case.cost)
+    span_s = case.start_s, case.start_s + case.scale.seconds
+    return begin(case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads)

@@ -1,0 +1,158 @@
+"""Many cases over many processes or machines, each durable before it counts.
+
+Cases are independent, so they go through Dask: a cluster on this machine by default, or any other by its address,
+whose workers see the same folders and run the same source.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from analysis.command.cluster import ClusterOptions, connected
+from analysis.storage.files import PARTIAL
+from analysis.study.cases import Case, Scale
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+    from analysis.study.evaluation import Place
+
+
+def run_cases(
+    cases: Sequence[Case], place: Place, options: ClusterOptions, on_done: Callable[[int], None] = lambda done: None
+) -> tuple[dict[Case, str], dict[Case, str]]:
+    """Runs every case whose result is not on disk yet; a case that fails does not stop the others.
+
+    Args:
+        cases: what to run; one that occurs twice is run once.
+        place: where results and references go; on a cluster, folders that all of its machines see.
+        options: the cluster.
+        on_done: told how many cases are done.
+
+    Returns:
+        The key of every case's result, and the reason of every failure.
+    """
+    from analysis.study.evaluation import finished, source_of_results
+
+    source = source_of_results()
+    keys = {case: case.key(source) for case in dict.fromkeys(cases)}
+    missing = [case for case in keys if finished(keys[case], place) is None]
+    done, failures = len(keys) - len(missing), dict[Case, str]()
+    on_done(done)
+    if not missing:
+        return keys, failures
+    try:
+        with connected(options) as client:
+            client.run(_keep_freed_memory, on_error="ignore")
+            for case, reason in _outcomes(client, _submit(client, missing, keys, place)):
+                if reason is not None:
+                    failures[case] = reason
+                done += 1
+                on_done(done)
+    except KeyboardInterrupt:
+        if not options.scheduler:  # its workers cannot do it any more
+            for left in place.results.rglob(f"*{PARTIAL}*"):
+                left.unlink(missing_ok=True)
+        raise
+    return keys, failures
+
+
+def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Case, str | None]]:
+    """Cases as they end, each with the reason why it failed, or None.
+
+    A scheduler that is gone, or that has had no worker for a while, fails all that are left.
+    """
+    from distributed import wait
+
+    pending, seen_s = set(waiting), time.monotonic()
+    while pending:
+        try:
+            done, pending = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
+        except TimeoutError:
+            done = set[Any]()
+        except Exception as error:  # of whatever library the connection is made of
+            yield from ((waiting[future], f"the scheduler is gone ({_reason(error)})") for future in pending)
+            return
+        for future in done:
+            yield waiting[future], _failure(future)
+        if done or _has_workers(client):
+            seen_s = time.monotonic()
+        elif time.monotonic() - seen_s > _WAIT_S:
+            yield from ((waiting[future], f"no worker was there for {_WAIT_S} s") for future in pending)
+            return
+
+
+def _failure(future: Future) -> str | None:
+    """Why a case has no result, or None where it has one."""
+    if future.status == "finished":
+        return None
+    if future.status == "error":
+        return _reason(future.exception())
+    return "the scheduler or its workers were ended"
+
+
+def _has_workers(client: Client) -> bool:
+    try:
+        return bool(client.scheduler_info(n_workers=1)["workers"])
+    except Exception:  # of whatever library the connection is made of
+        return False
+
+
+def describe_failures(failures: Mapping[str, str]) -> list[str]:
+    """A line for each reason, with the name of the first run that failed for it and how many others did."""
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in failures.items():
+        by_reason.setdefault(reason, []).append(name)
+    return [
+        f"failed: {names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {reason}"
+        for reason, names in by_reason.items()
+    ]
+
+
+def _keep_freed_memory() -> None:
+    """Has a worker keep the memory it frees, from one heap for all of its threads.
+
+    Images come and go by the hundred a second; glibc would give each back to the system, from the heaps of threads at
+    once, and a third of a worker's time would go into having them again. Elsewhere this does nothing.
+    """
+    arena_max, mmap_threshold, trim_threshold = -8, -3, -1
+    try:
+        tune = ctypes.CDLL("libc.so.6").mallopt
+    except (OSError, AttributeError):
+        return
+    for option, value in ((arena_max, 1), (mmap_threshold, 1 << 30), (trim_threshold, (1 << 31) - 1)):
+        tune(option, value)
+
+
+def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Place) -> dict[Future, Case]:
+    """Futures of the cases, each behind that of its reference, in an order in which the references come early."""
+    references = {_reference_of(case): None for case in missing}
+    behind = {wanted: client.submit(_prepare, *wanted, place, pure=False) for wanted in references}
+    return {
+        client.submit(_evaluate, case, keys[case], place, behind[_reference_of(case)], pure=False): case
+        for case in missing
+    }
+
+
+def _reference_of(case: Case) -> tuple[str, float, float, Scale]:
+    return case.input, case.phase, case.start_s, case.scale
+
+
+def _prepare(input: str, phase: float, start_s: float, scale: Scale, place: Place) -> None:
+    from analysis.study.evaluation import render_reference
+
+    render_reference(input, phase, start_s, scale, place)
+
+
+def _evaluate(case: Case, key: str, place: Place, reference: None) -> str:
+    from analysis.study.evaluation import evaluate
+
+    return evaluate(case, key, place)
+
+
+def _reason(error: BaseException | None) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text[:300]}"

@@ -1,0 +1,161 @@
+"""A policy on a scene by a clock: its images, what it asked of the renderer, and what its cycles add up to."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds
+from analysis.metrics.quality import Shown
+from analysis.storage.records import InvariantCheck, RecordLimits
+from tsar.config import StagesName, TsarConfig, closed_choices
+from tsar.policies import POLICIES
+from tsar.policy import Policy, Price, Setting, run
+from tsar.types import FrameletBatch, SampleBatch, StepRecord, Trace
+
+if TYPE_CHECKING:
+    from renderer.trace import Renderer
+    from tsar.policy import Truth
+
+
+@dataclass
+class Meter:
+    """A renderer that counts: work by kind, calls and seconds. Changes in place."""
+
+    trace: Trace
+    counters: Counter[str] = field(default_factory=Counter)
+    calls: int = 0
+    wall_s: float = 0.0
+
+    def __call__(self, batch: FrameletBatch) -> SampleBatch:
+        began = time.perf_counter()
+        samples = self.trace(batch)
+        self.wall_s += time.perf_counter() - began
+        self.calls += 1
+        self.counters.update(samples.counters)
+        return samples
+
+
+class Totals:
+    """Sums over the recorded cycles of a run that lie within the span, and its invariants. Changes in place.
+
+    Warm-up is left out of the sums, not of the invariants.
+    """
+
+    def __init__(self, config: TsarConfig) -> None:
+        limits = RecordLimits(config.batch_size, config.budget, config.spatial_bounds, config.temporal_bounds)
+        self._check = InvariantCheck(limits)
+        self.cycles = self.warmup_cycles = self.nonfinite = self.nonfinite_fields = 0
+        self.simulated_s = self.age_spread_s = 0.0
+        self.stage_s: Counter[str] = Counter()
+        self.counters: Counter[str] = Counter()
+
+    def add(self, record: StepRecord) -> None:
+        """Takes in one cycle."""
+        self._check.add(record)
+        if record.cycle < 0:
+            self.warmup_cycles += 1
+            return
+        self.cycles += 1
+        self.simulated_s += record.cost_s
+        self.nonfinite += record.nonfinite
+        self.nonfinite_fields += record.nonfinite_fields
+        self.age_spread_s += record.age_spread_s
+        self.stage_s.update(record.stage_s)
+        self.counters.update(record.counters)
+
+    @property
+    def recorded(self) -> bool:
+        """Whether the policy records its cycles."""
+        return self.cycles + self.warmup_cycles > 0
+
+    @property
+    def invariants(self) -> dict[str, Any]:
+        """What :meth:`analysis.storage.records.InvariantCheck.result` found."""
+        return self._check.result()
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class Machine:
+    """The simulated machine: how cost is counted, its speed in FLOP/s, and the parameters of the cost model."""
+
+    ledger: Ledger
+    capacity: float
+    cost: CostParameters
+
+
+@dataclass(frozen=True)
+class PolicyRun:
+    """A policy at work. Its stream is consumed once.
+
+    Attributes:
+        price: of a cycle.
+        latency_cycles: cycles between sampling and display.
+        meter: what it asked of the renderer.
+        totals: of its recorded cycles.
+        images: records, where it makes any, and images.
+    """
+
+    price: Price
+    latency_cycles: int
+    meter: Meter
+    totals: Totals
+    images: Iterator[Shown]
+
+
+def begin(
+    name: str,
+    config: TsarConfig,
+    renderer_of: Callable[[int], Renderer],
+    machine: Machine,
+    span_s: tuple[float, float],
+    truth: Truth | None = None,
+    stages: StagesName = "compiled",
+    threads: int = 1,
+    on_record: Callable[[StepRecord], None] = lambda record: None,
+) -> PolicyRun:
+    """A run of a policy, not started yet.
+
+    Args:
+        name: of the policy.
+        config: of the run.
+        renderer_of: a renderer that filters textures for so many samples along a pixel's side.
+        machine: what it runs on.
+        span_s: animation time to cover.
+        truth: for policies that may look at it.
+        stages: what runs the stages around tracing.
+        threads: that share them.
+        on_record: told of every recorded cycle.
+
+    Raises:
+        ConfigError: no policy has that name.
+    """
+    from renderer.stages.control import stages as stages_of
+
+    setting = Setting(
+        config, lambda config: stages_of(config, stages, threads), truth, lambda batch: renderer_of(1).trace(batch)
+    )
+    policy = POLICIES[name](setting)
+    meter, totals = Meter(renderer_of(policy.footprint).trace), Totals(config)
+    clock = cycle_seconds(machine.ledger, machine.capacity, machine.cost, policy.price)
+    images = _noted(policy, meter, clock, span_s, totals, on_record)
+    return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)
+
+
+def _noted(
+    policy: Policy[Any],
+    trace: Trace,
+    clock: Callable[[Mapping[str, int], float], float],
+    span_s: tuple[float, float],
+    totals: Totals,
+    on_record: Callable[[StepRecord], None],
+) -> Iterator[Shown]:
+    for record, display in run(policy, trace, clock, *span_s):
+        if record is not None:
+            on_record(record)
+            totals.add(record)
+        yield record, display

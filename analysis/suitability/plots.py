@@ -1,0 +1,278 @@
+"""Figures 7.8 to 7.22 of a suitability study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+from PIL import Image
+
+from analysis.metrics.quality import WHISKERS, percentile
+from analysis.page.figures import ADAPTIVE, FRAMED, save
+from analysis.study.cases import INPUTS, ROWS, SCALES, Case
+from analysis.study.evaluation import Place
+from analysis.suitability.study import STILLS, SuitabilityOptions
+from analysis.suitability.tables import Result, Results, ratios
+
+_GRID = {"color": "0.88", "linewidth": 0.6}
+_STRIP_BATCHES = (32, 128, 256, 512, 1024)
+_INK = {256: "#e8a33d", 512: "#c9570c", 1024: "#6d2077"}
+
+
+def write_all(
+    folder: Path, options: SuitabilityOptions, results: Results, keys: Mapping[Case, str], place: Place
+) -> dict[str, Path]:
+    """Draws every figure there are results for; returns captions and files in the order of the thesis."""
+    made: dict[str, Path] = {}
+
+    def keep(name: str, caption: str, figure: Figure | None) -> None:
+        if figure is not None:
+            save(figure, folder / f"{name}.png")
+            made[caption] = folder / f"{name}.png"
+
+    keep("fig_7_8", "Characteristic behaviour of the error of a framed renderer (fig. 7.8)", behaviour(results))
+    keep("fig_7_9", "Error of framed runs of two inputs (fig. 7.9)", framed_errors(results))
+    keep("fig_7_10", "Error ratio over all runs (fig. 7.10)", boxes(results, results.inputs, "all inputs"))
+    for number, suitable in ((11, True), (13, False)):
+        chosen = [name for name in results.inputs if _suits(results, name) == suitable]
+        label = "suitable" if suitable else "not suitable"
+        which = "7.11 and 7.12" if suitable else "7.13"
+        caption = f"Inputs whose runs are {label} at the 75th percentile, by majority (figs {which})"
+        keep(f"fig_7_{number}", caption, boxes(results, chosen, label) if chosen else None)
+    for name in results.inputs:
+        figure = {0: "7_14"}.get(INPUTS.index(name), f"7_{16 + (INPUTS.index(name) > 2)}_{name}")
+        keep(f"fig_{figure}", f"Error over time, {name} (fig. {figure[:4].replace('_', '.')})", errors(results, name))
+    keep("fig_7_15", "Error ratio over time of one run (fig. 7.15)", ratio_over_time(results, options.policy_row))
+    for name in results.inputs:
+        strip = write_strip(folder / f"fig_7_{18 + INPUTS.index(name)}.png", options, results, name, keys, place)
+        if strip is not None:
+            made[f"What the displays show, {name} (fig. 7.{18 + INPUTS.index(name)})"] = strip
+    return made
+
+
+def _axes(width: float, height: float, columns: int = 1, **kwargs: Any) -> tuple[Figure, list[Any]]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = list(figure.subplots(1, columns, squeeze=False, **kwargs)[0])
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.grid(True, **_GRID)
+        axis.set_axisbelow(True)
+    return figure, axes
+
+
+def _positive(values: Any) -> Any:
+    return np.where(np.asarray(values) > 0, values, np.nan)
+
+
+def _refreshes(axis: Any, framed: Result) -> None:
+    """Vertical lines at the reference times from which on another image is shown."""
+    changes = framed.times["time_s"][framed.times["refresh"].diff() > 0]
+    axis.vlines(changes, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
+
+
+def _finest(results: Results, label: str, name: str) -> Result | None:
+    """The run of the finest resolution, first repetition."""
+    found = [one for one in results.all if (one.run.label, one.run.case.input) == (label, name)]
+    found = [one for one in found if one.run.repetition == results.repetitions[0]]
+    return max(found, key=lambda one: one.run.side_px, default=None)
+
+
+def behaviour(results: Results) -> Figure | None:
+    """Three refreshes of a framed renderer: least at a refresh (a, c), growing to the next (b)."""
+    name = "approach" if "approach" in results.inputs else next(iter(results.inputs), "")
+    framed = _finest(results, "framed", name)
+    changes = np.flatnonzero(framed.times["refresh"].diff() > 0) if framed else np.array([])
+    if framed is None or len(changes) < 3:
+        return None
+    first, last = max(changes[0] - 1, 0), min(changes[2] + 1, len(framed.times) - 1)
+    part = framed.times.iloc[first : last + 1]
+    figure, (axis,) = _axes(7.0, 3.2)
+    _refreshes(axis, framed)
+    axis.plot(part["time_s"], part["mse"], "o-", color=FRAMED, markersize=3)
+    marks = {"a": changes[0], "b": changes[1] - 1, "c": changes[1]}
+    for label, at in marks.items():
+        row = framed.times.iloc[at]
+        axis.annotate(
+            label, (row["time_s"], row["mse"]), (0, 7), textcoords="offset points", ha="center", weight="bold"
+        )
+    axis.set_xlim(part["time_s"].iloc[0], part["time_s"].iloc[-1])
+    axis.margins(y=0.2)
+    axis.set_xlabel("simulated time, s   (dotted: the display changes)")
+    axis.set_ylabel("mean squared error")
+    axis.set_title(f"{name}, framed, {framed.run.side_px}²", loc="left", fontsize=10)
+    return figure
+
+
+def framed_errors(results: Results) -> Figure | None:
+    """Inputs 3 and 1, as in the thesis."""
+    chosen = [name for name in (INPUTS[3], INPUTS[1]) if name in results.inputs]
+    runs = [run for run in (_finest(results, "framed", name) for name in chosen) if run is not None]
+    if not runs:
+        return None
+    figure, axes = _axes(10.0, 3.2, len(runs))
+    for axis, run in zip(axes, runs, strict=True):
+        _refreshes(axis, run)
+        axis.plot(run.times["time_s"], run.times["mse"], color=FRAMED)
+        axis.set_title(f"{run.run.case.input}, framed, {run.run.side_px}²", loc="left", fontsize=10)
+        axis.set_xlabel("simulated time, s   (dotted: the display changes)")
+    axes[0].set_ylabel("mean squared error")
+    return figure
+
+
+def _suits(results: Results, name: str) -> bool:
+    """Whether most runs of an input have a 75th percentile of at most 1."""
+    found = [percentile(np.sort(ratios(pair)), 75.0) <= 1 for row in results.rows for pair in results.pairs(name, row)]
+    return bool(np.mean(found) >= 0.5) if found else False
+
+
+def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
+    """A box per row of table 7.2, over the ratios of all repetitions; a column per input."""
+    if not names:
+        return None
+    figure, axes = _axes(max(5.0, 3.1 * len(names)), 4.2, len(names), sharey=True)
+    drawn, unbounded = False, 0
+    for axis, name in zip(axes, names, strict=True):
+        pooled = {row: [ratios(pair) for pair in results.pairs(name, row)] for row in results.rows}
+        values = {row: np.concatenate(found) for row, found in pooled.items() if found}
+        unbounded += sum(int(np.isinf(one).sum()) for one in values.values())
+        shown = [np.clip(one[np.isfinite(one)], 1e-6, None) for one in values.values()]
+        if not shown:
+            continue
+        drawn = True
+        flier = {"marker": "+", "markersize": 3, "markeredgecolor": "0.45"}
+        made = axis.boxplot(
+            shown, positions=list(values), widths=0.7, patch_artist=True, flierprops=flier, whis=WHISKERS
+        )
+        for row, box in zip(values, made["boxes"], strict=True):
+            box.set(facecolor=_INK[ROWS[row][1]], alpha=0.75, linewidth=0.7)
+        for median in made["medians"]:
+            median.set(color="black")
+        axis.axhline(1.0, color="0.0", linewidth=0.9)
+        axis.set_yscale("log")
+        axis.set_xticks(list(values), [str(row) for row in values], fontsize=7)
+        axis.set_title(name, loc="left", fontsize=10)
+        axis.set_xlabel("row of table 7.2")
+    if not drawn:
+        return None
+    axes[0].set_ylabel("error of TSAR / framed")
+    axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes[0].yaxis.set_major_formatter("{x:g}")
+    axes[0].yaxis.set_minor_formatter("")
+    divisor = results.all[0].run.case.scale.divisor
+    here = {side: f"{side}²" + (f", at {side // divisor}²" if divisor > 1 else "") for side in _INK}
+    handles = [_patch(color, here[side]) for side, color in _INK.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    note = f"; {unbounded} infinite ratios not drawn" if unbounded else ""
+    figure.suptitle(f"{title}: below 1 TSAR is better{note}", fontsize=10, x=0.01, ha="left")
+    return figure
+
+
+def _patch(color: str, label: str) -> Any:
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=color, alpha=0.75, label=label)
+
+
+def errors(results: Results, name: str) -> Figure | None:
+    """Error over time: framed runs bold, adaptive runs thin, a column per resolution."""
+    first = results.repetitions[0]
+    found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
+    sides = sorted({one.run.side_px for one in found if one.run.label == "tsar"})
+    if not sides:
+        return None
+    figure, axes = _axes(max(5.0, 3.6 * len(sides)), 3.6, len(sides), sharey=True)
+    for axis, side in zip(axes, sides, strict=True):
+        ours = [one for one in found if one.run.side_px == side and one.run.label == "tsar"]
+        ours.sort(key=lambda one: ROWS[one.run.row or 0][0])
+        for place, one in enumerate(ours):
+            batch = ROWS[one.run.row or 0][0]
+            ink, label = _shade(place, len(ours)), f"batch {batch}"
+            axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=ink, linewidth=0.9, label=label)
+        for one in found:
+            if one.run.side_px == side and one.run.label == "framed":
+                _refreshes(axis, one)
+                axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=FRAMED, linewidth=2.4, label="framed")
+        axis.set_yscale("log")
+        axis.set_title(f"{name}, {side}²", loc="left", fontsize=10)
+        axis.set_xlabel("simulated time, s")
+        axis.legend(fontsize=6, frameon=False, ncols=2)
+    axes[0].set_ylabel("mean squared error")
+    return figure
+
+
+def _shade(place: int, count: int) -> Any:
+    import matplotlib
+
+    return matplotlib.colormaps["autumn"](0.75 * place / max(count - 1, 1))
+
+
+def ratio_over_time(results: Results, row: int) -> Figure | None:
+    """One run of the first input: median dotted, quartiles dashed, the bound of outliers solid."""
+    row = 8 if 8 in results.rows else (row if row in results.rows else results.rows[0]) if results.rows else row
+    pairs = results.pairs(results.inputs[0], row) if results.inputs else []
+    if not pairs:
+        return None
+    values, framed = ratios(pairs[0]), pairs[0][1]
+    low, middle, high = (percentile(np.sort(values), one) for one in (25.0, 50.0, 75.0))
+    figure, (axis,) = _axes(8.0, 3.4)
+    _refreshes(axis, framed)
+    shown = np.where(np.isfinite(values) & (values > 0), values, np.nan)
+    axis.plot(framed.times["time_s"], shown, color=ADAPTIVE)
+    axis.axhline(middle, color="0.2", linestyle=":", linewidth=1.0, label="median")
+    for one in (low, high):
+        axis.axhline(one, color="0.2", linestyle="--", linewidth=0.9, label="quartiles" if one == low else None)
+    axis.axhline(high + 1.5 * (high - low), color="0.2", linewidth=0.9, label="outliers above")
+    axis.axhline(1.0, color=FRAMED, linewidth=0.9, label="equal error")
+    axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("")
+    axis.set_xlabel("simulated time, s   (dotted: the framed display changes)")
+    axis.set_ylabel("error of TSAR / framed")
+    axis.set_title(
+        f"{results.inputs[0]}, row {row}: batch {ROWS[row][0]}, {ROWS[row][1]}², drawn at {pairs[0][0].run.side_px}²",
+        loc="left",
+        fontsize=10,
+    )
+    axis.legend(fontsize=7, frameon=False, ncols=2)
+    return figure
+
+
+def write_strip(
+    path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Place
+) -> Path | None:
+    """Reference, framed renderer and TSAR of growing batch at one time, finest resolution there is of each batch."""
+    # the fast vehicle is gone by the second
+    first, number = results.repetitions[0], 0 if name == INPUTS[4] else len(STILLS) - 1
+    found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
+    framed = _finest(results, "framed", name)
+    if framed is None:
+        return None
+    pictures = [("reference", place.still(keys[framed.run.case], "reference", number))]
+    pictures.append((f"framed {framed.run.side_px}²", place.still(keys[framed.run.case], "shown", number)))
+    for batch in _STRIP_BATCHES:
+        ours = [one for one in found if one.run.label == "tsar" and ROWS[one.run.row or 0][0] == batch]
+        best = max(ours, key=lambda one: one.run.side_px, default=None)
+        if best is not None:
+            label = f"TSAR batch {batch}, {best.run.side_px}²"
+            pictures.append((label, place.still(keys[best.run.case], "shown", number)))
+    pictures = [(label, file) for label, file in pictures if file.exists()]
+    if not pictures:
+        return None
+    columns = min(4, len(pictures))
+    rows = -(-len(pictures) // columns)
+    figure = Figure(figsize=(3.0 * columns, 3.25 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).reshape(-1)
+    for axis in axes:
+        axis.set_axis_off()
+    for axis, (label, file) in zip(axes, pictures, strict=False):
+        axis.imshow(np.asarray(Image.open(file)), interpolation="nearest")
+        axis.set_title(label, fontsize=9, loc="left")
+    at = options.start_s + STILLS[number] * SCALES[options.scale].seconds
+    figure.suptitle(f"{name} at {at:.2f} s", fontsize=10, x=0.01, ha="left")
+    save(figure, path, dpi=150)
+    return path

@@ -1,0 +1,121 @@
+"""One picture for each effect of the ray tracer, and a sheet of them all."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.storage.files import atomic
+from analysis.tracer.options import GalleryOptions
+from scenes.effects import scenes as effects
+from tsar.config import require
+
+if TYPE_CHECKING:
+    from renderer.sampling.plan import SamplePlan
+
+COLUMNS = 4
+
+
+def render_effect(
+    name: str, plan: SamplePlan, options: GalleryOptions, done: Callable[[int], None]
+) -> tuple[NDArray[np.uint8], dict]:
+    """Renders the scene of an effect and writes ``NAME.png`` and ``NAME.exr``.
+
+    Returns:
+        The picture in sRGB, and what there is to say about it.
+    """
+    from renderer.film.files import encode_srgb, write_image
+    from renderer.frames import render_image
+    from renderer.kernels.entry import compiled_count
+    from renderer.layout.features import MEANING, Feature
+    from renderer.trace import Renderer
+
+    scene = effects.load(name)
+    renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
+    start = time.perf_counter()
+    image = render_image(renderer, plan, options.width_px, options.height_px, 0.0, renderer.shutter_s, done=done)
+    wall_s = time.perf_counter() - start
+    renderer.close()
+    nonfinite = write_image(options.out / f"{name}.png", image)
+    write_image(options.out / f"{name}.exr", image)
+    return encode_srgb(image), {
+        "what": effects.EFFECTS[name].what,
+        "features": [MEANING[feature] for feature in Feature if feature in renderer.layout.features],
+        "packets": renderer.kernels.packets,
+        "sets_compiled": compiled_count(),
+        "wall_s": wall_s,
+        "samples_per_s": options.width_px * options.height_px * options.samples / wall_s,
+        "nonfinite": nonfinite,
+        "mean_radiance": image.double().mean(dim=(0, 1)).tolist(),
+    }
+
+
+def write_sheet(path: Path, pictures: Sequence[NDArray[np.uint8]], captions: Sequence[str]) -> None:
+    """All pictures on one sheet, each with its caption below."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    rows = -(-len(pictures) // COLUMNS)
+    height, width = pictures[0].shape[:2]
+    inch = 3.2
+    figure, axes = plt.subplots(
+        rows, COLUMNS, figsize=(inch * COLUMNS, (inch * height / width + 0.32) * rows), squeeze=False, dpi=110
+    )
+    for axis in axes.flat:
+        axis.axis("off")
+    for axis, picture, caption in zip(axes.flat, pictures, captions, strict=False):
+        axis.imshow(picture, interpolation="antialiased")
+        axis.set_title(caption, fontsize=7.5, y=-0.11)
+    figure.subplots_adjust(left=0.005, right=0.995, top=0.995, bottom=0.03, wspace=0.02, hspace=0.12)
+    with atomic(path) as temporary:
+        figure.savefig(temporary, pil_kwargs={"quality": 88})
+    plt.close(figure)
+
+
+def names(options: GalleryOptions) -> tuple[str, ...]:
+    """Effects to show.
+
+    Raises:
+        ValueError: one is not known.
+    """
+    for name in options.effects:
+        require(name in effects.EFFECTS, "effects", f"one of {', '.join(effects.EFFECTS)}", name)
+    return tuple(dict.fromkeys(options.effects)) or tuple(effects.EFFECTS)
+
+
+def sample_plan(options: GalleryOptions) -> SamplePlan:
+    """How pixels are sampled.
+
+    Raises:
+        ValueError: for a number of samples that the point set cannot have, an effect that is not known, or pictures
+            that memory does not hold.
+    """
+    names(options)
+    from renderer.sampling.plan import SamplePlan
+    from renderer.tables.checks import check_frame_size
+
+    check_frame_size(options.width_px, options.height_px, 1)
+    return SamplePlan(options.samples, options.point_set, options.seed, options.space_filter)
+
+
+def render_gallery(
+    options: GalleryOptions, plan: SamplePlan, task: Callable[[str, int], Callable[[int], None]]
+) -> dict[str, Any]:
+    """Renders all effects that are asked for, and the sheet; what ``summary.json`` says of them."""
+    from renderer.frames import tile_count
+
+    found, pictures = {}, []
+    for name in names(options):
+        done = task(name, tile_count(options.width_px, options.height_px))
+        picture, found[name] = render_effect(name, plan, options, done)
+        pictures.append(picture)
+    write_sheet(options.out / "gallery.jpg", pictures, [effects.EFFECTS[name].what for name in names(options)])
+    return {"effects": found, "config": dataclasses.asdict(options)}

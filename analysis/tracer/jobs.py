@@ -1,0 +1,105 @@
+"""Batch jobs: a block file's sequence, rendered in every combination of sampling that a job file names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analysis.storage.reference import content_hash
+from analysis.storage.source import code_hash
+from analysis.tracer.options import JobOptions
+from renderer.tables.checks import check_frame_size
+from scenes import catalog
+from scenes.canonical import Scene, SceneError
+from scenes.formats.blocks.jobs import Combination, Job, read_job
+from scenes.formats.blocks.read import load_blocks
+from scenes.formats.blocks.settings import Settings
+
+
+@dataclass(frozen=True)
+class Work:
+    """A job, ready to run: what to render and how."""
+
+    job: Job
+    scene: Scene
+    settings: Settings
+    size_px: tuple[int, int]
+    frames: range
+
+
+def prepare(options: JobOptions) -> Work:
+    """Reads the job and its scene.
+
+    Raises:
+        SceneError: something in them cannot be used.
+    """
+    job = read_job(options.job)
+    name = options.scene or job.name.lower().replace("_", "").replace(" ", "")
+    if not options.scene and name not in catalog.BLUR_SCENES:
+        raise SceneError(f"scene: expected a block file or one of {', '.join(catalog.BLUR_SCENES)}, got none")
+    file = catalog.blur_scene_file(name) if name in catalog.BLUR_SCENES else Path(name)
+    scene, settings = load_blocks(file)
+    size = (settings.width_px, settings.height_px)
+    if options.width_px:
+        size = (options.width_px, max(1, round(options.width_px * settings.height_px / settings.width_px)))
+    check_frame_size(*size, 1)
+    end = options.first_frame + options.frames if options.frames else settings.frame_count
+    if not options.first_frame < end <= settings.frame_count:
+        count = settings.frame_count
+        raise SceneError(f"frames: expected some of the sequence's {count}, got {options.first_frame} to {end - 1}")
+    return Work(job, scene, settings, size, range(options.first_frame, end))
+
+
+def run_job(work: Work, options: JobOptions, task: Callable[[str, int], Callable[[int], None]]) -> list[dict[str, Any]]:
+    """Renders what is not on disk yet; a row per combination.
+
+    Args:
+        work: from :func:`prepare`.
+        options: of the job.
+        task: shows how far it is.
+    """
+    from analysis.tracer.stills import render_stills
+    from renderer.frames import pictures
+    from renderer.trace import Renderer
+
+    code = code_hash(Renderer, pictures, render_stills)
+    content = content_hash((work.scene, work.settings, work.size_px, code))
+    renderer = Renderer(work.scene, threads=options.threads or None, seed=options.seed)
+    rows = []
+    for combination in work.job.combinations:
+        done = task(combination.name, len(work.frames))
+        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, content, done)})
+    renderer.close()
+    return rows
+
+
+def _run(
+    renderer: Any,
+    combination: Combination,
+    work: Work,
+    options: JobOptions,
+    content: str,
+    done: Callable[[int], None],
+) -> dict[str, Any]:
+    from analysis.tracer.stills import render_stills
+    from renderer.frames import pictures
+    from renderer.sampling.plan import SamplePlan
+
+    plan = SamplePlan(
+        combination.samples,
+        combination.points,  # type: ignore[arg-type]
+        options.seed,
+        options.space_filter,
+        options.sigma_px,
+        combination.time_filter,  # type: ignore[arg-type]
+        options.box_share,
+        combination.shift,  # type: ignore[arg-type]
+    )
+    folder = options.out / combination.name
+    key = content_hash((plan, content))
+    times_s = {number: work.settings.frame_start_s(number) for number in work.frames}
+    picture = pictures(renderer, plan, *work.size_px)
+    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", key, done)
+    return {"frames": len(work.frames), "rendered_now": rendered, "nonfinite": nonfinite}

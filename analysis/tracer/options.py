@@ -1,0 +1,203 @@
+"""Options of the commands about the ray tracer; imports little, so that ``--help`` is quick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from analysis.command import limits
+from analysis.command.cluster import ClusterOptions
+from tsar.config import closed_choices, require
+
+PointSetName = Literal[
+    "hammersley",
+    "stratified",
+    "poisson",
+    "halton",
+    "sobol",
+    "owen",
+    "cells-even",
+    "cells-space",
+    "cells-time",
+    "random",
+]
+"""Of ``renderer.sampling.point_sets``, which takes long to import."""
+
+LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
+"""Samples per pixel of the motion-blur perception study."""
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class GalleryOptions:
+    """One picture for each effect of the ray tracer."""
+
+    effects: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Effects by name; all where none is named."""
+    width_px: int = 480
+    """Width, pixels."""
+    height_px: int = 360
+    """Height, pixels."""
+    samples: int = 64
+    """Samples per pixel; a cube for the point set stratified."""
+    point_set: PointSetName = "hammersley"
+    """Where in the pixel and when in the shutter's time they lie."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture."""
+    seed: int = 0
+    """Of everything random."""
+    device: Literal["cpu", "cuda:0"] = "cpu"
+    """Where rays are traced."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/gallery")
+    """Folder for NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
+
+    def __post_init__(self) -> None:
+        sides, samples = limits.SIDES_PX, (1, 1 << 16)
+        limits.within(self, width_px=sides, height_px=sides, samples=samples, seed=limits.SEEDS, threads=limits.THREADS)
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class AcceleratorOptions:
+    """Ray-triangle tests per ray of brute force, kd-tree and tree of boxes, and the two images of the report."""
+
+    out: Path = Path("out/accelerators")
+    """Folder for table.csv, tests.png, the images and summary.json."""
+    triangles: tuple[int, ...] = (100, 1_000, 10_080, 100_000, 1_000_000)
+    """Triangles of the meshes, about."""
+    repetitions: int = 5
+    """Turns of each structure; medians count."""
+    image: tuple[Literal["report-one", "report-two"], ...] = ()
+    """Images of the report to render, instead of the table."""
+    scale: float = 1.0
+    """Of the images' sides; 1 is the report's size."""
+    structure: Literal["kdtree", "bvh"] = "kdtree"
+    """Over the triangles of the images."""
+    seed: int = 0
+    """Of rays and samples."""
+    threads: int = 0
+    """Threads for tracing images; 0 takes one per core."""
+
+    def __post_init__(self) -> None:
+        limits.within(self, triangles=(16, 4_000_000), repetitions=(1, 100), scale=(0.01, 4.0))
+        limits.within(self, seed=limits.SEEDS, threads=limits.THREADS)
+
+
+@dataclass(frozen=True)
+class PointSetOptions:
+    """Measures point sets: discrepancy, distances, projections, strata, convergence on edges and smooth functions."""
+
+    out: Path = Path("out/pointsets")
+    """Folder for tables, figures and summary.json."""
+    levels: tuple[int, ...] = LEVELS
+    """Numbers of points, cubes."""
+    cases: int = 2048
+    """Integrands of each kind that an error is the mean over."""
+    sets_of_each: int = 4
+    """Point sets of each kind, from as many seeds."""
+    frame_px: int = 160
+    """Side of the pictures of motion blur, pixels; 0 leaves them out."""
+    seed: int = 0
+    """Of everything random."""
+
+    def __post_init__(self) -> None:
+        for level in self.levels:
+            ok = 1 <= level <= 4096 and round(level ** (1 / 3)) ** 3 == level
+            require(ok, "levels", "cubes between 1 and 4096", level)
+        require(len(set(self.levels)) >= 3, "levels", "at least three, for a slope", self.levels)
+        limits.within(self, cases=(1, 1 << 20), sets_of_each=(1, 256), frame_px=(0, 2048), seed=limits.SEEDS)
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class TileOptions:
+    """One picture of a scene, in tiles over processes or machines."""
+
+    scene: Annotated[str, tyro.conf.Positional]
+    """Built-in scene by name."""
+    width_px: int = 0
+    """Width, pixels; 0 takes that of the scene's film."""
+    height_px: int = 0
+    """Height, pixels; 0 takes that of the scene's film."""
+    samples: int = 32
+    """Samples per pixel; a cube for the point set stratified."""
+    point_set: PointSetName = "hammersley"
+    """Where in the pixel and when in the shutter's time they lie."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture."""
+    time_s: float = 0.0
+    """Animation time at which the frame begins, seconds."""
+    seed: int = 0
+    """Of everything random."""
+    chunk_tiles: int = 16
+    """Tiles of 16 x 16 pixels that a worker is handed at once."""
+    farm: ClusterOptions = field(default_factory=ClusterOptions)
+    """Where tiles are rendered."""
+    study: tuple[int, ...] = ()
+    """Numbers of local workers to time instead, each the same picture; such as 1 2 4."""
+    repetitions: int = 3
+    """Turns of each number in a study; medians count."""
+    out: Path = Path("out/tiles")
+    """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
+
+    def __post_init__(self) -> None:
+        limits.within(
+            self,
+            width_px=(0, limits.SIDES_PX[1]),
+            height_px=(0, limits.SIDES_PX[1]),
+            samples=(1, 1 << 16),
+            time_s=limits.TIMES_S,
+            seed=limits.SEEDS,
+            chunk_tiles=(1, 1 << 16),
+            study=(1, 64),
+            repetitions=(1, 100),
+        )
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class JobOptions:
+    """Every combination of sampling levels, point sets and time filters of a job file."""
+
+    job: Annotated[Path, tyro.conf.Positional]
+    """Job file: seven lines, as in figure 12 of the motion-blur perception thesis."""
+    scene: str = ""
+    """A block file, or the built-in planescene or spheresscene; by default the one the job's name names."""
+    width_px: int = 0
+    """Width and height of a frame, pixels; 0 takes the file's."""
+    first_frame: int = 0
+    """First frame of the sequence to render."""
+    frames: int = 0
+    """How many; 0 takes all that follow."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture; the thesis has a Gaussian."""
+    sigma_px: float = 0.5
+    """Of the Gaussian, pixels."""
+    box_share: float = 0.5
+    """The middle part of the shutter's time that the box filter spans; the thesis has 0.5."""
+    format: Literal["png", "exr"] = "png"
+    """Of the frames."""
+    seed: int = 0
+    """Of point sets and shifts."""
+    threads: int = 0
+    """Threads for tracing; 0 takes one per core."""
+    out: Path = Path("out/job")
+    """Folder for a folder of frames per combination, and summary.json; frames that an interrupted run of the same job
+    left there are kept."""
+
+    def __post_init__(self) -> None:
+        limits.within(
+            self,
+            width_px=(0, limits.SIDES_PX[1]),
+            first_frame=(0, 10**6),
+            frames=(0, 10**6),
+            sigma_px=(1e-3, 16.0),
+            box_share=(1e-6, 1.0),
+            seed=limits.SEEDS,
+            threads=limits.THREADS,
+        )

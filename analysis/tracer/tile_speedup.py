@@ -1,0 +1,185 @@
+"""How much faster a picture is rendered by more workers, why not by more still, and what twenty would do."""
+
+from __future__ import annotations
+
+import heapq
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.tracer.tiles import Picture, assembled, rendered
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+REPORTED = {"report-one": 5210.0 / 320.0, "report-two": 8240.0 / 610.0}
+"""Speed-up with 20 processes that the ray-tracer report gives for its two images: 16.3 and 13.5."""
+
+PREDICTED_WORKERS = 20
+
+
+@dataclass(frozen=True)
+class FarmModel:
+    """Seconds that a picture takes on a number of workers.
+
+    Workers take chunks in order, each as soon as it is free (list scheduling): a chunk occupies its worker for what it
+    takes to render, times ``contention`` where others render beside it, and ``overhead_s`` of scheduling and transfer.
+    The scheduler hands out one chunk after the other, ``dispatch_s`` apart; the picture is put together in the end.
+    Workers beyond the number of cores share them.
+
+    Attributes:
+        chunk_s: what each chunk takes alone, seconds.
+        overhead_s: per chunk, on the worker.
+        dispatch_s: per chunk, on the scheduler.
+        assembly_s: once.
+        contention: how much longer a chunk takes beside others, at least 1.
+        cores: of the machine or machines.
+    """
+
+    chunk_s: NDArray[np.float64]
+    overhead_s: float
+    dispatch_s: float
+    assembly_s: float
+    contention: float
+    cores: int
+
+    def seconds(self, workers: int, cores: int | None = None) -> float:
+        """What the picture takes; ``cores`` as they are, unless others are given."""
+        sharing = max(1.0, workers / (cores or self.cores)) * (self.contention if workers > 1 else 1.0)
+        free = [0.0] * workers
+        heapq.heapify(free)
+        for number, alone in enumerate(self.chunk_s):
+            start = max(heapq.heappop(free), (number + 1) * self.dispatch_s)
+            heapq.heappush(free, start + alone * sharing + self.overhead_s)
+        return max(free) + self.assembly_s
+
+    def speedup(self, workers: int, cores: int | None = None) -> float:
+        """How many times faster than one worker."""
+        return self.seconds(1) / self.seconds(workers, cores)
+
+
+def fitted(
+    chunk_s: Sequence[float], wall_s: dict[int, float], beside_s: Sequence[float], dispatch_s: float, assembly_s: float
+) -> FarmModel:
+    """A model from measurements.
+
+    Args:
+        chunk_s: seconds of each chunk on a worker that renders alone.
+        wall_s: seconds of the whole picture, by number of workers; that of one worker gives the overhead per chunk.
+        beside_s: seconds of each chunk on workers as many as there are cores, at most.
+        dispatch_s: seconds from one empty chunk to the next, all workers idle.
+        assembly_s: seconds to put the picture together.
+    """
+    alone = np.asarray(chunk_s, np.float64)
+    contention = max(1.0, float(np.sum(beside_s) / alone.sum()))
+    rest = wall_s[1] - alone.sum() - assembly_s
+    cores = len(os.sched_getaffinity(0))
+    return FarmModel(alone, max(0.0, rest / len(alone)), dispatch_s, assembly_s, contention, cores)
+
+
+def _nothing(shape: tuple[int, ...]) -> NDArray[np.float32]:
+    return np.zeros(shape, np.float32)
+
+
+def _dispatch_s(client: Client, chunks: Sequence[range], workers: Sequence[str]) -> float:
+    """Seconds per chunk of handing out work that takes no time, and of fetching as many bytes back."""
+    from distributed import as_completed
+
+    start = time.perf_counter()
+    futures = [client.submit(_nothing, (len(chunk), 256, 3), pure=False, workers=workers) for chunk in chunks]
+    for _ in as_completed(futures, with_results=True):
+        pass
+    return (time.perf_counter() - start) / len(chunks)
+
+
+def study(
+    client: Client,
+    picture: Picture,
+    chunks: Sequence[range],
+    counts: Sequence[int],
+    repetitions: int,
+    tick: Callable[[], None],
+) -> dict[str, Any]:
+    """Times a picture on subsets of a cluster's workers, in turns, fits the model and lets it predict.
+
+    Args:
+        client: of a local cluster with as many workers as the greatest count.
+        picture: what to render.
+        chunks: runs of tiles.
+        counts: numbers of workers; 1 is always among them.
+        repetitions: turns of each.
+        tick: called after every turn.
+
+    Returns:
+        Rows for tables, the parameters of the model, and whether all pictures were the same bits.
+    """
+    addresses = sorted(client.scheduler_info(n_workers=-1)["workers"])
+    wanted = sorted({1, *counts})
+    build_s = []
+    for address in addresses:  # every worker builds the scene once, on its own
+        start = time.perf_counter()
+        for _ in rendered(client, picture, chunks[:1], [address]):
+            pass
+        build_s.append(time.perf_counter() - start)
+    wall_s: dict[int, list[float]] = {count: [] for count in wanted}
+    worker_s: dict[int, list[NDArray[np.float64]]] = {count: [] for count in wanted}
+    assembly_s, images = [], []
+    for turn in range(repetitions):
+        for count in wanted if turn % 2 == 0 else wanted[::-1]:
+            start = time.perf_counter()
+            found = dict(rendered(client, picture, chunks, addresses[:count]))
+            joining = time.perf_counter()
+            image = assembled(picture, chunks, [found[number][0] for number in range(len(chunks))])
+            end = time.perf_counter()
+            wall_s[count].append(end - start)
+            assembly_s.append(end - joining)
+            worker_s[count].append(np.array([found[number][2] for number in range(len(chunks))]))
+            images.append(image.numpy().tobytes())
+            tick()
+    medians = {count: median(values) for count, values in wall_s.items()}
+    chunk_s = {count: np.median(np.stack(values), axis=0) for count, values in worker_s.items()}
+    cores = len(os.sched_getaffinity(0))
+    beside = max((count for count in wanted if count <= cores), default=1)
+    dispatch = median(_dispatch_s(client, chunks, addresses) for _ in range(3))
+    model = fitted(chunk_s[1].tolist(), medians, chunk_s[beside].tolist(), dispatch, median(assembly_s))
+    rows = [_row(count, wall_s[count], medians[1], model) for count in wanted]
+    return {
+        "rows": rows,
+        "same_bits": len(set(images)) == 1,
+        "model": {
+            "chunks": len(chunks),
+            "chunk_s_mean": float(model.chunk_s.mean()),
+            "chunk_s_greatest": float(model.chunk_s.max()),
+            "overhead_s": model.overhead_s,
+            "dispatch_s": model.dispatch_s,
+            "assembly_s": model.assembly_s,
+            "contention": model.contention,
+            "cores": model.cores,
+            "first_chunk_s": median(build_s),
+        },
+        "predicted": {
+            "workers": PREDICTED_WORKERS,
+            "speedup": model.speedup(PREDICTED_WORKERS, PREDICTED_WORKERS),
+            "efficiency": model.speedup(PREDICTED_WORKERS, PREDICTED_WORKERS) / PREDICTED_WORKERS,
+            "reported": REPORTED.get(picture.scene),
+        },
+    }
+
+
+def _row(count: int, seconds: Sequence[float], one_s: float, model: FarmModel) -> dict[str, Any]:
+    return {
+        "workers": count,
+        "wall_s": median(seconds),
+        "fastest_s": min(seconds),
+        "slowest_s": max(seconds),
+        "speedup": one_s / median(seconds),
+        "efficiency": one_s / median(seconds) / count,
+        "modelled_s": model.seconds(count),
+        "modelled_over_measured": model.seconds(count) / median(seconds),
+    }

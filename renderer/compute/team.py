@@ -1,0 +1,109 @@
+"""Launches side by side: the caller's thread and helpers that stay awake for a moment between one and the next.
+
+A cycle hands work to other threads several times within milliseconds. Waking a thread takes longer than some of that
+work, so a helper waits actively for a while before it sleeps.
+"""
+
+from __future__ import annotations
+
+import atexit
+import threading
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from renderer.compute import device as devices
+from renderer.compute import team_kernels as kernels
+from renderer.compute.launching import Command, address
+
+PATIENCE_US = 1000
+"""How long a helper waits actively: longer than any pause between the launches of one cycle."""
+
+_STATE, _ANSWER, _REST = 0, 4, 5  # places in a mailbox, as in ``native/team.h``
+_PARKED = 3
+
+
+class _Helper:
+    """A thread that runs one launch at a time for another."""
+
+    def __init__(self, patience_us: int) -> None:
+        self._mail = np.zeros(16, np.int64)
+        self._mail[_STATE] = _PARKED
+        where = address("mail", self._mail, torch.int64, len(self._mail))
+        self._serve = Command(kernels.serve, where, patience_us)
+        self._post, self._join = Command(kernels.post, where), Command(kernels.join, where)
+        self._wake = threading.Semaphore(0)
+        threading.Thread(target=self._live, daemon=True, name="tsar helper").start()
+
+    def _live(self) -> None:
+        while True:
+            self._wake.acquire()
+            self._serve.launch()
+
+    def start(self, command: Command) -> None:
+        """Hands a launch over; the command must not change until :meth:`finish`."""
+        self._post(*command.entry)
+        if self._mail[_ANSWER]:
+            self._wake.release()
+
+    def finish(self, command: Command) -> None:
+        """Waits for the launch, or runs it here if the helper has not begun."""
+        self._join.launch()
+        if self._mail[_ANSWER]:
+            command.launch()
+
+    def rest(self) -> None:
+        """Parks; returns when the thread has left the kernel, or does not within a second."""
+        self._mail[_REST] = 1
+        until = time.monotonic() + 1.0
+        while self._mail[_STATE] != _PARKED and time.monotonic() < until:
+            time.sleep(1e-4)
+        self._mail[_REST] = 0
+
+
+class Team:
+    """Helpers for one caller at a time; who comes while they are busy works alone."""
+
+    def __init__(self) -> None:
+        self._busy = threading.Lock()
+        self._helpers: list[_Helper] = []
+
+    def run(self, commands: Sequence[Command]) -> None:
+        """Runs all launches, the first one here; returns when all are done."""
+        first, *others = commands
+        if not others or not self._busy.acquire(blocking=False):
+            for command in commands:
+                command.launch()
+            return
+        started: list[tuple[_Helper, Command]] = []
+        try:
+            for number, command in enumerate(others):
+                helper = self._helper(number)
+                started.append((helper, command))
+                helper.start(command)
+            first.launch()
+        finally:
+            for helper, command in started:
+                helper.finish(command)
+            self._busy.release()
+
+    def rest(self) -> None:
+        """Parks all helpers: before the interpreter ends, for kernels are unloaded then."""
+        with self._busy:
+            for helper in self._helpers:
+                helper.rest()
+
+    def _helper(self, number: int) -> _Helper:
+        if number == len(self._helpers):
+            devices.load_kernels(kernels, "cpu")
+            # More threads than cores would wait for each other's waiting.
+            self._helpers.append(_Helper(PATIENCE_US if number + 1 < devices.core_count() else 0))
+        return self._helpers[number]
+
+
+TEAM = Team()
+"""That of this process."""
+
+atexit.register(TEAM.rest)

@@ -1,0 +1,40 @@
+"""Kernel entry points of :mod:`renderer.compute.team`; the C++ is in ``native/team.h``."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.compute.launching import Address
+from renderer.compute.native_code import module_options
+
+wp.set_module_options(module_options("team.h"))
+
+
+@wp.func_native("team::serve(*(team::Mailbox*)mailbox, patience_us);")
+def native_serve(mailbox: Address, patience_us: wp.int64): ...
+
+
+@wp.func_native("team::post(*(team::Mailbox*)mailbox, function, bounds, arguments);")
+def native_post(mailbox: Address, function: wp.int64, bounds: wp.int64, arguments: wp.int64): ...
+
+
+@wp.func_native("team::join(*(team::Mailbox*)mailbox);")
+def native_join(mailbox: Address): ...
+
+
+@wp.kernel
+def serve(mailbox: Address, patience_us: wp.int64):
+    """A helper's loop."""
+    native_serve(mailbox, patience_us)
+
+
+@wp.kernel
+def post(mailbox: Address, function: wp.int64, bounds: wp.int64, arguments: wp.int64):
+    """Hands a launch to a helper."""
+    native_post(mailbox, function, bounds, arguments)
+
+
+@wp.kernel
+def join(mailbox: Address):
+    """Waits for a helper, or takes the work back."""
+    native_join(mailbox)

@@ -1,0 +1,171 @@
+"""Kernel entry points: index, load, call, store.
+
+Those that shade are compiled for the features of a scene (:func:`specialised`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import warp as wp
+
+from renderer.kernels.camera import camera_ray, track_rotation, track_translation
+from renderer.kernels.packets import MODULE_OPTIONS
+from renderer.kernels.randomness import group_draw
+from renderer.kernels.shading import radiance
+from renderer.layout.features import ALL, MEANING, PACKETS, Feature
+from renderer.layout.structs import Ray, SceneData, ViewData
+from renderer.tables.requirements import explain, required
+from scenes.canonical import Scene
+
+
+@dataclass(frozen=True)
+class ShadingKernels:
+    """Kernels for one set of features.
+
+    Attributes:
+        shade_samples: shades a list of samples in groups.
+        render_pixels: shades the samples of a regular grid in every pixel, and takes their means.
+        module: what holds both, for loading.
+    """
+
+    shade_samples: wp.Kernel
+    render_pixels: wp.Kernel
+    module: wp.Module
+
+
+_MODULE = "renderer.kernels.shading_"
+
+SETS_MAX = 24
+"""Sets of features that one process compiles kernels for; scenes beyond them get kernels for everything there is."""
+
+
+def compiled_count() -> int:
+    """How many sets of features this process has kernels for."""
+    return specialised.cache_info().currsize
+
+
+def kept_count() -> int:
+    """How many sets of features this machine keeps compiled kernels for, of this revision and earlier ones."""
+    folders = Path(wp.config.kernel_cache_dir or "").glob(f"wp_{_MODULE}*")
+    return len({folder.name.removeprefix(f"wp_{_MODULE}")[:8] for folder in folders if folder.is_dir()})
+
+
+def explanation(scene: Scene) -> list[str]:
+    """Lines that say of every feature whether a scene requires it, and what in the scene does."""
+    found = explain(scene)
+    lines = [
+        f"{'yes' if feature in found else ' - '}  {MEANING[feature]:44} {found.get(feature, '')}" for feature in Feature
+    ]
+    alone = "one by one, by kernels of their own" if required(scene) & ~PACKETS else "in packets of sixteen"
+    kept = f"kernels for {kept_count()} sets of features are kept on this machine"
+    return [*(line.rstrip() for line in lines), f"samples are traced {alone}; {kept}"]
+
+
+def nearest(features: Feature) -> Feature:
+    """The set that kernels for ``features`` are compiled for: they themselves, or everything once there are enough."""
+    if features in _asked or len(_asked) < SETS_MAX:
+        _asked.add(features)
+        return features
+    return ALL
+
+
+_asked: set[Feature] = set()
+
+
+@cache
+def specialised(features: Feature) -> ShadingKernels:
+    """Kernels that can do what is in ``features`` and hold no code for the rest; the same object for the same set."""
+    mask = int(features)
+    name = f"{_MODULE}{mask:08x}"
+    wp.get_module(name).options.update(MODULE_OPTIONS)
+
+    @wp.kernel(enable_backward=False, module=name)
+    def shade_samples(
+        scene: SceneData,
+        view: ViewData,
+        stack: wp.array2d(dtype=Ray),
+        first: wp.int32,
+        group_size: wp.int32,
+        position: wp.array(dtype=wp.vec2),
+        time_s: wp.array(dtype=wp.float64),
+        color: wp.array(dtype=wp.vec3),
+        rays: wp.array(dtype=wp.vec3i),
+    ):
+        """Shades the samples from ``first`` on; ``rays`` receives the shadow, reflected and refracted rays of each."""
+        i = first + wp.tid()
+        leader = (i / group_size) * group_size
+        draw = group_draw(scene.seed, position[leader], time_s[leader], i - leader, group_size)
+        origin, direction = camera_ray(wp.static(mask), scene, view, draw, position[i], time_s[i])
+        result, counts = radiance(
+            wp.static(mask), scene, view, time_s[i], draw, origin, direction, stack, wp.tid()
+        )  # fmt: skip
+        color[i] = result
+        rays[i] = counts
+
+    @wp.kernel(enable_backward=False, module=name)
+    def render_pixels(
+        scene: SceneData,
+        view: ViewData,
+        stack: wp.array2d(dtype=Ray),
+        first: wp.int32,
+        samples: wp.int32,
+        time_s: wp.float64,
+        image: wp.array2d(dtype=wp.vec3),
+    ):
+        """Renders pixels, each the mean of a regular grid of ``samples`` squared samples, ``first`` counted like
+        threads: along the Morton curve within blocks of 16 x 16 pixels, those by rows."""
+        pixel = first + wp.tid()
+        height = image.shape[0]
+        width = image.shape[1]
+        columns = (width + 15) / 16
+        column = ((pixel / 256) % columns) * 16 + every_second_bit(pixel % 256)
+        row = ((pixel / 256) / columns) * 16 + every_second_bit((pixel % 256) >> 1)
+        if column < width and row < height:
+            total = wp.vec3(0.0, 0.0, 0.0)
+            leader = grid_position(column, row, 0, samples, width, height)
+            for sample in range(samples * samples):
+                position = grid_position(column, row, sample, samples, width, height)
+                draw = group_draw(scene.seed, leader, time_s, sample, samples * samples)
+                origin, direction = camera_ray(wp.static(mask), scene, view, draw, position, time_s)
+                result, _counts = radiance(
+                    wp.static(mask), scene, view, time_s, draw, origin, direction, stack, wp.tid()
+                )  # fmt: skip
+                total = total + result
+            image[row, column] = total * (1.0 / wp.float32(samples * samples))
+
+    return ShadingKernels(shade_samples, render_pixels, shade_samples.module)
+
+
+@wp.func
+def every_second_bit(code: wp.int32) -> wp.int32:
+    """Bits 0, 2, 4 and 6 of a Morton code, side by side."""
+    return (code & 1) | ((code >> 1) & 2) | ((code >> 2) & 4) | ((code >> 3) & 8)
+
+
+@wp.func
+def grid_position(
+    column: wp.int32, row: wp.int32, sample: wp.int32, samples: wp.int32, width: wp.int32, height: wp.int32
+) -> wp.vec2:
+    """Where a sample of a pixel's regular grid lies on the image."""
+    x = column * samples + sample % samples
+    y = row * samples + sample / samples
+    return wp.vec2(
+        (wp.float32(x) + 0.5) / wp.float32(width * samples), (wp.float32(y) + 0.5) / wp.float32(height * samples)
+    )
+
+
+@wp.kernel(enable_backward=False)
+def pose_tracks(
+    scene: SceneData,
+    view: ViewData,
+    translation: wp.array(dtype=wp.vec3),
+    rotation: wp.array(dtype=wp.quat),
+    time_s: wp.float64,
+):
+    """Poses of all tracks at one time, to the bit those that samples find for themselves."""
+    track = wp.tid()
+    translation[track] = track_translation(scene, view, track, time_s)
+    rotation[track] = track_rotation(scene, view, track, time_s)

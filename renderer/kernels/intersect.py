@@ -1,0 +1,222 @@
+"""Rays against instances: nearest hit and occlusion."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.kernels.camera import track_rotation, track_translation
+from renderer.kernels.heightfield import relief_distance
+from renderer.kernels.shapes import cube_distance, meets_box, misses_sphere, plane_distance, reciprocal, sphere_distance
+from renderer.layout.features import Feature
+from renderer.layout.structs import (
+    SHAPE_CUBE,
+    SHAPE_DISK,
+    SHAPE_MESH,
+    SHAPE_RECTANGLE,
+    SHAPE_RELIEF,
+    SHAPE_SPHERE,
+    Hit,
+    InstanceRecord,
+    SceneData,
+    ViewData,
+)
+
+_MESH = wp.constant(SHAPE_MESH)
+_SPHERE = wp.constant(SHAPE_SPHERE)
+_DISK = wp.constant(SHAPE_DISK)
+_RECTANGLE = wp.constant(SHAPE_RECTANGLE)
+_CUBE = wp.constant(SHAPE_CUBE)
+_RELIEF = wp.constant(SHAPE_RELIEF)
+_HAS_MESH = wp.constant(int(Feature.MESH))
+_HAS_SPHERE = wp.constant(int(Feature.SPHERE))
+_HAS_FLAT = wp.constant(int(Feature.FLAT))
+_HAS_CUBE = wp.constant(int(Feature.CUBE))
+_HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
+_HAS_MOTION = wp.constant(int(Feature.MOTION))
+_HAS_WARP_TREES = wp.constant(int(Feature.WARP_TREES))
+
+
+# On a GPU no mesh comes without a tree of Warp's, so that this is never called there.
+_NATIVE = """
+#if defined(__CUDACC__) || defined(__CUDA_ARCH__) || defined(__CUDACC_RTC__)
+    return wp::vec4(-1.0f, 0.0f, 0.0f, 0.0f);
+#else
+    packets::RayHit hit;
+    const bool found = packets::single_ray<{any}>(scene, mesh, start, towards, reach, (long long*)work.data, hit);
+    return wp::vec4(found ? hit.t : -1.0f, hit.u, hit.v, __builtin_bit_cast(float, hit.face));
+#endif
+"""
+
+
+@wp.func_native(_NATIVE.replace("{any}", "false"))
+def nearest_in_mesh(
+    scene: SceneData,
+    mesh: wp.int32,
+    start: wp.vec3,
+    towards: wp.vec3,
+    reach: wp.float32,
+    work: wp.array(dtype=wp.int64),
+) -> wp.vec4: ...
+
+
+@wp.func_native(_NATIVE.replace("{any}", "true"))
+def any_in_mesh(
+    scene: SceneData,
+    mesh: wp.int32,
+    start: wp.vec3,
+    towards: wp.vec3,
+    reach: wp.float32,
+    work: wp.array(dtype=wp.int64),
+) -> wp.vec4: ...
+
+
+@wp.func
+def meet_instance(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    record: InstanceRecord,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
+) -> Hit:
+    """Nearest hit of a ray in track space with one instance, before ``t_max``; ``instance`` is 0 for a hit."""
+    hit = Hit()
+    hit.instance = -1
+    start = record.to_local * origin + record.to_local_offset
+    towards = record.to_local * direction
+    stretch = wp.length(towards)
+    towards = towards / stretch
+    reach = t_max * stretch
+    t = wp.float32(-1.0)
+    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
+        if (features & _HAS_WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
+            query = wp.mesh_query_ray(scene.meshes[record.mesh].id, start, towards, reach)
+            if query.result:
+                t = query.t
+                hit.u = query.u
+                hit.v = query.v
+                hit.face = query.face
+        else:
+            found = nearest_in_mesh(scene, record.mesh, start, towards, reach, view.work)
+            t = found[0]
+            hit.u = found[1]
+            hit.v = found[2]
+            hit.face = wp.cast(found[3], wp.int32)
+    elif (features & _HAS_SPHERE) != 0 and record.shape == _SPHERE:
+        t = sphere_distance(start, towards)
+    elif (features & _HAS_FLAT) != 0 and (record.shape == _DISK or record.shape == _RECTANGLE):
+        t = plane_distance(start, towards, record.shape == _DISK)
+    elif (features & _HAS_RELIEF) != 0 and record.shape == _RELIEF:
+        t = relief_distance(scene, record, start, towards, reach)
+    elif (features & _HAS_CUBE) != 0 and record.shape == _CUBE:
+        distance, face = cube_distance(start, towards)
+        t = distance
+        hit.face = face
+    if t >= 0.0 and t < reach:
+        hit.instance = 0
+        hit.t = t / stretch
+    return hit
+
+
+@wp.func
+def instance_blocks(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    record: InstanceRecord,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
+) -> wp.bool:
+    """Whether an instance lies along a ray in track space before ``t_max``; any hit will do."""
+    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
+        start = record.to_local * origin + record.to_local_offset
+        towards = record.to_local * direction
+        stretch = wp.length(towards)
+        reach = t_max * stretch
+        if (features & _HAS_WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
+            return wp.mesh_query_ray_anyhit(scene.meshes[record.mesh].id, start, towards / stretch, reach)
+        found = any_in_mesh(scene, record.mesh, start, towards / stretch, reach, view.work)
+        return found[0] >= 0.0
+    hit = meet_instance(features, scene, view, record, origin, direction, t_max)
+    return hit.instance == 0
+
+
+@wp.func
+def closest_hit(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
+) -> Hit:
+    """Nearest hit of a world ray of unit direction with any instance."""
+    best = Hit()
+    best.instance = -1
+    best.t = t_max
+    for g in range(scene.group_count):
+        group = scene.groups[g]
+        start = wp.vec3(origin[0], origin[1], origin[2])
+        towards = wp.vec3(direction[0], direction[1], direction[2])
+        missed = wp.bool(False)
+        if (features & _HAS_MOTION) != 0 and group.track != 0:
+            start = origin - track_translation(scene, view, group.track, time_s)
+            missed = misses_sphere(start, direction, group.radius, best.t)
+            if not missed:
+                rotation = track_rotation(scene, view, group.track, time_s)
+                start = wp.quat_rotate_inv(rotation, start)
+                towards = wp.quat_rotate_inv(rotation, direction)
+        if not missed:
+            inverse = reciprocal(towards)
+            index = wp.int32(group.first)
+            while index < group.end:
+                node = scene.nodes[index]
+                index = index + 1
+                if not meets_box(start, inverse, node.lower, node.upper, best.t):
+                    index = node.skip
+                elif node.instance >= 0:
+                    hit = meet_instance(features, scene, view, scene.instances[node.instance], start, towards, best.t)
+                    if hit.instance == 0:
+                        best = hit
+                        best.instance = node.instance
+    return best
+
+
+@wp.func
+def occluded(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
+) -> wp.bool:
+    """Whether anything lies along a world ray before ``t_max``."""
+    for g in range(scene.group_count):
+        group = scene.groups[g]
+        start = wp.vec3(origin[0], origin[1], origin[2])
+        towards = wp.vec3(direction[0], direction[1], direction[2])
+        missed = wp.bool(False)
+        if (features & _HAS_MOTION) != 0 and group.track != 0:
+            start = origin - track_translation(scene, view, group.track, time_s)
+            missed = misses_sphere(start, direction, group.radius, t_max)
+            if not missed:
+                rotation = track_rotation(scene, view, group.track, time_s)
+                start = wp.quat_rotate_inv(rotation, start)
+                towards = wp.quat_rotate_inv(rotation, direction)
+        if not missed:
+            inverse = reciprocal(towards)
+            index = wp.int32(group.first)
+            while index < group.end:
+                node = scene.nodes[index]
+                index = index + 1
+                if not meets_box(start, inverse, node.lower, node.upper, t_max):
+                    index = node.skip
+                elif node.instance >= 0:
+                    if instance_blocks(features, scene, view, scene.instances[node.instance], start, towards, t_max):
+                        return True
+    return False

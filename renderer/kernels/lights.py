@@ -1,0 +1,229 @@
+"""Light that arrives at a point, before occlusion, and radiance from infinity."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.kernels.camera import track_rotation, track_translation
+from renderer.kernels.randomness import cone_direction
+from renderer.kernels.textures import image_bilinear_wrapped_around
+from renderer.layout.features import Feature
+from renderer.layout.structs import (
+    LIGHT_DIRECTIONAL,
+    LIGHT_ENVIRONMENT,
+    LIGHT_POINT,
+    LIGHT_QUAD,
+    LIGHT_SPHERE,
+    LIGHT_SPOT,
+    LIGHT_SUN_DISC,
+    LightRecord,
+    SceneData,
+    ViewData,
+)
+
+_POINT = wp.constant(LIGHT_POINT)
+_DIRECTIONAL = wp.constant(LIGHT_DIRECTIONAL)
+_SUN_DISC = wp.constant(LIGHT_SUN_DISC)
+_SPOT = wp.constant(LIGHT_SPOT)
+_QUAD = wp.constant(LIGHT_QUAD)
+_SPHERE = wp.constant(LIGHT_SPHERE)
+_ENVIRONMENT = wp.constant(LIGHT_ENVIRONMENT)
+_HAS_POINT = wp.constant(int(Feature.POINT))
+_HAS_DIRECTIONAL = wp.constant(int(Feature.DIRECTIONAL))
+_HAS_SUN_DISC = wp.constant(int(Feature.SUN_DISC))
+_HAS_SPOT = wp.constant(int(Feature.SPOT))
+_HAS_QUAD = wp.constant(int(Feature.QUAD))
+_HAS_SPHERE = wp.constant(int(Feature.SPHERE_LIGHT))
+_HAS_ENVIRONMENT = wp.constant(int(Feature.ENVIRONMENT))
+_HAS_MOTION = wp.constant(int(Feature.MOTION))
+_HAS_SKY = wp.constant(int(Feature.SKY))
+_FAR = wp.constant(1.0e30)
+# a shadow ray ends just short of its light, so that a lamp's own shape at that place does not count as an occluder
+_SHORT = wp.constant(0.9999)
+
+
+@wp.struct
+class Arriving:
+    """Unit direction towards a light, its irradiance on a surface facing it, and how far its shadow ray reaches."""
+
+    direction: wp.vec3
+    irradiance: wp.vec3
+    reach: wp.float32
+
+
+@wp.func
+def has_extent(record: LightRecord) -> wp.bool:
+    """Whether a light is seen in more than one direction, of which :func:`arriving_light` takes one."""
+    return record.kind != _POINT and record.kind != _DIRECTIONAL and record.kind != _SPOT
+
+
+@wp.func
+def from_point(record: LightRecord, position: wp.vec3) -> Arriving:
+    """Point light: intensity over the squared distance."""
+    light = Arriving()
+    towards = record.place - position
+    distance = wp.length(towards)
+    light.direction = towards / distance
+    light.irradiance = record.color / (distance * distance)
+    light.reach = distance * _SHORT
+    return light
+
+
+@wp.func
+def from_spot(record: LightRecord, position: wp.vec3) -> Arriving:
+    """Spot light: a point light whose intensity falls off by Hermite's ``3x² - 2x³`` in the cosine."""
+    light = from_point(record, position)
+    cosine = -wp.dot(light.direction, record.across)
+    x = wp.clamp((cosine - record.cos_outer) / wp.max(record.cos_inner - record.cos_outer, 1.0e-7), 0.0, 1.0)
+    light.irradiance = light.irradiance * (x * x * (3.0 - 2.0 * x))
+    return light
+
+
+@wp.func
+def from_sun(record: LightRecord, sample: wp.vec2) -> Arriving:
+    """A disc of even radiance at infinity, one direction in it."""
+    light = Arriving()
+    light.direction = cone_direction(record.place, record.cos_inner, sample)
+    light.irradiance = record.color
+    light.reach = _FAR
+    return light
+
+
+@wp.func
+def from_quad(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arriving:
+    """A point of a parallelogram that shines to one side: radiance times the solid angle of an even share of it."""
+    light = Arriving()
+    on_light = record.place + (2.0 * sample[0] - 1.0) * record.across + (2.0 * sample[1] - 1.0) * record.along
+    towards = on_light - position
+    squared = wp.max(wp.dot(towards, towards), 1.0e-30)
+    distance = wp.sqrt(squared)
+    light.direction = towards / distance
+    area_normal = 4.0 * wp.cross(record.across, record.along)
+    facing = -wp.dot(area_normal, light.direction)
+    light.irradiance = record.color * (wp.max(facing, 0.0) / squared)
+    light.reach = distance * _SHORT
+    return light
+
+
+@wp.func
+def from_sphere(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arriving:
+    """A direction into the cone that a sphere fills: radiance times the cone's solid angle; nothing from inside."""
+    light = Arriving()
+    towards = record.place - position
+    distance = wp.length(towards)
+    if distance <= record.radius:
+        return light
+    sine = record.radius / distance
+    cosine = wp.sqrt(wp.max((1.0 - sine) * (1.0 + sine), 0.0))
+    narrow = sine * sine / (1.0 + cosine)  # 1 - cosine, without the cancellation of a far sphere
+    light.direction = cone_direction(towards / distance, 1.0 - narrow, sample)
+    light.irradiance = record.color * (2.0 * wp.pi * narrow)
+    # the nearer meeting with the sphere, or the point nearest to it where rounding makes them miss
+    along = wp.dot(towards, light.direction)
+    aside = towards - along * light.direction
+    inside = wp.max(record.radius * record.radius - wp.dot(aside, aside), 0.0)
+    light.reach = (along - wp.sqrt(inside)) * _SHORT
+    return light
+
+
+@wp.func
+def cell_of(chances: wp.array(dtype=wp.float32), count: wp.int32, x: wp.float32) -> wp.int32:
+    """Which of ``count`` intervals between rising limits from 0 to 1 holds ``x``."""
+    low = wp.int32(0)
+    high = wp.int32(count)
+    while high - low > 1:
+        middle = (low + high) / 2
+        if chances[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@wp.func
+def map_radiance(scene: SceneData, level: wp.int32, to_map: wp.mat33, scale: wp.float32, direction: wp.vec3) -> wp.vec3:
+    """Radiance of a latitude–longitude map along a unit world direction."""
+    local = wp.normalize(to_map * direction)
+    u = wp.atan2(local[0], -local[2]) * (0.5 / wp.pi)
+    v = wp.acos(wp.clamp(local[1], -1.0, 1.0)) * (1.0 / wp.pi)
+    return image_bilinear_wrapped_around(scene, level, u, v) * scale
+
+
+@wp.func
+def from_environment(scene: SceneData, sample: wp.vec2) -> Arriving:
+    """A direction into the map, chosen by the brightness of its texels: radiance over the density of the choice."""
+    light = Arriving()
+    height = scene.lighting_columns.shape[0]
+    width = scene.lighting_columns.shape[1] - 1
+    row = cell_of(scene.lighting_rows, height, sample[1])
+    columns = scene.lighting_columns[row]
+    column = cell_of(columns, width, sample[0])
+    row_chance = scene.lighting_rows[row + 1] - scene.lighting_rows[row]
+    column_chance = columns[column + 1] - columns[column]
+    if row_chance <= 0.0 or column_chance <= 0.0:
+        return light
+    u = (wp.float32(column) + (sample[0] - columns[column]) / column_chance) / wp.float32(width)
+    v = (wp.float32(row) + (sample[1] - scene.lighting_rows[row]) / row_chance) / wp.float32(height)
+    polar = wp.pi * v
+    turn = 2.0 * wp.pi * u
+    local = wp.vec3(wp.sin(turn) * wp.sin(polar), wp.cos(polar), -wp.cos(turn) * wp.sin(polar))
+    # the transpose of a rotation takes the map's directions back to the world's
+    light.direction = wp.normalize(wp.transpose(scene.lighting_to_map) * local)
+    solid_angle = 2.0 * wp.pi * wp.pi * wp.sin(polar)  # of the whole map, were it as dense as here
+    density = row_chance * column_chance * wp.float32(width * height)
+    radiance = map_radiance(scene, scene.lighting_level, scene.lighting_to_map, scene.lighting_scale, light.direction)
+    light.irradiance = radiance * (solid_angle / density)
+    light.reach = _FAR
+    return light
+
+
+@wp.func
+def arriving_light(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    record: LightRecord,
+    sample: wp.vec2,
+    position: wp.vec3,
+) -> Arriving:
+    """Light from one direction towards a light.
+
+    Of a light with an extent ``sample``, in [0, 1)², picks a point; the irradiance is then such that its mean over
+    even samples, weighed by the cosine of each, is the light's.
+    """
+    if (features & _HAS_POINT) != 0 and record.kind == _POINT:
+        return from_point(record, position)
+    if (features & _HAS_SPOT) != 0 and record.kind == _SPOT:
+        return from_spot(record, position)
+    if (features & _HAS_SUN_DISC) != 0 and record.kind == _SUN_DISC:
+        return from_sun(record, sample)
+    if (features & _HAS_ENVIRONMENT) != 0 and record.kind == _ENVIRONMENT:
+        return from_environment(scene, sample)
+    light = Arriving()
+    if (features & _HAS_DIRECTIONAL) != 0 and record.kind == _DIRECTIONAL:
+        light.direction = record.place
+        light.irradiance = record.color
+        light.reach = _FAR
+    if (features & (_HAS_QUAD | _HAS_SPHERE)) != 0 and (record.kind == _QUAD or record.kind == _SPHERE):
+        start = wp.vec3(position[0], position[1], position[2])
+        rotation = wp.quat(0.0, 0.0, 0.0, 1.0)
+        moves = (features & _HAS_MOTION) != 0 and record.track != 0
+        if moves:
+            rotation = track_rotation(scene, view, record.track, time_s)
+            start = wp.quat_rotate_inv(rotation, position - track_translation(scene, view, record.track, time_s))
+        if (features & _HAS_QUAD) != 0 and record.kind == _QUAD:
+            light = from_quad(record, sample, start)
+        if (features & _HAS_SPHERE) != 0 and record.kind == _SPHERE:
+            light = from_sphere(record, sample, start)
+        if moves:
+            light.direction = wp.quat_rotate(rotation, light.direction)
+    return light
+
+
+@wp.func
+def environment_radiance(features: wp.int32, scene: SceneData, direction: wp.vec3) -> wp.vec3:
+    """Radiance that is seen at infinity along a unit world direction."""
+    if (features & _HAS_SKY) == 0 or scene.environment_level < 0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    return map_radiance(scene, scene.environment_level, scene.environment_to_map, scene.environment_scale, direction)

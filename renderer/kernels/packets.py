@@ -1,0 +1,155 @@
+"""Kernels that trace sixteen neighbouring samples at once: the fast path of the CPU.
+
+Sixteen consecutive samples on the Morton curve are a block of 4 x 4, so their rays take nearly the same way. The C++ in
+``native/`` carries them through the scene side by side, in vector registers; Warp's own compiler builds it together
+with these kernels. The same computation for one sample, in Python, is
+:func:`renderer.kernels.entry.shade_samples`: what CUDA runs and what tests compare with.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.compute.launching import Address
+from renderer.compute.native_code import module_options
+from renderer.layout.features import PACKETS, Feature
+from renderer.layout.structs import SceneData, ViewData
+
+LANES = wp.constant(16)
+"""Samples a kernel thread handles, as in ``native/lanes.h``."""
+
+NODE_FLOATS, BLOCK_FLOATS = 64, 40
+"""Sizes of a tree's records in units of four bytes, as in ``native/tree.h``."""
+
+
+@wp.struct
+class Queries:
+    """Rays through one mesh, and where their hits go: ``face`` is -1 for a miss, or a flag where any hit will do."""
+
+    nodes: wp.array(dtype=wp.float32)
+    blocks: wp.array(dtype=wp.float32)
+    origin: wp.array(dtype=wp.vec3)
+    direction: wp.array(dtype=wp.vec3)
+    reach: wp.array(dtype=wp.float32)
+    face: wp.array(dtype=wp.int32)
+    t: wp.array(dtype=wp.float32)
+    u: wp.array(dtype=wp.float32)
+    v: wp.array(dtype=wp.float32)
+
+
+def suffice_for(features: Feature) -> bool:
+    """Whether packets can do all that is in a set."""
+    return features | PACKETS == PACKETS
+
+
+MODULE_OPTIONS = module_options("queries.h", "samples.h")
+wp.set_module_options(MODULE_OPTIONS)
+
+
+@wp.func_native("packets::build_tree(vertices, faces, boxes, order, nodes, blocks, counts);")
+def native_build_tree(
+    vertices: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    boxes: wp.array(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    nodes: wp.array(dtype=wp.float32),
+    blocks: wp.array(dtype=wp.float32),
+    counts: wp.array(dtype=wp.int32),
+): ...
+
+
+@wp.func_native("packets::trace_single(scene, rays, ray, nearest != 0, (long long*)work.data);")
+def native_trace_single(
+    scene: SceneData, rays: Queries, ray: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)
+): ...
+
+
+@wp.func_native("packets::trace_queries(rays, first, nearest != 0);")
+def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
+
+
+@wp.func_native(
+    """
+    packets::shade_samples(scene, view, (int*)taken, count, (const float*)position, (const double*)time_s,
+                           (float*)color, (long long*)rays);
+    """
+)
+def native_shade_samples(
+    scene: SceneData,
+    view: ViewData,
+    taken: Address,
+    count: wp.int32,
+    position: Address,
+    time_s: Address,
+    color: Address,
+    rays: Address,
+): ...
+
+
+@wp.func_native("packets::render_pixels(scene, view, taken.data, samples, time_s, image);")
+def native_render_pixels(
+    scene: SceneData,
+    view: ViewData,
+    taken: wp.array(dtype=wp.int32),
+    samples: wp.int32,
+    time_s: wp.float64,
+    image: wp.array2d(dtype=wp.vec3),
+): ...
+
+
+@wp.kernel(enable_backward=False)
+def build_tree(
+    vertices: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    boxes: wp.array(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    nodes: wp.array(dtype=wp.float32),
+    blocks: wp.array(dtype=wp.float32),
+    counts: wp.array(dtype=wp.int32),
+):
+    """Fills ``nodes`` and ``blocks`` and how many of each there are; ``boxes`` and ``order`` are scratch."""
+    native_build_tree(vertices, faces, boxes, order, nodes, blocks, counts)
+
+
+@wp.kernel(enable_backward=False)
+def trace_singles(scene: SceneData, rays: Queries, first: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)):
+    """Traces a ray a thread through the scene's first mesh, from ray ``first`` on, and adds up what that takes."""
+    native_trace_single(scene, rays, first + wp.tid(), nearest, work)
+
+
+@wp.kernel(enable_backward=False)
+def trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32):
+    """Traces sixteen rays a thread, from ray ``first`` on."""
+    native_trace_queries(rays, first + LANES * wp.tid(), nearest)
+
+
+@wp.kernel(enable_backward=False)
+def shade_samples(
+    scene: SceneData,
+    view: ViewData,
+    taken: Address,
+    count: wp.int32,
+    position: Address,
+    time_s: Address,
+    color: Address,
+    rays: Address,
+):
+    """As the kernel of the same name in ``kernels.py``, for all samples that no other launch has taken.
+
+    Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero. ``rays``
+    receives the totals. Arrays come as addresses, for a launch that is recorded once.
+    """
+    native_shade_samples(scene, view, taken, count, position, time_s, color, rays)
+
+
+@wp.kernel(enable_backward=False)
+def render_pixels(
+    scene: SceneData,
+    view: ViewData,
+    taken: wp.array(dtype=wp.int32),
+    samples: wp.int32,
+    time_s: wp.float64,
+    image: wp.array2d(dtype=wp.vec3),
+):
+    """As the kernel of the same name in ``kernels.py``, shared between launches like :func:`shade_samples`."""
+    native_render_pixels(scene, view, taken, samples, time_s, image)

@@ -1,0 +1,300 @@
+"""Light transport along one camera ray: Phong reflection, shadows, mirrors and glass.
+
+The tree of Whitted 1980 with the spread rays of Cook, Porter and Carpenter 1984. Every function takes the set of
+features (:mod:`renderer.layout.features`) that its kernel is compiled for; it is a literal there, so that the compiler
+drops what lies behind tests of other features.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.kernels.glass import Sent, sent_by_glass
+from renderer.kernels.intersect import closest_hit, occluded
+from renderer.kernels.lights import arriving_light, environment_radiance, has_extent
+from renderer.kernels.randomness import (
+    PURPOSE_LIGHT,
+    PURPOSE_REFLECT,
+    PURPOSE_REFRACT,
+    branched,
+    cell_2d,
+    cone_direction,
+    draw_2d,
+)
+from renderer.kernels.surface import surface_at
+from renderer.kernels.textures import texture_color
+from renderer.layout.features import Feature
+from renderer.layout.structs import Draw, MaterialRecord, Ray, SceneData, Surface, ViewData
+
+_FAR = wp.constant(1.0e30)
+_REFLECT = wp.constant(PURPOSE_REFLECT)
+_REFRACT = wp.constant(PURPOSE_REFRACT)
+_LIGHT = wp.constant(PURPOSE_LIGHT)
+_HIGHLIGHT = wp.constant(int(Feature.HIGHLIGHT))
+_MIRROR = wp.constant(int(Feature.MIRROR))
+_GLOSSY = wp.constant(int(Feature.GLOSSY))
+_GLASS = wp.constant(int(Feature.GLASS))
+_MANY_RAYS = wp.constant(int(Feature.MANY_RAYS))
+_EXTENDED = wp.constant(int(Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT))
+_ALL_CELLS = wp.constant(int(Feature.ALL_CELLS))
+
+
+@wp.func
+def direct_light(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    draw: Draw,
+    surface: Surface,
+    material: MaterialRecord,
+    albedo: wp.vec3,
+    direction: wp.vec3,
+):
+    """Radiance reflected from the lights towards the viewer, and the shadow rays it took.
+
+    ``albedo`` is the diffuse colour, scaled by what the mirrored part leaves; ``direction`` is the viewing ray's.
+    """
+    total = wp.vec3(0.0, 0.0, 0.0)
+    rays = wp.int32(0)
+    start = surface.position + surface.offset * surface.geometric_normal
+    mirrored = direction - 2.0 * wp.dot(direction, surface.normal) * surface.normal
+    for light in range(scene.light_count):
+        record = scene.lights[light]
+        extended = wp.bool((features & _EXTENDED) != 0)
+        if extended:
+            extended = has_extent(record)
+        cells = wp.int32(1)
+        if (features & _ALL_CELLS) != 0 and extended:
+            cells = scene.light_cells
+        sample = wp.vec2(0.0, 0.0)
+        if extended and cells == 1:
+            sample = draw_2d(draw, _LIGHT + light)
+        share = 1.0 / wp.float32(cells * cells)
+        for cell in range(cells * cells):
+            if cells > 1:
+                sample = cell_2d(draw, _LIGHT + light, cell, cells)
+            arriving = arriving_light(features, scene, view, time_s, record, sample, start)
+            towards = arriving.direction
+            cosine = wp.dot(surface.normal, towards)
+            # light from behind the true surface must not leak in over a smooth normal
+            if cosine > 0.0 and wp.dot(surface.geometric_normal, towards) > 0.0 and wp.max(arriving.irradiance) > 0.0:
+                reflected = albedo * (cosine / wp.pi)
+                if (features & _HIGHLIGHT) != 0:
+                    lobe = wp.max(wp.dot(mirrored, towards), 0.0)
+                    gloss = wp.pow(lobe, material.exponent) * (material.exponent + 2.0) * (0.5 / wp.pi)
+                    reflected = reflected + material.specular * gloss
+                rays = rays + 1
+                if not occluded(features, scene, view, time_s, start, towards, arriving.reach):
+                    total = total + wp.cw_mul(reflected, arriving.irradiance) * share
+    return total, rays
+
+
+@wp.func
+def above(towards: wp.vec3, normal: wp.vec3) -> wp.vec3:
+    """A direction kept above a surface, where a smooth normal or the spread of rays would send it below."""
+    height = wp.dot(towards, normal)
+    if height < 1.0e-4:
+        towards = towards + (1.0e-4 - height) * normal
+    return wp.normalize(towards)
+
+
+@wp.func
+def mirror_direction(surface: Surface, direction: wp.vec3) -> wp.vec3:
+    """Mirrored viewing direction, above the true surface."""
+    mirrored = direction - 2.0 * wp.dot(direction, surface.normal) * surface.normal
+    return above(mirrored, surface.geometric_normal)
+
+
+@wp.func
+def fresnel(material: MaterialRecord, cosine: wp.float32) -> wp.float32:
+    """Mirror reflectance ``min + (max - min) (1 - cos)^exponent``."""
+    grazing = wp.pow(wp.clamp(1.0 - cosine, 0.0, 1.0), material.fresnel_exponent)
+    return material.fresnel_min + (material.fresnel_max - material.fresnel_min) * grazing
+
+
+@wp.func
+def sent_by(
+    features: wp.int32,
+    scene: SceneData,
+    surface: Surface,
+    material: MaterialRecord,
+    cosine: wp.float32,
+    footprint: wp.float32,
+    direction: wp.vec3,
+) -> Sent:
+    """What leaves a surface along the perfect directions."""
+    if (features & _GLASS) != 0 and material.transmission >= 0:
+        return sent_by_glass(features, scene, surface, material, cosine, footprint, direction)
+    sent = Sent()
+    if (features & _MIRROR) != 0:
+        sent.reflection = material.mirror_tint * fresnel(material, cosine)
+        if material.mirror >= 0:
+            color = texture_color(features, scene, material.mirror, surface.uv, footprint)
+            sent.reflection = wp.cw_mul(sent.reflection, color)
+    return sent
+
+
+@wp.func
+def sent_on(
+    features: wp.int32,
+    surface: Surface,
+    material: MaterialRecord,
+    ray: Ray,
+    perfect: wp.vec3,
+    weight: wp.vec3,
+    number: wp.int32,
+    rays: wp.int32,
+    purpose: wp.int32,
+) -> Ray:
+    """One of the ``rays`` that go on about a perfect direction: up for reflection, down for refraction."""
+    side = wp.where(purpose == _REFLECT, 1.0, -1.0)
+    normal = side * surface.geometric_normal
+    child = Ray()
+    child.draw = branched(ray.draw, number, rays, purpose)
+    child.start = surface.position + surface.offset * normal
+    child.towards = perfect
+    if (features & _GLOSSY) != 0 and material.cos_spread < 1.0:
+        spread = cone_direction(perfect, material.cos_spread, draw_2d(child.draw, purpose))
+        child.towards = above(spread, normal)
+    child.weight = weight
+    child.travelled = ray.travelled
+    child.bounces = ray.bounces + 1
+    return child
+
+
+@wp.func
+def leave_waiting(
+    features: wp.int32,
+    surface: Surface,
+    material: MaterialRecord,
+    ray: Ray,
+    perfect: wp.vec3,
+    weight: wp.vec3,
+    first: wp.int32,
+    rays: wp.int32,
+    purpose: wp.int32,
+    stack: wp.array2d(dtype=Ray),
+    row: wp.int32,
+    waiting: wp.int32,
+) -> wp.int32:
+    """Puts rays ``first`` to ``rays - 1`` of a bundle of even weights on the stack; how many wait now."""
+    for number in range(first, rays):
+        stack[row, waiting] = sent_on(features, surface, material, ray, perfect, weight, number, rays, purpose)
+        waiting = waiting + 1
+    return waiting
+
+
+@wp.func
+def bundle_size(features: wp.int32, material: MaterialRecord, ray: Ray, rays: wp.int32) -> wp.int32:
+    """Rays to send about a perfect direction: several at the first surface, where it spreads them."""
+    if (features & _MANY_RAYS) != 0 and ray.bounces == 0 and material.cos_spread < 1.0:
+        return rays
+    return 1
+
+
+@wp.func
+def left_by(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    surface: Surface,
+    material: MaterialRecord,
+    ray: Ray,
+    cosine: wp.float32,
+    footprint: wp.float32,
+):
+    """Radiance that leaves a surface against a ray, but for what it mirrors or lets through; and its shadow rays."""
+    glow = material.emission
+    shadow_rays = wp.int32(0)
+    if not surface.inside:
+        glow = glow + surface.emission
+    if material.diffuse >= 0:
+        albedo = texture_color(features, scene, material.diffuse, surface.uv, footprint)
+        if (features & _MIRROR) != 0:
+            albedo = albedo * (1.0 - fresnel(material, cosine))
+        lit, rays = direct_light(features, scene, view, time_s, ray.draw, surface, material, albedo, ray.towards)
+        shadow_rays = rays
+        glow = glow + wp.cw_mul(albedo, scene.ambient) * material.ambient + lit
+    return glow, shadow_rays
+
+
+@wp.func
+def radiance(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    draw: Draw,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    stack: wp.array2d(dtype=Ray),
+    row: wp.int32,
+):
+    """Radiance along a world ray, and how many rays it took: to the lights, reflected, refracted.
+
+    Rays still to follow wait in ``stack[row]``; without glass and spread bundles there never are any.
+    """
+    total = wp.vec3(0.0, 0.0, 0.0)
+    counts = wp.vec3i(0, 0, 0)
+    waiting = wp.int32(0)
+    ray = Ray()
+    ray.start = origin
+    ray.towards = direction
+    ray.weight = wp.vec3(1.0, 1.0, 1.0)
+    ray.draw = draw
+    alive = wp.bool(True)
+    while alive:
+        alive = False
+        hit = closest_hit(features, scene, view, time_s, ray.start, ray.towards, _FAR)
+        if hit.instance < 0:
+            total = total + wp.cw_mul(ray.weight, environment_radiance(features, scene, ray.towards))
+        else:
+            surface = surface_at(features, scene, view, time_s, hit, ray.start, ray.towards)
+            material = scene.materials[surface.material]
+            ray.travelled = ray.travelled + hit.t
+            cosine = -wp.dot(surface.normal, ray.towards)
+            slant = wp.max(wp.abs(wp.dot(surface.geometric_normal, ray.towards)), 1.0e-4)
+            footprint = (view.width + view.spread * ray.travelled) / slant * surface.uv_density
+            glow, rays = left_by(features, scene, view, time_s, surface, material, ray, cosine, footprint)
+            counts[0] = counts[0] + rays
+            total = total + wp.cw_mul(ray.weight, glow)
+            if (features & _MIRROR) != 0 and ray.bounces < scene.depth:
+                sent = sent_by(features, scene, surface, material, cosine, footprint, ray.towards)
+                weight = wp.cw_mul(ray.weight, sent.refraction)
+                if (features & _GLASS) != 0 and wp.max(weight) > scene.throughput_cutoff:
+                    rays = bundle_size(features, material, ray, scene.refraction_rays)
+                    weight = weight / wp.float32(rays)
+                    counts[2] = counts[2] + rays
+                    waiting = leave_waiting(
+                        features, surface, material, ray, sent.through, weight, 0, rays, _REFRACT, stack, row, waiting
+                    )
+                weight = wp.cw_mul(ray.weight, sent.reflection)
+                if wp.max(weight) > scene.throughput_cutoff:
+                    rays = bundle_size(features, material, ray, scene.reflection_rays)
+                    weight = weight / wp.float32(rays)
+                    counts[1] = counts[1] + rays
+                    mirrored = mirror_direction(surface, ray.towards)
+                    if (features & _MANY_RAYS) != 0:
+                        waiting = leave_waiting(
+                            features, surface, material, ray, mirrored, weight, 1, rays, _REFLECT, stack, row, waiting
+                        )
+                    ray = sent_on(features, surface, material, ray, mirrored, weight, 0, rays, _REFLECT)
+                    alive = True
+        if (features & (_GLASS | _MANY_RAYS)) != 0 and not alive and waiting > 0:
+            waiting = waiting - 1
+            ray = stack[row, waiting]
+            alive = True
+    return total, counts
+
+
+def stack_size(features: Feature, depth: int, reflection_rays: int, refraction_rays: int) -> int:
+    """Rays that can wait at once while one camera ray is followed.
+
+    The first surface leaves at most ``refraction_rays + reflection_rays - 1`` behind, each deeper one a single one.
+    """
+    if not features & (Feature.GLASS | Feature.MANY_RAYS):
+        return 1
+    bundles = reflection_rays + refraction_rays if features & Feature.MANY_RAYS else 2
+    return bundles + depth

@@ -1,0 +1,98 @@
+"""Rays through a single mesh, for those who need hits rather than pictures."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.compute.launching import shared
+from renderer.kernels import packets
+from renderer.tables.trees import aligned, build_tree
+
+_RANGE_RAYS = 1 << 14
+FAR = 1.0e30
+"""How far a ray reaches that has no end of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayHits:
+    """Nearest hits of rays.
+
+    Attributes:
+        face: ``(n,)`` int32 face, -1 for a miss.
+        t: ``(n,)`` float32 distance in units of the direction's length; how far the ray reached for a miss.
+        u, v: ``(n,)`` float32 weights of the face's first two corners.
+    """
+
+    face: NDArray[np.int32]
+    t: NDArray[np.float32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+
+
+class RayQueries:
+    """A mesh that rays are traced through, on the CPU.
+
+    Sixteen consecutive rays that keep together are traced as a packet, others one by one; the hits are the same bits
+    either way. Of two faces hit at the same distance the one with the lower number is reported.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, threads: int = 1) -> None:
+        """Builds the tree.
+
+        Args:
+            vertices: ``(v, 3)``, best within ``[-1, 1]³``.
+            faces: ``(f, 3)`` indices of corners.
+            threads: host threads.
+
+        Raises:
+            ValueError: if the mesh is not one (see :func:`renderer.tables.trees.build_tree`), or threads is below 1.
+        """
+        if threads < 1:
+            raise ValueError(f"threads: expected at least 1, got {threads}")
+        tree = build_tree(vertices, faces)
+        self._nodes, self._blocks = (shared(aligned(part), wp.float32) for part in (tree.nodes, tree.blocks))
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def closest(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None = None) -> RayHits:
+        """Nearest hits of rays ``(n, 3)`` up to ``t_max``, a number or ``(n,)``; directions need not be unit.
+
+        Raises:
+            ValueError: if the shapes do not fit.
+        """
+        return self._trace(origin, direction, t_max, nearest=True)
+
+    def blocked(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None = None) -> NDArray[np.bool_]:
+        """Whether anything lies along rays ``(n, 3)`` before ``t_max``, a number or ``(n,)``.
+
+        Raises:
+            ValueError: if the shapes do not fit.
+        """
+        return self._trace(origin, direction, t_max, nearest=False).face != 0
+
+    def _trace(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None, nearest: bool) -> RayHits:
+        starts, ways = np.ascontiguousarray(origin, np.float32), np.ascontiguousarray(direction, np.float32)
+        if starts.ndim != 2 or starts.shape[1] != 3 or ways.shape != starts.shape:
+            raise ValueError(f"rays: expected origins and directions (n, 3), got {starts.shape} and {ways.shape}")
+        count = len(starts)
+        reach = np.full(count, FAR, np.float32)
+        if t_max is not None:
+            reach = np.minimum(reach, np.broadcast_to(np.asarray(t_max, np.float32), count))
+        hits = RayHits(np.empty(count, np.int32), *(np.empty(count if nearest else 0, np.float32) for _ in range(3)))
+        rays = packets.Queries()
+        rays.nodes, rays.blocks = self._nodes, self._blocks
+        rays.origin, rays.direction = shared(starts, wp.vec3), shared(ways, wp.vec3)
+        rays.reach, rays.face = shared(reach, wp.float32), shared(hits.face, wp.int32)
+        rays.t, rays.u, rays.v = (shared(part, wp.float32) for part in (hits.t, hits.u, hits.v))
+
+        def run(first: int) -> None:
+            dim = -(-min(_RANGE_RAYS, count - first) // packets.LANES)
+            wp.launch(packets.trace_queries, dim=dim, inputs=[rays, first, int(nearest)], device="cpu")
+
+        for _ in (map if self._pool is None else self._pool.map)(run, range(0, count, _RANGE_RAYS)):
+            pass
+        return hits

@@ -1,0 +1,70 @@
+"""From colours to signed errors in C++ (``native/framelets.h``); defined in ``tsar/error.py`` and ``tsar/haar.py``."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.compute.launching import Address
+from renderer.stages.cache import CacheView, ClaimMemory
+
+
+@wp.struct
+class ErrorPlan:
+    """What of the configuration the estimate depends on."""
+
+    samples: wp.int32
+    """Per framelet, at most 1024."""
+    octaves: wp.int32
+    octave_positions: wp.int32
+    """Positions of all octaves together."""
+    state: wp.int32
+    """Coefficients kept per framelet."""
+    field_level: wp.int32
+    linf: wp.int32
+    """Whether the norm is the greatest power instead of the total."""
+    difference: wp.int32
+    """Whether the error is a difference of logarithms instead of a contrast."""
+    template_spatial: wp.float32
+    template_temporal: wp.float32
+    """Powers that the template tolerates, summed over octaves."""
+    radiance_max: wp.float32
+
+
+@wp.func_native("""
+    const long long bytes = 4ll << (2 * plan.field_level);
+    memset((void*)errors_spatial, 0, bytes);
+    memset((void*)errors_temporal, 0, bytes);
+    memset((void*)pending, 1, count);
+""")
+def start_observing(
+    plan: ErrorPlan, count: wp.int32, pending: Address, errors_spatial: Address, errors_temporal: Address
+):
+    """Fields of zeros, and all framelets pending."""
+    ...
+
+
+@wp.func_native("""
+    framelets::observe_rows(plan, cache, count, (const long long*)level, (const long long*)index, (const float*)color,
+                            (const long long*)memory.slot, (const float* const*)memory.past, (unsigned char*)pending,
+                            (framelets::Progress*)progress, (float*)errors_spatial, (float*)errors_temporal);
+""")
+def observe_framelets(
+    plan: ErrorPlan,
+    cache: CacheView,
+    memory: ClaimMemory,
+    pending: Address,
+    progress: Address,
+    count: wp.int32,
+    level: Address,
+    index: Address,
+    color: Address,
+    errors_spatial: Address,
+    errors_temporal: Address,
+):
+    """Errors of framelets that are pending, and colours and wavelet states into their slots; threads share them.
+
+    Args:
+        pending: uint8 flags; what remains set holds a sample that is not finite.
+        progress: int32, how many are taken, and how many remain.
+    """
+    ...

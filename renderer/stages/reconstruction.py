@@ -1,0 +1,161 @@
+"""Reconstruction as kernels on the CPU: cached framelets of many ages and sizes to an image, in one pass over bands of
+rows that threads share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from renderer.compute import device as devices
+from renderer.compute.launching import Command, address, require_same
+from renderer.compute.team import TEAM
+from renderer.stages import reconstruction_kernels as kernels
+from renderer.stages.ages import DisplayPlan
+from renderer.stages.bands import PLANES
+from renderer.stages.coverage import covers
+from renderer.stages.views import PerCache, point_at_cache
+from tsar.cache import FrameletCache
+from tsar.config import TsarConfig
+from tsar.morton import raster_to_morton
+from tsar.reconstruction import Reconstruction, spatial_weights
+from tsar.stages import REFERENCE
+from tsar.types import SampleMap
+
+_BAND_PIXELS = 1 << 15
+"""About as many pixels to a band, 20 bytes each, as a second-level cache holds beside the framelets."""
+_BAND_ROWS_LEAST = 8
+_SPARE = 16
+"""Elements behind arrays that are read or written sixteen at a time."""
+
+
+@dataclass(frozen=True)
+class _Launches:
+    """Recorded launches that know where a cache lies; one of ``paint`` per thread."""
+
+    find: Command
+    paint: list[Command]
+    bury: Command
+
+
+class Display:
+    """Reconstruction for one configuration. Holds constants, recorded launches and working memory, nothing of a run."""
+
+    def __init__(self, config: TsarConfig, threads: int = 1) -> None:
+        """Prepares launches for ``threads`` threads."""
+        devices.load_kernels(kernels, "cpu")
+        self.config, self._covered = config, covers(config, "reconstruct")
+        self._cells = 2**config.level_max
+        self._memory: dict[str, Tensor] = {}
+        self._plan = self._make_plan()
+        self._count, self._taken, self._overdraw = np.zeros(1, np.int32), np.zeros(1, np.int32), np.zeros(1)
+        threads = min(threads, config.resolution_px // self._plan.band)
+        self._holes = np.zeros(threads, np.int32)
+        self._workers = [self._make_worker(number) for number in range(threads)]
+        self._per_cache = PerCache(self._record)
+
+    def reconstruct(self, cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
+        """As :func:`tsar.reconstruction.reconstruct`, to which an image with holes is left, and what is not covered."""
+        require_same(config, self.config)
+        if not self._covered:
+            return REFERENCE.reconstruct(cache, config, cycle_s)
+        launches = self._per_cache(cache)
+        newest_s = torch.empty(self._cells, self._cells, dtype=torch.float64)
+        level = torch.empty(self._cells, self._cells, dtype=torch.int64)
+        image = torch.empty(config.resolution_px, config.resolution_px, 3)
+        cells, pixels = self._cells**2, address("image", image, torch.float32, 3 * config.resolution_px**2)
+        launches.find(
+            cycle_s, address("newest_s", newest_s, torch.float64, cells), address("level", level, torch.int64, cells)
+        )
+        self._taken[0] = 0
+        for paint in launches.paint:
+            paint.set(self._count[0], pixels)
+        TEAM.run(launches.paint)
+        if self._holes.any():
+            return REFERENCE.reconstruct(cache, config, cycle_s)
+        launches.bury()
+        return Reconstruction(image, SampleMap(newest_s, level), float(self._overdraw[0]))
+
+    def _record(self, cache: FrameletCache) -> _Launches:
+        view = kernels.CachedFramelets()
+        point_at_cache(view, cache, self.config)
+        taken = address("taken", self._taken, torch.int32, 1)
+        count = address("count", self._count, torch.int32, 1)
+        overdraw = address("overdraw", self._overdraw, torch.float64, 1)
+        return _Launches(
+            Command(kernels.find_candidates, self._plan, view, count),
+            [Command(kernels.paint_bands, self._plan, view, worker, taken) for worker in self._workers],
+            Command(kernels.bury_dead, self._plan, view, overdraw),
+        )
+
+    def _keep(self, name: str, tensor: Tensor, dtype: torch.dtype, count: int) -> int:
+        """Address of a tensor that lives as long as this object."""
+        self._memory[name] = tensor.contiguous()
+        return address(name, self._memory[name], dtype, count)
+
+    def _room(self, name: str, count: int, dtype: torch.dtype = torch.float32) -> int:
+        """Address of memory that lives as long as this object, zero at first."""
+        return self._keep(name, torch.zeros(count, dtype=dtype), dtype, count)
+
+    def _make_plan(self) -> DisplayPlan:
+        config, plan = self.config, DisplayPlan()
+        side, low, high = config.framelet_side, config.level_min, config.level_max
+        resolution, cells, slots = config.resolution_px, self._cells, config.cache_slots
+        plan.resolution, plan.level_low, plan.level_high, plan.side = resolution, low, high, side
+        plan.half = config.reconstruction.age_support_px // 2
+        plan.band = min(max(_BAND_PIXELS // resolution, _BAND_ROWS_LEAST), resolution)
+        axes = [_axis(side, resolution >> level) for level in range(low, high + 1)]
+        length = sum(axis[0].numel() for axis in axes) + _SPARE
+        for place, name in enumerate(("left", "right", "share_left", "share_right", "weight")):
+            values = torch.cat([*(axis[place] for axis in axes), axes[0][place].repeat(_SPARE)[:_SPARE]])
+            setattr(plan, name, self._keep(name, values, torch.float32 if place > 1 else torch.int32, length))
+        lengths = torch.tensor([0, *(axis[0].numel() for axis in axes)], dtype=torch.int32)
+        first = torch.cumsum(lengths, 0, dtype=torch.int32)
+        plan.first = self._keep("first", first, torch.int32, len(axes) + 1)
+        margins = [(axis[0].numel() - (resolution >> level)) // 2 for level, axis in enumerate(axes, low)]
+        plan.margin = self._keep("margin", torch.tensor(margins, dtype=torch.int32), torch.int32, len(axes))
+        width = resolution // cells
+        plan.reach = -(-plan.half // width) - (-max(margins) // width)
+        plan.order = self._keep("order", raster_to_morton(side).to(torch.int32), torch.int32, side**2)
+        nodes = (4 ** (high + 1) - 1) // 3
+        plan.node_time = self._room("node_time", nodes, torch.float64)
+        plan.node_level = self._room("node_level", nodes, torch.int32)
+        plan.cell_age = self._room("cell_age", cells**2)
+        plan.cell_least = self._room("cell_least", 2 * cells**2)
+        plan.row_integral = self._room("row_integral", resolution + 2 * plan.half + 1, torch.float64)
+        plan.row_sum = self._room("row_sum", cells * resolution, torch.float64)
+        plan.slot_age = self._room("slot_age", slots)
+        plan.candidate = self._room("candidate", slots, torch.int32)
+        plan.seen = self._room("seen", slots, torch.int32)
+        return plan
+
+    def _make_worker(self, number: int) -> kernels.Worker:
+        config, worker = self.config, kernels.Worker()
+        resolution, side = config.resolution_px, config.framelet_side
+        widest = max(2 * side, 2 * (resolution >> config.level_min))
+        planes, rows = PLANES * self._plan.band * resolution, 3 * side * widest
+        worker.planes = self._room(f"planes {number}", planes + _SPARE)
+        worker.rows = self._room(f"rows {number}", rows + _SPARE)
+        worker.samples = self._room(f"samples {number}", 3 * side**2)
+        worker.box = self._room(f"box {number}", resolution, torch.float64)
+        worker.ages = self._room(f"ages {number}", resolution)
+        worker.result = address("holes", self._holes[number : number + 1], torch.int32, 1)
+        return worker
+
+
+def _axis(side: int, width_px: int) -> tuple[Tensor, ...]:
+    """For each pixel of a tile along an axis, margin included: two samples, their shares, and the weight."""
+    if width_px <= side:
+        pixel = torch.arange(width_px, dtype=torch.int32)
+        return pixel, pixel, torch.ones(width_px), torch.zeros(width_px), torch.ones(width_px)
+    weights, _ = spatial_weights(side, width_px)
+    total = weights.sum(1)
+    unit = weights / total[:, None]
+    left = (unit > 0).to(torch.int32).argmax(1)
+    right = (left + 1).clamp(max=side - 1)
+    share_left = unit.gather(1, left[:, None]).squeeze(1)
+    share_right = torch.where(right > left, unit.gather(1, right[:, None]).squeeze(1), 0.0)
+    right = torch.where(share_right > 0, right, left)
+    return left.to(torch.int32), right.to(torch.int32), share_left, share_right, total

@@ -1,0 +1,60 @@
+"""A framelet cache's tensors as native code sees them: checked once, and what is launched on them recorded once."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+from weakref import WeakKeyDictionary
+
+import torch
+from torch import Tensor
+
+from renderer.compute.launching import address
+from tsar.cache import FrameletCache
+from tsar.config import TsarConfig
+from tsar.haar import state_size
+
+_TENSORS = "level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"
+
+Recorded = TypeVar("Recorded")
+
+
+def point_at_cache(view: Any, cache: FrameletCache, config: TsarConfig) -> None:
+    """Sets those fields of a kernel's record that are addresses of a cache's tensors, and its number of slots.
+
+    Raises:
+        ValueError: if a tensor is not what a cache of this configuration has.
+    """
+    slots, samples = config.cache_slots, config.samples
+    expected = {
+        "level": (torch.int64, slots),
+        "index": (torch.int64, slots),
+        "time_s": (torch.float64, slots),
+        "dead": (torch.bool, slots),
+        "color": (torch.float32, slots * samples * 3),
+        "coefficients": (torch.float32, slots * state_size(samples)),
+        "slot_of_node": (torch.int64, (4 ** (config.level_max + 1) - 1) // 3),
+    }
+    view.slots = slots
+    for name, (dtype, count) in expected.items():
+        if hasattr(view, name):
+            setattr(view, name, address(f"cache.{name}", getattr(cache, name), dtype, count))
+
+
+class PerCache(Generic[Recorded]):
+    """What is recorded for each cache: once, and anew where a cache has been given another tensor."""
+
+    def __init__(self, record: Callable[[FrameletCache], Recorded]) -> None:
+        self._record = record
+        self._kept: WeakKeyDictionary[FrameletCache, tuple[tuple[Tensor, ...], Recorded]] = WeakKeyDictionary()
+
+    def __call__(self, cache: FrameletCache) -> Recorded:
+        """What is recorded for a cache."""
+        tensors, kept = _tensors_of(cache), self._kept.get(cache)
+        if kept is None or not all(map(operator.is_, kept[0], tensors)):
+            kept = self._kept[cache] = tensors, self._record(cache)
+        return kept[1]
+
+
+_tensors_of: Callable[[FrameletCache], tuple[Tensor, ...]] = operator.attrgetter(*_TENSORS)

@@ -1,0 +1,150 @@
+"""What a scene requires of the kernels, so that they model nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from renderer.layout.features import Feature
+from scenes.canonical import (
+    CheckerboardTexture,
+    Cube,
+    DirectionalLight,
+    Disk,
+    EnvironmentCamera,
+    EnvironmentLight,
+    Glass,
+    HeightField,
+    ImageTexture,
+    Instance,
+    Material,
+    Matte,
+    Mesh,
+    Mirror,
+    OrthographicCamera,
+    PerspectiveCamera,
+    Phong,
+    PointLight,
+    Rectangle,
+    Scene,
+    Sphere,
+    SpotLight,
+    Texture,
+)
+
+_EXTENDED = Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT
+_LIGHTING = _EXTENDED | Feature.POINT | Feature.DIRECTIONAL | Feature.SPOT | Feature.ALL_CELLS
+_SHAPES = {Mesh: Feature.MESH, Sphere: Feature.SPHERE, Rectangle: Feature.FLAT, Disk: Feature.FLAT, Cube: Feature.CUBE}
+
+
+def explain(scene: Scene) -> dict[Feature, str]:
+    """What a scene requires, each with the first thing in it that does."""
+    found: dict[Feature, str] = {}
+    lit = any(_is_lit(instance.material) for instance in scene.instances)
+    for feature, cause in _required(scene):
+        if lit or not feature & _LIGHTING:
+            found.setdefault(feature, cause)
+    return {feature: found[feature] for feature in Feature if feature in found}
+
+
+def required(scene: Scene) -> Feature:
+    """The features of a scene, as one set."""
+    features = Feature(0)
+    for feature in explain(scene):
+        features |= feature
+    return features
+
+
+def _required(scene: Scene) -> Iterator[tuple[Feature, str]]:
+    yield from _of_camera(scene)
+    for instance in scene.instances:
+        yield from _of_instance(instance, scene)
+    for light in scene.lights:
+        for feature in _of_light(light):
+            yield feature, type(light).__name__
+            if feature & _EXTENDED and scene.integrator.shadow_rays == "all":
+                yield Feature.ALL_CELLS, "Integrator.shadow_rays"
+    if scene.background is not None:
+        yield Feature.SKY, "Scene.background"
+
+
+def _of_camera(scene: Scene) -> Iterator[tuple[Feature, str]]:
+    camera = scene.camera
+    if isinstance(camera, PerspectiveCamera) and camera.lens_radius > 0.0:
+        yield Feature.LENS, f"PerspectiveCamera.lens_radius {camera.lens_radius:g}"
+    if isinstance(camera, OrthographicCamera):
+        yield Feature.PARALLEL, "OrthographicCamera"
+    if isinstance(camera, EnvironmentCamera):
+        yield Feature.PANORAMA, "EnvironmentCamera"
+    if getattr(camera, "track", None) is not None:
+        yield Feature.MOTION, f"{type(camera).__name__}.track"
+
+
+def _of_instance(instance: Instance, scene: Scene) -> Iterator[tuple[Feature, str]]:
+    where = f"instance {instance.name!r}"
+    relief = isinstance(instance.material, HeightField)
+    if relief:
+        yield Feature.HEIGHT_FIELD, where
+    elif type(instance.shape) in _SHAPES:
+        yield _SHAPES[type(instance.shape)], where
+    if instance.track is not None:
+        yield Feature.MOTION, where
+    if instance.emission is not None and max(instance.emission) > 0.0:
+        yield Feature.QUAD if isinstance(instance.shape, Rectangle) else Feature.SPHERE_LIGHT, where
+        if scene.integrator.shadow_rays == "all":
+            yield Feature.ALL_CELLS, "Integrator.shadow_rays"
+    for feature in _of_material(instance.material, scene):
+        yield feature, where
+
+
+def _of_material(material: Material, scene: Scene) -> Iterator[Feature]:
+    several = scene.integrator.reflection_rays > 1
+    if isinstance(material, HeightField):
+        yield from _of_material(material.base, scene)
+    if isinstance(material, Phong):
+        yield from _of_texture(material.diffuse)
+        if max(material.specular) > 0.0:
+            yield Feature.HIGHLIGHT
+        if material.fresnel_max > 0.0:
+            yield Feature.MIRROR
+            if material.mirror_spread_deg > 0.0:
+                yield Feature.GLOSSY
+    if isinstance(material, Matte):
+        yield from _of_texture(material.reflectance)
+    if isinstance(material, Mirror | Glass):
+        yield from _of_texture(material.reflectance)
+        yield Feature.MIRROR
+        if material.spread_deg > 0.0:
+            yield Feature.GLOSSY
+    if isinstance(material, Glass):
+        yield from _of_texture(material.transmittance)
+        yield Feature.GLASS
+        several = several or scene.integrator.refraction_rays > 1
+    spread = getattr(material, "spread_deg", getattr(material, "mirror_spread_deg", 0.0))
+    if several and spread > 0.0:
+        yield Feature.MANY_RAYS
+
+
+def _is_lit(material: Material) -> bool:
+    """Whether a material takes light from the lights, not only from where it mirrors and refracts."""
+    return _is_lit(material.base) if isinstance(material, HeightField) else isinstance(material, Phong | Matte)
+
+
+def _of_texture(texture: Texture) -> Iterator[Feature]:
+    if isinstance(texture, ImageTexture):
+        yield Feature.IMAGE
+    if isinstance(texture, CheckerboardTexture):
+        yield Feature.CHECKERBOARD
+        yield from _of_texture(texture.even)
+        yield from _of_texture(texture.odd)
+
+
+def _of_light(light: object) -> Iterator[Feature]:
+    if isinstance(light, PointLight):
+        yield Feature.POINT
+    if isinstance(light, DirectionalLight):
+        yield Feature.SUN_DISC if light.angle_deg > 0.0 else Feature.DIRECTIONAL
+    if isinstance(light, SpotLight):
+        yield Feature.SPOT
+    if isinstance(light, EnvironmentLight):
+        yield Feature.SKY
+        yield Feature.ENVIRONMENT

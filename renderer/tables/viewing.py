@@ -1,0 +1,65 @@
+"""A scene's camera as the record that kernels read."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import warp as wp
+
+from renderer.layout.structs import CAMERA_PANORAMA, CAMERA_PARALLEL, CAMERA_PERSPECTIVE, ViewData
+from renderer.tables.checks import check_affine, check_finite
+from renderer.tables.tracks import TrackTable
+from scenes.arithmetic import tan
+from scenes.canonical import EnvironmentCamera, OrthographicCamera, PerspectiveCamera, Scene, SceneError
+
+ViewingCamera = PerspectiveCamera | OrthographicCamera | EnvironmentCamera
+
+
+def check_camera(scene: Scene) -> ViewingCamera:
+    """The camera of a scene.
+
+    Raises:
+        SceneError: if it is none of those that the renderer has, or its values cannot be used.
+    """
+    camera = scene.camera
+    name = type(camera).__name__
+    if not isinstance(camera, ViewingCamera):
+        raise SceneError(f"camera {name} is not supported yet, expected {ViewingCamera}")
+    if isinstance(camera, PerspectiveCamera):
+        check_finite((camera.lens_radius, camera.focal_distance), "PerspectiveCamera.lens_radius, focal_distance")
+    if isinstance(camera, OrthographicCamera) and not 0.0 < camera.half_width < math.inf:
+        raise SceneError(f"OrthographicCamera.half_width: expected a positive number, got {camera.half_width}")
+    check_affine(camera.to_world, f"{name}.to_world")
+    return camera
+
+
+def camera_view(camera: ViewingCamera, tracks: TrackTable, aspect: float, footprint_px: float) -> ViewData:
+    """Camera record for samples of many times.
+
+    Args:
+        camera: from :func:`check_camera`.
+        tracks: of the scene.
+        aspect: width over height of the picture.
+        footprint_px: pixels along its shorter axis that textures are filtered for.
+    """
+    view = ViewData()
+    to_world = np.asarray(camera.to_world, np.float64)
+    view.from_camera = wp.mat33(*to_world[:3, :3].astype(np.float32).reshape(-1).tolist())
+    view.from_camera_offset = wp.vec3(*to_world[:3, 3].tolist())
+    view.camera_track = tracks.add(getattr(camera, "track", None))
+    half = 1.0
+    if isinstance(camera, PerspectiveCamera):
+        view.kind = CAMERA_PERSPECTIVE
+        half = tan(math.radians(camera.fov_deg) / 2.0)
+        view.spread = 2.0 * half / footprint_px
+        view.lens_radius, view.focal_distance = camera.lens_radius, camera.focal_distance
+    elif isinstance(camera, OrthographicCamera):
+        view.kind = CAMERA_PARALLEL
+        half = camera.half_width
+        view.width = 2.0 * half / footprint_px
+    else:
+        view.kind = CAMERA_PANORAMA
+        view.spread = math.pi / footprint_px
+    view.tan_x, view.tan_y = half * max(aspect, 1.0), half * max(1.0 / aspect, 1.0)
+    return view

@@ -1,0 +1,306 @@
+"""Textures and materials of the canonical scene; conventions as in :mod:`scenes.canonical`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.canonical.values import Rgb, SceneError
+
+# --- textures --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ConstantTexture:
+    """One colour everywhere."""
+
+    value: Rgb
+
+
+@dataclass(frozen=True, eq=False)
+class ImageTexture:
+    """An image looked up at ``uv * uv_scale + uv_offset``.
+
+    Attributes:
+        image: ``(height, width, 3)`` float32, linear RGB, row 0 at the top (``v = 1``).
+        wrap: what lies outside ``[0, 1]``.
+        filter: ``mipmap`` is bilinear within a level chosen by the ray's footprint.
+        source: the file it came from, for export and for messages.
+    """
+
+    image: NDArray[np.float32]
+    uv_scale: tuple[float, float] = (1.0, 1.0)
+    uv_offset: tuple[float, float] = (0.0, 0.0)
+    wrap: Literal["repeat", "clamp", "black"] = "repeat"
+    filter: Literal["nearest", "bilinear", "mipmap"] = "mipmap"
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.image.ndim != 3 or self.image.shape[2] != 3 or min(self.image.shape[:2]) < 1:
+            raise SceneError(f"ImageTexture {self.source!r}: expected (h, w, 3) with h, w >= 1, got {self.image.shape}")
+        if not np.isfinite(self.image).all():
+            raise SceneError(f"ImageTexture {self.source!r}: holds non-finite values")
+
+
+@dataclass(frozen=True)
+class CheckerboardTexture:
+    """Two textures in alternating unit squares of ``uv * uv_scale``."""
+
+    even: Texture
+    odd: Texture
+    uv_scale: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class ScaleTexture:
+    """The product of two textures."""
+
+    first: Texture
+    second: Texture
+
+
+@dataclass(frozen=True)
+class MixTexture:
+    """``(1 - amount) * first + amount * second``."""
+
+    first: Texture
+    second: Texture
+    amount: float = 0.5
+
+
+Texture = ConstantTexture | ImageTexture | CheckerboardTexture | ScaleTexture | MixTexture
+
+
+def _check_spread(name: str, spread_deg: float) -> None:
+    """Raises SceneError unless a cone of rays fits above a surface."""
+    if not 0.0 <= spread_deg <= 180.0:
+        raise SceneError(f"{name}: expected an angle in [0, 180], got {spread_deg}")
+
+
+# --- materials -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Phong:
+    """Phong reflection with a Fresnel-weighted mirror term: the material of the driving scenes.
+
+    Outgoing radiance is ``ambient * diffuse``, plus over all lights the sum of
+    ``(diffuse / π * cos + specular * (e + 2) / 2π * cos^e)`` times the arriving irradiance, plus
+    ``F * mirrored radiance`` with ``F = fresnel_min + (fresnel_max - fresnel_min) * (1 - cos)^fresnel_exponent``; the
+    diffuse part is scaled by ``1 - F``.
+
+    Attributes:
+        diffuse: albedo.
+        specular: colour of the highlight.
+        exponent: of the highlight, at least 1.
+        ambient: weight of the constant ambient term, of which the world supplies the radiance.
+        fresnel_min, fresnel_max: mirror reflectance at normal and at grazing incidence, in [0, 1].
+        fresnel_exponent: 5 is Schlick's.
+        mirror_tint: colour of the mirrored part (metals).
+        mirror_spread_deg: full angle of the cone that mirrored rays fill evenly, zero for a sharp mirror image.
+    """
+
+    diffuse: Texture
+    specular: Rgb = (0.0, 0.0, 0.0)
+    exponent: float = 32.0
+    ambient: float = 1.0
+    fresnel_min: float = 0.0
+    fresnel_max: float = 0.0
+    fresnel_exponent: float = 5.0
+    mirror_tint: Rgb = (1.0, 1.0, 1.0)
+    mirror_spread_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_spread("Phong.mirror_spread_deg", self.mirror_spread_deg)
+        if self.exponent < 1.0:
+            raise SceneError(f"Phong.exponent: expected at least 1, got {self.exponent}")
+        if not 0.0 <= self.fresnel_min <= self.fresnel_max <= 1.0:
+            raise SceneError(
+                f"Phong: expected 0 <= fresnel_min <= fresnel_max <= 1, got {self.fresnel_min}, {self.fresnel_max}"
+            )
+
+
+@dataclass(frozen=True)
+class Matte:
+    """Lambertian, or Oren–Nayar where ``sigma_deg`` is positive."""
+
+    reflectance: Texture
+    sigma_deg: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Specular reflection: perfect, or glossy over an even cone of full angle ``spread_deg`` about the mirrored ray."""
+
+    reflectance: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    spread_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_spread("Mirror.spread_deg", self.spread_deg)
+
+
+@dataclass(frozen=True)
+class Glass:
+    """Dielectric.
+
+    Attributes:
+        reflectance, transmittance: multiply what Fresnel's equations send each way.
+        ior: index of refraction of the inside over the outside, positive.
+        roughness: microfacet alpha per tangent axis, zero for smooth.
+        thin: a pane without thickness: light passes unbent, and reflections between its faces are summed.
+        spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill evenly.
+    """
+
+    reflectance: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    transmittance: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    ior: float = 1.5
+    roughness: tuple[float, float] = (0.0, 0.0)
+    thin: bool = False
+    spread_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_spread("Glass.spread_deg", self.spread_deg)
+        if not 0.0 < self.ior < float("inf"):
+            raise SceneError(f"Glass.ior: expected a positive number, got {self.ior}")
+
+
+@dataclass(frozen=True)
+class Metal:
+    """Conductor with complex index ``eta + i k`` in RGB; ``roughness`` is the microfacet alpha."""
+
+    eta: Rgb
+    k: Rgb
+    roughness: tuple[float, float] = (0.0, 0.0)
+    reflectance_scale: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    distribution: Literal["beckmann", "ggx"] = "ggx"
+
+
+@dataclass(frozen=True)
+class Glossy:
+    """A glossy coat over a diffuse base (PBRT ``substrate``, LuxRender ``glossy``)."""
+
+    diffuse: Texture
+    specular: Texture
+    roughness: tuple[float, float] = (0.1, 0.1)
+
+
+@dataclass(frozen=True)
+class Plastic:
+    """A dielectric coat of index ``ior`` over a diffuse base."""
+
+    diffuse: Texture
+    specular: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    ior: float = 1.5
+    roughness: float = 0.0
+
+
+@dataclass(frozen=True)
+class Translucent:
+    """Diffuse reflection and diffuse transmission."""
+
+    reflectance: Texture
+    transmittance: Texture
+
+
+@dataclass(frozen=True)
+class Uber:
+    """PBRT's all-in-one: diffuse, glossy, mirrored and transmitted parts under an opacity."""
+
+    diffuse: Texture
+    specular: Texture
+    reflectance: Texture
+    transmittance: Texture
+    opacity: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    ior: float = 1.5
+    roughness: tuple[float, float] = (0.1, 0.1)
+
+
+@dataclass(frozen=True)
+class MixMaterial:
+    """``(1 - amount)`` of the first and ``amount`` of the second material."""
+
+    first: Material
+    second: Material
+    amount: Texture
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """Relief on a :class:`Rectangle`, carved into it.
+
+    Height 1 lies in the plane of the rectangle, height 0 lies ``depth`` below it (against its normal). Rays that leave
+    the relief through its sides pass on, so its silhouette is that of the relief.
+
+    Attributes:
+        base: what the relief is made of.
+        height: ``(h, w)`` or ``(h, w, 3)`` float32 in [0, 1], of which the first channel counts; stretched over the
+            rectangle, bilinear, row 0 at the top (``v = 1``).
+        depth: in object space, positive.
+        steps: even steps that a ray takes through the whole relief, at least 2, before the secant search.
+    """
+
+    base: Material
+    height: NDArray[np.float32]
+    depth: float
+    steps: int = 64
+
+    def __post_init__(self) -> None:
+        if self.height.ndim not in (2, 3) or min(self.height.shape) < 1:
+            raise SceneError(f"HeightField.height: expected (h, w) or (h, w, 3), got {self.height.shape}")
+        if not (np.isfinite(self.height).all() and self.height.min() >= 0.0 and self.height.max() <= 1.0):
+            raise SceneError("HeightField.height: expected finite values in [0, 1]")
+        if not 0.0 < self.depth < float("inf"):
+            raise SceneError(f"HeightField.depth: expected a positive number, got {self.depth}")
+        if self.steps < 2:
+            raise SceneError(f"HeightField.steps: expected at least 2, got {self.steps}")
+
+
+@dataclass(frozen=True)
+class Emissive:
+    """A surface that only emits, two-sided, constant radiance."""
+
+    radiance: Rgb
+
+
+@dataclass(frozen=True)
+class Masked:
+    """A material with holes: ``opacity`` of it is there, the rest lets light pass unbent."""
+
+    base: Material
+    opacity: Texture
+
+
+@dataclass(frozen=True)
+class Bumped:
+    """A material whose shading normal follows a height field.
+
+    Attributes:
+        base: what is bumped.
+        height: displacement along the normal, of which the mean of the channels counts.
+        scale: of the height, scene units.
+    """
+
+    base: Material
+    height: Texture
+    scale: float = 1.0
+
+
+Material = (
+    Phong
+    | Matte
+    | Mirror
+    | Glass
+    | Metal
+    | Glossy
+    | Plastic
+    | Translucent
+    | Uber
+    | MixMaterial
+    | HeightField
+    | Emissive
+    | Masked
+    | Bumped
+)

@@ -1,0 +1,77 @@
+"""Textures that are products or mixtures, made into plainer ones where that loses nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from scenes.canonical import (
+    CheckerboardTexture,
+    ConstantTexture,
+    ImageTexture,
+    MixTexture,
+    Rgb,
+    ScaleTexture,
+    Texture,
+)
+from scenes.formats.appearance.spectra import rgb
+
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+def folded(texture: Texture) -> Texture:
+    """The same texture without products and mixtures where one part is constant or both repeat alike."""
+    if isinstance(texture, CheckerboardTexture):
+        parts = folded(texture.even), folded(texture.odd)
+        same = parts[0] is texture.even and parts[1] is texture.odd
+        return texture if same else CheckerboardTexture(*parts, texture.uv_scale)
+    if not isinstance(texture, ScaleTexture | MixTexture):
+        return texture
+    first, second = folded(texture.first), folded(texture.second)
+    made = _of_two(first, second, _product if isinstance(texture, ScaleTexture) else _mixture(texture.amount))
+    return texture if made is None else made
+
+
+def _product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    return first * second
+
+
+def _mixture(amount: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    return lambda first, second: (1.0 - amount) * first + amount * second
+
+
+def _of_two(first: Texture, second: Texture, join: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Texture | None:
+    """Two textures joined point by point; None where the result is none of the plain ones."""
+    if isinstance(first, ConstantTexture):
+        value = np.array(first.value)
+        return _changed(second, lambda other: join(value, other))
+    if isinstance(second, ConstantTexture):
+        value = np.array(second.value)
+        return _changed(first, lambda other: join(other, value))
+    if isinstance(first, CheckerboardTexture) and isinstance(second, CheckerboardTexture):
+        if first.uv_scale != second.uv_scale:
+            return None
+        parts = _of_two(first.even, second.even, join), _of_two(first.odd, second.odd, join)
+        return None if parts[0] is None or parts[1] is None else CheckerboardTexture(parts[0], parts[1], first.uv_scale)
+    if isinstance(first, ImageTexture) and isinstance(second, ImageTexture):
+        placed = [(one.uv_scale, one.uv_offset, one.wrap, one.filter, one.image.shape) for one in (first, second)]
+        if placed[0] != placed[1]:
+            return None
+        image = join(first.image, second.image).astype(np.float32)
+        return ImageTexture(image, first.uv_scale, first.uv_offset, first.wrap, first.filter)
+    return None
+
+
+def _changed(texture: Texture, change: Change) -> Texture | None:
+    """A texture with every colour changed; None for one that is not plain."""
+    if isinstance(texture, ConstantTexture):
+        value: Rgb = rgb(change(np.array(texture.value)))
+        return ConstantTexture(value)
+    if isinstance(texture, CheckerboardTexture):
+        parts = _changed(texture.even, change), _changed(texture.odd, change)
+        return None if parts[0] is None or parts[1] is None else CheckerboardTexture(*parts, texture.uv_scale)  # type: ignore[arg-type]
+    if isinstance(texture, ImageTexture) and texture.wrap != "black":
+        image = change(texture.image.astype(np.float64)).astype(np.float32)
+        return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, texture.filter)
+    return None

@@ -1,0 +1,240 @@
+"""A canonical scene as this project's renderer can draw it: what it does not have becomes what it has, and is reported.
+
+Facets of alpha ``α`` spread mirrored rays about evenly over a cone of half angle ``2 atan α``: that of a facet whose
+slope is ``α`` turns the ray by twice its angle.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from scenes.arithmetic import arctan, product
+from scenes.canonical import (
+    Bumped,
+    CheckerboardTexture,
+    ConstantTexture,
+    Cube,
+    Disk,
+    Emissive,
+    EnvironmentCamera,
+    Glass,
+    Glossy,
+    ImageTexture,
+    Instance,
+    Light,
+    Masked,
+    Material,
+    Matte,
+    Metal,
+    Mirror,
+    MixMaterial,
+    OrthographicCamera,
+    PerspectiveCamera,
+    Phong,
+    Plastic,
+    RealisticCamera,
+    Rectangle,
+    Scene,
+    Sphere,
+    SpotLight,
+    SunSky,
+    Texture,
+    Translucent,
+    Uber,
+)
+from scenes.daylight import sky_map, sun_light
+from scenes.formats.appearance.folding import folded
+from scenes.formats.appearance.spectra import rgb
+from scenes.formats.appearance.spot_profiles import reshaped
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.losses import LossReport
+from scenes.formats.luxrender.read_materials import reflectance_of_index
+from scenes.formats.pbrt.read_materials import mean_of
+
+DEPTH_MAX = 8
+"""Bounces that mirrored and refracted rays are followed for."""
+
+_SMOOTH = 0.02  # alpha below which a mirror is drawn sharp
+_EXPONENT_MAX = 1.0e4
+
+
+class Approximation:
+    """Replaces parts of a scene, each once."""
+
+    def __init__(self, report: LossReport) -> None:
+        self.report = report
+        self._materials: dict[int, tuple[Material, Material]] = {}
+
+    def scene(self, scene: Scene) -> Scene:
+        """The scene with everything replaced that cannot be drawn."""
+        camera, depth = scene.camera, scene.integrator.depth
+        if isinstance(camera, RealisticCamera):
+            self.report.add("camera", "a camera with lenses", "a pinhole of 45 degrees")
+            camera = PerspectiveCamera(camera.to_world)
+        assert isinstance(camera, PerspectiveCamera | OrthographicCamera | EnvironmentCamera)
+        if depth < 0 or depth > DEPTH_MAX:
+            self.report.add("integrator", f"{'endless' if depth < 0 else depth} bounces", f"{DEPTH_MAX}")
+            depth = DEPTH_MAX
+        if scene.integrator.kind not in ("whitted", "direct"):
+            self.report.add(
+                "integrator", f"{scene.integrator.kind}: light between surfaces", "direct light, mirrors, glass"
+            )
+        lights = tuple(made for light in scene.lights for made in self.light(light))
+        instances = tuple(
+            made for number, instance in enumerate(scene.instances) for made in self.instance(instance, number)
+        )
+        integrator = dataclasses.replace(scene.integrator, depth=depth)
+        return dataclasses.replace(scene, camera=camera, lights=lights, instances=instances, integrator=integrator)
+
+    def light(self, light: Light) -> list[Light]:
+        """Daylight becomes a map and a light as wide as the sun."""
+        if isinstance(light, SpotLight):
+            return [reshaped(light, "hermite", self.report)]
+        if not isinstance(light, SunSky):
+            return [light]
+        made: list[Light] = [] if light.part == "sky" else [sun_light(light)]
+        if light.part != "sun":
+            sky = sky_map(light)
+            self.report.add("light", "the analytic sky", f"a map of {sky.image.shape[0]} rows")
+            made.append(sky)
+        return made
+
+    def instance(self, instance: Instance, number: int) -> list[Instance]:
+        """A shape; lamps are rectangles and spheres, a cube is six, others are seen and give no light."""
+        name = instance.name or f"shape {number}"
+        made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
+        if instance.emission is None:
+            if isinstance(instance.shape, Cube | Disk) and depends_on_uv(made.material):
+                return [dataclasses.replace(made, shape=as_mesh(instance.shape))]
+            return [made]
+        if isinstance(instance.shape, Rectangle | Sphere):
+            return [made]
+        if isinstance(instance.shape, Cube):
+            places = [product(instance.to_world, side) for side in _sides()]
+            return [dataclasses.replace(made, shape=Rectangle(), to_world=place) for place in places]
+        if isinstance(instance.shape, Disk):
+            side = math.sqrt(math.pi) / 2.0 * instance.shape.radius
+            self.report.add(name, "a round lamp", "a square one of the same area")
+            scaled = product(instance.to_world, np.diag([side, side, 1.0, 1.0]))
+            return [dataclasses.replace(made, shape=Rectangle(), to_world=scaled)]
+        self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
+        return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
+
+    def texture(self, texture: Texture, where: str) -> Texture:
+        """A texture; products and mixtures that are none of the plain ones become their mean."""
+        texture = folded(texture)
+        if isinstance(texture, ConstantTexture | ImageTexture):
+            return texture
+        if isinstance(texture, CheckerboardTexture):
+            parts = self.texture(texture.even, where), self.texture(texture.odd, where)
+            return texture if parts == (texture.even, texture.odd) else CheckerboardTexture(*parts, texture.uv_scale)
+        self.report.add(where, f"texture {type(texture).__name__}", "its mean")
+        return ConstantTexture(mean_of(texture))
+
+    def material(self, material: Material, where: str) -> Material:
+        """A material that can be drawn; the same object where it can."""
+        if id(material) not in self._materials:
+            self._materials[id(material)] = material, self._material(material, where)
+        return self._materials[id(material)][1]
+
+    def _material(self, material: Material, where: str) -> Material:
+        if isinstance(material, Matte):
+            if material.sigma_deg:
+                self.report.add(where, f"a roughness of {material.sigma_deg:g} degrees", "smooth")
+            base = self.texture(material.reflectance, where)
+            return material if base is material.reflectance and not material.sigma_deg else Matte(base)
+        if isinstance(material, Glass):
+            return self._glass(material, where)
+        if isinstance(material, Metal):
+            return self._metal(material, where)
+        if isinstance(material, Glossy | Plastic | Uber):
+            return self._coated(material, where)
+        if isinstance(material, Translucent):
+            self.report.add(where, "light through a translucent surface", "left out")
+            return Matte(self.texture(material.reflectance, where))
+        if isinstance(material, MixMaterial):
+            share = float(np.mean(mean_of(material.amount)))
+            kept = material.second if share > 0.5 else material.first
+            self.report.add(
+                where, "a mixture of materials", f"the one of which there is more ({max(share, 1 - share):.2g})"
+            )
+            return self.material(kept, where)
+        if isinstance(material, Masked | Bumped):
+            what = "holes in a material" if isinstance(material, Masked) else "bumps"
+            self.report.add(where, what, "none")
+            return self.material(material.base, where)
+        return material
+
+    def _glass(self, material: Glass, where: str) -> Material:
+        sides = self.texture(material.reflectance, where), self.texture(material.transmittance, where)
+        alpha = math.sqrt(material.roughness[0] * material.roughness[1])
+        if alpha == 0.0 and sides == (material.reflectance, material.transmittance):
+            return material
+        if alpha > 0.0:
+            self.report.add(where, f"glass of alpha {alpha:.3g}", f"rays spread over {spread_deg(alpha):.3g} degrees")
+        spread = spread_deg(alpha) if alpha > 0.0 else material.spread_deg
+        return Glass(*sides, material.ior, (0.0, 0.0), material.thin, spread)
+
+    def _metal(self, material: Metal, where: str) -> Material:
+        """A mirror of the colour that the metal reflects straight back."""
+        color = np.array(reflectance_of_index(material.eta, material.k)) * mean_of(material.reflectance_scale)
+        alpha = math.sqrt(material.roughness[0] * material.roughness[1])
+        spread = spread_deg(alpha) if alpha > _SMOOTH else 0.0
+        self.report.add(where, "metal", f"a mirror of its colour, spread over {spread:.3g} degrees")
+        return Mirror(ConstantTexture(rgb(np.minimum(color, 1.0))), spread)
+
+    def _coated(self, material: Glossy | Plastic | Uber, where: str) -> Material:
+        """Phong: the highlight as wide as the facets make it, the coat's mirror where it is smooth."""
+        base = self.texture(material.diffuse, where)
+        coat = np.array(mean_of(material.specular))
+        if isinstance(material, Plastic):
+            straight = ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
+            alpha, coat = material.roughness, straight * coat
+        else:
+            alpha = math.sqrt(material.roughness[0] * material.roughness[1])
+            coat = 0.04 * coat if isinstance(material, Uber) else coat
+        amount = float(np.clip(coat.mean(), 0.0, 1.0))
+        exponent = float(np.clip(2.0 / max(alpha, 1e-3) ** 2 - 2.0, 1.0, _EXPONENT_MAX))
+        mirrored = amount if alpha <= 0.2 else 0.0
+        what = f"Phong with a highlight of exponent {exponent:.3g}"
+        self.report.add(where, f"{type(material).__name__.lower()} of alpha {alpha:.3g}", what)
+        room = np.maximum(1.0 - np.array(mean_of(base)), 0.0)
+        return Phong(
+            base,
+            rgb(np.minimum(coat, room)),
+            exponent,
+            0.0,
+            mirrored,
+            1.0 if mirrored else 0.0,
+            mirror_spread_deg=spread_deg(alpha) if mirrored and alpha > _SMOOTH else 0.0,
+        )
+
+
+def _sides() -> list[np.ndarray]:
+    """Where the rectangle lies as each side of the cube, facing outwards."""
+    made = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            matrix = np.eye(4)
+            normal, first = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
+            matrix[:3] = np.stack([first, np.cross(normal, first), normal, normal], axis=1)
+            made.append(matrix)
+    return made
+
+
+def spread_deg(alpha: float) -> float:
+    """Full angle of the cone that facets of an alpha spread rays over."""
+    return min(180.0, math.degrees(4.0 * arctan(alpha)))
+
+
+def drawable(scene: Scene, report: LossReport) -> Scene:
+    """A scene that this project's renderer draws.
+
+    Args:
+        scene: any canonical scene.
+        report: receives what was replaced.
+    """
+    return Approximation(report).scene(scene)

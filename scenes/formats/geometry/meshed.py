@@ -1,0 +1,132 @@
+"""The canonical shapes as meshes, and when it matters how textures lie on them.
+
+Renderers agree on the texture coordinates of rectangles only. On spheres Mitsuba's ``v`` runs from +z to -z and PBRT's
+from -z to +z, as in the canonical scene; on disks and cubes all have coordinates of their own (measured with Mitsuba
+3.9). Where a material depends on them, such a shape goes from one to the other as a mesh.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+
+import numpy as np
+
+from scenes.arithmetic import product
+from scenes.canonical import (
+    CheckerboardTexture,
+    Cube,
+    Disk,
+    HeightField,
+    ImageTexture,
+    Material,
+    Mesh,
+    Rectangle,
+    Shape,
+    Sphere,
+    Texture,
+)
+from scenes.formats.geometry.revolution import partial_sphere, ring
+
+SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+SQUARE_UV = 0.5 * SQUARE[:, :2] + 0.5
+
+
+FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
+"""Turns a sphere's ``v`` round and leaves the sphere."""
+
+
+def depends_on_uv(part: Material | Texture) -> bool:
+    """Whether a material looks different with other texture coordinates: by a texture, or by which way facets spread
+    more."""
+    if isinstance(part, ImageTexture | CheckerboardTexture | HeightField):
+        return True
+    roughness = getattr(part, "roughness", 0.0)
+    if isinstance(roughness, tuple) and roughness[0] != roughness[1]:
+        return True
+    values = (getattr(part, field.name) for field in dataclasses.fields(part))
+    return any(depends_on_uv(value) for value in values if dataclasses.is_dataclass(value))  # type: ignore[arg-type]
+
+
+def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
+    """A mesh and its place without a mirror in the place: the mesh is mirrored in its stead."""
+    if np.linalg.det(matrix[:3, :3]) > 0.0:
+        return mesh, matrix
+    return _mirrored(mesh), product(matrix, FLIPPED)
+
+
+def _mirrored(mesh: Mesh) -> Mesh:
+    away = np.array([1.0, 1.0, -1.0], np.float32)
+    normals = None if mesh.normals is None else mesh.normals * away
+    return Mesh(mesh.vertices * away, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
+
+
+@lru_cache(maxsize=1)
+def mitsuba_cube() -> Mesh:
+    """The cube with Mitsuba's texture coordinates."""
+    corners = {
+        (0, -1, 0): ((1, -1, -1), (1, -1, 1), (-1, -1, 1), (-1, -1, -1)),
+        (0, 1, 0): ((1, 1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, 1)),
+        (1, 0, 0): ((1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)),
+        (0, 0, 1): ((1, -1, 1), (1, 1, 1), (-1, 1, 1), (-1, -1, 1)),
+        (-1, 0, 0): ((-1, -1, 1), (-1, 1, 1), (-1, 1, -1), (-1, -1, -1)),
+        (0, 0, -1): ((1, 1, -1), (1, -1, -1), (-1, -1, -1), (-1, 1, -1)),
+    }
+    points = np.array([corner for side in corners.values() for corner in side], np.float32)
+    normals = np.repeat(np.array(list(corners), np.float32), 4, axis=0)
+    uvs = np.tile(np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32), (6, 1))
+    first = 4 * np.arange(6)[:, None]
+    faces = (first + np.array([0, 1, 2, 3, 0, 2])).reshape(-1, 3).astype(np.int32)
+    across = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    inward = (across * normals[faces[:, 0]]).sum(axis=1) < 0.0
+    return Mesh(points, np.where(inward[:, None], faces[:, ::-1], faces), normals, uvs, "cube")
+
+
+@lru_cache(maxsize=1)
+def mitsuba_disk() -> Mesh:
+    """The disk with Mitsuba's texture coordinates: from the middle outwards, and round."""
+    mesh = as_mesh(Disk())
+    assert mesh.uvs is not None
+    uvs = np.stack([1.0 - mesh.uvs[:, 1], mesh.uvs[:, 0]], axis=1)
+    return Mesh(mesh.vertices, mesh.faces, mesh.normals, uvs, "disk")
+
+
+def as_mesh(shape: Shape) -> Mesh:
+    """A shape as triangles: exact for rectangle and cube, fine for sphere and disk."""
+    return shape if isinstance(shape, Mesh) else _meshed(shape)
+
+
+@lru_cache(maxsize=256)
+def _meshed(shape: Rectangle | Cube | Disk | Sphere) -> Mesh:
+    """Once for all shapes of a size, so that it is written once."""
+    if isinstance(shape, Rectangle):
+        faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+        normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))
+        return Mesh(SQUARE.astype(np.float32), faces, normals, SQUARE_UV.astype(np.float32), "rectangle")
+    if isinstance(shape, Cube):
+        return _cube()
+    if isinstance(shape, Disk):
+        return ring(shape.radius, 0.0, 0.0)
+    assert isinstance(shape, Sphere)
+    return partial_sphere(shape.radius, -shape.radius, shape.radius)
+
+
+def _cube() -> Mesh:
+    vertices: list[np.ndarray] = []
+    normals: list[np.ndarray] = []
+    uvs: list[np.ndarray] = []
+    faces: list[list[int]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            normal = sign * np.eye(3)[axis]
+            right = np.eye(3)[(axis + 1) % 3]
+            up = np.cross(normal, right)
+            start = len(vertices)
+            for x, y in SQUARE[:, :2].tolist():
+                vertices.append(normal + x * right + y * up)
+                normals.append(normal)
+            uvs.extend(SQUARE_UV)
+            faces += [[start, start + 1, start + 2], [start, start + 2, start + 3]]
+    arrays = (np.array(part, np.float32) for part in (vertices, normals, uvs))
+    points, across, texture = arrays
+    return Mesh(points, np.array(faces, np.int32), across, texture, "cube")

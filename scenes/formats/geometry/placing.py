@@ -1,0 +1,57 @@
+"""What exporters share: which shapes are written once and placed often, and the keys of motions."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from scenes.animation import pose_at
+from scenes.arithmetic import product
+from scenes.canonical import Emissive, Instance, Mesh, Scene
+from scenes.canonical.values import Matrix, Rgb, RigidTrack
+from scenes.formats.geometry.transform_stack import track_times
+from scenes.formats.losses import LossReport
+
+PartKey = tuple[int, int]
+
+
+def part_key(instance: Instance) -> PartKey:
+    """Equal for instances of one shape and one material."""
+    return id(instance.shape), id(instance.material)
+
+
+def shared_parts(scene: Scene) -> frozenset[PartKey]:
+    """Meshes that several instances place and that do not shine; lamps cannot be placed as objects."""
+    counts = Counter(part_key(one) for one in scene.instances if isinstance(one.shape, Mesh) and not shines(one))
+    return frozenset(key for key, count in counts.items() if count > 1)
+
+
+def shines(instance: Instance) -> bool:
+    """Whether a shape is a lamp."""
+    return instance.emission is not None or isinstance(instance.material, Emissive)
+
+
+def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
+    """What a lamp gives off on its front, None for other shapes; one that shines on both sides is reported."""
+    if isinstance(instance.material, Emissive):
+        report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
+        return instance.material.radiance
+    return instance.emission
+
+
+def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix], list[float]]:
+    """Where something is at each key of its motion, and when, seconds; one at time zero where it rests."""
+    if track is None or len(track.translation) == 1:
+        return [placed(track, to_world)], [0.0]
+    times_s = track_times(track)
+    return [product(pose_at(track, time_s), to_world) for time_s in times_s], times_s
+
+
+def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:
+    """Where something is at the first key of its motion."""
+    return to_world if track is None else product(pose_at(track, track.start_s), to_world)
+
+
+def tracks_of(scene: Scene) -> list[RigidTrack]:
+    """All motions of a scene, the camera's first."""
+    found = [getattr(scene.camera, "track", None), *(one.track for one in scene.instances)]
+    return [track for track in found if track is not None and len(track.translation) > 1]

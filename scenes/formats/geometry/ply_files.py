@@ -1,0 +1,274 @@
+"""PLY meshes, read with nothing taken on trust and written plainly.
+
+The mesh library reads PLY too, but allocates what a header claims and makes normals where a file has none; here counts
+are held against the length of the file first, and a mesh without normals stays without.
+
+Source: G. Turk, "The PLY Polygon File Format" (1994).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.canonical import Mesh, SceneError
+from scenes.canonical.values import vertices_of
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+_CORNERS_MAX = 64
+_PIECE = 1 << 16  # rows that are written at a time
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    properties: tuple[tuple[str, str, str], ...]  # name, type, type of the count where it is a list
+
+
+def read_ply(content: bytes, name: str) -> Mesh:
+    """The mesh of a file's content; polygons are fans of triangles.
+
+    Raises:
+        SceneError: it is no PLY file, or not what its header says.
+    """
+    order, elements, body = _header(content, name)
+    numbers = _numbers(body, name) if order == "" else None
+    tables: dict[str, dict[str, NDArray]] = {}
+    at = 0
+    for element in elements:
+        if any(kind for _, _, kind in element.properties):
+            if element.name != "face":
+                raise SceneError(f"{name}: expected lists in faces only, got some in {element.name!r}")
+            if numbers is None:
+                faces, at = _binary_faces(body, at, element, order, name)
+            else:
+                faces, at = _ascii_faces(numbers, at, element, name)
+            tables["face"] = {"corners": faces}
+        elif numbers is None:
+            tables[element.name], at = _binary_columns(body, at, element, order, name)
+        else:
+            tables[element.name], at = _ascii_columns(numbers, at, element, name)
+    return _mesh(tables, name)
+
+
+def _header(content: bytes, name: str) -> tuple[str, list[_Element], memoryview]:
+    end = content.find(b"end_header", 0, 1 << 16)
+    newline = content.find(b"\n", end)
+    if not content.startswith(b"ply") or end < 0 or newline < 0:
+        raise SceneError(f"{name}: expected a PLY file, got {content[:8]!r}")
+    order, elements = None, []
+    for line in content[:end].decode("ascii", "replace").splitlines()[1:]:
+        parts = line.split()
+        if not parts or parts[0] in ("comment", "obj_info"):
+            continue
+        if parts[0] == "format" and len(parts) == 3 and parts[1] in _ORDERS:
+            order = _ORDERS[parts[1]]
+        elif parts[0] == "element" and len(parts) == 3 and parts[2].isdecimal():
+            elements.append(_Element(parts[1], int(parts[2]), ()))
+        elif parts[0] == "property" and elements and len(parts) == 3 and parts[1] in _TYPES:
+            elements[-1] = _with(elements[-1], (parts[2], _TYPES[parts[1]], ""))
+        elif parts[0] == "property" and elements and len(parts) == 5 and {parts[2], parts[3]} <= set(_TYPES):
+            elements[-1] = _with(elements[-1], (parts[4], _TYPES[parts[3]], _TYPES[parts[2]]))
+        else:
+            raise SceneError(f"{name}: expected a line of a PLY header, got {line[:40]!r}")
+    if order is None:
+        raise SceneError(f"{name}: expected a format in the PLY header, got none")
+    return order, elements, memoryview(content)[newline + 1 :]
+
+
+def _with(element: _Element, added: tuple[str, str, str]) -> _Element:
+    return _Element(element.name, element.count, (*element.properties, added))
+
+
+def _ascii_columns(
+    numbers: NDArray[np.float64], at: int, element: _Element, name: str
+) -> tuple[dict[str, NDArray], int]:
+    """Columns of an element without lists, and where the next begins."""
+    width = len(element.properties)
+    end = at + element.count * width
+    _enough(len(numbers), end, element, name)
+    table = numbers[at:end].reshape(element.count, width)
+    return {part[0]: table[:, column] for column, part in enumerate(element.properties)}, end
+
+
+def _binary_columns(
+    body: memoryview, at: int, element: _Element, order: str, name: str
+) -> tuple[dict[str, NDArray], int]:
+    """The same of binary rows; columns are views of the content."""
+    row = np.dtype([(f"{column}", order + part[1]) for column, part in enumerate(element.properties)])
+    end = at + element.count * row.itemsize
+    _enough(len(body), end, element, name)
+    rows = np.frombuffer(body, row, element.count, at) if element.count else np.zeros(0, row)
+    return {part[0]: rows[f"{column}"] for column, part in enumerate(element.properties)}, end
+
+
+def _enough(there: int, wanted: int, element: _Element, name: str) -> None:
+    if wanted > there:
+        raise SceneError(f"{name}: expected {element.count} of {element.name!r} as its header says, got fewer")
+
+
+def _numbers(body: memoryview, name: str) -> NDArray[np.float64]:
+    """All numbers of a text; raises SceneError where something else is among them."""
+    text = body.tobytes().strip()
+    if not text:
+        return np.zeros(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            raise SceneError(f"{name}: expected numbers behind the PLY header") from None
+
+
+def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name: str) -> tuple[NDArray, int]:
+    """Triangles ``(n, 3)``; fast where all faces have as many corners, which is the rule."""
+    lists = [part for part in element.properties if part[2]]
+    if len(lists) != 1 or not lists[0][0].startswith("vertex_ind"):
+        raise SceneError(f"{name}: expected one list of vertex indices in faces")
+    if element.count == 0:
+        return np.zeros((0, 3)), at
+    position = element.properties.index(lists[0])
+    before = np.dtype([(f"{n}", order + part[1]) for n, part in enumerate(element.properties[:position])]).itemsize
+    counter = np.dtype(order + lists[0][2])
+    _enough(len(body), at + before + counter.itemsize, element, name)
+
+    def row(corners: int) -> np.dtype:
+        fields: list[tuple] = []
+        for number, (_, kind, count_kind) in enumerate(element.properties):
+            if count_kind:
+                fields += [("count", order + count_kind), ("corners", order + kind, (corners,))]
+            else:
+                fields.append((f"{number}", order + kind))
+        return np.dtype(fields)
+
+    corners = int(np.frombuffer(body, counter, 1, at + before)[0])
+    if 3 <= corners <= _CORNERS_MAX and at + element.count * row(corners).itemsize <= len(body):
+        rows = np.frombuffer(body, row(corners), element.count, at)
+        if (rows["count"] == corners).all():
+            return _fans(rows["corners"]), at + element.count * row(corners).itemsize
+    triangles = []
+    for _ in range(element.count):
+        _enough(len(body), at + before + counter.itemsize, element, name)
+        corners = int(np.frombuffer(body, counter, 1, at + before)[0])
+        if not 3 <= corners <= _CORNERS_MAX:
+            raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners}")
+        _enough(len(body), at + row(corners).itemsize, element, name)
+        triangles.append(_fans(np.frombuffer(body, row(corners), 1, at)["corners"]))
+        at += row(corners).itemsize
+    return np.concatenate(triangles), at
+
+
+def _ascii_faces(
+    numbers: NDArray[np.float64], at: int, element: _Element, name: str
+) -> tuple[NDArray[np.float64], int]:
+    """As :func:`_binary_faces`."""
+    if len(element.properties) == 1 and element.count and at < len(numbers):
+        corners = numbers[at]
+        end = at + element.count * (int(corners) + 1) if 3 <= corners <= _CORNERS_MAX else len(numbers) + 1
+        if end <= len(numbers):
+            rows = numbers[at:end].reshape(element.count, -1)
+            if (rows[:, 0] == corners).all():
+                return _fans(rows[:, 1:]), end
+    triangles = [np.zeros((0, 3))]
+    for _ in range(element.count):
+        for part in element.properties:
+            _enough(len(numbers), at + 1, element, name)
+            if not part[2]:
+                at += 1
+                continue
+            corners = numbers[at]
+            if not (3 <= corners <= _CORNERS_MAX and corners == int(corners)):
+                raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners:g}")
+            _enough(len(numbers), at + 1 + int(corners), element, name)
+            if part[0].startswith("vertex_ind"):
+                triangles.append(_fans(numbers[None, at + 1 : at + 1 + int(corners)]))
+            at += 1 + int(corners)
+    return np.concatenate(triangles), at
+
+
+def _fans(polygons: NDArray) -> NDArray:
+    """Polygons ``(n, corners)`` as triangles about their first corner."""
+    if polygons.shape[1] == 3:
+        return polygons
+    parts = [polygons[:, [0, n, n + 1]] for n in range(1, polygons.shape[1] - 1)]
+    return np.stack(parts, axis=1).reshape(-1, 3)
+
+
+def _mesh(tables: dict[str, dict[str, NDArray]], name: str) -> Mesh:
+    vertex, face = tables.get("vertex", {}), tables.get("face", {})
+    if not {"x", "y", "z"} <= set(vertex) or "corners" not in face:
+        raise SceneError(f"{name}: expected vertices with x, y and z, and faces")
+    points = np.stack([vertex[axis] for axis in "xyz"], axis=1)
+    normals = np.stack([vertex[f"n{axis}"] for axis in "xyz"], axis=1) if "nx" in vertex else None
+    uvs = next((np.stack([vertex[u], vertex[v]], axis=1) for u, v in _UVS if u in vertex and v in vertex), None)
+    return checked_mesh(points, face["corners"], normals, uvs, name)
+
+
+def checked_mesh(
+    points: NDArray,
+    faces: NDArray,
+    normals: NDArray | None,
+    uvs: NDArray | None,
+    name: str,
+) -> Mesh:
+    """A mesh of numbers from a file.
+
+    Raises:
+        SceneError: a number is not finite or too great, an index is none, or there is no face.
+    """
+    for what, array in (("vertices", points), ("normals", normals), ("texture coordinates", uvs)):
+        if array is not None and not (np.abs(array) < 1e30).all():
+            raise SceneError(f"{name}: expected finite {what}")
+    if len(faces) and not ((faces >= 0) & (faces < len(points))).all():
+        raise SceneError(f"{name}: expected indices below {len(points)}, got {faces.max():g}")
+    unit = None
+    if normals is not None:
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        unit = np.where(lengths > 1e-20, normals / np.maximum(lengths, 1e-20), (0.0, 0.0, 1.0)).astype(np.float32)
+    return Mesh(
+        vertices_of(points),
+        faces.astype(np.int32).reshape(-1, 3),
+        unit,
+        None if uvs is None else uvs.astype(np.float32),
+        name,
+    )
+
+
+def ply_parts(mesh: Mesh) -> Iterator[bytes | memoryview]:
+    """A mesh as a binary PLY file, in pieces."""
+    columns = [mesh.vertices]
+    names = ["x", "y", "z"]
+    if mesh.normals is not None:
+        columns.append(mesh.normals)
+        names += ["nx", "ny", "nz"]
+    if mesh.uvs is not None:
+        columns.append(mesh.uvs)
+        names += ["s", "t"]  # what LuxCore and PBRT both know
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
+    lines += [f"property float {name}" for name in names]
+    lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    yield "\n".join(lines).encode()
+    for start in range(0, len(mesh.vertices), _PIECE):
+        piece = [column[start : start + _PIECE] for column in columns]
+        yield np.concatenate(piece, axis=1).astype("<f4", copy=False).data.cast("B")
+    for start in range(0, len(mesh.faces), _PIECE):
+        piece = mesh.faces[start : start + _PIECE]
+        rows = np.empty(len(piece), np.dtype([("count", "u1"), ("corners", "<i4", (3,))]))
+        rows["count"], rows["corners"] = 3, piece
+        yield rows.tobytes()
+
+
+def ply_bytes(mesh: Mesh) -> bytes:
+    """All of it at once."""
+    return b"".join(ply_parts(mesh))

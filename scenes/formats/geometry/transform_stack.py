@@ -1,0 +1,162 @@
+"""The transforms of PBRT and LuxRender files: matrices, named coordinate systems, and the keys of a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from scenes.animation import continuous_quaternions, pose_at
+from scenes.arithmetic import inverse, norm, product, products, rotation_about, rotation_between
+from scenes.canonical.values import Matrix, RigidTrack
+from scenes.formats.losses import LossReport
+
+KEYS_MAX = 1024
+"""Of a motion."""
+
+_RIGID = 1e-4
+
+
+def translation(x: float, y: float, z: float) -> Matrix:
+    """A shift."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def scaling(x: float, y: float, z: float) -> Matrix:
+    """A change of size along the axes."""
+    return np.diag([x, y, z, 1.0])
+
+
+def rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
+    """A turn about an axis, counter-clockwise seen from its tip; identity for an axis of no length."""
+    axis = np.array([x, y, z])
+    length = norm(axis)
+    matrix = np.eye(4)
+    if length > 0.0:
+        matrix[:3, :3] = rotation_about(axis / length, np.radians(angle_deg)).as_matrix()
+    return matrix
+
+
+def look_at(
+    eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64], left_handed: bool
+) -> Matrix | None:
+    """World to camera, which looks along +z with y up; x is to the right of the picture in PBRT's left-handed sense, or
+    of a right-handed world (LuxRender). None where the three points are on one line.
+    """
+    forward = target - eye
+    right = np.cross(up, forward) if left_handed else np.cross(forward, up)
+    if min(norm(forward), norm(right)) < 1e-12:
+        return None
+    forward, right = forward / norm(forward), right / norm(right)
+    above = np.cross(forward, right) if left_handed else np.cross(right, forward)
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([right, above, forward, eye], axis=1)
+    return inverse(matrix)
+
+
+def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack | None:
+    """The track that, applied outside the first key, passes through all; None where the motion is not rigid.
+
+    Keys at uneven times are sampled at even ones, no further apart than the nearest two, ``KEYS_MAX`` at most.
+    """
+    gaps = np.diff(times_s)
+    if not (gaps > 0.0).all():
+        return None
+    moved = product(np.stack(keys), inverse(keys[0]))
+    turns = moved[:, :3, :3]
+    if (
+        np.abs(product(turns, turns.transpose(0, 2, 1)) - np.eye(3)).max() > _RIGID
+        or (np.linalg.det(turns) < 0.0).any()
+    ):
+        return None
+    shifts, quaternions = moved[:, :3, 3], Rotation.from_matrix(turns).as_quat()
+    interval = float(gaps.mean())
+    if np.abs(gaps - interval).max() > 1e-6 * interval:
+        count = min(int(np.ceil((times_s[-1] - times_s[0]) / gaps.min())) + 1, KEYS_MAX)
+        at = np.linspace(times_s[0], times_s[-1], count)
+        shifts = np.stack([np.interp(at, times_s, shifts[:, axis]) for axis in range(3)], axis=1)
+        first = np.clip(np.searchsorted(times_s, at, "right") - 1, 0, len(times_s) - 2)
+        share = (at - np.asarray(times_s)[first]) / gaps[first]
+        quaternions = rotation_between(quaternions[first], quaternions[first + 1], share).as_quat()
+        interval = float(at[1] - at[0])
+    if quaternions[0, 3] < 0.0:
+        quaternions = -quaternions
+    return RigidTrack(float(times_s[0]), interval, shifts, continuous_quaternions(quaternions))
+
+
+def motion(keys: Sequence[Matrix], times_s: Sequence[float], where: str, report: LossReport) -> RigidTrack | None:
+    """The motion through keys, outside the first of them; None where nothing moves, or not rigidly, reported."""
+    if all(np.array_equal(keys[0], key) for key in keys[1:]):
+        return None
+    track = rigid_motion(keys, times_s)
+    if track is None:
+        report.add(where, "a motion that is not rigid", "its place at the start")
+    return track
+
+
+def track_times(track: RigidTrack) -> list[float]:
+    """Times of a track's keys, seconds."""
+    return [track.start_s + track.interval_s * key for key in range(len(track.translation))]
+
+
+def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
+    """The motion of what moves inside a space that ``matrix`` places; None where that is not rigid."""
+    times_s = track_times(track)
+    return rigid_motion([products(matrix, pose_at(track, time_s), inverse(matrix)) for time_s in times_s], times_s)
+
+
+class TransformStack:
+    """The current transform at the keys of a motion, those saved, and those with names.
+
+    Attributes:
+        current: one matrix a key.
+        active: keys that transforms apply to.
+        times_s: of the keys, seconds.
+        named: coordinate systems.
+    """
+
+    def __init__(self) -> None:
+        self.current = [np.eye(4), np.eye(4)]
+        self.active: tuple[bool, ...] = (True, True)
+        self.times_s: tuple[float, ...] = (0.0, 1.0)
+        self.named: dict[str, list[Matrix]] = {}
+        self._saved: list[tuple[list[Matrix], tuple[bool, ...], tuple[float, ...]]] = []
+
+    def push(self) -> None:
+        """Saves the state."""
+        self._saved.append(([matrix.copy() for matrix in self.current], self.active, self.times_s))
+
+    def pop(self) -> bool:
+        """Restores it; False where none is saved."""
+        if not self._saved:
+            return False
+        self.current, self.active, self.times_s = self._saved.pop()
+        return True
+
+    def replace(self, matrix: Matrix) -> None:
+        """Sets the transform, at the active keys."""
+        self.current = [matrix.copy() if on else old for on, old in zip(self.active, self.current, strict=True)]
+
+    def apply(self, matrix: Matrix) -> None:
+        """Applies a transform inside the current one, at the active keys."""
+        self.current = [product(old, matrix) if on else old for on, old in zip(self.active, self.current, strict=True)]
+
+    def take(self, name: str) -> None:
+        """Sets the transform to that of a name, at all keys; one with other keys is held at its first."""
+        found = self.named[name]
+        same = len(found) == len(self.current)
+        self.current = [part.copy() for part in (found if same else [found[0]] * len(self.current))]
+
+    def retime(self, times_s: Sequence[float]) -> None:
+        """Other keys, all where the first is now."""
+        self.current = [self.current[0].copy() for _ in times_s]
+        self.active, self.times_s = (True,) * len(times_s), tuple(times_s)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the keys differ."""
+        return any(not np.array_equal(self.current[0], key) for key in self.current[1:])

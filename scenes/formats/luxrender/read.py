@@ -1,0 +1,284 @@
+"""LuxRender 1.x scenes into the canonical scene.
+
+The syntax is PBRT's, and so is much of the meaning; this module holds what differs: ``LookAt`` is right-handed, images
+have their first row at ``v = 0``, lights have a gain and may be given by power, materials and metals have other names.
+
+Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
+ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenes.arithmetic import norm, product
+from scenes.canonical import (
+    ConstantTexture,
+    DirectionalLight,
+    EnvironmentLight,
+    Integrator,
+    PointLight,
+    Rgb,
+    Sampler,
+    Scene,
+    SceneError,
+    SpotLight,
+    SunSky,
+)
+from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.transform_stack import KEYS_MAX
+from scenes.formats.losses import LossReport
+from scenes.formats.luxrender.read_materials import LuxSurfaces, lux_image
+from scenes.formats.pbrt.read import PbrtReader, scene_of
+from scenes.formats.pbrt.read_materials import mean_of
+from scenes.formats.text.directive_reader import typed, word
+from scenes.formats.text.directives import Directive, Parameters, parameters_of
+from scenes.formats.text.scene_files import SceneFiles
+
+_INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlighting": "direct", "distributedpath": "path",
+                "exphotonmap": "photonmap", "sppm": "photonmap", "igi": "direct", "single": "path",
+                "emission": "path", "multi": "path", "none": "path"}  # fmt: skip
+_SAMPLERS = {"lowdiscrepancy": "sobol", "random": "independent", "metropolis": "independent", "erpt": "independent",
+             "sobol": "sobol", "halton": "halton"}  # fmt: skip
+_NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
+_MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
+SKY_UNIT, SUN_UNIT = 72_922.0, 66_000.0
+"""Radiance of LuxCore 2.10's sky2 and sun at a gain of 1 over that of Mitsuba 3 at a scale of 1. The sky is the same
+model, in luminous units (683 lm/W); the sun is another, and dimmer in haze. Held to 1 % and 15 % at a turbidity of 3 in
+``tests/scripts/test_conversion_check.py``."""
+_TRANSFORMS = (
+    "Identity",
+    "Translate",
+    "Scale",
+    "Rotate",
+    "LookAt",
+    "Transform",
+    "ConcatTransform",
+    "CoordSysTransform",
+)
+_LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+
+
+@dataclass
+class LuxReader(PbrtReader):
+    """State of a LuxRender file while it is read."""
+
+    left_handed: bool = False
+    _halt_samples: int = 0
+    _motion_key: int | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.surfaces = LuxSurfaces(self.files, self.report, self.textures, self.materials)
+
+    def dialect(self) -> dict[str, Callable[[Directive], None]]:
+        return {
+            **super().dialect(),
+            **dict.fromkeys(_NO_EFFECT, lambda d: None),
+            **dict.fromkeys(_MEDIA, self._lose_medium),
+            "LightGroup": lambda d: self.report.add(str(d.place), f"light group {word(d)!r}", "no groups"),
+            "PortalShape": lambda d: self.report.add(str(d.place), "a portal"),
+            "MotionInstance": self._move_object,
+            "MotionBegin": self._begin_motion,
+            "MotionEnd": self._end_motion,
+        }
+
+    def _do(self, directive: Directive) -> None:
+        """Inside a motion each transform is that of the next key."""
+        key = self._motion_key
+        if key is None or directive.name == "MotionEnd":
+            super()._do(directive)
+            return
+        if directive.name not in _TRANSFORMS:
+            raise SceneError(f"{directive.place}: MotionBegin: expected transforms and MotionEnd, got {directive.name}")
+        count = len(self.transforms.current)
+        if key >= count:
+            raise SceneError(f"{directive.place}: MotionBegin: expected {count} transforms, got more")
+        self.transforms.active = tuple(number == key for number in range(count))
+        super()._do(directive)
+        self._motion_key = key + 1
+
+    def _begin_motion(self, directive: Directive) -> None:
+        times_s = [value for part in directive.values if not isinstance(part, tuple) for value in part.tolist()]
+        if not 2 <= len(times_s) <= KEYS_MAX or not (np.diff(times_s) > 0.0).all():
+            raise SceneError(f"{directive.place}: MotionBegin: expected 2 to {KEYS_MAX} times, each after the last")
+        if self.transforms.moves:
+            self.report.add(str(directive.place), "a motion within a motion", "the inner one")
+        self.transforms.retime(times_s)
+        self._motion_key = 0
+
+    def _end_motion(self, directive: Directive) -> None:
+        count = len(self.transforms.current)
+        if self._motion_key != count:
+            raise SceneError(f"{directive.place}: MotionEnd: expected {count} transforms before it")
+        self.transforms.active, self._motion_key = (True,) * count, None
+
+    def _read_texture(self, directive: Directive) -> None:
+        if word(directive, 1) != "fresnel":
+            super()._read_texture(directive)
+            return
+        parameters = parameters_of(directive, 3)
+        assert isinstance(self.surfaces, LuxSurfaces)
+        self.surfaces.fresnel[word(directive)] = self.surfaces.make_fresnel(word(directive, 2), parameters)
+        self.left_over(parameters, f"texture {word(directive)!r}")
+
+    def _move_object(self, directive: Directive) -> None:
+        self.report.add(str(directive.place), "MotionInstance", "its place at the start")
+        self._place_object(directive)
+
+    def _read_film(self, directive: Directive) -> None:
+        _, parameters = typed(directive)
+        self._halt_samples = parameters.whole("haltspp", 0, 0, 1 << 24)
+        size = parameters.whole("xresolution", 800, 1, 32768), parameters.whole("yresolution", 600, 1, 32768)
+        name = parameters.text("filename", "")
+        self.film = dataclasses.replace(self.film, width_px=size[0], height_px=size[1], filename=name)
+        if parameters.unasked():
+            self.report.add(
+                str(directive.place), f"{len(parameters.unasked())} settings of the film", "linear radiance"
+            )
+        if self._halt_samples:
+            self.sampler = Sampler(self.sampler.kind, self._halt_samples)
+
+    def _read_sampler(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        name = self.report.kind(_SAMPLERS, kind, "sampler", directive.place)
+        if kind in ("metropolis", "erpt"):
+            parameters.asked.update(parameters.given)
+        count = parameters.whole("pixelsamples", self._halt_samples or 4, 1, 1 << 24)
+        self.sampler = Sampler(name, self._halt_samples or count)  # type: ignore[arg-type]
+        self.left_over(parameters, f"sampler {kind!r}")
+
+    def _read_integrator(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place)
+        depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
+        parameters.whole("lightdepth", depth, 0, 1 << 20)
+        # edges of a path, as measured with LuxCore
+        self.integrator = Integrator(name, max(depth - 1, 0))  # type: ignore[arg-type]
+        self.left_over(parameters, f"integrator {kind!r}")
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _strength(self, parameters: Parameters) -> Rgb:
+        """``L`` times the gain; a power is reported where it cannot be met."""
+        gain = parameters.number("gain", 1.0)
+        if parameters.types.get("L") == "texture":
+            color = self._light_texture(parameters)
+        else:
+            color = self.surfaces.color(parameters, "L", grey(1.0))
+        return rgb(gain * np.array(color))
+
+    def _light_texture(self, parameters: Parameters) -> Rgb:
+        name = parameters.text("L", "")
+        found = self.surfaces.textures.get(name)
+        if found is None:
+            self.report.add(str(parameters.place), f"light texture {name!r}, which is not known", "white")
+            return grey(1.0)
+        if not isinstance(found, ConstantTexture):
+            self.report.add(str(parameters.place), "a light with a texture", "its mean")
+        return mean_of(found)
+
+    def _read_light(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        where = str(directive.place)
+        self._lose_hints(parameters)
+        if kind in ("sun", "sky", "sky2", "sunsky", "sunsky2"):
+            self._daylight(kind, parameters)
+        elif kind in ("infinite", "infinitesample"):
+            self.lights.append(self._environment(parameters, self._strength(parameters), where))
+        elif kind in ("point", "spot", "distant", "projection", "goniometric"):
+            self._lamp(kind, parameters, where)
+        else:
+            parameters.asked.update(parameters.given)
+            self.report.unknown(where, "light", kind)
+        self.left_over(parameters, f"light {kind!r}")
+
+    def _lamp(self, kind: str, parameters: Parameters, where: str) -> None:
+        strength = self._strength(parameters)
+        start = self._placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
+        target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
+        if kind in ("point", "spot"):
+            power = parameters.number("power", 0.0) * parameters.number("efficacy", 17.0)
+            luminance = float(product(_LUMINANCE, strength))
+            if power > 0.0 and luminance > 0.0:
+                strength = rgb(np.array(strength) * power / (4.0 * math.pi * luminance))
+                self.report.add(where, "the power of a lamp", "an intensity, as even all round")
+        if kind == "distant":
+            direction = np.subtract(target, start)
+            if not norm(direction) > 0.0:
+                raise SceneError(f"{where}: distant: expected from and to apart")
+            angle = math.degrees(2.0 * parameters.number("theta", 0.0))
+            self.lights.append(DirectionalLight(rgb(direction / norm(direction)), strength, angle))
+        elif kind == "spot":
+            outer = parameters.number("coneangle", 30.0)
+            inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
+            self.lights.append(SpotLight(start, target, strength, inner, outer, "quartic"))
+        else:
+            if kind != "point":
+                parameters.asked.update(parameters.given)
+                self.report.add(where, f"light {kind!r}", "a point light as bright in all directions")
+            self.lights.append(PointLight(start, strength))
+
+    def _daylight(self, kind: str, parameters: Parameters) -> None:
+        toward = parameters.numbers("sundir", 3)
+        direction = np.array((0.0, 0.0, 1.0)) if toward is None else toward
+        if not norm(direction) > 0.0:
+            raise SceneError(f"{parameters.place}: sundir: expected a direction")
+        turned = product(self.transforms.current[0][:3, :3], direction)
+        part = {"sun": "sun", "sky": "sky", "sky2": "sky"}.get(kind, "both")
+        if "relsize" in parameters:
+            parameters.number("relsize", 1.0)
+            self.report.add(str(parameters.place), "the size of the sun's disk", "the real one")
+        turbidity, gain = parameters.number("turbidity", 2.0), parameters.number("gain", 1.0)
+        up = self.transforms.current[0][:3, 2]
+        unit, zenith = rgb(turned / norm(turned)), rgb(up / norm(up))
+        for one, size in (("sun", SUN_UNIT), ("sky", SKY_UNIT)):
+            if part in (one, "both"):
+                self.lights.append(SunSky(unit, turbidity, gain * size, one, zenith, 0.0))  # type: ignore[arg-type]
+
+    def _environment(self, parameters: Parameters, strength: Rgb, where: str) -> EnvironmentLight:
+        file, gamma = parameters.text("mapname", ""), parameters.number("gamma", 2.2)
+        mapping = parameters.text("mapping", "latlong")
+        if mapping != "latlong":
+            self.report.add(where, f"mapping {mapping!r} of an environment map", "latlong")
+        if not file:
+            return EnvironmentLight(np.array([[list(strength)]], np.float32))
+        path = self.files.path(file, where)
+        return self._map(lux_image(path, gamma, 1.0, where), strength, path)
+
+    def _read_area_light(self, directive: Directive) -> None:
+        _, parameters = typed(directive)
+        self.attributes.emission = self._strength(parameters)
+        self.attributes.power = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
+        self._lose_hints(parameters)
+        self.left_over(parameters, "area light")
+
+    def _read_shape(self, directive: Directive) -> None:
+        count = len(self.instances)
+        super()._read_shape(directive)
+        power, emission = self.attributes.power, self.attributes.emission
+        if len(self.instances) == count or emission is None or not power > 0.0:
+            return
+        luminance = float(product(_LUMINANCE, emission))
+        lamp = self.instances[-1]
+        corners = product(
+            as_mesh(lamp.shape).vertices[as_mesh(lamp.shape).faces].astype(np.float64), lamp.to_world[:3, :3].T
+        )
+        area = (
+            0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        )
+        if luminance > 0.0 and area > 0.0:
+            radiance = rgb(np.array(emission) * power / (math.pi * area * luminance))
+            self.instances[-1] = dataclasses.replace(lamp, emission=radiance)
+
+
+def load_luxrender(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
+    """Reads a scene; see :func:`scenes.formats.pbrt.read.load_pbrt`."""
+    return scene_of(LuxReader(SceneFiles(path, root), report or LossReport()), path)

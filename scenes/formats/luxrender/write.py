@@ -1,0 +1,219 @@
+"""The canonical scene as a LuxRender 1.x file, in the part of the format that LuxCore 2.10 reads as well.
+
+Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
+ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from scenes.arithmetic import power, product
+from scenes.canonical import (
+    Camera,
+    Cube,
+    DirectionalLight,
+    EnvironmentLight,
+    Instance,
+    Light,
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    Rectangle,
+    Scene,
+    Sphere,
+    SpotLight,
+    SunSky,
+)
+from scenes.canonical.values import Matrix, Rgb
+from scenes.daylight import sky_map
+from scenes.formats.appearance.spot_profiles import reshaped
+from scenes.formats.geometry.meshed import as_mesh, upright
+from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, shines
+from scenes.formats.geometry.revolution import lamp_sphere
+from scenes.formats.geometry.transform_stack import inverse
+from scenes.formats.losses import LossReport, first_of
+from scenes.formats.luxrender.read import SKY_UNIT, SUN_UNIT
+from scenes.formats.luxrender.write_materials import LuxSurfaceWriter
+from scenes.formats.pbrt.read import FAR, FILTERS, MAP_AXES
+from scenes.formats.pbrt.write import INLINE_MAX, PbrtWriter, aspect_of, inline_mesh, written_matrix
+from scenes.formats.pbrt.write_materials import listed, number
+from scenes.formats.text.output import Output
+
+_FILTERS = first_of(FILTERS)
+_SAMPLERS = {"sobol": "lowdiscrepancy", "halton": "lowdiscrepancy", "hammersley": "lowdiscrepancy",
+             "stratified": "lowdiscrepancy", "independent": "random"}  # fmt: skip
+_INTEGRATORS = {"path": "path", "whitted": "directlighting", "direct": "directlighting",
+                "bidirectional": "bidirectional", "photonmap": "exphotonmap", "metropolis": "path"}  # fmt: skip
+
+
+class LuxWriter(LuxSurfaceWriter, PbrtWriter):
+    """Lines of a LuxRender scene."""
+
+    def _options(self, scene: Scene) -> None:
+        self.aspect = aspect_of(scene.film)
+        integrator, sampler, film = scene.integrator, scene.sampler, scene.film
+        kind, depth = _INTEGRATORS[integrator.kind], integrator.depth
+        if depth < 0:
+            depth = 1000
+            self.report.add("integrator", "paths without a limit", "1000 bounces")
+        if integrator.kind in ("whitted", "metropolis"):
+            self.report.add("integrator", integrator.kind, kind)
+        edges = depth + 1  # LuxCore counts the edges of a path
+        limit = f'"integer eyedepth" [ {edges} ] "integer lightdepth" [ {edges} ]'
+        if kind != "bidirectional":
+            limit = f'"integer maxdepth" [ {edges} ]'
+        self.lines.append('Renderer "sampler"')
+        self.lines.append(f'SurfaceIntegrator "{kind}" {limit}')
+        if sampler.kind in ("halton", "hammersley", "stratified"):
+            self.report.add("sampler", sampler.kind, "lowdiscrepancy")
+        count = sampler.samples_per_pixel
+        self.lines.append(f'Sampler "{_SAMPLERS[sampler.kind]}" "integer pixelsamples" [ {count} ]')
+        radius = number(film.filter_radius_px)
+        width = f'"float xwidth" [ {radius} ] "float ywidth" [ {radius} ]'
+        self.lines.append(f'PixelFilter "{_FILTERS[film.filter]}" {width}')
+        size = f'"integer xresolution" [ {film.width_px} ] "integer yresolution" [ {film.height_px} ]'
+        name = (film.filename or "picture").rsplit(".", 1)[0].replace('"', "").replace("\\", "/")
+        tone = (
+            '"string tonemapkernel" [ "linear" ] "float linear_sensitivity" [ 100 ] "float linear_exposure" [ 1 ] '
+            '"float linear_fstop" [ 2.8 ] "float linear_gamma" [ 1 ] "float gamma" [ 2.2 ]'
+        )
+        self.lines.append(
+            f'Film "fleximage" {size} "string filename" [ "{name}" ] "integer haltspp" [ {count} ] {tone}'
+        )
+
+    def _camera(self, camera: Camera) -> None:
+        """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored picture by a window from right to left."""
+        poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
+        size = power(abs(np.linalg.det(poses[0][:3, :3])), 1.0 / 3.0)
+        axes = poses[0][:3, :3] / size
+        if np.abs(product(axes.T, axes) - np.eye(3)).max() > 1e-4:
+            self.report.add("camera", "a sheared camera", "an upright one")
+        if isinstance(camera, PerspectiveCamera) and abs(size - 1.0) > 1e-6:
+            lens, focus = size * camera.lens_radius, camera.focal_distance
+            camera = dataclasses.replace(camera, lens_radius=lens, focal_distance=size * focus if focus != FAR else FAR)
+        self.lines += _in_motion([_looking(pose) for pose in poses], times_s)
+        half = camera.half_width if isinstance(camera, OrthographicCamera) else 1.0
+        plain = dataclasses.replace(camera, half_width=1.0) if isinstance(camera, OrthographicCamera) else camera
+        # without a window LuxCore takes the field of view across, not along the shorter side
+        self.lines.append(self._camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0)))
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _light(self, light: Light) -> None:
+        if isinstance(light, PointLight):
+            line = f'"point" "point from" {listed(light.position)} "color L" {listed(light.intensity)}'
+        elif isinstance(light, SpotLight):
+            light = reshaped(light, "quartic", self.report)
+            cone = f'"float coneangle" [ {number(light.outer_deg)} ]'
+            cone += f' "float conedeltaangle" [ {number(light.outer_deg - light.inner_deg)} ]'
+            ends = f'"point from" {listed(light.position)} "point to" {listed(light.target)}'
+            line = f'"spot" {ends} "color L" {listed(light.intensity)} {cone}'
+        elif isinstance(light, DirectionalLight):
+            ends = f'"point from" {listed((0.0, 0.0, 0.0))} "point to" {listed(light.direction)}'
+            theta = f' "float theta" [ {number(math.radians(light.angle_deg) / 2.0)} ]' if light.angle_deg else ""
+            line = f'"distant" {ends} "color L" {listed(light.irradiance)}{theta}'
+        elif isinstance(light, SunSky):
+            self._daylight(light)
+            return
+        else:
+            self._infinite(light)
+            return
+        self.lines.append(f'\tLightSource {line} "float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]')
+
+    def _daylight(self, light: SunSky) -> None:
+        """The zenith is z whatever the transform says (LuxCore); a sky that is turned becomes a map."""
+        if light.part != "sky":
+            self._sun_or_sky("sun", light.sun_direction, light.turbidity, light.scale / SUN_UNIT)
+        if light.part == "sun":
+            return
+        if light.up != (0.0, 0.0, 1.0):
+            sky = sky_map(light)
+            self.report.add("light", "a sky with its zenith not along z", f"a map of {sky.image.shape[0]} rows")
+            self._infinite(sky)
+            return
+        if light.ground_albedo:
+            self.report.add("light", f"a sky over ground of albedo {light.ground_albedo:g}", "over black ground")
+        self._sun_or_sky("sky2", light.sun_direction, light.turbidity, light.scale / SKY_UNIT)
+
+    def _sun_or_sky(self, kind: str, toward: Rgb, turbidity: float, gain: float) -> None:
+        air = f'"float turbidity" [ {number(turbidity)} ] "float gain" [ {number(gain)} ]'
+        self.lines.append(f'\tLightSource "{kind}" "vector sundir" {listed(toward)} {air}')
+
+    def _infinite(self, light: EnvironmentLight) -> None:
+        if light.image.shape[:2] == (1, 1):
+            radiance = light.scale * light.image[0, 0].astype(np.float64)
+            self.lines.append(f'\tLightSource "infinite" "color L" {listed(radiance)} "float gain" [ 1 ]')
+            return
+        file = self.output.picture(light.image, light.source, (".exr",))
+        turn = product(light.to_world, inverse(MAP_AXES))
+        self.lines += [
+            "\tTransformBegin",
+            f"\t\tTransform {written_matrix(turn)}",
+            f'\t\tLightSource "infinite" "string mapname" [ "{file}" ] "string mapping" [ "latlong" ] '
+            f'"float gamma" [ 1 ] "color L" [ 1 1 1 ] "float gain" [ {number(light.scale)} ]',
+            "\tTransformEnd",
+        ]
+
+    # --- shapes --------------------------------------------------------------------------------------------------
+
+    def _times(self, scene: Scene) -> None:
+        """Each motion has times of its own."""
+
+    def _instance(self, instance: Instance) -> None:
+        """LuxCore makes objects of mesh files only, and shows a motion's last key."""
+        if isinstance(instance.shape, Sphere) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+            mesh, matrix = upright(self._meshed(instance), instance.to_world)
+            instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)
+        made = [self._object(instance)] if part_key(instance) in self.shared else self._part(instance)
+        poses, times_s = motion_keys(instance.track, instance.to_world)
+        lines = [f"Transform {written_matrix(pose)}" for pose in poses]
+        placing = [] if len(poses) == 1 and np.array_equal(poses[0], np.eye(4)) else _in_motion(lines, times_s)
+        self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
+
+    def _part(self, instance: Instance) -> list[str]:
+        emission = radiance_of(instance, self.report)
+        lines = [f'NamedMaterial "{self.material(instance.material)}"']
+        if emission is not None:
+            off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'
+            lines.append(f'AreaLightSource "area" "color L" {listed(emission)} {off}')
+        return [*lines, self._shape(instance)]
+
+    def _meshed(self, instance: Instance) -> Mesh:
+        """A shape as triangles: LuxCore leaves spheres and disks out."""
+        shape = instance.shape
+        mesh = lamp_sphere(shape.radius) if isinstance(shape, Sphere) and shines(instance) else as_mesh(shape)
+        if mesh is not shape and not isinstance(shape, Rectangle | Cube):
+            what = f"shape {type(shape).__name__.lower()}"
+            self.report.add(instance.name or "shape", what, f"a mesh of {len(mesh.faces)} triangles")
+        return mesh
+
+    def _shape(self, instance: Instance) -> str:
+        mesh = self._meshed(instance)
+        if len(mesh.faces) > INLINE_MAX or part_key(instance) in self.shared:
+            return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
+        return f'Shape "trianglemesh" {inline_mesh(mesh, "uv")}'
+
+
+def _looking(pose: Matrix) -> str:
+    eye = pose[:3, 3]
+    ends = [*eye, *(eye - pose[:3, 2]), *pose[:3, 1]]
+    return "LookAt " + " ".join(repr(float(value)) for value in ends)
+
+
+def _in_motion(lines: list[str], times_s: list[float]) -> list[str]:
+    """Transforms as the keys of a motion; one alone is itself."""
+    if len(lines) == 1:
+        return lines
+    return [f"MotionBegin [ {' '.join(repr(time_s) for time_s in times_s)} ]", *lines, "MotionEnd"]
+
+
+def save_luxrender(scene: Scene, output: Output, report: LossReport) -> None:
+    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    writer = LuxWriter(output, report)
+    writer.write(scene)
+    output.text(output.path.name, "\n".join(writer.lines) + "\n")

@@ -1,0 +1,232 @@
+"""Properties of Mitsuba elements: numbers, vectors, colours, transforms, with the parameters of the file put in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scenes.arithmetic import norm, power, product
+from scenes.canonical import Rgb, SceneError
+from scenes.canonical.values import Matrix
+from scenes.formats.appearance.spectra import blackbody_rgb, grey, rgb, sampled_rgb, xyz_to_rgb
+from scenes.formats.geometry.transform_stack import KEYS_MAX, rotation, scaling, translation
+from scenes.formats.losses import LossReport
+from scenes.formats.text.directives import NUMBER_MAX
+from scenes.formats.text.xml_tree import Node
+from scenes.loading import decode_srgb
+
+PROPERTIES = ("integer", "float", "string", "boolean", "rgb", "srgb", "spectrum", "blackbody", "point", "vector",
+              "transform", "animation", "xyz")  # fmt: skip
+
+
+@dataclass
+class Properties:
+    """An element's properties by name, and its other children; what is not asked for can be listed."""
+
+    node: Node
+    report: LossReport
+    given: dict[str, Node] = field(default_factory=dict)
+    rest: list[Node] = field(default_factory=list)
+    asked: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        for child in self.node.children:
+            if child.tag in PROPERTIES:
+                self.given.setdefault(child.get("name"), child)
+            else:
+                self.rest.append(child)
+
+    @property
+    def where(self) -> str:
+        """Place of the element."""
+        return str(self.node.place)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.given
+
+    def number(self, name: str, default: float) -> float:
+        """A float or integer property."""
+        self.asked.add(name)
+        if name not in self.given:
+            return default
+        return numbers(self.given[name], self.given[name].get("value"), 1)[0]
+
+    def whole(self, name: str, default: int, least: int, most: int) -> int:
+        """A whole number within bounds."""
+        value = self.number(name, default)
+        if value != int(value) or not least <= value <= most:
+            what = f"{self.given[name].place}: {name}"
+            raise SceneError(f"{what}: expected a whole number from {least} to {most}, got {value:g}")
+        return int(value)
+
+    def text(self, name: str, default: str) -> str:
+        """A string property."""
+        self.asked.add(name)
+        return self.given[name].get("value", default) if name in self.given else default
+
+    def truth(self, name: str, default: bool) -> bool:
+        """A boolean property."""
+        value = self.text(name, str(default)).lower()
+        if value not in ("true", "false"):
+            raise SceneError(f"{self.where}: {name}: expected true or false, got {value!r}")
+        return value == "true"
+
+    def vector(self, name: str, default: Rgb) -> np.ndarray:
+        """A point or vector."""
+        self.asked.add(name)
+        return np.array(default) if name not in self.given else np.array(triple(self.given[name], 0.0))
+
+    def color(self, name: str, default: Rgb) -> Rgb:
+        """A colour, however it is given."""
+        self.asked.add(name)
+        if name not in self.given:
+            return default
+        node = self.given[name]
+        return grey(self.number(name, 0.0)) if node.tag in ("float", "integer") else color_of(node)
+
+    def transform(self, name: str = "toWorld") -> Matrix:
+        """A transform; of an animation its first, reported."""
+        keys, _ = self.motion(name)
+        if len(keys) > 1:
+            self.report.add(str(self.given[name].place), "an animated transform", "the first of its transforms")
+        return keys[0]
+
+    def motion(self, name: str = "toWorld") -> tuple[list[Matrix], list[float]]:
+        """Transforms of an animation and their times, seconds; one at time zero where nothing moves."""
+        self.asked.add(name)
+        if name not in self.given:
+            return [np.eye(4)], [0.0]
+        node = self.given[name]
+        if node.tag != "animation":
+            return [transform_of(node)], [0.0]
+        steps = [child for child in node.children if child.tag == "transform"]
+        times_s = [numbers(step, step.get("time", "0"), 1)[0] for step in steps]
+        if not 1 <= len(steps) <= KEYS_MAX or not (np.diff(times_s) > 0.0).all():
+            raise SceneError(
+                f"{node.place}: animation: expected 1 to {KEYS_MAX} transforms, each later than the one before"
+            )
+        return [transform_of(step) for step in steps], times_s
+
+    def unasked(self) -> list[str]:
+        """Names of what was given and not asked for."""
+        return [name for name in self.given if name not in self.asked]
+
+
+def numbers(node: Node, text: str, count: int | None) -> list[float]:
+    """Numbers of a text, apart by commas or blanks; raises SceneError for another count, or what is none."""
+    words = text.replace(",", " ").split()
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        raise SceneError(f"{node.place}: {node.get('name') or node.tag}: expected numbers, got {text[:40]!r}") from None
+    if not all(abs(value) <= NUMBER_MAX for value in found) or (count is not None and len(found) != count):
+        wanted = f"{count} numbers" if count is not None else "numbers"
+        what = f"{node.place}: {node.get('name') or node.tag}"
+        raise SceneError(f"{what}: expected {wanted} up to {NUMBER_MAX:g}, got {text[:40]!r}")
+    return found
+
+
+def triple(node: Node, default: float, whole: str = "value") -> list[float]:
+    """Three numbers: as ``x``, ``y``, ``z``, or one value."""
+    if whole in node.attributes:
+        found = numbers(node, node.get(whole), None)
+        if len(found) == 1:
+            return found * 3
+        return numbers(node, node.get(whole), 3)
+    return [numbers(node, node.get(axis, repr(default)), 1)[0] for axis in "xyz"]
+
+
+def color_of(node: Node) -> Rgb:
+    """The colour of an element; raises SceneError where it cannot be read."""
+    text = node.get("value").strip()
+    if node.tag == "blackbody":
+        kelvin = numbers(node, node.get("temperature", "5000").rstrip("Kk"), 1)[0]
+        if not 100.0 <= kelvin <= 1e6:
+            raise SceneError(f"{node.place}: temperature: expected 100 to 1000000 K, got {kelvin:g}")
+        return blackbody_rgb(kelvin, numbers(node, node.get("scale", "1"), 1)[0])
+    if text.startswith("#"):
+        if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+            raise SceneError(f"{node.place}: expected a colour such as #a0b0c0, got {text[:20]!r}")
+        values = np.array([int(text[at : at + 2], 16) for at in (1, 3, 5)], np.uint8)
+        return rgb(decode_srgb(values) if node.tag == "srgb" else values / 255.0)
+    if node.tag == "spectrum" and ":" in text:
+        pairs = [part.split(":") for part in text.replace(",", " ").split()]
+        if any(len(pair) != 2 for pair in pairs):
+            raise SceneError(f"{node.place}: expected pairs such as 400:0.5, got {text[:40]!r}")
+        table = np.array([numbers(node, " ".join(pair), 2) for pair in pairs])
+        return sampled_rgb(table[:, 0], table[:, 1])
+    found = numbers(node, text, None)
+    if len(found) not in (1, 3):
+        raise SceneError(f"{node.place}: {node.get('name')}: expected one or three numbers, got {text[:40]!r}")
+    values = np.array(found * 3 if len(found) == 1 else found)
+    if node.tag == "xyz":
+        return xyz_to_rgb(values)
+    if node.tag == "srgb":
+        clipped = np.clip(values, 0.0, 1.0)
+        values = np.where(clipped <= 0.04045, clipped / 12.92, power((clipped + 0.055) / 1.055, 2.4))
+    return rgb(values)
+
+
+def transform_of(node: Node) -> Matrix:
+    """A transform's steps, each after those before it."""
+    matrix = np.eye(4)
+    for step in node.children:
+        if step.tag == "translate":
+            made = translation(*triple(step, 0.0))
+        elif step.tag == "scale":
+            made = scaling(*triple(step, 1.0))
+        elif step.tag == "rotate":
+            axis = [numbers(step, step.get(name, "0"), 1)[0] for name in "xyz"]
+            made = rotation(numbers(step, step.get("angle", "0"), 1)[0], *axis)
+        elif step.tag == "matrix":
+            made = np.array(numbers(step, step.get("value"), 16)).reshape(4, 4)
+        elif step.tag in ("lookat", "lookAt"):
+            made = looking(step)
+        else:
+            raise SceneError(f"{step.place}: expected a step of a transform, got {step.tag!r}")
+        matrix = product(made, matrix)
+    part = matrix[:3, :3]
+    size = np.abs(part).max(initial=0.0)
+    if not np.isfinite(matrix).all() or not abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0:
+        raise SceneError(f"{node.place}: transform: expected one that can be inverted")
+    return matrix
+
+
+def looking(step: Node) -> Matrix:
+    """Camera to world: looks along +z, y up, x to the left."""
+    points = {name: np.array(numbers(step, step.get(name), 3)) for name in ("origin", "target")}
+    forward = points["target"] - points["origin"]
+    if "up" in step.attributes:
+        up = np.array(numbers(step, step.get("up"), 3))
+    else:
+        up = np.eye(3)[int(np.abs(forward).argmin())]
+    left = np.cross(up, forward)
+    if min(norm(forward), norm(left)) < 1e-12:
+        raise SceneError(f"{step.place}: lookat: expected an upward direction across the line of sight")
+    forward, left = forward / norm(forward), left / norm(left)
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([left, np.cross(forward, left), forward, points["origin"]], axis=1)
+    return matrix
+
+
+IORS = {
+    "vacuum": 1.0, "helium": 1.00004, "hydrogen": 1.00013, "air": 1.00028, "carbon dioxide": 1.00045, "water": 1.3330,
+    "acetone": 1.36, "ethanol": 1.361, "carbon tetrachloride": 1.461, "glycerol": 1.4729, "benzene": 1.501,
+    "silicone oil": 1.52045, "bromine": 1.661, "water ice": 1.31, "fused quartz": 1.458, "pyrex": 1.470,
+    "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544, "amber": 1.55, "pet": 1.575,
+    "diamond": 2.419,
+}  # fmt: skip
+"""Indices of refraction by the names that Mitsuba 0.5 knows (documentation, section on dielectrics)."""
+
+
+def ior(properties: Properties, name: str, default: str) -> float:
+    """An index of refraction by name or number."""
+    node = properties.given.get(name)
+    if node is not None and node.tag != "string":
+        return properties.number(name, 1.5)
+    found = properties.text(name, default).lower()
+    if found not in IORS:
+        raise SceneError(f"{properties.where}: {name}: expected one of {', '.join(IORS)}, got {found!r}")
+    return IORS[found]

@@ -1,0 +1,318 @@
+"""Mitsuba 0.5 scenes into the canonical scene.
+
+Source: Mitsuba 0.5 documentation; conventions measured with Mitsuba 3; Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from scenes import loading
+from scenes.arithmetic import arctan, hypot, norm, product, tan
+from scenes.canonical import (
+    Camera,
+    DirectionalLight,
+    EnvironmentCamera,
+    EnvironmentLight,
+    Film,
+    Instance,
+    Integrator,
+    Light,
+    Material,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    Sampler,
+    Scene,
+    SceneError,
+    SpotLight,
+    SunSky,
+)
+from scenes.canonical.values import Matrix
+from scenes.daylight import sun_at
+from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.geometry.transform_stack import motion
+from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
+from scenes.formats.mitsuba.read_shapes import MitsubaShapes
+from scenes.formats.pbrt.read import FAR, duration_s
+from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
+from scenes.formats.text.xml_tree import Node, parse_xml
+
+FORWARD = np.diag([-1.0, 1.0, -1.0, 1.0])
+"""From a camera that looks along +z with x to the left to the canonical one."""
+
+FILTERS = {"box": "box", "tent": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "catmullrom": "mitchell",
+           "lanczos": "sinc"}  # fmt: skip
+_RADII = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 3.0}
+SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "ldsampler": "sobol",
+            "halton": "halton", "hammersley": "hammersley"}  # fmt: skip
+INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "direct": "direct", "ao": "direct",
+               "bdpt": "bidirectional", "mlt": "metropolis", "pssmlt": "metropolis", "erpt": "metropolis",
+               "photonmapper": "photonmap", "ppm": "photonmap", "sppm": "photonmap", "ptracer": "path",
+               "adaptive": "path", "irrcache": "path", "vpl": "path"}  # fmt: skip
+_TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
+
+
+class MitsubaReader:
+    """State of a Mitsuba file while it is read."""
+
+    def __init__(self, files: SceneFiles, report: LossReport) -> None:
+        self.files, self.report = files, report
+        self.names: dict[str, Node] = {}
+        self.defaults: dict[str, str] = {}
+        self.surfaces = MitsubaSurfaces(files, report, self.find)
+        self.shapes = MitsubaShapes(files, report, self.surfaces, self.find)
+        self.materials: dict[str, Material] = {}
+        self.camera: Camera | None = None
+        self.film, self.sampler, self.integrator = Film(768, 576), Sampler("independent", 4), Integrator("path", -1)
+        self.instances: list[Instance] = []
+        self.lights: list[Light] = []
+
+    # --- the tree ------------------------------------------------------------------------------------------------
+
+    def read(self, path: Path) -> None:
+        """Reads a file and what it includes."""
+        nodes = self._nodes(path, [])
+        for node in nodes:
+            self._node(node)
+
+    def _nodes(self, path: Path, inside: list[Path]) -> list[Node]:
+        """Elements of the scene, included ones in their place, parameters put in, names noted."""
+        where = str(inside[-1]) if inside else str(path)
+        if path in inside:
+            raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
+        if len(inside) >= DEPTH_MAX:
+            raise SceneError(f"{where}: expected at most {DEPTH_MAX} files inside each other")
+        root = parse_xml(self.files.read(path, where), path.name)
+        if root.tag != "scene":
+            raise SceneError(f"{root.place}: expected a scene, got {root.tag!r}")
+        found = []
+        for node in root.children:
+            if node.tag == "default":
+                self.defaults.setdefault(node.get("name"), node.get("value"))
+                continue
+            self._filled(node)
+            if node.tag == "include":
+                found += self._nodes(self.files.path(node.get("filename"), str(node.place), path), [*inside, path])
+            elif node.tag == "alias":
+                self._named(node, node.get("id"))
+                self.names[node.get("as")] = self.names[node.get("id")]
+            else:
+                found.append(node)
+        return found
+
+    def _filled(self, node: Node) -> None:
+        """Puts parameters in the place of ``$name``, and notes what has a name of its own."""
+        for key, value in node.attributes.items():
+            if value.startswith("$"):
+                if value[1:] not in self.defaults:
+                    raise SceneError(f"{node.place}: expected a parameter with a default, got {value!r}")
+                node.attributes[key] = self.defaults[value[1:]]
+        if node.tag not in ("ref", "alias") and "id" in node.attributes:
+            self.names[node.get("id")] = node
+        for child in node.children:
+            self._filled(child)
+
+    def _named(self, node: Node, name: str) -> Node:
+        if name not in self.names:
+            raise SceneError(f"{node.place}: expected a name of something before it, got {name!r}")
+        return self.names[name]
+
+    def find(self, reference: Node) -> Node:
+        """What a reference names; raises SceneError where nothing has the name."""
+        return self._named(reference, reference.get("id"))
+
+    def _node(self, node: Node) -> None:
+        if node.tag == "integrator":
+            self._integrator(node)
+        elif node.tag in ("sensor", "camera"):
+            self._sensor(node)
+        elif node.tag == "bsdf":
+            self.materials[node.get("id") or f"bsdf{len(self.materials)}"] = self.surfaces.material(node)
+        elif node.tag == "texture":
+            self.surfaces.made_texture(node)
+        elif node.tag == "shape":
+            self.instances += self.shapes.read(node)
+        elif node.tag == "emitter":
+            self._emitter(node)
+        elif node.tag in ("medium", "phase", "volume", "subsurface"):
+            named = f" {node.get('id')!r}" if node.get("id") else ""
+            self.report.add(str(node.place), f"{node.tag}{named} (participating medium)")
+        elif node.tag in ("sampler", "film"):
+            (self._sampler if node.tag == "sampler" else self._film)(node)
+        else:
+            raise SceneError(f"{node.place}: expected an element of a scene, got {node.tag!r}")
+
+    # --- camera, film, sampling ----------------------------------------------------------------------------------
+
+    def _integrator(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        name = self.report.kind(INTEGRATORS, kind, "integrator", node.place)
+        edges = properties.whole("maxDepth", -1, -1, 1 << 20)
+        # it counts the edges of a path, the canonical scene its bounces
+        self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
+        self.surfaces.left_over(properties)
+
+    def _film(self, node: Node) -> None:
+        properties = Properties(node, self.report)
+        size = properties.whole("width", 768, 1, 32768), properties.whole("height", 576, 1, 32768)
+        name, radius = "gaussian", None
+        for child in properties.rest:
+            if child.tag == "rfilter":
+                inner = Properties(child, self.report)
+                name = self.report.kind(FILTERS, child.get("type"), "filter", child.place)
+                radius = inner.number("radius", _RADII[name])
+                self.surfaces.left_over(inner)
+        width = _RADII[name] if radius is None else radius
+        self.film = Film(*size, name, width, properties.text("filename", ""))  # type: ignore[arg-type]
+        for setting in ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod"):
+            properties.asked.add(setting)
+        self.surfaces.left_over(properties)
+
+    def _sampler(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        name = self.report.kind(SAMPLERS, kind, "sampler", node.place)
+        self.sampler = Sampler(name, properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
+        self.surfaces.left_over(properties)
+
+    def _sensor(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        for child in properties.rest:
+            if child.tag in ("film", "sampler"):
+                self._node(child)
+        keys, times_s = properties.motion()
+        to_world, track = product(keys[0], FORWARD), motion(keys, times_s, properties.where, self.report)
+        properties.asked.update(("nearClip", "farClip"))
+        shutter = properties.number("shutterOpen", 0.0), properties.number("shutterClose", 0.0)
+        if kind in ("perspective", "thinlens"):
+            lens = properties.number("apertureRadius", 0.0) if kind == "thinlens" else 0.0
+            focus = properties.number("focusDistance", FAR)
+            self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, track, shutter)
+        elif kind == "orthographic":
+            self.camera = OrthographicCamera(to_world, track=track)
+        elif kind == "spherical":
+            self.camera = EnvironmentCamera(to_world)
+        else:
+            raise SceneError(f"{node.place}: expected a kind of sensor, got {kind!r}")
+        self.surfaces.left_over(properties)
+
+    def _field(self, properties: Properties) -> float:
+        """Field of view of the shorter side, degrees."""
+        width, height = self.film.width_px, self.film.height_px
+        axis = properties.text("fovAxis", "x")
+        sides = {"x": width, "y": height, "smaller": min(width, height), "larger": max(width, height),
+                 "diagonal": hypot(width, height)}  # fmt: skip
+        if axis not in sides:
+            raise SceneError(f"{properties.where}: fovAxis: expected one of {', '.join(sides)}, got {axis!r}")
+        if "fov" in properties or "focalLength" not in properties:
+            fov = properties.number("fov", -1.0)
+            if fov < 0.0 and "fov" not in properties:  # 50 mm on film of 36 x 24 mm
+                fov, axis = 2.0 * math.degrees(arctan(hypot(36.0, 24.0) / 100.0)), "diagonal"
+        else:
+            text = properties.text("focalLength", "50mm").removesuffix("mm").strip()
+            try:
+                length = float(text)
+            except ValueError:
+                length = 0.0
+            if not 0.1 <= length <= 1e5:
+                raise SceneError(f"{properties.where}: focalLength: expected millimetres, got {text[:20]!r}")
+            fov, axis = 2.0 * math.degrees(arctan(hypot(36.0, 24.0) / (2.0 * length))), "diagonal"
+        if not 0.0 < fov < 180.0:
+            raise SceneError(f"{properties.where}: fov: expected an angle in (0, 180), got {fov:g}")
+        if sides[axis] == min(width, height):
+            return fov
+        return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * min(width, height) / sides[axis]))
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def _emitter(self, node: Node) -> None:
+        kind, properties = node.get("type"), Properties(node, self.report)
+        matrix = properties.transform()
+        if kind == "point":
+            place = product(matrix, np.append(properties.vector("position", grey(0.0)), 1.0))
+            self.lights.append(PointLight(rgb(place[:3]), properties.color("intensity", grey(1.0))))
+        elif kind == "spot":
+            outer = properties.number("cutoffAngle", 20.0)
+            inner = properties.number("beamWidth", 0.75 * outer)
+            ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / norm(matrix[:3, 2]))
+            if any(child.tag in ("texture", "ref") for child in properties.rest):
+                self.report.add(properties.where, "a picture in a spot light", "none")
+            self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
+        elif kind in ("directional", "collimated"):
+            direction = properties.vector("direction", rgb(matrix[:3, 2]))
+            if not norm(direction) > 0.0:
+                raise SceneError(f"{properties.where}: direction: expected one")
+            if kind == "collimated":
+                self.report.add(properties.where, "a beam of no width", "a parallel light")
+            unit = rgb(direction / norm(direction))
+            self.lights.append(DirectionalLight(unit, properties.color("irradiance", grey(1.0))))
+        elif kind == "constant":
+            radiance = properties.color("radiance", grey(1.0))
+            self.lights.append(EnvironmentLight(np.array([[list(radiance)]], np.float32)))
+        elif kind == "envmap":
+            path = self.files.path(properties.text("filename", ""), properties.where)
+            matrix[:3, 3] = 0.0
+            image = loading.read_image(path)
+            self.lights.append(EnvironmentLight(image, matrix, properties.number("scale", 1.0), str(path)))
+        elif kind in ("sun", "sky", "sunsky"):
+            self._daylight(kind, properties, matrix)
+        elif kind == "area":
+            raise SceneError(f"{node.place}: area: expected it inside a shape")
+        else:
+            properties.asked.update(properties.given)
+            self.report.unknown(node.place, "emitter", kind)
+        if "samplingWeight" in properties:
+            self.report.add(properties.where, "samplingWeight of a light", "the renderer's own choice")
+            properties.asked.add("samplingWeight")
+        self.surfaces.left_over(properties)
+
+    def _daylight(self, kind: str, properties: Properties, matrix: Matrix) -> None:
+        turned = matrix[:3, :3]
+        direction = properties.vector("sunDirection", (0.0, 1.0, 0.0))
+        if "sunDirection" not in properties:
+            direction = product(turned, self._by_time(properties))
+        if not norm(direction) > 0.0:
+            raise SceneError(f"{properties.where}: sunDirection: expected a direction")
+        unit, up = rgb(direction / norm(direction)), rgb(turned[:, 1] / norm(turned[:, 1]))
+        turbidity, scale = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
+        albedo = float(np.mean(properties.color("albedo", grey(0.15))))
+        shares = {part: properties.number(f"{part}Scale", 1.0) for part in ("sun", "sky")}
+        if kind != "sunsky" or shares["sun"] == shares["sky"]:
+            part = "both" if kind == "sunsky" else kind
+            factor = scale * (shares["sky"] if kind == "sunsky" else 1.0)
+            self.lights.append(SunSky(unit, turbidity, factor, part, up, albedo))  # type: ignore[arg-type]
+            return
+        for part, share in shares.items():
+            self.lights.append(SunSky(unit, turbidity, scale * share, part, up, albedo))  # type: ignore[arg-type]
+
+    def _by_time(self, properties: Properties) -> np.ndarray:
+        """Towards the sun, by date and place; east is x, north -z."""
+        names = zip(_TIME_AND_PLACE, (2010, 7, 10, 15, 0, 0, 35.6894, 139.6917, 9), strict=True)
+        values = {name: properties.number(name, default) for name, default in names}
+        hour = values["hour"] + values["minute"] / 60.0 + values["second"] / 3600.0
+        date = int(values["year"]), int(values["month"]), int(values["day"])
+        try:
+            east, north, up = sun_at(date, hour, values["latitude"], values["longitude"], values["timezone"])
+        except (ValueError, OverflowError) as error:
+            raise SceneError(f"{properties.where}: expected a date and time, got {error}") from None
+        self.report.add(properties.where, "the sun's place by time and latitude", "its direction, x to the east")
+        return np.array([east, up, -north])
+
+
+def load_mitsuba(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
+    """Reads a scene; see :func:`scenes.formats.pbrt.read.load_pbrt`."""
+    reader = MitsubaReader(SceneFiles(path, root), report or LossReport())
+    main = reader.files.folder / Path(path).name
+    if not main.is_file():
+        raise SceneError(f"{path}: expected a scene file, found none")
+    reader.read(main)
+    if reader.camera is None:
+        raise SceneError(f"{path}: expected a sensor, found none")
+    parts = tuple(reader.instances), tuple(reader.lights), reader.film, reader.sampler, reader.integrator
+    lasts = duration_s(reader.camera, reader.instances)
+    return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem, duration_s=lasts)

@@ -1,0 +1,314 @@
+"""Textures and materials of Mitsuba 0.5, into the canonical scene's.
+
+Source: Mitsuba 0.5 documentation, sections on scattering models and textures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scenes import loading
+from scenes.arithmetic import arctan, power
+from scenes.canonical import (
+    Bumped,
+    CheckerboardTexture,
+    ConstantTexture,
+    Glass,
+    Glossy,
+    ImageTexture,
+    Masked,
+    Material,
+    Matte,
+    Metal,
+    MixMaterial,
+    Phong,
+    Plastic,
+    Rgb,
+    SceneError,
+    Texture,
+    Translucent,
+)
+from scenes.formats.appearance.spectra import grey, metal
+from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.properties import Properties, ior
+from scenes.formats.pbrt.read_materials import encoded_again, mean_of, product
+from scenes.formats.text.scene_files import SceneFiles
+from scenes.formats.text.xml_tree import Node
+
+_WRAPS = {"repeat": "repeat", "clamp": "clamp", "zero": "black", "mirror": "repeat", "one": "clamp"}
+_FILTERS = {"nearest": "nearest", "trilinear": "mipmap", "ewa": "mipmap"}
+_NESTED_MAX = 32
+
+
+@dataclass
+class MitsubaSurfaces:
+    """Makes textures and materials of elements.
+
+    Attributes:
+        files: for images.
+        report: of what could not be kept.
+        find: the element that a reference names.
+    """
+
+    files: SceneFiles
+    report: LossReport
+    find: Callable[[Node], Node]
+    made: dict[int, Material] = field(default_factory=dict)
+    textures: dict[int, Texture] = field(default_factory=dict)
+    _deep: int = 0
+
+    def left_over(self, properties: Properties) -> None:
+        """Reports properties that nothing asked for."""
+        for name in properties.unasked():
+            self.report.add(properties.where, f"{properties.node.get('type')}: property {name!r}")
+
+    # --- textures ------------------------------------------------------------------------------------------------
+
+    def texture(self, properties: Properties, name: str, default: Rgb) -> Texture:
+        """A texture, a reference to one, or a colour."""
+        for child in properties.rest:
+            if child.tag in ("texture", "ref") and child.get("name") == name:
+                node = self.find(child) if child.tag == "ref" else child
+                if node.tag != "texture":
+                    raise SceneError(f"{child.place}: {name}: expected a texture, got {node.tag!r}")
+                return self.made_texture(node)
+        return ConstantTexture(properties.color(name, default))
+
+    def made_texture(self, node: Node) -> Texture:
+        """The texture of an element, made once."""
+        if id(node) not in self.textures:
+            properties = Properties(node, self.report)
+            self.textures[id(node)] = self._texture(properties)
+            self.left_over(properties)
+        return self.textures[id(node)]
+
+    def _texture(self, properties: Properties) -> Texture:
+        kind = properties.node.get("type")
+        even = properties.number("uvscale", 1.0)
+        scale = properties.number("uscale", even), properties.number("vscale", even)
+        offset = properties.number("uoffset", 0.0), properties.number("voffset", 0.0)
+        if kind == "checkerboard":
+            if offset != (0.0, 0.0):
+                self.report.add(properties.where, "offset of a checkerboard", "none")
+            parts = self.texture(properties, "color0", grey(0.4)), self.texture(properties, "color1", grey(0.2))
+            # a square of its checks is half a unit wide
+            return CheckerboardTexture(*parts, (2.0 * scale[0], 2.0 * scale[1]))
+        if kind == "scale":
+            inner = next((child for child in properties.rest if child.tag in ("texture", "ref")), None)
+            base = self.made_texture(self.find(inner) if inner.tag == "ref" else inner) if inner else None
+            factor = ConstantTexture(properties.color("scale", grey(1.0)))
+            return factor if base is None else product(base, factor)
+        if kind == "bitmap":
+            return self._bitmap(properties, scale, offset)
+        properties.asked.update(properties.given)
+        self.report.add(properties.where, f"texture {kind!r}", "the constant 0.5")
+        return ConstantTexture(grey(0.5))
+
+    def _bitmap(self, properties: Properties, scale: tuple[float, float], offset: tuple[float, float]) -> Texture:
+        where = properties.where
+        path = self.files.path(properties.text("filename", ""), where)
+        image = loading.read_image(path)
+        gamma = properties.number("gamma", -1.0)
+        if gamma > 0.0 and path.suffix.lower() != ".exr":
+            image = power(encoded_again(image), np.float32(gamma)).astype(np.float32)
+        wrap = properties.text("wrapMode", "repeat")
+        if wrap not in _WRAPS:
+            raise SceneError(f"{where}: wrapMode: expected one of {', '.join(_WRAPS)}, got {wrap!r}")
+        if wrap in ("mirror", "one"):
+            self.report.add(where, f"wrapMode {wrap!r}", _WRAPS[wrap])
+        kind = properties.text("filterType", "ewa")
+        if kind not in _FILTERS:
+            raise SceneError(f"{where}: filterType: expected one of {', '.join(_FILTERS)}, got {kind!r}")
+        properties.number("maxAnisotropy", 20.0)
+        # the first row is at v = 0 here, and at v = 1 in the canonical scene
+        size, start = (scale[0], -scale[1]), (offset[0], 1.0 - offset[1])
+        return ImageTexture(image, size, start, _WRAPS[wrap], _FILTERS[kind], str(path))  # type: ignore[arg-type]
+
+    # --- materials -----------------------------------------------------------------------------------------------
+
+    def material(self, node: Node) -> Material:
+        """The material of an element, made once; one that Mitsuba does not have is reported."""
+        if id(node) in self.made:
+            return self.made[id(node)]
+        makers = {
+            "diffuse": self._diffuse, "roughdiffuse": self._diffuse, "dielectric": self._dielectric,
+            "thindielectric": self._dielectric, "roughdielectric": self._dielectric, "conductor": self._conductor,
+            "roughconductor": self._conductor, "plastic": self._plastic, "roughplastic": self._plastic,
+            "phong": self._phong, "ward": self._ward, "difftrans": self._difftrans, "twosided": self._twosided,
+            "mask": self._mask, "blendbsdf": self._blend, "mixturebsdf": self._mixture, "bump": self._bump,
+            "bumpmap": self._bump, "coating": self._coating, "roughcoating": self._coating,
+        }  # fmt: skip
+        kind, properties = node.get("type"), Properties(node, self.report)
+        self._deep += 1
+        if self._deep > _NESTED_MAX:
+            raise SceneError(f"{node.place}: expected at most {_NESTED_MAX} materials inside each other")
+        if kind in makers:
+            made = makers[kind](properties)
+            self.left_over(properties)
+        elif kind in ("null", "hk", "irawan", "sssbrdf", "normalmap", "rmbrdf", "dipole"):
+            self.report.add(properties.where, f"material {kind!r}", "grey, matte")
+            made = Matte(ConstantTexture(grey(0.5)))
+        else:
+            self.report.unknown(properties.where, "material", kind, "grey, matte")
+            made = Matte(ConstantTexture(grey(0.5)))
+        self._deep -= 1
+        self.made[id(node)] = made
+        return made
+
+    def inner(self, properties: Properties) -> list[Material]:
+        """Materials inside a material, of elements or references."""
+        found = []
+        for child in properties.rest:
+            node = self.find(child) if child.tag == "ref" else child
+            if node.tag == "bsdf":
+                found.append(self.material(node))
+        return found
+
+    def one_inner(self, properties: Properties) -> Material:
+        """The one material inside; raises SceneError for another number."""
+        found = self.inner(properties)
+        if len(found) not in (1, 2):
+            raise SceneError(f"{properties.where}: expected a bsdf inside, got {len(found)}")
+        return found[0]
+
+    def _alphas(self, properties: Properties) -> tuple[float, float]:
+        pair = []
+        for name in ("alphaU", "alphaV"):
+            for child in properties.rest:
+                if child.get("name") in (name, "alpha") and child.tag in ("texture", "ref"):
+                    self.report.add(properties.where, "a texture as roughness", "0.1")
+            pair.append(properties.number(name, properties.number("alpha", 0.1)))
+        if min(pair) < 0.0:
+            raise SceneError(f"{properties.where}: alpha: expected no negative number, got {min(pair):g}")
+        return pair[0], pair[1]
+
+    def _distribution(self, properties: Properties) -> str:
+        found = properties.text("distribution", "beckmann")
+        if found not in ("beckmann", "ggx"):
+            self.report.add(properties.where, f"the distribution {found!r} of facets", "beckmann")
+        return "ggx" if found == "ggx" else "beckmann"
+
+    def _diffuse(self, properties: Properties) -> Material:
+        name = "diffuseReflectance" if "diffuseReflectance" in properties else "reflectance"
+        sigma = 0.0
+        if properties.node.get("type") == "roughdiffuse":
+            # alpha is sqrt(2) times the slopes' deviation that sigma is the angle of
+            sigma = math.degrees(arctan(properties.number("alpha", 0.2) / math.sqrt(2.0)))
+            properties.truth("useFastApprox", False)
+        return Matte(self.texture(properties, name, grey(0.5)), sigma)
+
+    def _dielectric(self, properties: Properties) -> Material:
+        kind = properties.node.get("type")
+        index = ior(properties, "intIOR", "bk7") / ior(properties, "extIOR", "air")
+        parts = (
+            self.texture(properties, "specularReflectance", grey(1.0)),
+            self.texture(properties, "specularTransmittance", grey(1.0)),
+        )
+        alphas = (0.0, 0.0)
+        if kind == "roughdielectric":
+            alphas = self._alphas(properties)
+            if self._distribution(properties) != "ggx":
+                self.report.add(properties.where, "the distribution beckmann of glass", "ggx")
+        return Glass(*parts, index, alphas, kind == "thindielectric")
+
+    def _conductor(self, properties: Properties) -> Material:
+        name = properties.text("material", "Cu")
+        known = metal(name)
+        if known is None and name != "none":
+            if "eta" not in properties:
+                self.report.add(properties.where, f"the metal {name!r}, which is not known", "copper")
+            known = metal("Cu")
+        outside = ior(properties, "extEta", "air") if "extEta" in properties else 1.0
+        if known is None:  # a perfect mirror
+            known = grey(0.0), grey(1.0)
+        index = [
+            tuple(np.array(properties.color(part, value)) / outside)
+            for part, value in zip(("eta", "k"), known, strict=True)
+        ]
+        scale = self.texture(properties, "specularReflectance", grey(1.0))
+        if properties.node.get("type") == "conductor":
+            return Metal(index[0], index[1], (0.0, 0.0), scale)
+        kind = self._distribution(properties)
+        return Metal(index[0], index[1], self._alphas(properties), scale, kind)  # type: ignore[arg-type]
+
+    def _plastic(self, properties: Properties) -> Material:
+        index = ior(properties, "intIOR", "polypropylene") / ior(properties, "extIOR", "air")
+        parts = (
+            self.texture(properties, "diffuseReflectance", grey(0.5)),
+            self.texture(properties, "specularReflectance", grey(1.0)),
+        )
+        if properties.truth("nonlinear", False):
+            self.report.add(properties.where, "colour shifts by bounces inside (nonlinear)", "none")
+        alpha = 0.0
+        if properties.node.get("type") == "roughplastic":
+            alpha = self._alphas(properties)[0]
+            self._distribution(properties)
+        return Plastic(*parts, index, alpha)
+
+    def _phong(self, properties: Properties) -> Material:
+        specular = mean_of(self.texture(properties, "specularReflectance", grey(0.2)))
+        diffuse = self.texture(properties, "diffuseReflectance", grey(0.5))
+        exponent = properties.number("exponent", 30.0)
+        if exponent < 1.0:
+            self.report.add(properties.where, f"an exponent of {exponent:g}", "1")
+        return Phong(diffuse, specular, max(exponent, 1.0))
+
+    def _ward(self, properties: Properties) -> Material:
+        self.report.add(properties.where, "material 'ward'", "glossy")
+        properties.text("variant", "balanced")
+        parts = (
+            self.texture(properties, "diffuseReflectance", grey(0.5)),
+            self.texture(properties, "specularReflectance", grey(0.2)),
+        )
+        return Glossy(*parts, self._alphas(properties))
+
+    def _difftrans(self, properties: Properties) -> Material:
+        return Translucent(ConstantTexture(grey(0.0)), self.texture(properties, "transmittance", grey(0.5)))
+
+    def _twosided(self, properties: Properties) -> Material:
+        if len(self.inner(properties)) > 1:
+            self.report.add(properties.where, "another material on the back", "that of the front")
+        return self.one_inner(properties)
+
+    def _mask(self, properties: Properties) -> Material:
+        return Masked(self.one_inner(properties), self.texture(properties, "opacity", grey(0.5)))
+
+    def _blend(self, properties: Properties) -> Material:
+        parts = self.inner(properties)
+        if len(parts) != 2:
+            raise SceneError(f"{properties.where}: blendbsdf: expected two bsdfs inside, got {len(parts)}")
+        return MixMaterial(parts[0], parts[1], self.texture(properties, "weight", grey(0.5)))
+
+    def _mixture(self, properties: Properties) -> Material:
+        parts = self.inner(properties)
+        words = properties.text("weights", "").replace(",", " ").split()
+        try:
+            weights = [float(word) for word in words]
+        except ValueError:
+            weights = []
+        if not parts or len(weights) != len(parts) or not all(0.0 <= weight <= 1e6 for weight in weights):
+            raise SceneError(f"{properties.where}: mixturebsdf: expected as many weights as bsdfs")
+        total, made = weights[0], parts[0]
+        for weight, part in zip(weights[1:], parts[1:], strict=True):
+            total += weight
+            made = MixMaterial(made, part, ConstantTexture(grey(weight / total if total > 0.0 else 0.0)))
+        if abs(total - 1.0) > 1e-6:
+            self.report.add(properties.where, f"weights of a mixture that sum to {total:g}", "1")
+        return made
+
+    def _bump(self, properties: Properties) -> Material:
+        maps = [child for child in properties.rest if child.tag in ("texture", "ref")]
+        nodes = [self.find(child) if child.tag == "ref" else child for child in maps]
+        heights = [node for node in nodes if node.tag == "texture"]
+        if not heights:
+            raise SceneError(f"{properties.where}: bump: expected a texture inside")
+        return Bumped(self.one_inner(properties), self.made_texture(heights[0]))
+
+    def _coating(self, properties: Properties) -> Material:
+        properties.asked.update(properties.given)
+        self.report.add(properties.where, f"{properties.node.get('type')} over a material", "the material alone")
+        return self.one_inner(properties)

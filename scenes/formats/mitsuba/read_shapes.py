@@ -1,0 +1,173 @@
+"""Shapes of Mitsuba 0.5, into the canonical scene's instances.
+
+Source: Mitsuba 0.5 documentation, section on shapes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from scenes.arithmetic import norm, product
+from scenes.canonical import (
+    ConstantTexture,
+    Cube,
+    Disk,
+    Instance,
+    Material,
+    Matte,
+    Mesh,
+    Rectangle,
+    Rgb,
+    SceneError,
+    Shape,
+    Sphere,
+)
+from scenes.canonical.values import Matrix
+from scenes.formats.appearance.spectra import grey
+from scenes.formats.geometry import revolution
+from scenes.formats.geometry.mesh_files import read_obj, read_serialized
+from scenes.formats.geometry.meshed import FLIPPED, as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk
+from scenes.formats.geometry.ply_files import read_ply
+from scenes.formats.geometry.recognition import shape_of
+from scenes.formats.geometry.transform_stack import motion, moved_by, translation
+from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
+from scenes.formats.pbrt.read_shapes import facing_normals, turned
+from scenes.formats.text.scene_files import SceneFiles
+from scenes.formats.text.xml_tree import Node
+
+_SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized")
+_DEFAULT = Matte(ConstantTexture(grey(0.5)))
+
+
+class MitsubaShapes:
+    """Makes instances of elements; files of meshes are read once."""
+
+    def __init__(
+        self, files: SceneFiles, report: LossReport, surfaces: MitsubaSurfaces, find: Callable[[Node], Node]
+    ) -> None:
+        self.files, self.report, self.surfaces, self.find = files, report, surfaces, find
+        self.groups: dict[int, list[Instance]] = {}
+        self._meshes: dict[tuple, Mesh] = {}
+
+    def read(self, node: Node) -> list[Instance]:
+        """Instances of a shape: one, those of a group, or none, reported."""
+        kind, properties = node.get("type"), Properties(node, self.report)
+        if kind == "shapegroup":
+            parts = [child for child in properties.rest if child.tag == "shape"]
+            self.groups[id(node)] = [found for part in parts for found in self.read(part)]
+            return []
+        if kind == "instance":
+            return self._instances(properties)
+        if kind in ("hair", "heightfield", "deformable"):
+            self.report.add(properties.where, "hair" if kind == "hair" else f"shape {kind!r}")
+            return []
+        if kind not in _SHAPES:
+            self.report.unknown(properties.where, "shape", kind)
+            return []
+        keys, times_s = properties.motion()
+        track = motion(keys, times_s, properties.where, self.report)
+        material, emission = self._inside(properties)
+        shape, local = self._made(kind, properties, material)
+        if properties.truth("flipNormals", False):
+            shape = turned(as_mesh(shape))
+        self.surfaces.left_over(properties)
+        return [Instance(shape, material, product(keys[0], local), track, node.get("id"), emission)]
+
+    def _instances(self, properties: Properties) -> list[Instance]:
+        keys, times_s = properties.motion()
+        track = motion(keys, times_s, properties.where, self.report)
+        for child in properties.rest:
+            group = self.find(child) if child.tag == "ref" else child
+            if id(group) in self.groups:
+                self.surfaces.left_over(properties)
+                parts = self.groups[id(group)]
+                if track is not None and any(part.track is not None for part in parts):
+                    self.report.add(properties.where, "a motion within a motion", "that of the instance")
+                return [
+                    dataclasses.replace(
+                        part,
+                        to_world=product(keys[0], part.to_world),
+                        track=moved_by(keys[0], part.track) if track is None and part.track is not None else track,
+                    )
+                    for part in parts
+                ]
+        raise SceneError(f"{properties.where}: instance: expected a reference to a shapegroup before it")
+
+    def _inside(self, properties: Properties) -> tuple[Material, Rgb | None]:
+        """Material and emission of a shape."""
+        material, emission = None, None
+        for child in properties.rest:
+            node = self.find(child) if child.tag == "ref" else child
+            if node.tag == "bsdf":
+                material = self.surfaces.material(node)
+            elif node.tag == "emitter" and node.get("type") == "area":
+                inner = Properties(node, self.report)
+                emission = inner.color("radiance", grey(1.0))
+                if "samplingWeight" in inner:
+                    self.report.add(inner.where, "samplingWeight of a light", "the renderer's own choice")
+                    inner.asked.add("samplingWeight")
+                self.surfaces.left_over(inner)
+            elif node.tag in ("medium", "subsurface"):
+                self.report.add(str(node.place), f"{node.tag} (participating medium)")
+            elif node.tag not in ("texture",):
+                raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
+        return material or _DEFAULT, emission
+
+    def _made(self, kind: str, properties: Properties, material: Material) -> tuple[Shape, Matrix]:
+        where, place = properties.where, np.eye(4)
+        if kind == "sphere":
+            radius = properties.number("radius", 1.0)
+            if not radius > 0.0:
+                raise SceneError(f"{where}: radius: expected a positive number, got {radius:g}")
+            place = translation(*properties.vector("center", grey(0.0)).tolist())
+            return Sphere(radius), product(place, FLIPPED) if depends_on_uv(material) else place
+        if kind in ("rectangle", "cube", "disk"):
+            shapes = {"rectangle": Rectangle(), "cube": Cube(), "disk": Disk()}
+            if not depends_on_uv(material) or kind == "rectangle":
+                return shapes[kind], place
+            mesh = mitsuba_cube() if kind == "cube" else mitsuba_disk()
+            if kind == "disk":
+                self.report.add(where, "a textured disk", f"a mesh of {len(mesh.faces)} triangles")
+            return mesh, place
+        if kind == "cylinder":
+            return self._cylinder(properties)
+        return shape_of(self._file(kind, properties), material, where, self.report)
+
+    def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
+        first, last = properties.vector("p0", grey(0.0)), properties.vector("p1", (0.0, 0.0, 1.0))
+        radius, length = properties.number("radius", 1.0), norm(last - first)
+        if not (radius > 0.0 and length > 0.0):
+            raise SceneError(f"{properties.where}: cylinder: expected a radius and two ends apart")
+        axis = (last - first) / length
+        side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+        side /= norm(side)
+        place = np.eye(4)
+        place[:3] = np.stack([side, np.cross(axis, side), axis, first], axis=1)
+        mesh = revolution.cylinder(radius, 0.0, length)
+        self.report.add(properties.where, "shape 'cylinder'", f"a mesh of {len(mesh.faces)} triangles")
+        return mesh, place
+
+    def _file(self, kind: str, properties: Properties) -> Mesh:
+        path = self.files.path(properties.text("filename", ""), properties.where)
+        index = properties.whole("shapeIndex", 0, 0, 1 << 20)
+        faceted, flipped = properties.truth("faceNormals", False), properties.truth("flipTexCoords", kind == "obj")
+        if properties.number("maxSmoothAngle", 0.0):
+            self.report.add(properties.where, "maxSmoothAngle of a mesh", "its normals as they are")
+        key = (path, index, faceted, flipped)
+        if key not in self._meshes:
+            content = self.files.read(path, properties.where)
+            if kind == "serialized":
+                mesh = read_serialized(content, index, str(path))
+            else:
+                mesh = read_obj(content, str(path)) if kind == "obj" else read_ply(content, str(path))
+            uvs = mesh.uvs
+            if uvs is not None and flipped:
+                uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1).astype(np.float32)
+            mesh = facing_normals(mesh) if not faceted else mesh
+            self._meshes[key] = Mesh(mesh.vertices, mesh.faces, None if faceted else mesh.normals, uvs, str(path))
+        return self._meshes[key]

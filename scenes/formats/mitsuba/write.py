@@ -1,0 +1,285 @@
+"""The canonical scene as a Mitsuba 0.5 file, or in the names and plugins of Mitsuba 3.
+
+Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scenes.arithmetic import product
+from scenes.canonical import (
+    Camera,
+    Cube,
+    DirectionalLight,
+    Disk,
+    EnvironmentCamera,
+    Instance,
+    Light,
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    Rectangle,
+    Scene,
+    Sphere,
+    SpotLight,
+    SunSky,
+)
+from scenes.canonical.values import Matrix
+from scenes.daylight import facing_up
+from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.appearance.spot_profiles import reshaped
+from scenes.formats.geometry.meshed import FLIPPED, as_mesh, depends_on_uv
+from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
+from scenes.formats.losses import LossReport, first_of
+from scenes.formats.mitsuba.read import FAR, FILTERS, FORWARD
+from scenes.formats.mitsuba.write_materials import Element, MitsubaSurfaceWriter
+from scenes.formats.pbrt.write_materials import number
+from scenes.formats.text.output import Output
+
+_FILTERS = first_of(FILTERS)
+_SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "halton": "halton",
+             "hammersley": "hammersley"}  # fmt: skip
+_INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidirectional": "bdpt",
+                "photonmap": "photonmapper", "metropolis": "pssmlt"}  # fmt: skip
+
+
+@dataclass
+class MitsubaWriter(MitsubaSurfaceWriter):
+    """Elements of a scene, as they are made; ``modern`` is Mitsuba 3."""
+
+    shared: frozenset[PartKey] = frozenset()
+    _groups: dict[PartKey, str] = field(default_factory=dict)
+
+    # --- the scene -----------------------------------------------------------------------------------------------
+
+    def write(self, scene: Scene) -> None:
+        """Writes a scene."""
+        self.root.set("version", "3.0.0" if self.modern else "0.5.0")
+        self._integrator(scene)
+        self._sensor(scene)
+        for name, material in scene.materials.items():
+            self.material(material, name)
+        for light in (*scene.lights, *([scene.background] if scene.background is not None else [])):
+            self._emitter(light)
+        if scene.background is not None:
+            self.report.add(scene.name or "scene", "a background that is seen and does not light", "one that lights")
+        if scene.ambient != (0.0, 0.0, 0.0):
+            self.report.add(scene.name or "scene", "constant ambient light")
+        self.shared = shared_parts(scene)
+        for instance in scene.instances:
+            self._instance(instance)
+
+    def _integrator(self, scene: Scene) -> None:
+        kind, depth = _INTEGRATORS[scene.integrator.kind], scene.integrator.depth
+        if self.modern and kind in ("bdpt", "photonmapper", "pssmlt"):
+            self.report.add("integrator", scene.integrator.kind, "path")
+            kind = "path"
+        if scene.integrator.kind == "whitted":
+            kind = "path"  # follows mirrors and glass
+            self.report.add("integrator", "whitted", "path")
+        made = self.plugin("integrator", kind, self.root)
+        if kind != "direct":
+            self.put(made, "integer", "maxDepth", str(depth if depth < 0 else depth + 1))
+        elif depth != 1:
+            self.report.add("integrator", f"a depth of {depth}", "direct light")
+
+    def _sensor(self, scene: Scene) -> None:
+        camera, film = scene.camera, scene.film
+        made = self._camera(camera)
+        self.root.append(made)
+        kind = _SAMPLERS[scene.sampler.kind]
+        if self.modern and kind in ("sobol", "halton", "hammersley"):
+            self.report.add("sampler", kind, "independent")
+            kind = "independent"
+        sampler = self.plugin("sampler", kind, made)
+        self.put(sampler, "integer", "sampleCount", str(scene.sampler.samples_per_pixel))
+        holder = self.plugin("film", "hdrfilm", made)
+        self.put(holder, "integer", "width", str(film.width_px))
+        self.put(holder, "integer", "height", str(film.height_px))
+        rfilter = self.plugin("rfilter", _FILTERS[film.filter], holder)
+        if self.modern:
+            if film.filter == "tent":
+                self.put(rfilter, "float", "radius", number(film.filter_radius_px))
+            elif film.filter != "box":
+                self.report.add("film", f"a filter of radius {film.filter_radius_px:g}", "the width it has by default")
+        else:
+            self.put(rfilter, "float", "radius", number(film.filter_radius_px))
+
+    def _camera(self, camera: Camera) -> Element:
+        keys, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
+        local = FORWARD
+        if isinstance(camera, PerspectiveCamera):
+            made = self.plugin("sensor", "thinlens" if camera.lens_radius > 0.0 else "perspective")
+            self.put(made, "float", "fov", number(camera.fov_deg))
+            self.put(made, "string", "fovAxis", "smaller")
+            if camera.lens_radius > 0.0:
+                self.put(made, "float", "apertureRadius", number(camera.lens_radius))
+            if camera.lens_radius > 0.0 or (camera.focal_distance != FAR and not self.modern):
+                self.put(made, "float", "focusDistance", number(camera.focal_distance))
+            for name, value in zip(("shutterOpen", "shutterClose"), camera.shutter_s, strict=True):
+                if camera.shutter_s != (0.0, 0.0):
+                    self.put(made, "float", name, number(value))
+        elif isinstance(camera, OrthographicCamera):
+            made = self.plugin("sensor", "orthographic")
+            half = camera.half_width
+            local = product(FORWARD, np.diag([half, half, 1.0, 1.0]))
+        else:
+            made = self.plugin("sensor", "spherical" if isinstance(camera, EnvironmentCamera) else "perspective")
+            if self.modern or not isinstance(camera, EnvironmentCamera):
+                self.report.add("camera", type(camera).__name__, "one that the target may not have")
+        self._placing(made, [product(key, local) for key in keys], times_s, "camera", True)
+        return made
+
+    # --- lights and shapes ---------------------------------------------------------------------------------------
+
+    def _emitter(self, light: Light) -> None:
+        if isinstance(light, PointLight):
+            made = self.plugin("emitter", "point", self.root)
+            place = {axis: number(value) for axis, value in zip("xyz", light.position, strict=True)}
+            ElementTree.SubElement(made, "point", {"name": "position", **place})
+            self.color(made, "intensity", light.intensity)
+        elif isinstance(light, SpotLight):
+            light = reshaped(light, "linear", self.report)
+            made = self.plugin("emitter", "spot", self.root)
+            holder = ElementTree.SubElement(made, "transform", {"name": self.name("toWorld")})
+            ends = {name: ", ".join(number(value) for value in point) for name, point in
+                    (("origin", light.position), ("target", light.target))}  # fmt: skip
+            forward = np.subtract(light.target, light.position)
+            up = np.eye(3)[int(np.abs(forward).argmin())]
+            ElementTree.SubElement(holder, "lookat", {**ends, "up": ", ".join(number(value) for value in up)})
+            self.color(made, "intensity", light.intensity)
+            self.put(made, "float", "cutoffAngle", number(light.outer_deg))
+            self.put(made, "float", "beamWidth", number(light.inner_deg))
+        elif isinstance(light, DirectionalLight):
+            if light.angle_deg:
+                self.report.add("light", f"a sun of {light.angle_deg:g} degrees", "a parallel light")
+            made = self.plugin("emitter", "directional", self.root)
+            way = {axis: number(value) for axis, value in zip("xyz", light.direction, strict=True)}
+            ElementTree.SubElement(made, "vector", {"name": "direction", **way})
+            self.color(made, "irradiance", light.irradiance)
+        elif isinstance(light, SunSky):
+            self._daylight(light)
+        elif light.image.shape[:2] == (1, 1):
+            made = self.plugin("emitter", "constant", self.root)
+            self.color(made, "radiance", rgb(light.scale * light.image[0, 0].astype(np.float64)))
+        else:
+            made = self.plugin("emitter", "envmap", self.root)
+            self.put(made, "string", "filename", self.output.picture(light.image, light.source))
+            self.put(made, "float", "scale", number(light.scale))
+            self.matrix(made, "toWorld", light.to_world)
+
+    def _daylight(self, light: SunSky) -> None:
+        """Directions are those of the world here; the transform turns the zenith, y or in Mitsuba 3 z."""
+        kind = "sunsky" if self.modern or light.part == "both" else light.part
+        made = self.plugin("emitter", kind, self.root)
+        way = {axis: number(value) for axis, value in zip("xyz", light.sun_direction, strict=True)}
+        ElementTree.SubElement(made, "vector", {"name": self.name("sunDirection"), **way})
+        air = light
+        if self.modern and not 1.0 <= light.turbidity <= 10.0:
+            air = dataclasses.replace(light, turbidity=min(max(light.turbidity, 1.0), 10.0))
+            self.report.add("light", f"a turbidity of {light.turbidity:g}", f"{air.turbidity:g}")
+        self.put(made, "float", "turbidity", number(air.turbidity))
+        self.color(made, "albedo", grey(light.ground_albedo))
+        if self.modern:
+            for part in ("sun", "sky"):
+                self.put(made, "float", f"{part}Scale", number(light.scale if light.part in (part, "both") else 0.0))
+        else:
+            self.put(made, "float", "scale", number(light.scale))
+        turn = facing_up(light.up, 2 if self.modern else 1)
+        if not np.array_equal(turn, np.eye(4)):
+            self.matrix(made, "toWorld", turn)
+
+    def _instance(self, instance: Instance) -> None:
+        """A shape in its place; shared and moving ones as instances of a group, which alone may move."""
+        keys, times_s = motion_keys(instance.track, instance.to_world)
+        where, shared = instance.name or "shape", part_key(instance) in self.shared
+        if shines(instance) or not (shared or (len(keys) > 1 and not self.modern)):
+            made, local = self._shape(instance)
+            self.root.append(made)
+            self._placing(made, [product(key, local) for key in keys], times_s, where)
+            return
+        key = part_key(instance)
+        if key not in self._groups:
+            made, local = self._shape(instance)
+            label = self.label("group")
+            self.plugin("shape", "shapegroup", self.root, id=label).append(made)
+            self._placing(made, [local], [0.0], where)
+            self._groups[key] = label
+        made = self.plugin("shape", "instance", self.root)
+        ElementTree.SubElement(made, "ref", {"id": self._groups[key]})
+        self._placing(made, keys, times_s, where, True)
+
+    def _placing(
+        self, made: Element, keys: list[Matrix], times_s: list[float], where: str, may_move: bool = False
+    ) -> None:
+        """The transform of an element, or its animation."""
+        if len(keys) > 1 and may_move and not self.modern:
+            holder = ElementTree.SubElement(made, "animation", {"name": "toWorld"})
+            for key, time_s in zip(keys, times_s, strict=True):
+                step = ElementTree.SubElement(holder, "transform", {"time": repr(float(time_s))})
+                values = " ".join(repr(float(value)) for value in key.ravel())
+                ElementTree.SubElement(step, "matrix", {"value": values})
+            return
+        if len(keys) > 1:
+            what = "the motion of the camera" if where == "camera" else "the motion of a shape"
+            self.report.add(where, what, "its place at the start")
+        if not np.array_equal(keys[0], np.eye(4)):
+            self.matrix(made, "toWorld", keys[0])
+
+    def _as_triangles(self, instance: Instance) -> bool:
+        """Whether a shape is not one of Mitsuba's: by its texture coordinates, or as a sphere that is stretched."""
+        shape, textured = instance.shape, depends_on_uv(instance.material)
+        if isinstance(shape, Cube | Disk):
+            return textured
+        if not isinstance(shape, Sphere):
+            return False
+        axes = instance.to_world[:3, :3]
+        even = product(axes.T, axes)
+        stretched = np.abs(even - even.trace() / 3.0 * np.eye(3)).max() > 1e-4 * even.trace()
+        return bool(stretched) or (textured and float(np.linalg.det(axes)) > 0.0)
+
+    def _shape(self, instance: Instance) -> tuple[Element, Matrix]:
+        """A shape's element without its place, and the transform of its own size."""
+        shape, material = instance.shape, instance.material
+        if self._as_triangles(instance):
+            if isinstance(shape, Disk | Sphere):
+                what = f"{'a textured' if depends_on_uv(material) else 'a stretched'} {type(shape).__name__.lower()}"
+                became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
+                self.report.add(instance.name or "shape", what, became)
+            shape = as_mesh(shape)
+        label, local = self.material(material), np.eye(4)
+        kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
+        made = self.plugin("shape", kinds[type(shape)])
+        if isinstance(shape, Mesh):
+            self.put(made, "string", "filename", self.output.mesh(shape))
+            if shape.normals is None:
+                self.put(made, "boolean", "faceNormals", "true")
+        elif isinstance(shape, Sphere):
+            self.put(made, "float", "radius", number(shape.radius))
+            local = FLIPPED if np.linalg.det(instance.to_world[:3, :3]) < 0.0 else local
+        elif isinstance(shape, Disk):
+            local = np.diag([shape.radius, shape.radius, 1.0, 1.0])
+        ElementTree.SubElement(made, "ref", {"id": label})
+        emission = radiance_of(instance, self.report)
+        if emission is not None:
+            self.color(self.plugin("emitter", "area", made), "radiance", emission)
+        return made, local
+
+
+def save_mitsuba(scene: Scene, output: Output, report: LossReport, modern: bool = False) -> None:
+    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    writer = MitsubaWriter(output, report, modern)
+    writer.write(scene)
+    ElementTree.indent(writer.root, "\t")
+    output.text(output.path.name, ElementTree.tostring(writer.root, "unicode", xml_declaration=True) + "\n")
+
+
+def save_mitsuba3(scene: Scene, output: Output, report: LossReport) -> None:
+    """The same for Mitsuba 3."""
+    save_mitsuba(scene, output, report, modern=True)

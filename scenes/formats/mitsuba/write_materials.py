@@ -1,0 +1,325 @@
+"""Textures and materials of the canonical scene as elements of a Mitsuba file.
+
+Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scenes.arithmetic import tan
+from scenes.canonical import (
+    Bumped,
+    CheckerboardTexture,
+    ConstantTexture,
+    Emissive,
+    Glass,
+    Glossy,
+    HeightField,
+    ImageTexture,
+    Masked,
+    Material,
+    Matte,
+    Metal,
+    Mirror,
+    MixMaterial,
+    Phong,
+    Plastic,
+    Texture,
+    Translucent,
+    Uber,
+)
+from scenes.canonical.values import Matrix, Rgb
+from scenes.formats.appearance.folding import folded
+from scenes.formats.appearance.spectra import rgb
+from scenes.formats.losses import LossReport
+from scenes.formats.pbrt.read_materials import mean_of
+from scenes.formats.pbrt.write_materials import number
+from scenes.formats.text.output import Output
+
+Element = ElementTree.Element
+
+BLUNT = 0.002
+"""Alpha of mirrors in mixtures for Mitsuba 3."""
+
+_NEW_NAMES = {"toWorld": "to_world", "intIOR": "int_ior", "extIOR": "ext_ior"}
+
+
+@dataclass
+class MitsubaSurfaceWriter:
+    """Elements of a scene, as they are made; ``modern`` is Mitsuba 3."""
+
+    output: Output
+    report: LossReport
+    modern: bool = False
+    root: Element = field(default_factory=lambda: Element("scene"))
+    _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
+    _folded: dict[int, tuple[Texture, Texture]] = field(default_factory=dict)
+    _taken: set[str] = field(default_factory=set)
+
+    # --- elements ------------------------------------------------------------------------------------------------
+
+    def name(self, text: str) -> str:
+        """A property's name in the flavour that is written."""
+        if not self.modern:
+            return text
+        return _NEW_NAMES.get(text) or re.sub(r"(?<!^)(?=[A-Z])", "_", text).lower()
+
+    def plugin(self, tag: str, kind: str, parent: Element | None = None, **named: str) -> Element:
+        """An element of a kind."""
+        made = Element(tag, {"type": kind, **named})
+        if parent is not None:
+            parent.append(made)
+        return made
+
+    def put(self, parent: Element, tag: str, name: str, value: str) -> None:
+        """A property."""
+        ElementTree.SubElement(parent, tag, {"name": self.name(name), "value": value})
+
+    def matrix(self, parent: Element, name: str, matrix: Matrix) -> None:
+        """A transform."""
+        holder = ElementTree.SubElement(parent, "transform", {"name": self.name(name)})
+        ElementTree.SubElement(holder, "matrix", {"value": " ".join(repr(float(value)) for value in matrix.ravel())})
+
+    def color(self, parent: Element, name: str, value: Rgb) -> None:
+        """A colour, linear."""
+        self.put(parent, "rgb", name, ", ".join(number(part) for part in value))
+
+    def texture(self, parent: Element, texture: Texture, name: str) -> None:
+        """A texture or colour as a property."""
+        if id(texture) not in self._folded:
+            self._folded[id(texture)] = texture, folded(texture)
+        texture = self._folded[id(texture)][1]
+        if isinstance(texture, ConstantTexture):
+            self.color(parent, name, texture.value)
+            return
+        if isinstance(texture, ImageTexture):
+            made = self.plugin("texture", "bitmap", parent, name=self.name(name))
+            self.put(made, "string", "filename", self.output.picture(texture.image, texture.source))
+            self.put(made, "string", "wrapMode", "clamp" if texture.wrap == "black" and self.modern else
+                     {"repeat": "repeat", "clamp": "clamp", "black": "zero"}[texture.wrap])  # fmt: skip
+            kind = {"nearest": "nearest", "bilinear": "trilinear", "mipmap": "ewa"}[texture.filter]
+            if texture.filter == "bilinear" and not self.modern:
+                self.report.add(name, "a texture without levels of detail", "trilinear")
+            if self.modern:
+                kind = "nearest" if texture.filter == "nearest" else "bilinear"
+            self.put(made, "string", "filterType", kind)
+            # the first row is at v = 0 here
+            self._uv(
+                made, (texture.uv_scale[0], -texture.uv_scale[1]), (texture.uv_offset[0], 1.0 - texture.uv_offset[1])
+            )
+        elif isinstance(texture, CheckerboardTexture):
+            made = self.plugin("texture", "checkerboard", parent, name=self.name(name))
+            self.texture(made, texture.even, "color0")
+            self.texture(made, texture.odd, "color1")
+            self._uv(made, (0.5 * texture.uv_scale[0], 0.5 * texture.uv_scale[1]), (0.0, 0.0))
+        else:
+            self.report.add(name, f"texture {type(texture).__name__}", "its mean")
+            self.color(parent, name, mean_of(texture))
+
+    def _uv(self, made: Element, scale: tuple[float, float], offset: tuple[float, float]) -> None:
+        if self.modern:
+            holder = ElementTree.SubElement(made, "transform", {"name": "to_uv"})
+            size = {"x": number(scale[0]), "y": number(scale[1]), "z": "1"}
+            ElementTree.SubElement(holder, "scale", size)
+            ElementTree.SubElement(holder, "translate", {"x": number(offset[0]), "y": number(offset[1]), "z": "0"})
+            return
+        for name, value in zip(("uscale", "vscale", "uoffset", "voffset"), (*scale, *offset), strict=True):
+            if value != (0.0 if name.endswith("offset") else 1.0):
+                self.put(made, "float", name, number(value))
+
+    def label(self, wanted: str) -> str:
+        """An identifier that nothing has yet."""
+        label, count = wanted, 1
+        while label in self._taken:
+            count += 1
+            label = f"{wanted}{count}"
+        self._taken.add(label)
+        return label
+
+    def material(self, material: Material, name: str = "") -> str:
+        """Identifier of a material, written before where it is new."""
+        if id(material) not in self._materials:
+            label = self.label(re.sub(r"[^\w.-]", "_", name) or "m")
+            made = self.bsdf(material, f"material {name or type(material).__name__!r}")
+            made.set("id", label)
+            self.root.append(made)
+            self._materials[id(material)] = material, label
+        return self._materials[id(material)][1]
+
+    def bsdf(self, material: Material, where: str) -> Element:
+        """The element of a material; opaque ones have two sides."""
+        if isinstance(material, Masked):
+            made = self.plugin("bsdf", "mask")
+            self.texture(made, material.opacity, "opacity")
+            made.append(self.bsdf(material.base, where))
+            return made
+        if isinstance(material, MixMaterial):
+            made = self.plugin("bsdf", "blendbsdf")
+            amount = material.amount
+            if isinstance(amount, ConstantTexture):  # a number: Mitsuba 0.5 takes no colour here
+                if len(set(amount.value)) > 1:
+                    self.report.add(where, "a mixture of each colour by itself", "by their mean")
+                self.put(made, "float", "weight", number(float(np.mean(amount.value))))
+            else:
+                self.texture(made, amount, "weight")
+            for part in (material.first, material.second):
+                made.append(self.bsdf(self._blunt(part, where) if self.modern else part, where))
+            return made
+        if isinstance(material, Bumped):
+            made = self.plugin("bsdf", "bumpmap" if self.modern else "bump")
+            self.texture(made, material.height, "map")
+            if isinstance(material.height, ConstantTexture):
+                return self.bsdf(material.base, where)
+            made.append(self.bsdf(material.base, where))
+            return made
+        if isinstance(material, HeightField):
+            self.report.add(where, "a height field", "its material, flat")
+            return self.bsdf(material.base, where)
+        if isinstance(material, Glass):
+            return self._glass(material, where)
+        if isinstance(material, Translucent):
+            return self._translucent(material, where)
+        both = self.plugin("bsdf", "twosided")
+        both.append(self._opaque(material, where))
+        return both
+
+    def _blunt(self, material: Material, where: str) -> Material:
+        """A sharp mirror or glass with facets of a small alpha: Mitsuba 3.9's blend of a sharp one loses light."""
+        made = material
+        if isinstance(material, Mirror):
+            made = Metal((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (BLUNT, BLUNT), material.reflectance)
+        elif isinstance(material, Metal | Glass) and material.roughness == (0.0, 0.0):
+            made = dataclasses.replace(material, roughness=(BLUNT, BLUNT))
+        if made is not material:
+            self.report.add(where, "a sharp mirror or glass in a mixture", f"one of alpha {BLUNT:g}")
+        return made
+
+    def _opaque(self, material: Material, where: str) -> Element:
+        if isinstance(material, Matte):
+            rough = material.sigma_deg > 0.0 and not self.modern
+            made = self.plugin("bsdf", "roughdiffuse" if rough else "diffuse")
+            self.texture(made, material.reflectance, "reflectance")
+            if rough:
+                self.put(made, "float", "alpha", number(tan(math.radians(material.sigma_deg)) * math.sqrt(2.0)))
+            elif material.sigma_deg:
+                self.report.add(where, f"a roughness of {material.sigma_deg:g} degrees", "smooth")
+            return made
+        if isinstance(material, Mirror):
+            if material.spread_deg:
+                self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
+            made = self.plugin("bsdf", "conductor")
+            self.put(made, "string", "material", "none")
+            self.texture(made, material.reflectance, "specularReflectance")
+            return made
+        if isinstance(material, Metal):
+            smooth = material.roughness == (0.0, 0.0)
+            made = self.plugin("bsdf", "conductor" if smooth else "roughconductor")
+            self.color(made, "eta", material.eta)
+            self.color(made, "k", material.k)
+            if not self.modern:
+                self.put(made, "float", "extEta", "1")
+            if material.reflectance_scale != ConstantTexture((1.0, 1.0, 1.0)):
+                self.texture(made, material.reflectance_scale, "specularReflectance")
+            if not smooth:
+                self.put(made, "string", "distribution", material.distribution)
+                self._alphas(made, material.roughness)
+            return made
+        if isinstance(material, Emissive):
+            made = self.plugin("bsdf", "diffuse")
+            self.color(made, "reflectance", (0.0, 0.0, 0.0))
+            return made
+        if isinstance(material, Phong) and not self.modern:
+            if material.fresnel_max > 0.0:
+                self.report.add(where, "the mirror of Phong reflection", "left out")
+            made = self.plugin("bsdf", "phong")
+            self.texture(made, material.diffuse, "diffuseReflectance")
+            self.color(made, "specularReflectance", material.specular)
+            self.put(made, "float", "exponent", number(material.exponent))
+            return made
+        return self._plastic(material, where)
+
+    def _plastic(self, material: Material, where: str) -> Element:
+        """A dielectric coat over a diffuse base, or what comes nearest to it."""
+        if isinstance(material, Plastic):
+            parts = material.diffuse, material.specular, material.ior, material.roughness
+        elif isinstance(material, Glossy | Uber):
+            # Fresnel's equations of an index reflect at normal incidence what the coat does
+            alpha = math.sqrt(material.roughness[0] * material.roughness[1])
+            coat = np.array(mean_of(material.specular)) * (1.0 if isinstance(material, Glossy) else 0.04)
+            most = float(np.clip(coat.max(), 1e-4, 0.25))
+            if coat.max() > most:
+                self.report.add(where, f"a coat that reflects {coat.max():.3g}", f"one that reflects {most:.3g}")
+            index = (1.0 + math.sqrt(most)) / (1.0 - math.sqrt(most))
+            parts = material.diffuse, ConstantTexture(rgb(np.minimum(coat / most, 1.0))), index, alpha
+            self.report.add(where, type(material).__name__.lower(), f"rough plastic of alpha {alpha:.3g}")
+        else:
+            assert isinstance(material, Phong)
+            alpha = math.sqrt(2.0 / (material.exponent + 2.0))
+            parts = material.diffuse, ConstantTexture((1.0, 1.0, 1.0)), 1.5, alpha
+            self.report.add(where, "Phong reflection", f"rough plastic of alpha {alpha:.3g}")
+        made = self.plugin("bsdf", "roughplastic" if parts[3] > 0.0 else "plastic")
+        self.texture(made, parts[0], "diffuseReflectance")
+        self.texture(made, parts[1], "specularReflectance")
+        self.put(made, "float", "intIOR", number(parts[2]))
+        self.put(made, "float", "extIOR", "1")
+        if parts[3] > 0.0:
+            self.put(made, "float", "alpha", number(parts[3]))
+        return made
+
+    def _alphas(self, made: Element, alphas: tuple[float, float]) -> None:
+        if alphas[0] == alphas[1]:
+            self.put(made, "float", "alpha", number(alphas[0]))
+        else:
+            self.put(made, "float", "alphaU", number(alphas[0]))
+            self.put(made, "float", "alphaV", number(alphas[1]))
+
+    def _glass(self, material: Glass, where: str) -> Element:
+        if material.spread_deg:
+            self.report.add(where, "rays spread about the perfect ones", "clear glass")
+        rough = material.roughness != (0.0, 0.0)
+        if rough and material.thin:
+            self.report.add(where, "a rough pane", "a clear one")
+        kind = "thindielectric" if material.thin else "roughdielectric" if rough else "dielectric"
+        made = self.plugin("bsdf", kind)
+        self.put(made, "float", "intIOR", number(material.ior))
+        self.put(made, "float", "extIOR", "1")
+        for texture, name in (
+            (material.reflectance, "specularReflectance"),
+            (material.transmittance, "specularTransmittance"),
+        ):
+            if texture != ConstantTexture((1.0, 1.0, 1.0)):
+                self.texture(made, texture, name)
+        if kind == "roughdielectric":
+            self.put(made, "string", "distribution", "ggx")
+            self._alphas(made, material.roughness)
+        return made
+
+    def _translucent(self, material: Translucent, where: str) -> Element:
+        if self.modern:
+            self.report.add(where, "diffuse transmission", "diffuse reflection alone")
+        if self.modern or mean_of(material.transmittance) == (0.0, 0.0, 0.0):
+            both = self.plugin("bsdf", "twosided")
+            self.texture(self.plugin("bsdf", "diffuse", both), material.reflectance, "reflectance")
+            return both
+        if mean_of(material.reflectance) == (0.0, 0.0, 0.0):
+            made = self.plugin("bsdf", "difftrans")
+            self.texture(made, material.transmittance, "transmittance")
+            return made
+        self.report.add(where, "diffuse reflection beside transmission", "a mixture of both")
+        made = self.plugin("bsdf", "mixturebsdf")
+        self.put(made, "string", "weights", "0.5, 0.5")
+        both = self.plugin("bsdf", "twosided", made)
+        twice = [
+            ConstantTexture(rgb(2.0 * np.array(mean_of(part))))
+            for part in (material.reflectance, material.transmittance)
+        ]
+        self.texture(self.plugin("bsdf", "diffuse", both), twice[0], "reflectance")
+        self.texture(self.plugin("bsdf", "difftrans", made), twice[1], "transmittance")
+        return made

@@ -1,0 +1,151 @@
+"""Shapes of PBRT v3 and LuxRender files, into the canonical scene's.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on shapes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from scenes.canonical import Disk, Mesh, SceneError, Shape, Sphere
+from scenes.canonical.values import Matrix
+from scenes.formats.geometry import revolution
+from scenes.formats.geometry.ply_files import checked_mesh, read_ply
+from scenes.formats.losses import LossReport
+from scenes.formats.text.directives import Parameters
+from scenes.formats.text.scene_files import SceneFiles
+
+
+@dataclass
+class ShapeReader:
+    """Makes shapes of parameters; files of meshes are read once.
+
+    Attributes:
+        files: for meshes.
+        report: of what could not be kept.
+    """
+
+    files: SceneFiles
+    report: LossReport
+    _meshes: dict[Path, Mesh] = field(default_factory=dict)
+
+    def made(self, kind: str, parameters: Parameters, turn_over: bool, beside: Path) -> tuple[Shape, Matrix] | None:
+        """A shape and where it lies in the current space; None for what cannot be had, reported."""
+        where = str(parameters.place)
+        if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
+            mesh = self._ply(parameters, beside) if kind == "plymesh" else self._triangles(parameters)
+            if kind == "loopsubdiv":
+                parameters.asked.update(parameters.given)
+                self.report.add(where, "a subdivision surface", "its control mesh")
+            return facing_normals(turned(mesh) if turn_over else mesh), np.eye(4)
+        if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
+            return self._quadric(kind, parameters, turn_over)
+        parameters.asked.update(parameters.given)
+        if kind in ("curve", "hairfile"):
+            self.report.add(where, f"hair ({kind})")
+        elif kind in ("nurbs", "heightfield", "stlmesh", "torus", "lenscomponent"):
+            self.report.add(where, f"shape {kind!r}")
+        else:
+            self.report.unknown(where, "shape", kind)
+        return None
+
+    def _quadric(self, kind: str, parameters: Parameters, turn_over: bool) -> tuple[Shape, Matrix]:
+        place = np.eye(4)
+        radius = parameters.number("radius", 1.0)
+        if not radius > 0.0:
+            raise SceneError(f"{parameters.place}: radius: expected a positive number, got {radius:g}")
+        turn = parameters.number("phimax", 360.0)
+        if not 0.0 < turn <= 360.0:
+            raise SceneError(f"{parameters.place}: phimax: expected an angle in (0, 360], got {turn:g}")
+        if kind == "sphere":
+            low, high = parameters.number("zmin", -radius), parameters.number("zmax", radius)
+            if turn == 360.0 and low <= -radius and high >= radius and not turn_over:
+                return Sphere(radius), place
+            if not min(low, high) < radius or not max(low, high) > -radius or low == high:
+                raise SceneError(f"{parameters.place}: zmin, zmax: expected heights within the sphere")
+            mesh = revolution.partial_sphere(radius, max(low, -radius), min(high, radius), turn)
+        elif kind == "disk":
+            inner, height = parameters.number("innerradius", 0.0), parameters.number("height", 0.0)
+            if turn == 360.0 and inner == 0.0 and not turn_over:
+                place[2, 3] = height
+                return Disk(radius), place
+            if not 0.0 <= inner < radius:
+                raise SceneError(f"{parameters.place}: innerradius: expected less than the radius, got {inner:g}")
+            mesh = revolution.ring(radius, inner, height, turn)
+        elif kind == "cylinder":
+            heights = parameters.number("zmin", -1.0), parameters.number("zmax", 1.0)
+            mesh = revolution.cylinder(radius, *_apart(heights, parameters), turn)
+        elif kind == "cone":
+            mesh = revolution.cone(radius, *_apart((0.0, parameters.number("height", 1.0)), parameters)[1:], turn)
+        elif kind == "paraboloid":
+            heights = parameters.number("zmin", 0.0), parameters.number("zmax", 1.0)
+            if not 0.0 <= heights[0] < heights[1]:
+                raise SceneError(f"{parameters.place}: paraboloid: expected 0 <= zmin < zmax")
+            mesh = revolution.paraboloid(radius, *heights, turn)
+        else:
+            ends = [parameters.numbers(name, 3) for name in ("p1", "p2")]
+            first = np.zeros(3) if ends[0] is None else ends[0]
+            second = np.ones(3) if ends[1] is None else ends[1]
+            if np.array_equal(first, second):
+                raise SceneError(f"{parameters.place}: hyperboloid: expected p1 and p2 apart")
+            mesh = revolution.hyperboloid(first, second, turn)
+        self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
+        return (turned(mesh) if turn_over else mesh), place
+
+    def _ply(self, parameters: Parameters, beside: Path) -> Mesh:
+        where = str(parameters.place)
+        path = self.files.path(parameters.text("filename", ""), where, beside)
+        if path not in self._meshes:
+            self._meshes[path] = facing_normals(read_ply(self.files.read(path, where), str(path)))
+        return self._meshes[path]
+
+    def _triangles(self, parameters: Parameters) -> Mesh:
+        points, indices = parameters.numbers("P"), parameters.numbers("indices")
+        if indices is None:
+            indices = parameters.numbers("triindices")
+        where = str(parameters.place)
+        if points is None or indices is None or len(points) % 3 or len(indices) % 3 or not len(indices):
+            raise SceneError(f"{where}: expected points P and indices, in threes")
+        normals = parameters.numbers("N")
+        pairs = [found for found in (parameters.numbers(name) for name in ("uv", "st")) if found is not None]
+        if parameters.numbers("S") is not None:
+            self.report.add(where, "tangents S of a mesh", "those of its texture coordinates")
+        count = len(points) // 3
+        for name, array, width in (("N", normals, 3), ("uv", pairs[0] if pairs else None, 2)):
+            if array is not None and len(array) != width * count:
+                raise SceneError(f"{where}: {name}: expected {width * count} numbers, got {len(array)}")
+        return checked_mesh(
+            points.reshape(-1, 3),
+            indices.reshape(-1, 3),
+            None if normals is None else normals.reshape(-1, 3),
+            pairs[0].reshape(-1, 2) if pairs else None,
+            where,
+        )
+
+
+def _apart(heights: tuple[float, float], parameters: Parameters) -> tuple[float, float]:
+    if heights[0] == heights[1]:
+        raise SceneError(f"{parameters.place}: expected two different heights, got {heights[0]:g} twice")
+    return heights
+
+
+def turned(mesh: Mesh) -> Mesh:
+    """The mesh with its outside in."""
+    normals = None if mesh.normals is None else -mesh.normals
+    return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
+
+
+def facing_normals(mesh: Mesh) -> Mesh:
+    """The mesh with every face counter-clockwise seen from where its normals point."""
+    if mesh.normals is None:
+        return mesh
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    wrong = (across * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
+    if not wrong.any():
+        return mesh
+    faces = np.where(wrong[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces).astype(np.int32)
+    return Mesh(mesh.vertices, faces, mesh.normals, mesh.uvs, mesh.source)

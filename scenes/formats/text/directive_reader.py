@@ -1,0 +1,201 @@
+"""Reads PBRT-like files: includes, transforms, attributes. What the other directives mean is the dialect's.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3).
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from scenes.canonical import Material, SceneError, Texture
+from scenes.canonical.values import Matrix
+from scenes.formats.geometry.transform_stack import TransformStack, look_at, rotation, scaling, translation
+from scenes.formats.losses import LossReport
+from scenes.formats.text.directives import Directive, Parameters, Place, parameters_of, parse_directives
+from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
+
+SAVED_MAX = 1024
+"""Attribute blocks inside each other."""
+
+
+@dataclass
+class Attributes:
+    """What ``AttributeBegin`` saves besides the transform."""
+
+    material: Material | None = None
+    emission: tuple[float, float, float] | None = None
+    power: float = 0.0  # lumens that scale the emission, 0 for none
+    reversed: bool = False
+
+
+@dataclass
+class DirectiveReader:
+    """State while a file is read; a dialect adds the directives that describe a scene.
+
+    Attributes:
+        files: what may be read.
+        report: of what could not be kept.
+        left_handed: whether ``LookAt`` has x to the right in a left-handed world.
+    """
+
+    files: SceneFiles
+    report: LossReport
+    left_handed: bool = True
+    transforms: TransformStack = field(default_factory=TransformStack)
+    attributes: Attributes = field(default_factory=Attributes)
+    textures: dict[str, Texture] = field(default_factory=dict)
+    materials: dict[str, Material] = field(default_factory=dict)
+    _saved: list[tuple[str, Attributes | None]] = field(default_factory=list)
+    _including: list[Path] = field(default_factory=list)
+
+    def read(self, path: Path) -> None:
+        """Reads a file and what it includes.
+
+        Raises:
+            SceneError: something in it is not as it must be; file, line, column.
+        """
+        where = f"{self._including[-1]}" if self._including else str(path)
+        if path in self._including:
+            raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
+        if len(self._including) >= DEPTH_MAX:
+            raise SceneError(f"{where}: expected at most {DEPTH_MAX} files inside each other")
+        self._including.append(path)
+        for directive in parse_directives(self.files.text(path, where), path.name):
+            self._do(directive)
+        self._including.pop()
+
+    def finish(self) -> None:
+        """Raises SceneError where a block is still open."""
+        if self._saved:
+            raise SceneError(f"{self.files.main}: expected every block to end, {self._saved[-1][0]}Begin does not")
+
+    @property
+    def beside(self) -> Path:
+        """The file that is being read."""
+        return self._including[-1] if self._including else self.files.main
+
+    def dialect(self) -> dict[str, Callable[[Directive], None]]:
+        """Directives of the dialect by name."""
+        raise NotImplementedError
+
+    def _do(self, directive: Directive) -> None:
+        own = self.dialect().get(directive.name) or self._common().get(directive.name)
+        if own is None:
+            raise SceneError(f"{directive.place}: expected a directive, got {directive.name!r}")
+        own(directive)
+
+    def _common(self) -> dict[str, Callable[[Directive], None]]:
+        apply = self.transforms.apply
+        return {
+            "Include": lambda d: self.read(self.files.path(word(d), str(d.place), self.beside)),
+            "Identity": lambda d: self.transforms.replace(np.eye(4)),
+            "Translate": lambda d: apply(translation(*numbers(d, 3))),
+            "Scale": lambda d: apply(checked(d, scaling(*numbers(d, 3)))),
+            "Rotate": lambda d: apply(rotation(*numbers(d, 4))),
+            "LookAt": self._look_at,
+            "Transform": lambda d: self.transforms.replace(checked(d, matrix(d))),
+            "ConcatTransform": lambda d: apply(checked(d, matrix(d))),
+            "CoordinateSystem": self._name_system,
+            "CoordSysTransform": self._take_system,
+            # "ActiveTransform StartTime" is two bare words
+            "ActiveTransform": lambda d: None,
+            "StartTime": lambda d: setattr(self.transforms, "active", (True, False)),
+            "EndTime": lambda d: setattr(self.transforms, "active", (False, True)),
+            "All": lambda d: setattr(self.transforms, "active", (True, True)),
+            "TransformTimes": self._set_times,
+            "AttributeBegin": lambda d: self._begin("Attribute", d),
+            "AttributeEnd": lambda d: self._end("Attribute", d),
+            "TransformBegin": lambda d: self._begin("Transform", d),
+            "TransformEnd": lambda d: self._end("Transform", d),
+            "ReverseOrientation": lambda d: setattr(self.attributes, "reversed", not self.attributes.reversed),
+        }
+
+    def _look_at(self, directive: Directive) -> None:
+        eye, target, up = np.array(numbers(directive, 9)).reshape(3, 3)
+        found = look_at(eye, target, up, self.left_handed)
+        if found is None:
+            raise SceneError(f"{directive.place}: LookAt: expected an upward direction across the line of sight")
+        self.transforms.apply(found)
+
+    def _name_system(self, directive: Directive) -> None:
+        self.transforms.named[word(directive)] = [part.copy() for part in self.transforms.current]
+
+    def _take_system(self, directive: Directive) -> None:
+        name = word(directive)
+        if name not in self.transforms.named:
+            self.report.add(str(directive.place), f"coordinate system {name!r}, which nothing defines")
+        else:
+            self.transforms.take(name)
+
+    def _set_times(self, directive: Directive) -> None:
+        start, end = numbers(directive, 2)
+        self.transforms.times_s = start, end
+
+    def _begin(self, kind: str, directive: Directive) -> None:
+        if len(self._saved) >= SAVED_MAX:
+            raise SceneError(f"{directive.place}: expected at most {SAVED_MAX} blocks inside each other")
+        self.transforms.push()
+        self._saved.append((kind, copy.copy(self.attributes) if kind != "Transform" else None))
+
+    def _end(self, kind: str, directive: Directive) -> None:
+        if not self._saved or self._saved[-1][0] != kind:
+            found = f"{self._saved[-1][0]}Begin" if self._saved else "none"
+            raise SceneError(f"{directive.place}: {kind}End: expected a {kind}Begin before it, got {found}")
+        self.transforms.pop()
+        _, attributes = self._saved.pop()
+        if attributes is not None:
+            self.attributes = attributes
+
+    def left_over(self, parameters: Parameters, what: str) -> None:
+        """Reports parameters that nothing asked for."""
+        for name in parameters.unasked():
+            self.report.add(str(parameters.place), f"{what}: parameter {name!r}")
+
+
+def word(directive: Directive, at: int = 0) -> str:
+    """A string value of a directive; raises SceneError where there is none."""
+    found = directive.values[at] if at < len(directive.values) else None
+    if not isinstance(found, tuple) or len(found) != 1:
+        raise SceneError(f"{directive.place}: {directive.name}: expected a string")
+    return found[0]
+
+
+def numbers(directive: Directive, count: int) -> list[float]:
+    """The numbers of a directive, bracketed or not; raises SceneError for another count."""
+    found: list[float] = []
+    for value in directive.values:
+        if isinstance(value, tuple):
+            raise SceneError(f"{directive.place}: {directive.name}: expected {count} numbers, got {value!s:.40}")
+        found.extend(value.tolist())
+    if len(found) != count:
+        raise SceneError(f"{directive.place}: {directive.name}: expected {count} numbers, got {len(found)}")
+    return found
+
+
+def matrix(directive: Directive) -> Matrix:
+    """Sixteen numbers, column by column."""
+    return np.array(numbers(directive, 16)).reshape(4, 4).T.copy()
+
+
+def checked(directive: Directive, found: Matrix) -> Matrix:
+    """A transform that can be inverted; raises SceneError for another."""
+    part = found[:3, :3]
+    size = np.abs(part).max(initial=0.0)
+    if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0:
+        raise SceneError(
+            f"{directive.place}: {directive.name}: expected a matrix that can be inverted, last row 0 0 0 1"
+        )
+    return found
+
+
+def typed(directive: Directive) -> tuple[str, Parameters]:
+    """Kind of a directive and its parameters."""
+    return word(directive), parameters_of(directive, 1)
+
+
+__all__ = ["Attributes", "DirectiveReader", "Place", "checked", "matrix", "numbers", "typed", "word"]

@@ -1,0 +1,84 @@
+"""XML of Mitsuba scenes as a plain tree with places; no entities, no document types, nothing from outside."""
+
+from __future__ import annotations
+
+import io
+import xml.sax
+from dataclasses import dataclass, field
+from typing import Any
+
+import defusedxml
+import defusedxml.expatreader
+
+from scenes.canonical import SceneError
+from scenes.formats.text.directives import Place
+
+DEPTH_MAX = 64
+NODES_MAX = 2_000_000
+
+
+@dataclass
+class Node:
+    """An element: its tag, attributes, children, and where it begins."""
+
+    tag: str
+    attributes: dict[str, str]
+    place: Place
+    children: list[Node] = field(default_factory=list)
+
+    def get(self, name: str, default: str = "") -> str:
+        """An attribute."""
+        return self.attributes.get(name, default)
+
+
+class _Builder(xml.sax.ContentHandler):
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self.file, self.open, self.count = file, [], 0
+        self.root: Node | None = None
+        self.locator: Any = None
+
+    def setDocumentLocator(self, locator: Any) -> None:
+        self.locator = locator
+
+    def startElement(self, name: str, attrs: Any) -> None:
+        place = Place(self.file, self.locator.getLineNumber(), self.locator.getColumnNumber() + 1)
+        node = Node(name, dict(attrs.items()), place)
+        self.count += 1
+        if len(self.open) >= DEPTH_MAX or self.count > NODES_MAX:
+            raise SceneError(
+                f"{place}: expected at most {DEPTH_MAX} elements inside each other and {NODES_MAX:,} in all"
+            )
+        if self.open:
+            self.open[-1].children.append(node)
+        else:
+            self.root = node
+        self.open.append(node)
+
+    def endElement(self, name: str) -> None:
+        self.open.pop()
+
+
+def parse_xml(content: bytes, file: str) -> Node:
+    """The tree of a document.
+
+    Raises:
+        SceneError: it is not well-formed, or declares entities or a document type; file, line, column.
+    """
+    builder = _Builder(file)
+    parser = defusedxml.expatreader.create_parser(forbid_dtd=True)
+    parser.setContentHandler(builder)
+    try:
+        parser.parse(io.BytesIO(content))
+    except xml.sax.SAXParseException as error:
+        place = Place(file, error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1)
+        raise SceneError(f"{place}: expected well-formed XML ({error.getMessage()})") from None
+    except defusedxml.DefusedXmlException as error:
+        raise SceneError(f"{file}: expected no document type and no entities, got {type(error).__name__}") from None
+    except (ValueError, LookupError, UnicodeError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError(f"{file}: expected XML ({' '.join(str(error).split())[:100]})") from None
+    if builder.root is None:
+        raise SceneError(f"{file}: expected an XML document, got none")
+    return builder.root

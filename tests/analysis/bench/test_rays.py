@@ -1,0 +1,110 @@
+"""Rays that are compared with Embree's: what they are, and that both sides answer alike."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.bench import rays as bench_rays
+from analysis.bench.rays import (
+    CLOSEST_TARGETS,
+    Rays,
+    coherent,
+    compare,
+    disagreements,
+    framelet_calls,
+    glossy_bounces,
+    incoherent,
+    random_rays,
+    seen,
+    shadow_rays,
+)
+from analysis.bench.scenes import LIGHT, bumpy_sphere
+from analysis.bench.turns import NOT_INSTALLED, BenchOptions, Row
+from renderer.rays.queries import RayQueries
+
+SMALL = BenchOptions(Path("unused"), resolution_px=256, batch_size=128, subdivisions=(4,), repetitions=7)
+MESH = bumpy_sphere(4)
+
+
+class NoBars:
+    def task(self, label: str, total: int):
+        return lambda done: None
+
+
+@pytest.fixture(scope="module")
+def ours() -> RayQueries:
+    return RayQueries(MESH.vertices, MESH.faces, threads=1)
+
+
+def all_kinds(ours: RayQueries) -> dict[str, list[Rays]]:
+    generator = np.random.default_rng(1)
+    calls = framelet_calls(SMALL)
+    return {
+        "camera": calls,
+        "shadow": [shadow_rays(MESH, ours, rays) for rays in calls],
+        "glossy": [glossy_bounces(MESH, ours, rays, generator) for rays in calls],
+        "random": [random_rays(MESH, 4096, generator) for _ in range(16)],
+    }
+
+
+def test_both_sides_agree_on_nearly_every_ray(ours: RayQueries) -> None:
+    embree = pytest.importorskip("embreex") and bench_rays.EmbreeMesh(MESH.vertices, MESH.faces)
+    for kind, calls in all_kinds(ours).items():
+        count = sum(rays.count for rays in calls)
+        wrong = sum(disagreements(ours, embree, rays) for rays in calls)
+        assert wrong < 1e-4 * count, (kind, wrong, count)
+        assert count > 40_000, kind
+
+
+def test_disagreements_are_counted(ours: RayQueries) -> None:
+    """Against another mesh there are many: the agreement above is not that of a blind comparison."""
+    pytest.importorskip("embreex")
+    other = bench_rays.EmbreeMesh(MESH.vertices * np.float32(0.9), MESH.faces)
+    for kind, calls in all_kinds(ours).items():
+        assert disagreements(ours, other, calls[0]) > 0.005 * calls[0].count, kind
+
+
+def test_shadow_rays_start_above_what_is_seen_and_end_at_the_light(ours: RayQueries) -> None:
+    rays = framelet_calls(SMALL)[0]
+    shadow = shadow_rays(MESH, ours, rays)
+    point, normal, hit = seen(MESH, ours, rays)
+    assert shadow.t_max is not None and np.all(shadow.t_max < 1.0)
+    np.testing.assert_allclose(shadow.origin + shadow.direction, np.broadcast_to(LIGHT, shadow.origin.shape), atol=1e-5)
+    assert len(point) == hit.sum() > shadow.count > 0
+    assert (np.einsum("ij,ij->i", normal, rays.direction[hit]) < 0.0).all()
+
+
+def test_bounces_leave_the_surface_near_the_mirror_direction(ours: RayQueries) -> None:
+    rays = framelet_calls(SMALL)[0]
+    bounces = glossy_bounces(MESH, ours, rays, np.random.default_rng(1))
+    _, normal, hit = seen(MESH, ours, rays)
+    assert bounces.count == hit.sum()
+    assert (np.einsum("ij,ij->i", bounces.direction, normal) >= -1e-6).all()
+    towards = rays.direction[hit]
+    mirrored = towards - 2.0 * np.einsum("ij,ij->i", towards, normal)[:, None] * normal
+    cosine = np.einsum("ij,ij->i", mirrored, bounces.direction)
+    assert 0.9 < np.median(cosine) < 0.999
+
+
+def test_random_rays_are_as_often_up_as_down() -> None:
+    rays = random_rays(MESH, 20_000, np.random.default_rng(1))
+    assert np.abs(rays.direction.mean(axis=0)).max() < 0.02
+    np.testing.assert_allclose(np.linalg.norm(rays.direction, axis=1), 1.0, atol=1e-5)
+    assert (rays.origin >= MESH.vertices.min(axis=0)).all() and (rays.origin <= MESH.vertices.max(axis=0)).all()
+
+
+def test_rows_of_both_groups() -> None:
+    rows = [*coherent(SMALL, NoBars()), *incoherent(SMALL, NoBars())]  # pyright: ignore[reportArgumentType]
+    assert [row.name for row in rows] == [
+        f"{kind}, 5,120 triangles" for kind in ("camera rays", "shadow rays", "glossy bounces", "random directions")
+    ]
+    assert [row.target for row in rows] == [None, 2.0, 0.8, 0.8]
+    assert all(row.ours > 0.0 and row.repetitions == 7 for row in rows)
+    assert CLOSEST_TARGETS[5] == 3.0 and CLOSEST_TARGETS[8] == 2.0
+
+
+def test_without_embree_the_row_says_so(ours: RayQueries) -> None:
+    question = bench_rays.Question("camera rays", framelet_calls(SMALL)[:1], 3.0)
+    row = compare(Row("coherent", "a", "M rays/s", 0.0, "Embree"), question, ours, None, 7)
+    assert row.note == NOT_INSTALLED and row.peer is None and row.met is None and row.ours > 0.0

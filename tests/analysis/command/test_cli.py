@@ -1,0 +1,212 @@
+"""Bad input ends with one plain line that names the field, and with the right exit status."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from analysis.command import cli
+from analysis.command.cli import InputError, bad_input, full_disk, parse, require_memory, run_cli
+from tsar.config import TsarConfig
+
+
+@dataclass(frozen=True)
+class Options:
+    """Like those of a script."""
+
+    count: int = 3
+    """How many."""
+    place: Path = Path("a")
+    """Where."""
+    tsar: TsarConfig = field(default_factory=TsarConfig)
+    """What."""
+
+    def __post_init__(self) -> None:
+        if self.count < 0:
+            raise ValueError(f"count: expected at least 0,\n got {self.count}")
+
+
+def test_options_are_parsed() -> None:
+    found = parse(Options, "d", ["--count", "7", "--place", "b/c", "--tsar.batch-size", "64"])
+    assert found == Options(7, Path("b/c"), TsarConfig(batch_size=64))
+    assert parse(Options, "d", []) == Options()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--nope", "3"], ["--nope"]),
+        (["--coumt", "3"], ["--coumt", "--count"]),
+        (["--count", "x"], ["--count", "'x'"]),
+        (["--count"], ["--count"]),
+        (["stray"], ["stray"]),
+        (["--count", "-1"], ["count: expected at least 0", "got -1"]),
+        (["--tsar.batch-size", "-3"], ["batch_size: expected between 1 and 8192 framelets, got -3"]),
+        (["--tsar.tiling.level-max", "9"], ["tiling.level_max: expected between 2 and 7, got 9"]),
+        (["--tsar.error.norm", "l3"], ["--tsar.error.norm", "l3", "linf"]),
+    ],
+)
+def test_bad_arguments_name_what_is_wrong_in_one_line(
+    arguments: list[str], parts: list[str], capsys: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(InputError) as caught:
+        parse(Options, "d", arguments)
+    message = str(caught.value)
+    assert all(part in message for part in parts), message
+    assert not set(message) & set("╭╮╰╯│─") and "full helptext" not in message
+    assert capsys.readouterr() == ("", ""), "nothing is printed on the way"
+
+    with pytest.raises(SystemExit) as stop:
+        run_cli(lambda: parse(Options, "d", arguments))
+    printed = capsys.readouterr()
+    assert stop.value.code == 2 and printed.out == ""
+    assert printed.err.startswith("error: ") and printed.err.endswith("\n") and printed.err.count("\n") == 1
+
+
+def test_help_goes_to_standard_output(capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as stop:
+        parse(Options, "what it does", ["--help"])
+    printed = capsys.readouterr()
+    assert not stop.value.code and printed.err == ""
+    assert "what it does" in printed.out and "--tsar.batch-size" in printed.out and "How many." in printed.out
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def main() -> None:
+        raise error
+
+    return main
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (InputError("a: expected b,\n   got\tc"), 2, "error: a: expected b, got c\n"),
+        (KeyboardInterrupt(), 130, None),
+    ],
+)
+def test_run_cli_ends_with_one_line(error, status: int, line: str | None, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit) as stop:
+        run_cli(raising(error))
+    printed = capsys.readouterr()
+    assert stop.value.code == status and printed.out == ""
+    assert printed.err.count("\n") == 1 and (printed.err == line or (line is None and "interrupted" in printed.err))
+
+
+def test_run_cli_hides_neither_success_nor_faults_of_the_program() -> None:
+    done = []
+    run_cli(lambda: done.append(1))
+    assert done == [1]
+    with pytest.raises(ValueError, match="a fault"):
+        run_cli(raising(ValueError("a fault")))
+
+
+def test_idle_threads_spin_briefly_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
+    for name in names:
+        monkeypatch.setenv(name, "")
+        monkeypatch.delenv(name)
+    found: list[tuple[str | None, ...]] = []
+
+    def main() -> None:
+        found.append(tuple(os.environ.get(name) for name in names))
+
+    run_cli(main)
+    monkeypatch.setenv("GOMP_SPINCOUNT", "7")
+    run_cli(main)
+    monkeypatch.delenv("GOMP_SPINCOUNT")
+    monkeypatch.setenv("OMP_WAIT_POLICY", "active")
+    run_cli(main)
+    brief = found[0][0]
+    assert brief is not None and 0 < int(brief) < 100_000
+    assert found == [(brief, None), ("7", None), (None, "active")]
+
+
+def test_the_spinning_is_settled_before_torch_is_imported() -> None:
+    """The library reads it once; a script that imports torch at its top would come too late."""
+    answer = "print('torch' in sys.modules, 'GOMP_SPINCOUNT' in os.environ)"
+    program = f"import os, sys, analysis.command.cli as c\nc.run_cli(lambda: {answer})"
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
+    }
+    root = Path(__file__).resolve().parents[3]
+    done = subprocess.run([sys.executable, "-c", program], cwd=root, env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == ["False", "True"], done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (ValueError("side: got 3"), "side: got 3"),
+        (ValueError(), "ValueError"),
+        (InputError("as it is"), "as it is"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory", "a/b.obj"), "a/b.obj: No such file or directory"),
+        (OSError("plain"), "plain"),
+    ],
+)
+def test_bad_input_turns_faults_of_the_input_into_one_kind(error: Exception, message: str) -> None:
+    with pytest.raises(InputError) as caught, bad_input():
+        raise error
+    assert str(caught.value) == message
+
+
+def test_bad_input_lets_other_faults_through() -> None:
+    with pytest.raises(KeyError), bad_input():
+        raise KeyError("a")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        RuntimeError("[enforce fail at alloc_cpu.cpp:132] DefaultCPUAllocator: can't allocate memory: you tried to"),
+        RuntimeError("Failed to allocate 123 bytes on device 'cpu'"),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+    ],
+)
+def test_a_lack_of_memory_is_one_line(error: Exception, capsys: pytest.CaptureFixture) -> None:
+    def main() -> None:
+        raise error
+
+    def marked(block) -> None:
+        with block:
+            raise error
+
+    for failing in (main, lambda: marked(bad_input()), lambda: marked(full_disk(Path("x")))):
+        with pytest.raises(SystemExit) as stop:
+            run_cli(failing)
+        said = capsys.readouterr().err
+        assert stop.value.code == 2 and said.startswith("error: out of memory (") and said.count("\n") == 1
+
+
+def test_other_faults_of_a_run_are_not_a_lack_of_memory() -> None:
+    for error in (RuntimeError("shape"), OSError(errno.EIO, "I/O error")):
+        with pytest.raises(type(error)), bad_input() if isinstance(error, RuntimeError) else nullcontext():
+            raise error
+
+
+def test_require_memory_says_what_is_needed_and_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cli, "free_memory_bytes", lambda: 2 * 2**30)
+    require_memory(2.0 * 2**30, "x")
+    with pytest.raises(InputError, match=r"^resolution_px: 99 needs about 2\.5 GiB of memory, 2\.0 GiB are free$"):
+        require_memory(2.5 * 2**30, "resolution_px: 99")
+
+
+def test_a_command_under_a_limit_of_memory_ends_with_one_line(tmp_path: Path) -> None:
+    """The limit of the process, not of the machine, is what is free."""
+    program = "import analysis.command.cli as c\nimport numpy as np\nc.run_cli(lambda: {body})"
+    root = Path(__file__).resolve().parents[3]
+    bodies = ("c.require_memory(3e9, 'pictures')", "np.ones(400_000_000)")
+    for body, part in zip(bodies, ("pictures needs about 2.8 GiB of memory", "out of memory"), strict=True):
+        command = f'ulimit -v 2000000; exec "{sys.executable}" -c "{program.format(body=body)}"'
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        done = subprocess.run(["bash", "-c", command], cwd=root, env=environment, capture_output=True, text=True)
+        assert done.returncode == 2 and part in done.stderr and done.stderr.count("\n") == 1, done.stderr

@@ -1,0 +1,186 @@
+"""The comparison film: sizes, places, labels and curves of a frame, and a film on disk that reads back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image, ImageDraw
+
+from analysis.metrics.quality import View
+from analysis.page.pictures import AGE_MAP, palette
+from analysis.page.video import OWN, PAPER, RIVALS, ComparisonFilm, draw_errors, inks, maps, photographs, to_pixels
+from renderer.film.files import Mp4Writer
+from tests.analysis.builders import SCALES, grey, view
+from tsar.types import SampleMap
+
+SIDE = 96
+MAPS = ["tiling by refresh rate", "spatial density", "temporal density", "age of samples"]
+LABELS = ["reference", "own", "framed", *MAPS]
+FRAMED, ERRORS = RIVALS[0], {"own": [0.1], "framed": [0.2]}
+
+
+def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> ComparisonFilm:
+    return ComparisonFilm(side, SCALES, span, ["own", "framed"], "own")
+
+
+def panels(view: View) -> dict:
+    return photographs(view, SIDE) | maps(view, "own", SCALES, SIDE)
+
+
+def of_age(view: View, newest_s: torch.Tensor | None) -> View:
+    """The same with other ages of the samples of the first run."""
+    record, display = view.shown["own"]
+    ages = None if newest_s is None else SampleMap(newest_s, torch.zeros(2, 2, dtype=torch.int64))
+    return replace(view, shown={**view.shown, "own": (record, replace(display, samples=ages))})
+
+
+def panel(frame: np.ndarray, slot: int, strip: int) -> np.ndarray:
+    """Pixels below the label of one of two times four slots."""
+    top, left = slot // 4 * (SIDE + strip) + strip, slot % 4 * SIDE
+    return frame[top : top + SIDE, left : left + SIDE]
+
+
+def has(pixels: np.ndarray, ink: tuple[int, int, int]) -> np.ndarray:
+    return (pixels == np.array(ink)).all(-1)
+
+
+@settings(max_examples=12)
+@given(st.integers(1, 300))
+def test_a_frame_has_the_size_it_says_and_that_is_even(side: int) -> None:
+    made = film(side)
+    assert made.width_px % 2 == 0 and made.height_px % 2 == 0
+    assert made.width_px // 4 == max(96, side // 2 * 2)
+    frame = made.frame(view(), [0.0], ERRORS)
+    assert frame.shape == (made.height_px, made.width_px, 3) and frame.dtype == np.uint8
+
+
+def test_every_picture_has_its_place_and_its_label() -> None:
+    """Reference and displays first, then tiling, fields and ages; the last slot holds the errors."""
+    made = film()
+    strip = made.height_px // 2 - SIDE
+    frame, shown = made.frame(view(), [0.0], ERRORS), panels(view())
+    assert list(shown) == LABELS
+    for slot, pixels in enumerate(shown.values()):
+        assert pixels is not None and np.array_equal(panel(frame, slot, strip), pixels), LABELS[slot]
+    for slot, value in enumerate((0, 255, 188)):
+        assert (panel(frame, slot, strip) == value).all(), "sRGB of linear 0, 0.5 and 1"
+    labels = [frame[s // 4 * (SIDE + strip) :, s % 4 * SIDE :][:strip, :SIDE] for s in range(8)]
+    assert all((~has(label, PAPER)).sum() > 20 for label in labels)
+    assert len({label.tobytes() for label in labels}) == 8
+
+
+def test_ages_are_of_the_time_shown() -> None:
+    """The same samples are older later; the scale is logarithmic from 10 ms to 1 s."""
+    sampled = of_age(view(), torch.zeros(2, 2, dtype=torch.float64))
+    shown = [panels(replace(sampled, time_s=t))["age of samples"] for t in (0.01, 0.2, 0.5, 1.0)]
+    found = [palette(AGE_MAP).tolist().index(pixels[0, 0].tolist()) for pixels in shown if pixels is not None]
+    assert found == [0, round(255 * np.log10(20) / 2), round(255 * np.log10(50) / 2), 255]
+
+
+def test_unknown_ages_leave_their_place_empty() -> None:
+    lacking, made = of_age(view(), None), film()
+    assert panels(lacking)["age of samples"] is None
+    known, unknown = (made.frame(shown, [0.0], ERRORS) for shown in (view(), lacking))
+    strip = made.height_px // 2 - SIDE
+    assert (panel(unknown, 6, strip) == PAPER).all() and not (panel(known, 6, strip) == PAPER).all()
+    label = slice(SIDE + strip, SIDE + 2 * strip), slice(2 * SIDE, 3 * SIDE)
+    assert not np.array_equal(known[label], unknown[label]), "the label says so"
+
+
+@pytest.mark.parametrize("side", [96, 256, 512])
+def test_labels_do_not_run_into_the_next_panel(side: int) -> None:
+    made = film(side)
+    frame, width, strip = made.frame(view(), [0.0], ERRORS), made.width_px // 4, made.height_px // 2 - side
+    for slot in range(8):
+        top, left = slot // 4 * (side + strip), slot % 4 * width
+        label = frame[top : top + strip, left : left + width]
+        assert not has(label, PAPER).all() and has(label[:, -2:], PAPER).all(), slot
+
+
+def test_the_time_is_shown() -> None:
+    early, late = (film().frame(view(time), [0.0], ERRORS) for time in (0.1, 0.9))
+    changed = (early != late).any(-1).nonzero()
+    assert len(changed[0]) and changed[1].min() >= 3 * SIDE and changed[0].min() >= film().height_px // 2
+
+
+def test_curves_lie_where_their_values_are() -> None:
+    """The greater error above the lesser one, both up to the present and no further."""
+    side, text = 256, 170  # pixels: of a panel, and how far its legend reaches
+    made = film(side)
+    top, times = made.height_px - side, np.linspace(0.0, 0.75, 30).tolist()
+    box = made.frame(view(0.75), times, {"own": [1e-3] * 30, "framed": [1e-1] * 30})[top:, 3 * side :]
+    drawn = {ink: has(box, ink)[:, text:] for ink in (OWN, FRAMED)}
+    rows = {ink: np.median(mask.nonzero()[0]) for ink, mask in drawn.items()}
+    assert rows[FRAMED] < rows[OWN] - side / 4
+    ends = [mask.any(0).nonzero()[0].max() + text for mask in drawn.values()]
+    size = side // 24
+    expected = 4 * size + 0.75 * (side - 5 * size)
+    assert all(abs(end - expected) <= 2 for end in ends)
+
+
+@pytest.mark.parametrize("errors", [[], [0.0], [0.0, 0.0], [1e-9, 2.0], [0.0, 1e-3]])
+def test_any_errors_can_be_drawn(errors: list[float]) -> None:
+    canvas = Image.new("RGB", (200, 100), PAPER)
+    times = [0.1 * i for i in range(len(errors))]
+    curves = {"a": (errors, OWN), "b": (errors[::-1], FRAMED)}
+    draw_errors(ImageDraw.Draw(canvas), (0, 0, 200, 100), (0.0, 1.0), times, curves)
+    assert has(np.asarray(canvas), FRAMED).any() == bool(errors)
+
+
+def test_to_pixels_is_srgb_and_black_where_not_finite() -> None:
+    image = torch.tensor([[[0.0, 1.0, 0.5], [float("nan"), float("inf"), -float("inf")], [-1.0, 7.0, 0.002]]])
+    assert to_pixels(image).tolist() == [[[0, 255, 188], [0, 0, 0], [0, 255, 7]]]
+    assert torch.isnan(image).sum() == 1, "the image is left as it is"
+
+
+def test_a_film_reads_back(tmp_path: Path) -> None:
+    """Frames, size, rate and colours; the grey of the framed panel grows from frame to frame."""
+    made, path = film(), tmp_path / "films" / "comparison.mp4"
+    strip, values = made.height_px // 2 - SIDE, [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9]
+    with Mp4Writer(path, 30.0, made.width_px, made.height_px) as writer:
+        for number, value in enumerate(values):
+            writer.add(made.frame(view(number / 30, framed=value), [0.0], ERRORS))
+        assert not path.exists()
+    assert writer.frames == len(values) and [p.name for p in path.parent.iterdir()] == ["comparison.mp4"]
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.average_rate == 30
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert [frame.shape for frame in frames] == [(made.height_px, made.width_px, 3)] * len(values)
+    density = np.asarray(panels(view())["temporal density"], int)
+    for value, frame in zip(values, frames, strict=True):
+        expected = to_pixels(grey(value))[0, 0].astype(int)
+        assert np.abs(panel(frame, 2, strip)[20:-20, 20:-20].astype(int) - expected).max() <= 6
+        assert np.abs(panel(frame, 5, strip)[10:50, 10:-10].astype(int) - density[10:50, 10:-10]).max() <= 12
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_exception_leaves_no_film(tmp_path: Path, error: type[BaseException]) -> None:
+    made = film()
+    with pytest.raises(error), Mp4Writer(tmp_path / "a.mp4", 30.0, made.width_px, made.height_px) as writer:
+        writer.add(made.frame(view(), [0.0], ERRORS))
+        raise error
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 9])
+def test_no_run_is_left_out(count: int) -> None:
+    """Every run has a panel, and the last panel is free for the errors."""
+    one, names = view(), [f"run {number}" for number in range(count)]
+    many = replace(one, shown={name: one.shown["own"] for name in names}, mse=dict.fromkeys(names, 0.1))
+    made = ComparisonFilm(SIDE, SCALES, (0.0, 1.0), names, "run 0")
+    frame = made.frame(many, [0.0], {name: [0.1] for name in names})
+    columns, strip = made.width_px // SIDE, made.height_px // 2 - SIDE
+    filled = 1 + count + len(MAPS)
+    assert 2 * columns > filled
+    for slot in range(filled):
+        top, left = slot // columns * (SIDE + strip) + strip, slot % columns * SIDE
+        assert not has(frame[top : top + SIDE, left : left + SIDE], PAPER).all(), slot
+    assert len(set(inks(names, "run 0")[:7])) == min(count, 7)

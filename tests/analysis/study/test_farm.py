@@ -1,0 +1,121 @@
+"""Clusters of processes: who can reach them, and what is said when they end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import dask.config
+import psutil
+import pytest
+
+from analysis.command.cluster import ClusterOptions, connected
+from analysis.study import farm
+from analysis.study.cases import Case, Scale
+from analysis.study.evaluation import Place
+from analysis.study.farm import describe_failures, run_cases
+from tests.scripts.commands import ROOT
+from tsar.config import TsarConfig
+
+TINY = Scale(4, seconds=0.2, reference_rate_hz=30.0, reference_samples_per_axis=1, stride=2)
+
+
+def cases(count: int) -> list[Case]:
+    configs = [TINY.config(0, TsarConfig(seed=seed)) for seed in range(count)]
+    return [Case(input="fly-by", policy="tsar", tsar=config, scale=TINY) for config in configs]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return Place(tmp_path / "runs", tmp_path / "references")
+
+
+def sleep_as_a_run(*_: Any) -> None:
+    time.sleep(60)
+
+
+def exit_as_a_run(*_: Any) -> None:
+    os._exit(1)
+
+
+def test_a_local_cluster_listens_on_loopback_only() -> None:
+    with connected(ClusterOptions(workers=1)) as client:
+        assert client.submit(int, 3).result() == 3
+        ours = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        listening = {
+            place.laddr.ip
+            for one in ours
+            for place in one.net_connections("inet")
+            if place.status == psutil.CONN_LISTEN
+        }
+        assert listening == {"127.0.0.1"}
+        workers = client.scheduler_info()["workers"].values()
+        assert len(workers) == 1 and all(one["host"] == "127.0.0.1" for one in workers)
+
+
+def test_runs_whose_workers_die_fail_with_the_reason(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(farm, "_prepare", exit_as_a_run)
+    asked, told = cases(2), list[int]()
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        _, failures = run_cases(asked, place, ClusterOptions(workers=1), told.append)
+    assert set(failures) == set(asked) and told[-1] == 2
+    assert all("KilledWorker" in reason for reason in failures.values()), failures
+
+
+@pytest.fixture
+def cluster() -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
+    """Address and processes of a scheduler and a worker of others."""
+    module, home = [sys.executable, "-m"], {"cwd": ROOT, "env": {**os.environ, "PYTHONPATH": str(ROOT)}}
+    command = [*module, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **home)
+    assert scheduler.stderr is not None
+    line = next(line for line in scheduler.stderr if "Scheduler at:" in line)
+    address = line.split()[-1]
+    drain = threading.Thread(target=scheduler.stderr.read, daemon=True)
+    drain.start()
+    command = [*module, "distributed.cli.dask_worker", address, "--no-nanny", "--no-dashboard"]
+    worker = subprocess.Popen(command, stderr=subprocess.DEVNULL, **home)
+    yield address, scheduler, [worker]
+    for process in (worker, scheduler):
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize("ended", ["scheduler", "workers"])
+def test_a_cluster_that_ends_is_said(ended: str, cluster: Any, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    address, scheduler, workers = cluster
+    monkeypatch.setattr(farm, "_prepare", sleep_as_a_run)
+    monkeypatch.setattr(farm, "_WAIT_S", 3)
+    asked = cases(3)
+
+    def end() -> None:
+        for process in [scheduler] if ended == "scheduler" else workers:
+            process.send_signal(signal.SIGKILL)
+
+    submit = farm._submit
+
+    def submit_and_end(*given: Any) -> Any:
+        found = submit(*given)
+        threading.Timer(1.0, end).start()
+        return found
+
+    monkeypatch.setattr(farm, "_submit", submit_and_end)
+    _, failures = run_cases(asked, place, ClusterOptions(scheduler=address))
+    assert set(failures) == set(asked)
+    expected = "no worker was there" if ended == "workers" else "scheduler"
+    assert all(expected in reason for reason in failures.values()), failures
+
+
+def test_a_reason_is_said_once() -> None:
+    assert describe_failures({"a": "full", "b": "died", "c": "full"}) == [
+        "failed: a and 1 more: full",
+        "failed: b: died",
+    ]
+    assert describe_failures({}) == []

@@ -1,0 +1,173 @@
+"""What the reference learns the compiled stages do not ignore: a choice or a field that they do not know goes there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Literal, get_args
+
+import pytest
+import torch
+
+import tsar.accounting
+import tsar.decision
+import tsar.error
+import tsar.reconstruction
+from renderer.stages.control import Control, compiled_stages
+from renderer.stages.coverage import _KNOWN, StageName, covers
+from renderer.stages.reconstruction import Display
+from tests.oracles import pictures, runs
+from tests.renderer.stages.builders import CONFIGS, CYCLE_S, small
+from tsar.config import (
+    ErrorConfig,
+    ReconstructionConfig,
+    ResponseConfig,
+    Solver,
+    TilingConfig,
+    TsarConfig,
+    closed_choices,
+)
+from tsar.policies.adaptive import State
+from tsar.policy import Cycle, Moment, step
+from tsar.response.transport import SOLVERS, Waterfill
+from tsar.stages import REFERENCE, Stages
+
+STAGES: tuple[StageName, ...] = get_args(StageName)
+
+
+@dataclass(frozen=True)
+class MoreErrors(ErrorConfig):
+    norm: Literal["l2", "linf", "l1"] = "l2"  # type: ignore[assignment]
+    form: Literal["contrast", "difference", "ratio"] = "contrast"  # type: ignore[assignment]
+
+
+@dataclass(frozen=True)
+class MoreSolvers(ResponseConfig):
+    solver: Solver | Literal["half"] = "waterfill"  # type: ignore[assignment]
+
+
+@dataclass(frozen=True)
+class MoreReconstructions(ReconstructionConfig):
+    method: Literal["blend", "negative"] = "blend"
+
+
+@dataclass(frozen=True)
+class MoreTilings(TilingConfig):
+    order: Literal["morton", "reversed"] = "morton"
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class MoreSettings(TsarConfig):
+    unheard_of: int = 0
+
+
+def replay(config: TsarConfig, stages: Stages, cycles: int = 3) -> list[Cycle[State]]:
+    policy, trace, found = runs.made("tsar", config, stages), pictures.tracer(pictures.textured_motion), []
+    state = policy.start()
+    for number in range(cycles):
+        found.append(step(policy, state, trace, Moment(number * CYCLE_S, number, CYCLE_S)))
+        state = found[-1].after
+    return found
+
+
+def assert_handed_over(config: TsarConfig, known: TsarConfig, stage: StageName, exact: bool = True) -> None:
+    """The compiled stages do with a configuration what the reference does, and that is another thing than with one that
+    they know."""
+    assert not covers(config, stage) and covers(known, stage)
+    ours, theirs, other = (replay(*case) for case in ((config, compiled_stages(config)), (config, REFERENCE),
+                                                      (known, compiled_stages(known))))  # fmt: skip
+    seen = {
+        "observe": lambda at: at.after.errors.spatial,
+        "respond": lambda at: at.after.densities.spatial,
+        "reconstruct": lambda at: at.shown.image,
+    }[stage]
+    close = {"rtol": 0.0, "atol": 0.0} if exact else {"rtol": 1e-4, "atol": 1e-4}
+    for one, two in zip(ours, theirs, strict=True):
+        torch.testing.assert_close(seen(one), seen(two), **close)
+    assert any((seen(one) - seen(two)).abs().max() > 1e-2 for one, two in zip(ours, other, strict=True))
+
+
+@pytest.fixture(autouse=True)
+def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Adds to the reference the norm ``l1``, the form ``ratio``, the solver ``half``, and negatives of its images."""
+    power, error, image = tsar.error.levelwise_power, tsar.error.signed_error, tsar.reconstruction.reconstruct
+
+    def levelwise_power(octaves, config):
+        return tuple(part.sqrt() if config.norm == "l1" else part for part in power(octaves, config))
+
+    def signed_error(signal, offset, slope, config):
+        return -error(signal, offset, slope, config) if config.form == "ratio" else error(signal, offset, slope, config)
+
+    class Half(Waterfill):
+        def solve(self, desired, bound, surplus, surplus_max):
+            return 0.5 * super().solve(desired, bound, surplus, surplus_max)
+
+    def reconstruct(cache, config, cycle_s):
+        made = image(cache, config, cycle_s)
+        if getattr(config.reconstruction, "method", "blend") == "negative":
+            made = replace(made, image=-made.image)
+        return made
+
+    monkeypatch.setattr(tsar.error, "levelwise_power", levelwise_power)
+    monkeypatch.setattr(tsar.error, "signed_error", signed_error)
+    monkeypatch.setitem(SOLVERS, "half", Half())
+    original = REFERENCE.reconstruct
+    object.__setattr__(REFERENCE, "reconstruct", reconstruct)
+    yield
+    object.__setattr__(REFERENCE, "reconstruct", original)
+
+
+@pytest.mark.parametrize("error", [MoreErrors(norm="l1"), MoreErrors(form="ratio")], ids=["norm", "form"])
+def test_an_error_that_is_not_compiled_is_estimated_by_the_reference(error: ErrorConfig) -> None:
+    assert_handed_over(small(error=error), small(), "observe")
+
+
+def test_a_solver_that_is_not_compiled_is_the_references() -> None:
+    assert_handed_over(small(response=MoreSolvers(solver="half")), small(), "respond", exact=False)
+
+
+def test_a_reconstruction_that_is_not_compiled_is_the_references() -> None:
+    negative = small(reconstruction=MoreReconstructions(method="negative"))
+    assert_handed_over(negative, small(), "reconstruct", exact=False)
+
+
+@pytest.mark.parametrize(
+    "config", [small(tiling=MoreTilings()), MoreSettings(batch_size=32, resolution_px=256)], ids=["tiling", "run"]
+)
+def test_a_field_that_no_stage_knows_goes_to_the_reference_throughout(config: TsarConfig) -> None:
+    assert not any(covers(config, stage) for stage in STAGES)
+    called = []
+
+    def heard(name: str):
+        return lambda *arguments: called.append(name)
+
+    original = {field.name: getattr(REFERENCE, field.name) for field in fields(REFERENCE)}
+    control, display = Control(config), Display(config)
+    try:
+        for name in original:
+            object.__setattr__(REFERENCE, name, heard(name))
+        control.observe(None, None, None, config, None)
+        control.decide(None, None, None, config, None)
+        control.account(None, None, None, config)
+        display.reconstruct(None, config, 1.0)
+    finally:
+        for name, stage in original.items():
+            object.__setattr__(REFERENCE, name, stage)
+    assert called == ["observe", "decide", "account", "reconstruct"]
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_everything_that_there_is_today_is_compiled(name: str) -> None:
+    """But for the solvers that are not; so that a new field does not make all runs slow unnoticed."""
+    assert all(covers(CONFIGS[name], stage) for stage in STAGES)
+    for solver in get_args(Solver):
+        config = replace(CONFIGS[name], response=replace(CONFIGS[name].response, solver=solver))
+        assert covers(config, "respond") == (solver == "waterfill") and covers(config, "decide")
+
+
+def test_what_is_known_is_there() -> None:
+    config = TsarConfig()
+    for name, known in _KNOWN.items():
+        record = getattr(config, name) if name else config
+        assert is_dataclass(record) and known.keys() == {field.name for field in fields(record)}

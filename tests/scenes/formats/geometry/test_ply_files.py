@@ -1,0 +1,99 @@
+"""PLY files: what is read, and what lies is refused before anything is allocated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from scenes.canonical import Mesh, SceneError
+from scenes.formats.geometry.ply_files import ply_bytes, read_ply
+
+ASCII = b"""ply
+format ascii 1.0
+comment made by hand
+element vertex 5
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+0 0 1
+4 0 1 2 3
+3 0 1 4
+"""
+
+
+def test_polygons_are_fans() -> None:
+    mesh = read_ply(ASCII, "a.ply")
+    np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 4]])
+    assert mesh.normals is None and mesh.uvs is None
+
+
+@pytest.mark.parametrize(("order", "sign"), [("little", "<"), ("big", ">")])
+def test_binary_with_faces_of_several_sizes(order: str, sign: str) -> None:
+    header = ASCII[: ASCII.index(b"end_header")].replace(b"ascii", f"binary_{order}_endian".encode()) + b"end_header\n"
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1]], sign + "f4").tobytes()
+    faces = (
+        b"\x04" + np.array([0, 1, 2, 3], sign + "i4").tobytes() + b"\x03" + np.array([0, 1, 4], sign + "i4").tobytes()
+    )
+    found, wanted = read_ply(header + points + faces, "a.ply"), read_ply(ASCII, "a.ply")
+    np.testing.assert_array_equal(found.faces, wanted.faces)
+    np.testing.assert_array_equal(found.vertices, wanted.vertices)
+
+
+@pytest.mark.parametrize("parts", [(False, False), (True, False), (False, True), (True, True)])
+def test_what_is_written_is_read_again_here_and_by_the_mesh_library(parts: tuple[bool, bool], tmp_path) -> None:
+    rng = np.random.default_rng(1)
+    normals = rng.standard_normal((9, 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    uvs = rng.random((9, 2)).astype(np.float32)
+    faces = rng.permuted(np.tile(np.arange(9), (7, 1)), axis=1)[:, :3].astype(np.int32)
+    mesh = Mesh(rng.random((9, 3)).astype(np.float32), faces, normals if parts[0] else None, uvs if parts[1] else None)
+    found = read_ply(ply_bytes(mesh), "a.ply")
+    np.testing.assert_array_equal(found.vertices, mesh.vertices)
+    np.testing.assert_array_equal(found.faces, mesh.faces)
+    for a, b in ((found.normals, mesh.normals), (found.uvs, mesh.uvs)):
+        assert (a is None) == (b is None) and (a is None or b is None or np.allclose(a, b, atol=1e-6))
+    (tmp_path / "a.ply").write_bytes(ply_bytes(mesh))
+    other = trimesh.load_mesh(tmp_path / "a.ply", process=False)
+    np.testing.assert_allclose(other.vertices, mesh.vertices)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"ply\n", b"plx\n", "expected a PLY file"),
+        (b"vertex 5", b"vertex 4000000000", "expected 4000000000 of 'vertex' as its header says, got fewer"),
+        (b"face 2", b"face 3", "expected 3 of 'face'"),
+        (b"4 0 1 2 3", b"4 0 1 2 7", "expected indices below 5, got 7"),
+        (b"4 0 1 2 3", b"2 0 1\n3 0 1 2", "expected faces of 3 to 64 corners, got 2"),
+        (b"0 0 1\n4", b"0 0 nan\n4", "expected finite vertices"),
+        (b"0 0 1\n4", b"0 0 1e308\n4", "expected finite vertices"),
+        (b"0 0 1\n4", b"0 0 x\n4", "expected numbers behind the PLY header"),
+        (b"property float z", b"property floaty z", "expected a line of a PLY header"),
+        (b"format ascii 1.0\n", b"", "expected a format"),
+        (b"property float z\n", b"", "expected"),
+        (b"end_header", b"end_head", "expected a PLY file"),
+    ],
+)
+def test_files_that_are_not_what_they_say(old: bytes, new: bytes, message: str) -> None:
+    assert old in ASCII
+    with pytest.raises(SceneError, match=message):
+        read_ply(ASCII.replace(old, new, 1), "a.ply")
+
+
+def test_binary_headers_that_lie() -> None:
+    mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+    content = ply_bytes(mesh)
+    for old, new in ((b"vertex 3", b"vertex 99999999999"), (b"face 1", b"face 99999999999"), (b"face 1", b"face 2")):
+        with pytest.raises(SceneError, match="as its header says, got fewer"):
+            read_ply(content.replace(old, new, 1), "a.ply")
+    for cut in range(len(content)):
+        with pytest.raises(SceneError):
+            read_ply(content[:cut], "a.ply")
