@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[3]
 STUDY, RUN = "analysis/study/evaluation.py", "analysis/comparison/experiment.py"
 ENTRIES = {"renderer/trace.py": Renderer, STUDY: evaluate, RUN: run_experiment}
 
+PACKAGES = ("tsar", "renderer", "scenes", "analysis", "scripts")
 PACKAGE = {
     "house/__init__.py": "",
     "house/start.py": "from house.room import door\nimport json\ntry:\n    import numpy\nexcept ImportError:\n    pass",
@@ -130,14 +131,14 @@ def only(copy: Path, stem: str) -> Path:
 @pytest.mark.parametrize(
     ("entry", "names"),
     [
-        (
-            "renderer/trace.py",
-            ("shading.py", "lights.py", "shading.h", "tree.h", "canonical.py", "trace.py", "kernels.py"),
-        ),
-        (STUDY, ("records.py", "display_model.py", "torchvision_operators.py", "cost_model.py")),
-        (STUDY, ("sky.exr", "hosek_wilkie.npz", "spheresscene.txt", "control.py", "framed.py")),
-        (STUDY, ("shading.py", "shading.h", "response.h", "world.py", "read.py", "perceptual.py")),
-        (RUN, ("viewers.py", "shading.py", "response.h", "sky.exr", "write.py", "summary.py")),
+        ("renderer/trace.py", ("kernels/shading.py", "kernels/lights.py", "shading.h", "tree.h", "canonical/scene.py")),
+        ("renderer/trace.py", ("renderer/trace.py", "kernels/entry.py", "compute/team.py")),
+        (STUDY, ("storage/records.py", "display_model.py", "torchvision_operators.py", "cost_model.py")),
+        (STUDY, ("sky.exr", "hosek_wilkie.npz", "spheresscene.txt", "stages/control.py", "policies/framed.py")),
+        (STUDY, ("kernels/shading.py", "shading.h", "response.h", "driving/world.py", "blocks/read.py")),
+        (STUDY, ("metrics/perceptual.py", "metrics/quality.py", "study/displays.py")),
+        (RUN, ("comparison/viewers.py", "kernels/shading.py", "response.h", "sky.exr", "pbrt/read.py")),
+        (RUN, ("comparison/summary.py", "luxrender/read_materials.py", "policies/afr.py")),
     ],
 )
 def test_what_decides_a_result_is_in_its_hash(copy: Path, entry: str, names: tuple[str, ...]) -> None:
@@ -150,7 +151,7 @@ def test_what_decides_a_result_is_in_its_hash(copy: Path, entry: str, names: tup
 
 
 def test_a_file_format_does_not_decide_a_reference(copy: Path) -> None:
-    assert not changes(only(copy, "film.py"), lambda: hash_of_modules(copy, [only(copy, "trace.py")]))
+    assert not changes(copy / "renderer/film/files.py", lambda: hash_of_modules(copy, [only(copy, "trace.py")]))
 
 
 @pytest.mark.parametrize("entry", ENTRIES)
@@ -160,7 +161,7 @@ def test_nothing_is_loaded_that_was_not_found(entry: str) -> None:
     files = "[m.__file__ for m in sys.modules.values() if getattr(m, '__file__', None)]"
     program = f"import sys, {maker.__module__}\nprint(*{files})"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = {Path(name) for name in done.stdout.split() if name.startswith(f"{ROOT}/")}
+    loaded = {Path(name) for name in done.stdout.split() if name.startswith(tuple(f"{ROOT}/{package}/" for package in PACKAGES))}
     assert len(loaded) > 5 and loaded <= modules_of(maker)[0]
 
 
