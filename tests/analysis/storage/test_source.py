@@ -159,9 +159,10 @@ def test_nothing_is_loaded_that_was_not_found(entry: str) -> None:
     """Python itself says which modules an import loads."""
     maker = ENTRIES[entry]
     files = "[m.__file__ for m in sys.modules.values() if getattr(m, '__file__', None)]"
+    own = tuple(f"{ROOT}/{package}/" for package in PACKAGES)
     program = f"import sys, {maker.__module__}\nprint(*{files})"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = {Path(name) for name in done.stdout.split() if name.startswith(tuple(f"{ROOT}/{package}/" for package in PACKAGES))}
+    loaded = {Path(name) for name in done.stdout.split() if name.startswith(own)}
     assert len(loaded) > 5 and loaded <= modules_of(maker)[0]
 
 
