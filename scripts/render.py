@@ -23,8 +23,8 @@ from analysis.tracer.render_options import RenderOptions
 def main() -> None:
     """Parses, renders, prints what was written where."""
     options = parse(RenderOptions, __doc__ or "")
-    from renderer.kernels.entry import explanation
     from renderer.tables.checks import check_frame_size
+    from renderer.tables.requirements import explanation
     from scenes import catalog
 
     with bad_input():

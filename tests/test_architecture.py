@@ -13,6 +13,7 @@ PACKAGES = ("tsar", "renderer", "scenes", "analysis", "scripts")
 
 RECORDS = ("tsar.types", "tsar.config", "tsar.morton", "tsar.memory", "tsar.named")
 CANONICAL = ("scenes.canonical", "scenes.arithmetic")
+POSED = (*CANONICAL, "scenes.animation")
 SHARED = tuple(f"scenes.formats.{room}" for room in ("text", "geometry", "appearance", "losses"))
 BESIDE = ("scenes.animation", "scenes.arithmetic", "scenes.daylight", "scenes.loading", "scenes.models")
 MEASURED = tuple(f"analysis.{room}" for room in ("command", "storage", "metrics", "page"))
@@ -27,7 +28,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "renderer/compute": RECORDS,
     "renderer/layout": ("renderer.compute",),
     "renderer/kernels": ("renderer.compute", "renderer.layout"),
-    "renderer/tables": ("renderer.compute", "renderer.layout", "renderer.kernels", *CANONICAL, *RECORDS),
+    "renderer/tables": (*(f"renderer.{room}" for room in ("compute", "layout", "kernels")), *POSED, *RECORDS),
     "renderer/stages": ("renderer.compute", "tsar"),
     "renderer/sampling": (*RECORDS, "scenes.arithmetic"),
     "renderer/rays": ("renderer.compute", "renderer.layout", "renderer.kernels", "renderer.tables"),

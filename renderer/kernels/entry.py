@@ -15,10 +15,8 @@ from renderer.kernels.camera import camera_ray, track_rotation, track_translatio
 from renderer.kernels.packets import MODULE_OPTIONS
 from renderer.kernels.randomness import group_draw
 from renderer.kernels.shading import radiance
-from renderer.layout.features import ALL, MEANING, PACKETS, Feature
+from renderer.layout.features import ALL, Feature
 from renderer.layout.structs import Ray, SceneData, ViewData
-from renderer.tables.requirements import explain, required
-from scenes.canonical import Scene
 
 
 @dataclass(frozen=True)
@@ -51,17 +49,6 @@ def kept_count() -> int:
     """How many sets of features this machine keeps compiled kernels for, of this revision and earlier ones."""
     folders = Path(wp.config.kernel_cache_dir or "").glob(f"wp_{_MODULE}*")
     return len({folder.name.removeprefix(f"wp_{_MODULE}")[:8] for folder in folders if folder.is_dir()})
-
-
-def explanation(scene: Scene) -> list[str]:
-    """Lines that say of every feature whether a scene requires it, and what in the scene does."""
-    found = explain(scene)
-    lines = [
-        f"{'yes' if feature in found else ' - '}  {MEANING[feature]:44} {found.get(feature, '')}" for feature in Feature
-    ]
-    alone = "one by one, by kernels of their own" if required(scene) & ~PACKETS else "in packets of sixteen"
-    kept = f"kernels for {kept_count()} sets of features are kept on this machine"
-    return [*(line.rstrip() for line in lines), f"samples are traced {alone}; {kept}"]
 
 
 def nearest(features: Feature) -> Feature:

@@ -15,29 +15,24 @@ from torch import Tensor
 
 from renderer.compute import device as devices
 from renderer.compute.launching import Command, address, require_same
+from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
-from renderer.stages import kernels
+from renderer.stages import kernels, plans
 from renderer.stages import reconstruction_kernels as display_kernels
-from renderer.stages.cache import CacheView, ClaimMemory
 from renderer.stages.coverage import StageName, covers
-from renderer.stages.estimate import ErrorPlan
 from renderer.stages.reconstruction import Display
-from renderer.stages.response import COLUMNS, ResponsePlan
-from renderer.stages.selection import SelectionPlan
-from renderer.stages.views import PerCache, point_at_cache
+from renderer.stages.views import PerCache
 from tsar.accounting import FAST_REFRESH, Account
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import StagesName, TsarConfig
 from tsar.decision import Decision
-from tsar.error import RADIANCE_MAX, replace_nonfinite, tolerated_power
-from tsar.haar import octave_count, state_size
-from tsar.morton import deinterleave
+from tsar.error import replace_nonfinite
 from tsar.observation import Observation
 from tsar.response import respond
-from tsar.selection import Request, cell_centres, require_full
+from tsar.selection import Request, require_full
 from tsar.stages import REFERENCE, Stages
-from tsar.tiling import split_bounds, tie_order
+from tsar.tiling import split_bounds
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
 
 _F32, _F64, _I32, _I64 = torch.float32, torch.float64, torch.int32, torch.int64
@@ -79,15 +74,12 @@ class Control:
         self._covered: dict[StageName, bool] = {stage: covers(config, stage) for stage in get_args(StageName)}
         self._elements = config.sdf_side**2
         self._most_tiles = 4**config.level_min + 3 * split_bounds(config)[1]
-        self._ranks = torch.empty(2, max(4**config.level_max, config.cache_slots), dtype=torch.float64)
-        self._scratch = kernels.Scratch()
-        for name, row in zip(("value", "key"), self._ranks, strict=True):
-            setattr(self._scratch, name, address(name, row, _F64, self._ranks.shape[1]))
+        self._memory = Memory()
+        self._scratch = plans.scratch(config, self._memory)
         self._prepare_observation()
         self._prepare_decision()
-        self._parts = _part_of_element(config)
         self._sums = np.zeros(3)
-        parts = address("parts", self._parts, _I32, self._elements)
+        parts = plans.part_of_element(config, self._memory)
         fixed = self._elements, FAST_REFRESH, parts, address("sums", self._sums, _F64, 3)
         self._account = Command(kernels.take_account, *fixed)
 
@@ -220,7 +212,7 @@ class Control:
     def _record(self, cache: FrameletCache) -> tuple[Command, Command]:
         """Launches that know where a cache lies: one claims slots, one observes a batch."""
         pending = address("pending", self._pending, torch.uint8, self.config.batch_size)
-        fixed = self._error_plan, _cache_view(cache, self.config), self._claim, pending
+        fixed = self._error_plan, plans.cache_view(cache, self.config), self._claim, pending
         progress = address("progress", self._progress, _I32, 2)
         return (
             Command(kernels.claim_slots, *fixed, self._scratch),
@@ -228,17 +220,9 @@ class Control:
         )
 
     def _prepare_observation(self) -> None:
-        config, claim = self.config, ClaimMemory()
+        config, batch = self.config, self.config.batch_size
         self._per_cache = PerCache(self._record)
-        self._error_plan = _error_plan(config)
-        batch, slots, state = config.batch_size, config.cache_slots, state_size(config.samples)
-        self._places = torch.empty(2, batch, dtype=_I64)
-        self._spare = torch.empty(batch, state)
-        self._marks = torch.zeros(slots, dtype=torch.bool)
-        claim.slot, claim.past = (address("places", row, _I64, batch) for row in self._places)
-        claim.spare = address("spare", self._spare, _F32, batch * state)
-        claim.marks = address("marks", self._marks, torch.bool, slots)
-        self._claim = claim
+        self._error_plan, self._claim = plans.error_plan(config), plans.claim_memory(config, self._memory)
         self._pending, self._progress = np.zeros(batch, np.uint8), np.zeros(2, np.int32)
         self._times = np.zeros(batch)
         self._times_address = address("times", self._times, _F64, batch)
@@ -250,80 +234,11 @@ class Control:
             address("tile count", self._tile_count, _I32, 1),
             address("times", self._decided, _I64, 4),
         )
-        plans = self._make_response_plan(), self._make_tiling_plan(), self._make_selection_plan()
-        self._decide = Command(kernels.decide_next, *plans, self._scratch, *results)
-
-    def _make_response_plan(self) -> ResponsePlan:
-        plan = _response_plan(self.config)
-        self._active = torch.empty(self._elements, dtype=torch.int32)
-        self._columns = torch.empty(COLUMNS, self._elements, dtype=torch.float64)
-        plan.active = self._field("active", self._active, _I32)
-        plan.columns = address("columns", self._columns, _F64, COLUMNS * self._elements)
-        return plan
-
-    def _make_tiling_plan(self) -> kernels.TilingPlan:
-        config, plan = self.config, kernels.TilingPlan()
-        low, high = config.level_min, config.level_max
-        nodes = 4**config.field_level
-        self._order = tie_order(low, high) if high > low else torch.empty(0, dtype=torch.int64)
-        self._nodes, self._node_keys = torch.empty(2, nodes, dtype=torch.float64)
-        self._split = torch.empty(nodes, dtype=torch.uint8)
-        plan.field_level, plan.level_low, plan.level_high = config.field_level, low, high
-        plan.splits_least, plan.splits_most = split_bounds(config)
-        plan.threshold = config.tiling.threshold_samples
-        ordered = (4**high - 4**low) // 3
-        plan.order = address("order", self._order, _I64, ordered)
-        plan.sums = address("sums", self._nodes, _F64, nodes)
-        plan.key = address("keys", self._node_keys, _F64, nodes)
-        plan.split = address("splits", self._split, torch.uint8, nodes)
-        return plan
-
-    def _make_selection_plan(self) -> SelectionPlan:
-        config, plan = self.config, SelectionPlan()
-        self._centres = cell_centres(config.framelet_side)
-        plan.batch, plan.field_level, plan.samples = config.batch_size, config.field_level, config.samples
-        plan.centre = address("centres", self._centres, _F32, 2 * config.samples)
-        return plan
+        config, memory = self.config, self._memory
+        response, tiling = plans.response_plan(config, memory), plans.tiling_plan(config, memory)
+        selection = plans.selection_plan(config, memory)
+        self._decide = Command(kernels.decide_next, response, tiling, selection, self._scratch, *results)
 
 
 def _single(field: Tensor) -> Tensor:
     return field if field.dtype == torch.float32 else field.to(torch.float32)
-
-
-def _error_plan(config: TsarConfig) -> ErrorPlan:
-    error, plan = config.error, ErrorPlan()
-    octaves = octave_count(config.samples)
-    plan.samples, plan.octaves, plan.state = config.samples, octaves, state_size(config.samples)
-    plan.octave_positions = plan.state // 4
-    plan.field_level = config.field_level
-    plan.linf, plan.difference = int(error.norm == "linf"), int(error.form == "difference")
-    spatial = tolerated_power(octaves, error.spatial_offset, error.spatial_slope, error)
-    temporal = tolerated_power(octaves, error.temporal_offset, error.temporal_slope, error)
-    plan.template_spatial, plan.template_temporal = spatial, temporal
-    plan.radiance_max = RADIANCE_MAX
-    return plan
-
-
-def _response_plan(config: TsarConfig) -> ResponsePlan:
-    plan = ResponsePlan()
-    (spatial_low, spatial_high), (temporal_low, temporal_high) = config.spatial_bounds, config.temporal_bounds
-    plan.elements = config.sdf_side**2
-    plan.spatial_high, plan.temporal_high = spatial_high, temporal_high
-    plan.spatial_min, plan.temporal_min = spatial_low / spatial_high, temporal_low / temporal_high
-    plan.gain, plan.shift = config.response.gain, 2.0**config.response.bias
-    plan.surplus_max = config.response.surplus_max * config.budget / (spatial_high * temporal_high)
-    return plan
-
-
-def _cache_view(cache: FrameletCache, config: TsarConfig) -> CacheView:
-    view = CacheView()
-    view.samples, view.state = config.samples, state_size(config.samples)
-    point_at_cache(view, cache, config)
-    return view
-
-
-def _part_of_element(config: TsarConfig) -> Tensor:
-    """For each element, the part of the map of samples it lies in, raster order."""
-    x, y = deinterleave(torch.arange(config.sdf_side**2))
-    shift = config.field_level - config.level_max
-    return ((y >> shift) * 2**config.level_max + (x >> shift)).to(torch.int32)

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from renderer.compute import device as devices
 from renderer.compute.launching import Command, address, require_same
+from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
 from renderer.stages import reconstruction_kernels as kernels
 from renderer.stages.ages import DisplayPlan
@@ -48,7 +49,7 @@ class Display:
         devices.load_kernels(kernels, "cpu")
         self.config, self._covered = config, covers(config, "reconstruct")
         self._cells = 2**config.level_max
-        self._memory: dict[str, Tensor] = {}
+        self._memory = Memory()
         self._plan = self._make_plan()
         self._count, self._taken, self._overdraw = np.zeros(1, np.int32), np.zeros(1, np.int32), np.zeros(1)
         threads = min(threads, config.resolution_px // self._plan.band)
@@ -90,17 +91,8 @@ class Display:
             Command(kernels.bury_dead, self._plan, view, overdraw),
         )
 
-    def _keep(self, name: str, tensor: Tensor, dtype: torch.dtype, count: int) -> int:
-        """Address of a tensor that lives as long as this object."""
-        self._memory[name] = tensor.contiguous()
-        return address(name, self._memory[name], dtype, count)
-
-    def _room(self, name: str, count: int, dtype: torch.dtype = torch.float32) -> int:
-        """Address of memory that lives as long as this object, zero at first."""
-        return self._keep(name, torch.zeros(count, dtype=dtype), dtype, count)
-
     def _make_plan(self) -> DisplayPlan:
-        config, plan = self.config, DisplayPlan()
+        config, plan, keep, zeros = self.config, DisplayPlan(), self._memory.keep, self._memory.zeros
         side, low, high = config.framelet_side, config.level_min, config.level_max
         resolution, cells, slots = config.resolution_px, self._cells, config.cache_slots
         plan.resolution, plan.level_low, plan.level_high, plan.side = resolution, low, high, side
@@ -110,37 +102,37 @@ class Display:
         length = sum(axis[0].numel() for axis in axes) + _SPARE
         for place, name in enumerate(("left", "right", "share_left", "share_right", "weight")):
             values = torch.cat([*(axis[place] for axis in axes), axes[0][place].repeat(_SPARE)[:_SPARE]])
-            setattr(plan, name, self._keep(name, values, torch.float32 if place > 1 else torch.int32, length))
+            setattr(plan, name, keep(name, values, torch.float32 if place > 1 else torch.int32, length))
         lengths = torch.tensor([0, *(axis[0].numel() for axis in axes)], dtype=torch.int32)
         first = torch.cumsum(lengths, 0, dtype=torch.int32)
-        plan.first = self._keep("first", first, torch.int32, len(axes) + 1)
+        plan.first = keep("first", first, torch.int32, len(axes) + 1)
         margins = [(axis[0].numel() - (resolution >> level)) // 2 for level, axis in enumerate(axes, low)]
-        plan.margin = self._keep("margin", torch.tensor(margins, dtype=torch.int32), torch.int32, len(axes))
+        plan.margin = keep("margin", torch.tensor(margins, dtype=torch.int32), torch.int32, len(axes))
         width = resolution // cells
         plan.reach = -(-plan.half // width) - (-max(margins) // width)
-        plan.order = self._keep("order", raster_to_morton(side).to(torch.int32), torch.int32, side**2)
+        plan.order = keep("order", raster_to_morton(side).to(torch.int32), torch.int32, side**2)
         nodes = (4 ** (high + 1) - 1) // 3
-        plan.node_time = self._room("node_time", nodes, torch.float64)
-        plan.node_level = self._room("node_level", nodes, torch.int32)
-        plan.cell_age = self._room("cell_age", cells**2)
-        plan.cell_least = self._room("cell_least", 2 * cells**2)
-        plan.row_integral = self._room("row_integral", resolution + 2 * plan.half + 1, torch.float64)
-        plan.row_sum = self._room("row_sum", cells * resolution, torch.float64)
-        plan.slot_age = self._room("slot_age", slots)
-        plan.candidate = self._room("candidate", slots, torch.int32)
-        plan.seen = self._room("seen", slots, torch.int32)
+        plan.node_time = zeros("node_time", nodes, torch.float64)
+        plan.node_level = zeros("node_level", nodes, torch.int32)
+        plan.cell_age = zeros("cell_age", cells**2)
+        plan.cell_least = zeros("cell_least", 2 * cells**2)
+        plan.row_integral = zeros("row_integral", resolution + 2 * plan.half + 1, torch.float64)
+        plan.row_sum = zeros("row_sum", cells * resolution, torch.float64)
+        plan.slot_age = zeros("slot_age", slots)
+        plan.candidate = zeros("candidate", slots, torch.int32)
+        plan.seen = zeros("seen", slots, torch.int32)
         return plan
 
     def _make_worker(self, number: int) -> kernels.Worker:
-        config, worker = self.config, kernels.Worker()
+        config, worker, zeros = self.config, kernels.Worker(), self._memory.zeros
         resolution, side = config.resolution_px, config.framelet_side
         widest = max(2 * side, 2 * (resolution >> config.level_min))
         planes, rows = PLANES * self._plan.band * resolution, 3 * side * widest
-        worker.planes = self._room(f"planes {number}", planes + _SPARE)
-        worker.rows = self._room(f"rows {number}", rows + _SPARE)
-        worker.samples = self._room(f"samples {number}", 3 * side**2)
-        worker.box = self._room(f"box {number}", resolution, torch.float64)
-        worker.ages = self._room(f"ages {number}", resolution)
+        worker.planes = zeros(f"planes {number}", planes + _SPARE)
+        worker.rows = zeros(f"rows {number}", rows + _SPARE)
+        worker.samples = zeros(f"samples {number}", 3 * side**2)
+        worker.box = zeros(f"box {number}", resolution, torch.float64)
+        worker.ages = zeros(f"ages {number}", resolution)
         worker.result = address("holes", self._holes[number : number + 1], torch.int32, 1)
         return worker
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from renderer.layout.features import Feature
+from renderer.kernels.entry import kept_count
+from renderer.layout.features import MEANING, PACKETS, Feature
 from scenes.canonical import (
     CheckerboardTexture,
     Cube,
@@ -52,6 +53,17 @@ def required(scene: Scene) -> Feature:
     for feature in explain(scene):
         features |= feature
     return features
+
+
+def explanation(scene: Scene) -> list[str]:
+    """Lines that say of every feature whether a scene requires it, and what in the scene does."""
+    found = explain(scene)
+    lines = [
+        f"{'yes' if feature in found else ' - '}  {MEANING[feature]:44} {found.get(feature, '')}" for feature in Feature
+    ]
+    alone = "one by one, by kernels of their own" if required(scene) & ~PACKETS else "in packets of sixteen"
+    kept = f"kernels for {kept_count()} sets of features are kept on this machine"
+    return [*(line.rstrip() for line in lines), f"samples are traced {alone}; {kept}"]
 
 
 def _required(scene: Scene) -> Iterator[tuple[Feature, str]]:

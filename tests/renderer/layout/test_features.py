@@ -9,7 +9,7 @@ import pytest
 
 from renderer.kernels import entry as kernels
 from renderer.layout.features import ALL, MEANING, PACKETS, Feature
-from renderer.tables.requirements import explain, required
+from renderer.tables.requirements import explain, explanation, required
 from renderer.trace import Renderer
 from scenes import catalog
 from scenes.canonical import (
@@ -111,7 +111,7 @@ def test_every_feature_has_words_and_a_cause() -> None:
     assert set(MEANING) == set(Feature)
     found = explain(effects.load("depth-of-field"))
     assert "lens_radius" in found[Feature.LENS] and list(found) == sorted(found)
-    lines = kernels.explanation(effects.load("glass"))
+    lines = explanation(effects.load("glass"))
     assert any(line.startswith("yes  refraction") and "'ball'" in line for line in lines)
     assert any(line.startswith(" -   thin lens") for line in lines)
     assert "sets of features are kept" in lines[-1]

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from renderer.compute import memory
 from renderer.stages import control
 from renderer.stages import reconstruction as display
 from tests.oracles import pictures, runs
@@ -57,14 +58,12 @@ def replay(config: TsarConfig, fences: Fences | None, cycles: int = 10) -> str:
 
 def fence(fences: Fences) -> None:
     """From now on the stages make their arrays between fences."""
-    for module in (control, display):
+    for module in (control, display, memory):
         module.torch = Replaced(torch, empty=fences.empty, zeros=fences.zeros)  # type: ignore[attr-defined]
+    for module in (control, display):
         module.np = Replaced(module.np, zeros=fences.zero_array)  # type: ignore[attr-defined]
-    for name in ("tie_order", "cell_centres", "_part_of_element"):
-        made = getattr(control, name)
-        setattr(control, name, lambda *arguments, made=made: fences.tensor(made(*arguments)))
-    kept = display.Display._keep
-    display.Display._keep = lambda self, name, values, *rest: kept(self, name, fences.tensor(values), *rest)
+    kept = memory.Memory.keep
+    memory.Memory.keep = lambda self, name, values, *rest: kept(self, name, fences.tensor(values), *rest)
 
 
 def in_a_process(name: str, place: str) -> str:
