@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from analysis.comparison import plots
 from analysis.comparison.summary import Measured, key_table, ledger_table, metric_table, stage_table
 from analysis.metrics.cost_model import stage_flops
+from analysis.page import figures
 from analysis.page.player import Curve, Player
 from analysis.page.report import Report, write_report
 from analysis.storage.records import density_quantiles, read_limits
@@ -36,11 +37,11 @@ def _error_figure(summary: Mapping[str, Any], measured: Measured) -> Figure:
 
 def write_figures(out: Path, summary: Mapping[str, Any], measured: Measured) -> None:
     """Writes ``error.png``."""
-    plots.save(_error_figure(summary, measured), out / "error.png")
+    figures.save(_error_figure(summary, measured), out / "error.png")
 
 
 def _player(measured: Measured) -> Player:
-    inks = plots.inks(list(measured.seen), measured.own)
+    inks = figures.inks(list(measured.seen), measured.own)
     rival = measured.rival
     marks = f" Dotted: the display of {rival} changes." if rival else ""
     return Player(
@@ -58,14 +59,14 @@ def _player(measured: Measured) -> Player:
 
 def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> None:
     """Writes ``report.html``."""
-    figures = {"Error over time": _error_figure(summary, measured)}
+    drawn = {"Error over time": _error_figure(summary, measured)}
     tables = [ledger_table(measured)]
     if measured.totals.recorded:
         limits = read_limits(out / "steps.parquet")
         bounds = {"density_spatial": limits.density_spatial, "density_temporal": limits.density_temporal}
         flops = {name: float(value) for name, value in stage_flops(measured.cost).items()}
-        figures["Densities over time"] = plots.density_figure(density_quantiles(out / "steps.parquet"), bounds)
-        figures["Stages"] = plots.stage_figure(flops, measured.totals.stage_s)
+        drawn["Densities over time"] = plots.density_figure(density_quantiles(out / "steps.parquet"), bounds)
+        drawn["Stages"] = plots.stage_figure(flops, measured.totals.stage_s)
         tables.insert(0, stage_table(measured))
     metrics = metric_table(measured)
     write_report(
@@ -74,7 +75,7 @@ def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> Non
             title=_title(summary),
             lead=_lead(summary, measured),
             key_numbers=key_table(measured),
-            figures=[(caption, _png(figure)) for caption, figure in figures.items()],
+            figures=[(caption, _png(figure)) for caption, figure in drawn.items()],
             player=_player(measured),
             tables=[metrics, *tables] if metrics else tables,
             details={"Configuration": summary["config"], "Provenance": summary["provenance"]},

@@ -46,8 +46,8 @@ def render_effect(
     write_image(options.out / f"{name}.exr", image)
     return encode_srgb(image), {
         "what": effects.EFFECTS[name].what,
-        "features": [MEANING[feature] for feature in Feature if feature in renderer.layout.features],
-        "packets": renderer.kernels.packets,
+        "features": [MEANING[feature] for feature in Feature if feature in renderer.features],
+        "packets": renderer.packets,
         "sets_compiled": compiled_count(),
         "wall_s": wall_s,
         "samples_per_s": options.width_px * options.height_px * options.samples / wall_s,

@@ -53,7 +53,8 @@ def shared(values: NDArray, dtype: type) -> wp.array:
         ValueError: if its elements are of another kind, or do not lie one after the other.
     """
     made = wp.array(values, dtype=dtype, device="cpu", copy=False)
-    if made.ptr != values.ctypes.data or not made.is_contiguous:  # where the kind differs Warp makes a copy unasked
+    # where the kind differs Warp makes a copy unasked; an empty array has no address
+    if values.size and (made.ptr != values.ctypes.data or not made.is_contiguous):
         raise ValueError(
             f"expected contiguous elements of {dtype.__name__}, got shape {values.shape} of {values.dtype}"
         )

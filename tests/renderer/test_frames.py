@@ -31,7 +31,7 @@ def lens():
 def packets():
     """A scene that packets can trace."""
     renderer = Renderer(effects.load("moving-object"))
-    assert renderer.kernels.packets
+    assert renderer.packets
     yield renderer
     renderer.close()
 

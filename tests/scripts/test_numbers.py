@@ -55,7 +55,7 @@ OPTIONS: dict[str, Any] = {
 }
 """The options of each command at their defaults."""
 
-WITHOUT_NUMBERS = {"convert.py"}
+WITHOUT_NUMBERS = {"convert.py", "same.py"}
 HOPELESS = (math.nan, math.inf, -math.inf, 1e300, -1e300, 10**20, -(10**20))
 PLAUSIBLE = (-1, 0)
 

@@ -1,11 +1,16 @@
 """Policies by name: the project's own, those of installed packages, and those that are added from Python."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from tsar.named import Named
-from tsar.policy import Policy, Setting
 
-Make = Callable[[Setting], Policy]
+if TYPE_CHECKING:
+    from tsar.policy import Policy, Setting
+
+    Make = Callable[[Setting], Policy[Any]]
 
 POLICIES: Named[Make] = Named(
     "policy",

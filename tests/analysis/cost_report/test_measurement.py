@@ -225,7 +225,7 @@ def test_a_small_pipeline_is_measured(one_torch_thread: None) -> None:
         ({"measured_batches": (32, 32, 64)}, "measured_batches"),
         ({"measured_resolutions": (128, 256)}, "measured_resolutions"),
         ({"measured_resolutions": (128, 256, 300)}, "resolution_px"),
-        ({"measured_batches": (0, 1, 2)}, "batch_size"),
+        ({"measured_batches": (0, 1, 2)}, "measured_batches"),
         ({"repetitions": 0}, "repetitions"),
         ({"cycle_s": math.nan}, "cycle_s"),
         ({"memory_cycles": 5}, "memory_cycles"),

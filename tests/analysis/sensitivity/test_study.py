@@ -114,8 +114,8 @@ def test_slopes_run_from_steep_to_flat_in_any_order_given() -> None:
         ({"offsets": (1.0, 1.0)}, ("offsets", "none twice")),
         ({"repetitions": 0}, ("repetitions", "0")),
         ({"still_s": SCALES["quick"].seconds}, ("still_s", f"{SCALES['quick'].seconds:g} s")),
-        ({"biases": (9.0,)}, ("response.bias", "9.0")),
-        ({"offsets": (float("nan"),)}, ("error.spatial_offset", "nan")),
+        ({"biases": (9.0,)}, ("biases", "9.0")),
+        ({"offsets": (float("nan"),)}, ("offsets", "nan")),
         ({"ledger": "wall"}, ("ledger", "wall")),
     ],
 )

@@ -115,8 +115,8 @@ def test_a_file_in_place_of_a_folder_is_named(tmp_path: Path, below: str) -> Non
 OWNER = """
 import sys, time
 from pathlib import Path
-from analysis.cli import bad_input, run_cli
-from analysis.files import own_folder
+from analysis.command.cli import bad_input, run_cli
+from analysis.command.ownership import own_folder
 def main():
     with bad_input():
         own_folder(Path(sys.argv[1]), "out")
