@@ -109,6 +109,12 @@ def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.where(steps > np.float32(0.04045), bright, steps / np.float32(12.92))[encoded]
 
 
+def encoded_srgb(image: Picture) -> Picture:
+    """sRGB values of linear ones, not rounded: undoes the decoding of a picture whose file says that it is linear."""
+    low = image <= 0.0031308
+    return np.where(low, 12.92 * image, 1.055 * power(np.maximum(image, 0.0), 1.0 / 2.4) - 0.055).astype(np.float32)
+
+
 def _read_exr(path: Path) -> Picture:
     with OpenEXR.File(str(path), header_only=True) as file:
         first, last = (corner.astype(np.int64) for corner in file.header()["dataWindow"])

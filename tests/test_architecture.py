@@ -37,8 +37,14 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "scenes/canonical": ("scenes.arithmetic",),
     "scenes/driving": ("scenes.canonical", *BESIDE),
     "scenes/effects": ("scenes.canonical", "scenes.driving", *BESIDE),
-    **{f"scenes/formats/{room}": ("scenes.canonical", *SHARED, *BESIDE) for room in ("text", "geometry", "appearance")},
-    **{f"scenes/formats/{dialect}": ("scenes.canonical", *SHARED, *BESIDE) for dialect in DIALECTS},
+    **{
+        f"scenes/formats/{room}": ("scenes.canonical", *SHARED, *BESIDE)
+        for room in ("text", "geometry", "appearance", "directives")
+    },
+    **{
+        f"scenes/formats/{dialect}": ("scenes.canonical", *SHARED, "scenes.formats.directives", *BESIDE)
+        for dialect in DIALECTS
+    },
     "scenes": ("scenes", "tsar.named"),
     "analysis/command": RECORDS,
     "analysis/storage": ("analysis.command", *RECORDS),
@@ -165,6 +171,8 @@ def test_warp_is_started_in_one_place() -> None:
         ("scenes/formats/a.py", "from ...analysis import x"),
         ("scenes/formats/luxrender/a.py", "from scenes.formats.pbrt.read import read"),
         ("scenes/formats/text/a.py", "from scenes.formats.conversion import convert"),
+        ("scenes/formats/geometry/a.py", "from scenes.formats.directives.syntax import Directive"),
+        ("scenes/formats/directives/a.py", "from scenes.formats.pbrt.read import read"),
         ("analysis/storage/a.py", "from renderer.film.files import write_exr"),
         ("analysis/storage/a.py", "from analysis.study.cases import Case"),
         ("analysis/page/a.py", "from scenes import catalog"),

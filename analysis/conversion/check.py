@@ -118,7 +118,7 @@ def _size(options: CheckOptions, scene: Scene) -> tuple[int, int]:
 def plain(scene: Scene) -> Scene:
     """The scene with every surface matte, of the colour that it has most of."""
     from scenes.canonical import ConstantTexture, Matte
-    from scenes.formats.pbrt.read_materials import mean_of
+    from scenes.formats.appearance.folding import mean_of
 
     def matte(instance: Instance) -> Instance:
         material: Any = instance.material

@@ -46,13 +46,12 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.daylight import sky_map, sun_light
-from scenes.formats.appearance.folding import folded
+from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.losses import LossReport
-from scenes.formats.luxrender.read_materials import reflectance_of_index
-from scenes.formats.pbrt.read_materials import mean_of
 
 DEPTH_MAX = 8
 """Bounces that mirrored and refracted rays are followed for."""

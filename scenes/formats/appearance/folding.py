@@ -1,4 +1,4 @@
-"""Textures that are products or mixtures, made into plainer ones where that loses nothing."""
+"""Products, mixtures and means of textures; products and mixtures become plainer textures where that loses nothing."""
 
 from __future__ import annotations
 
@@ -75,3 +75,28 @@ def _changed(texture: Texture, change: Change) -> Texture | None:
         image = change(texture.image.astype(np.float64)).astype(np.float32)
         return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, texture.filter)
     return None
+
+
+def product_of(first: Texture, second: Texture) -> Texture:
+    """The product of two textures; a constant where both are, and the other one where one is white."""
+    if isinstance(first, ConstantTexture) and isinstance(second, ConstantTexture):
+        return ConstantTexture(rgb(np.multiply(first.value, second.value)))
+    if isinstance(first, ConstantTexture) and first.value == (1.0, 1.0, 1.0):
+        return second
+    if isinstance(second, ConstantTexture) and second.value == (1.0, 1.0, 1.0):
+        return first
+    return ScaleTexture(first, second)
+
+
+def mean_of(texture: Texture) -> Rgb:
+    """Mean colour of a texture over the unit square of its coordinates."""
+    if isinstance(texture, ConstantTexture):
+        return texture.value
+    if isinstance(texture, ImageTexture):
+        return rgb(texture.image.reshape(-1, 3).mean(axis=0, dtype=np.float64))
+    if isinstance(texture, CheckerboardTexture):
+        return rgb(0.5 * (np.array(mean_of(texture.even)) + mean_of(texture.odd)))
+    if isinstance(texture, ScaleTexture):
+        return rgb(np.multiply(mean_of(texture.first), mean_of(texture.second)))
+    weights = 1.0 - texture.amount, texture.amount
+    return rgb(weights[0] * np.array(mean_of(texture.first)) + weights[1] * np.array(mean_of(texture.second)))

@@ -12,7 +12,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenes.arithmetic import product
 from scenes.canonical import (
     CheckerboardTexture,
     Cube,
@@ -32,10 +31,6 @@ SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 
 SQUARE_UV = 0.5 * SQUARE[:, :2] + 0.5
 
 
-FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
-"""Turns a sphere's ``v`` round and leaves the sphere."""
-
-
 def depends_on_uv(part: Material | Texture) -> bool:
     """Whether a material looks different with other texture coordinates: by a texture, or by which way facets spread
     more."""
@@ -46,19 +41,6 @@ def depends_on_uv(part: Material | Texture) -> bool:
         return True
     values = (getattr(part, field.name) for field in dataclasses.fields(part))
     return any(depends_on_uv(value) for value in values if dataclasses.is_dataclass(value))  # type: ignore[arg-type]
-
-
-def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
-    """A mesh and its place without a mirror in the place: the mesh is mirrored in its stead."""
-    if np.linalg.det(matrix[:3, :3]) > 0.0:
-        return mesh, matrix
-    return _mirrored(mesh), product(matrix, FLIPPED)
-
-
-def _mirrored(mesh: Mesh) -> Mesh:
-    away = np.array([1.0, 1.0, -1.0], np.float32)
-    normals = None if mesh.normals is None else mesh.normals * away
-    return Mesh(mesh.vertices * away, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
 
 
 @lru_cache(maxsize=1)

@@ -20,26 +20,24 @@ import numpy as np
 from scenes.arithmetic import norm, product
 from scenes.canonical import (
     ConstantTexture,
-    DirectionalLight,
     EnvironmentLight,
     Integrator,
-    PointLight,
     Rgb,
     Sampler,
     Scene,
     SceneError,
-    SpotLight,
     SunSky,
 )
+from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.directives import lights
+from scenes.formats.directives.reader import typed, word
+from scenes.formats.directives.scene_reader import SceneReader, scene_of
+from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
 from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.transform_stack import KEYS_MAX
 from scenes.formats.losses import LossReport
 from scenes.formats.luxrender.read_materials import LuxSurfaces, lux_image
-from scenes.formats.pbrt.read import PbrtReader, scene_of
-from scenes.formats.pbrt.read_materials import mean_of
-from scenes.formats.text.directive_reader import typed, word
-from scenes.formats.text.directives import Directive, Parameters, parameters_of
 from scenes.formats.text.scene_files import SceneFiles
 
 _INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlighting": "direct", "distributedpath": "path",
@@ -67,22 +65,26 @@ _LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 
 
 @dataclass
-class LuxReader(PbrtReader):
+class LuxReader(SceneReader):
     """State of a LuxRender file while it is read."""
 
     left_handed: bool = False
     _halt_samples: int = 0
     _motion_key: int | None = None
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.surfaces = LuxSurfaces(self.files, self.report, self.textures, self.materials)
+    def make_surfaces(self) -> LuxSurfaces:
+        return LuxSurfaces(self.files, self.report, self.textures, self.materials)
 
     def dialect(self) -> dict[str, Callable[[Directive], None]]:
         return {
             **super().dialect(),
             **dict.fromkeys(_NO_EFFECT, lambda d: None),
-            **dict.fromkeys(_MEDIA, self._lose_medium),
+            **dict.fromkeys(_MEDIA, self.lose_medium),
+            **dict.fromkeys(("Integrator", "SurfaceIntegrator"), self._read_integrator),
+            "Film": self._read_film,
+            "Sampler": self._read_sampler,
+            "LightSource": self._read_light,
+            "AreaLightSource": self._read_area_light,
             "LightGroup": lambda d: self.report.add(str(d.place), f"light group {word(d)!r}", "no groups"),
             "PortalShape": lambda d: self.report.add(str(d.place), "a portal"),
             "MotionInstance": self._move_object,
@@ -120,9 +122,9 @@ class LuxReader(PbrtReader):
             raise SceneError(f"{directive.place}: MotionEnd: expected {count} transforms before it")
         self.transforms.active, self._motion_key = (True,) * count, None
 
-    def _read_texture(self, directive: Directive) -> None:
+    def read_texture(self, directive: Directive) -> None:
         if word(directive, 1) != "fresnel":
-            super()._read_texture(directive)
+            super().read_texture(directive)
             return
         parameters = parameters_of(directive, 3)
         assert isinstance(self.surfaces, LuxSurfaces)
@@ -131,14 +133,12 @@ class LuxReader(PbrtReader):
 
     def _move_object(self, directive: Directive) -> None:
         self.report.add(str(directive.place), "MotionInstance", "its place at the start")
-        self._place_object(directive)
+        self.place_object(directive)
 
     def _read_film(self, directive: Directive) -> None:
         _, parameters = typed(directive)
         self._halt_samples = parameters.whole("haltspp", 0, 0, 1 << 24)
-        size = parameters.whole("xresolution", 800, 1, 32768), parameters.whole("yresolution", 600, 1, 32768)
-        name = parameters.text("filename", "")
-        self.film = dataclasses.replace(self.film, width_px=size[0], height_px=size[1], filename=name)
+        self.read_size(parameters, 800, 600)
         if parameters.unasked():
             self.report.add(
                 str(directive.place), f"{len(parameters.unasked())} settings of the film", "linear radiance"
@@ -188,7 +188,7 @@ class LuxReader(PbrtReader):
     def _read_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         where = str(directive.place)
-        self._lose_hints(parameters)
+        lights.lose_hints(parameters, self.report)
         if kind in ("sun", "sky", "sky2", "sunsky", "sunsky2"):
             self._daylight(kind, parameters)
         elif kind in ("infinite", "infinitesample"):
@@ -202,8 +202,8 @@ class LuxReader(PbrtReader):
 
     def _lamp(self, kind: str, parameters: Parameters, where: str) -> None:
         strength = self._strength(parameters)
-        start = self._placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
-        target = self._placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
+        start = self.placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
+        target = self.placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
         if kind in ("point", "spot"):
             power = parameters.number("power", 0.0) * parameters.number("efficacy", 17.0)
             luminance = float(product(_LUMINANCE, strength))
@@ -211,20 +211,12 @@ class LuxReader(PbrtReader):
                 strength = rgb(np.array(strength) * power / (4.0 * math.pi * luminance))
                 self.report.add(where, "the power of a lamp", "an intensity, as even all round")
         if kind == "distant":
-            direction = np.subtract(target, start)
-            if not norm(direction) > 0.0:
-                raise SceneError(f"{where}: distant: expected from and to apart")
-            angle = math.degrees(2.0 * parameters.number("theta", 0.0))
-            self.lights.append(DirectionalLight(rgb(direction / norm(direction)), strength, angle))
+            angle_deg = math.degrees(2.0 * parameters.number("theta", 0.0))
+            self.lights.append(lights.distant(start, target, strength, where, angle_deg))
         elif kind == "spot":
-            outer = parameters.number("coneangle", 30.0)
-            inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
-            self.lights.append(SpotLight(start, target, strength, inner, outer, "quartic"))
+            self.lights.append(lights.spot(parameters, start, target, strength))
         else:
-            if kind != "point":
-                parameters.asked.update(parameters.given)
-                self.report.add(where, f"light {kind!r}", "a point light as bright in all directions")
-            self.lights.append(PointLight(start, strength))
+            self.lights.append(lights.lamp(kind, parameters, start, strength, self.report))
 
     def _daylight(self, kind: str, parameters: Parameters) -> None:
         toward = parameters.numbers("sundir", 3)
@@ -249,20 +241,20 @@ class LuxReader(PbrtReader):
         if mapping != "latlong":
             self.report.add(where, f"mapping {mapping!r} of an environment map", "latlong")
         if not file:
-            return EnvironmentLight(np.array([[list(strength)]], np.float32))
+            return lights.even_environment(strength)
         path = self.files.path(file, where)
-        return self._map(lux_image(path, gamma, 1.0, where), strength, path)
+        return lights.environment_map(lux_image(path, gamma, 1.0, where), self.transforms.current[0], strength, path)
 
     def _read_area_light(self, directive: Directive) -> None:
         _, parameters = typed(directive)
         self.attributes.emission = self._strength(parameters)
         self.attributes.power = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
-        self._lose_hints(parameters)
+        lights.lose_hints(parameters, self.report)
         self.left_over(parameters, "area light")
 
-    def _read_shape(self, directive: Directive) -> None:
+    def read_shape(self, directive: Directive) -> None:
         count = len(self.instances)
-        super()._read_shape(directive)
+        super().read_shape(directive)
         power, emission = self.attributes.power, self.attributes.emission
         if len(self.instances) == count or emission is None or not power > 0.0:
             return

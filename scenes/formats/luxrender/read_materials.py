@@ -28,9 +28,14 @@ from scenes.canonical import (
     Texture,
     Translucent,
 )
+from scenes.formats.appearance.folding import mean_of, product_of
+from scenes.formats.appearance.indices import index_of_reflectance
+from scenes.formats.appearance.mixtures import mixture_of
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb
-from scenes.formats.pbrt.read_materials import Surfaces, encoded_again, mean_of, mixture, product
-from scenes.formats.text.directives import Parameters
+from scenes.formats.directives.surfaces import Maker, Surfaces
+from scenes.formats.directives.syntax import Parameters
+from scenes.formats.directives.textures import Pair
+from scenes.formats.geometry.conventions import first_row_below
 
 
 @dataclass
@@ -39,19 +44,15 @@ class LuxSurfaces(Surfaces):
 
     fresnel: dict[str, tuple[Rgb, Rgb]] = dataclasses.field(default_factory=dict)
 
-    def _image(self, parameters: Parameters, scale: tuple[float, float], offset: tuple[float, float]) -> Texture:
+    def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         where = str(parameters.place)
-        path = self.files.path(parameters.text("filename", ""), where)
-        wrap = parameters.text("wrap", "repeat")
-        if wrap not in ("repeat", "clamp", "black"):
-            raise SceneError(f"{where}: wrap: expected repeat, clamp or black, got {wrap!r}")
+        path, wrap = self.image_path(parameters)
         image = lux_image(path, parameters.number("gamma", 2.2), parameters.number("gain", 1.0), where)
         kind = parameters.text("filtertype", "bilinear")
         kinds = {"nearest": "nearest", "bilinear": "bilinear", "mipmap_trilinear": "mipmap", "mipmap_ewa": "mipmap"}
         if kind not in kinds:
             raise SceneError(f"{where}: filtertype: expected one of {', '.join(kinds)}, got {kind!r}")
-        # the first row is at v = 0 here, and at v = 1 in the canonical scene
-        size, start = (scale[0], -scale[1]), (offset[0], 1.0 - offset[1])
+        size, start = first_row_below(scale, offset)
         return ImageTexture(image, size, start, wrap, kinds[kind], str(path))  # type: ignore[arg-type]
 
     def made_texture(self, kind: str, parameters: Parameters) -> Texture:
@@ -84,27 +85,20 @@ class LuxSurfaces(Surfaces):
         assert found is not None
         return found
 
-    def material(self, kind: str, parameters: Parameters) -> Material:
-        makers = {
-            "matte": self._matte, "mirror": self._mirror, "glass": self._glass, "glass2": self._glass,
+    def makers(self) -> dict[str, Maker]:
+        return {
+            "matte": self.matte, "mirror": self._mirror, "glass": self._glass, "glass2": self._glass,
             "roughglass": self._glass, "metal": self._named_metal, "metal2": self._metal, "glossy": self._glossy,
             "shinymetal": self._glossy, "mix": self._mix, "mattetranslucent": self._mattetranslucent,
+            "null": self._null,
         }  # fmt: skip
-        where = str(parameters.place)
-        parameters.text("type", kind)
-        if kind in makers:
-            made = makers[kind](parameters)
-        elif kind == "null":
-            made = Masked(Matte(ConstantTexture(grey(0.0))), ConstantTexture(grey(0.0)))
-        elif kind in ("carpaint", "velvet", "cloth", "glossytranslucent", "scatter", "layered", "glossycoating",
-                      "doubleside"):  # fmt: skip
-            base = self.texture(parameters, "Kd", grey(0.5))
-            parameters.asked.update(parameters.given)
-            self.report.add(where, f"material {kind!r}", "matte of its base colour")
-            made = Matte(base)
-        else:
-            made = self.unknown_material(kind, parameters)
-        return made
+
+    def base_colors(self) -> dict[str, str]:
+        kinds = ("carpaint", "velvet", "cloth", "glossytranslucent", "scatter", "layered", "glossycoating")
+        return dict.fromkeys((*kinds, "doubleside"), "Kd")
+
+    def _null(self, parameters: Parameters) -> Material:
+        return Masked(Matte(ConstantTexture(grey(0.0))), ConstantTexture(grey(0.0)))
 
     def _mirror(self, parameters: Parameters) -> Material:
         return Mirror(self.texture(parameters, "Kr", grey(1.0)))
@@ -151,17 +145,17 @@ class LuxSurfaces(Surfaces):
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)
         amount = self.texture(parameters, "amount", grey(0.5))
-        return Masked(second, amount) if _nothing(first) else mixture(first, second, amount)
+        return Masked(second, amount) if _nothing(first) else mixture_of(first, second, amount)
 
     def _mattetranslucent(self, parameters: Parameters) -> Material:
         sides = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
         if not parameters.truth("energyconserving", False):
             return Translucent(*sides)
         if isinstance(sides[0], ConstantTexture):
-            return Translucent(sides[0], product(sides[1], ConstantTexture(rgb(1.0 - np.array(sides[0].value)))))
+            return Translucent(sides[0], product_of(sides[1], ConstantTexture(rgb(1.0 - np.array(sides[0].value)))))
         self.report.add(str(parameters.place), "energyconserving with a texture", "its mean")
         rest = ConstantTexture(rgb(1.0 - np.array(mean_of(sides[0]))))
-        return Translucent(sides[0], product(sides[1], rest))
+        return Translucent(sides[0], product_of(sides[1], rest))
 
 
 def _nothing(material: Material) -> bool:
@@ -169,24 +163,12 @@ def _nothing(material: Material) -> bool:
     return isinstance(material, Masked) and material.opacity == ConstantTexture(grey(0.0))
 
 
-def index_of_reflectance(reflectance: Rgb) -> tuple[Rgb, Rgb]:
-    """The real index that reflects so much at normal incidence: ``(1 + √r) / (1 - √r)``."""
-    root = np.sqrt(np.clip(reflectance, 0.0, 0.9999))
-    return rgb((1.0 + root) / (1.0 - root)), grey(0.0)
-
-
-def reflectance_of_index(eta: Rgb, k: Rgb) -> Rgb:
-    """What a conductor reflects at normal incidence (Fresnel's equations)."""
-    n, absorbed = np.array(eta), np.array(k)
-    return rgb(((n - 1.0) ** 2 + absorbed**2) / ((n + 1.0) ** 2 + absorbed**2))
-
-
 def lux_image(path: Path, gamma: float, gain: float, where: str) -> np.ndarray:
     """An image by LuxRender's rule: values to the power of ``gamma``; 1 takes them as they are."""
     if not 0.1 <= gamma <= 10.0:
         raise SceneError(f"{where}: gamma: expected 0.1 to 10, got {gamma:g}")
     image = loading.read_image(path)
-    encoded = image if path.suffix.lower() == ".exr" else encoded_again(image)
+    encoded = image if path.suffix.lower() == ".exr" else loading.encoded_srgb(image)
     if gamma == 1.0 and gain == 1.0 and path.suffix.lower() == ".exr":
         return image
     return np.float32(gain) * power(np.maximum(encoded, 0.0), np.float32(gamma)).astype(np.float32)

@@ -32,16 +32,18 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix, Rgb
 from scenes.daylight import sky_map
 from scenes.formats.appearance.spot_profiles import reshaped
-from scenes.formats.geometry.meshed import as_mesh, upright
+from scenes.formats.directives.scene_reader import FILTERS
+from scenes.formats.directives.scene_writer import SceneWriter, quoted
+from scenes.formats.geometry.conventions import FAR, MAP_AXES
+from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.orientation import upright
 from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, shines
 from scenes.formats.geometry.revolution import lamp_sphere
 from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.luxrender.read import SKY_UNIT, SUN_UNIT
 from scenes.formats.luxrender.write_materials import LuxSurfaceWriter
-from scenes.formats.pbrt.read import FAR, FILTERS, MAP_AXES
-from scenes.formats.pbrt.write import INLINE_MAX, PbrtWriter, aspect_of, inline_mesh, written_matrix
-from scenes.formats.pbrt.write_materials import listed, number
+from scenes.formats.text.numbers import listed, number, written_matrix
 from scenes.formats.text.output import Output
 
 _FILTERS = first_of(FILTERS)
@@ -51,16 +53,12 @@ _INTEGRATORS = {"path": "path", "whitted": "directlighting", "direct": "directli
                 "bidirectional": "bidirectional", "photonmap": "exphotonmap", "metropolis": "path"}  # fmt: skip
 
 
-class LuxWriter(LuxSurfaceWriter, PbrtWriter):
+class LuxWriter(LuxSurfaceWriter, SceneWriter):
     """Lines of a LuxRender scene."""
 
-    def _options(self, scene: Scene) -> None:
-        self.aspect = aspect_of(scene.film)
-        integrator, sampler, film = scene.integrator, scene.sampler, scene.film
-        kind, depth = _INTEGRATORS[integrator.kind], integrator.depth
-        if depth < 0:
-            depth = 1000
-            self.report.add("integrator", "paths without a limit", "1000 bounces")
+    def write_settings(self, scene: Scene) -> None:
+        integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
+        kind = _INTEGRATORS[integrator.kind]
         if integrator.kind in ("whitted", "metropolis"):
             self.report.add("integrator", integrator.kind, kind)
         edges = depth + 1  # LuxCore counts the edges of a path
@@ -77,16 +75,14 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
         width = f'"float xwidth" [ {radius} ] "float ywidth" [ {radius} ]'
         self.lines.append(f'PixelFilter "{_FILTERS[film.filter]}" {width}')
         size = f'"integer xresolution" [ {film.width_px} ] "integer yresolution" [ {film.height_px} ]'
-        name = (film.filename or "picture").rsplit(".", 1)[0].replace('"', "").replace("\\", "/")
+        name = quoted((film.filename or "picture").rsplit(".", 1)[0])
         tone = (
             '"string tonemapkernel" [ "linear" ] "float linear_sensitivity" [ 100 ] "float linear_exposure" [ 1 ] '
             '"float linear_fstop" [ 2.8 ] "float linear_gamma" [ 1 ] "float gamma" [ 2.2 ]'
         )
-        self.lines.append(
-            f'Film "fleximage" {size} "string filename" [ "{name}" ] "integer haltspp" [ {count} ] {tone}'
-        )
+        self.lines.append(f'Film "fleximage" {size} "string filename" [ {name} ] "integer haltspp" [ {count} ] {tone}')
 
-    def _camera(self, camera: Camera) -> None:
+    def write_camera(self, camera: Camera) -> None:
         """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored picture by a window from right to left."""
         poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
         size = power(abs(np.linalg.det(poses[0][:3, :3])), 1.0 / 3.0)
@@ -100,11 +96,11 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
         half = camera.half_width if isinstance(camera, OrthographicCamera) else 1.0
         plain = dataclasses.replace(camera, half_width=1.0) if isinstance(camera, OrthographicCamera) else camera
         # without a window LuxCore takes the field of view across, not along the shorter side
-        self.lines.append(self._camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0)))
+        self.lines.append(self.camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0)))
 
     # --- lights --------------------------------------------------------------------------------------------------
 
-    def _light(self, light: Light) -> None:
+    def write_light(self, light: Light) -> None:
         if isinstance(light, PointLight):
             line = f'"point" "point from" {listed(light.position)} "color L" {listed(light.intensity)}'
         elif isinstance(light, SpotLight):
@@ -161,21 +157,18 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
 
     # --- shapes --------------------------------------------------------------------------------------------------
 
-    def _times(self, scene: Scene) -> None:
-        """Each motion has times of its own."""
-
-    def _instance(self, instance: Instance) -> None:
+    def write_instance(self, instance: Instance) -> None:
         """LuxCore makes objects of mesh files only, and shows a motion's last key."""
         if isinstance(instance.shape, Sphere) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
             instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)
-        made = [self._object(instance)] if part_key(instance) in self.shared else self._part(instance)
+        made = [self.object_line(instance)] if part_key(instance) in self.shared else self.part(instance)
         poses, times_s = motion_keys(instance.track, instance.to_world)
         lines = [f"Transform {written_matrix(pose)}" for pose in poses]
         placing = [] if len(poses) == 1 and np.array_equal(poses[0], np.eye(4)) else _in_motion(lines, times_s)
         self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
 
-    def _part(self, instance: Instance) -> list[str]:
+    def part(self, instance: Instance) -> list[str]:
         emission = radiance_of(instance, self.report)
         lines = [f'NamedMaterial "{self.material(instance.material)}"']
         if emission is not None:
@@ -194,9 +187,7 @@ class LuxWriter(LuxSurfaceWriter, PbrtWriter):
 
     def _shape(self, instance: Instance) -> str:
         mesh = self._meshed(instance)
-        if len(mesh.faces) > INLINE_MAX or part_key(instance) in self.shared:
-            return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
-        return f'Shape "trianglemesh" {inline_mesh(mesh, "uv")}'
+        return self.mesh_line(mesh, in_file=part_key(instance) in self.shared)
 
 
 def _looking(pose: Matrix) -> str:

@@ -13,7 +13,7 @@ from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, rgb, sampled_rgb, xyz_to_rgb
 from scenes.formats.geometry.transform_stack import KEYS_MAX, rotation, scaling, translation
 from scenes.formats.losses import LossReport
-from scenes.formats.text.directives import NUMBER_MAX
+from scenes.formats.text.numbers import NUMBER_MAX
 from scenes.formats.text.xml_tree import Node
 from scenes.loading import decode_srgb
 

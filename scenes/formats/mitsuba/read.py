@@ -34,12 +34,12 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix
 from scenes.daylight import sun_at
 from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.geometry.conventions import FAR, duration_s
 from scenes.formats.geometry.transform_stack import motion
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
 from scenes.formats.mitsuba.read_shapes import MitsubaShapes
-from scenes.formats.pbrt.read import FAR, duration_s
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.text.xml_tree import Node, parse_xml
 

@@ -32,10 +32,11 @@ from scenes.canonical import (
     Texture,
     Translucent,
 )
+from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.spectra import grey, metal
+from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties, ior
-from scenes.formats.pbrt.read_materials import encoded_again, mean_of, product
 from scenes.formats.text.scene_files import SceneFiles
 from scenes.formats.text.xml_tree import Node
 
@@ -101,7 +102,7 @@ class MitsubaSurfaces:
             inner = next((child for child in properties.rest if child.tag in ("texture", "ref")), None)
             base = self.made_texture(self.find(inner) if inner.tag == "ref" else inner) if inner else None
             factor = ConstantTexture(properties.color("scale", grey(1.0)))
-            return factor if base is None else product(base, factor)
+            return factor if base is None else product_of(base, factor)
         if kind == "bitmap":
             return self._bitmap(properties, scale, offset)
         properties.asked.update(properties.given)
@@ -114,7 +115,7 @@ class MitsubaSurfaces:
         image = loading.read_image(path)
         gamma = properties.number("gamma", -1.0)
         if gamma > 0.0 and path.suffix.lower() != ".exr":
-            image = power(encoded_again(image), np.float32(gamma)).astype(np.float32)
+            image = power(loading.encoded_srgb(image), np.float32(gamma)).astype(np.float32)
         wrap = properties.text("wrapMode", "repeat")
         if wrap not in _WRAPS:
             raise SceneError(f"{where}: wrapMode: expected one of {', '.join(_WRAPS)}, got {wrap!r}")
@@ -124,8 +125,7 @@ class MitsubaSurfaces:
         if kind not in _FILTERS:
             raise SceneError(f"{where}: filterType: expected one of {', '.join(_FILTERS)}, got {kind!r}")
         properties.number("maxAnisotropy", 20.0)
-        # the first row is at v = 0 here, and at v = 1 in the canonical scene
-        size, start = (scale[0], -scale[1]), (offset[0], 1.0 - offset[1])
+        size, start = first_row_below(scale, offset)
         return ImageTexture(image, size, start, _WRAPS[wrap], _FILTERS[kind], str(path))  # type: ignore[arg-type]
 
     # --- materials -----------------------------------------------------------------------------------------------

@@ -29,14 +29,14 @@ from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
 from scenes.formats.geometry.mesh_files import read_obj, read_serialized
-from scenes.formats.geometry.meshed import FLIPPED, as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk
+from scenes.formats.geometry.orientation import FLIPPED, facing_normals, turned
 from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import motion, moved_by, translation
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
-from scenes.formats.pbrt.read_shapes import facing_normals, turned
 from scenes.formats.text.scene_files import SceneFiles
 from scenes.formats.text.xml_tree import Node
 

@@ -34,12 +34,14 @@ from scenes.canonical.values import Matrix
 from scenes.daylight import facing_up
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.appearance.spot_profiles import reshaped
-from scenes.formats.geometry.meshed import FLIPPED, as_mesh, depends_on_uv
+from scenes.formats.geometry.conventions import FAR
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.geometry.orientation import FLIPPED
 from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.losses import LossReport, first_of
-from scenes.formats.mitsuba.read import FAR, FILTERS, FORWARD
+from scenes.formats.mitsuba.read import FILTERS, FORWARD
 from scenes.formats.mitsuba.write_materials import Element, MitsubaSurfaceWriter
-from scenes.formats.pbrt.write_materials import number
+from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
 
 _FILTERS = first_of(FILTERS)

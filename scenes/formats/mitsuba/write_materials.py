@@ -36,11 +36,11 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.values import Matrix, Rgb
-from scenes.formats.appearance.folding import folded
+from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.spectra import rgb
+from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.losses import LossReport
-from scenes.formats.pbrt.read_materials import mean_of
-from scenes.formats.pbrt.write_materials import number
+from scenes.formats.text.numbers import number, spaced
 from scenes.formats.text.output import Output
 
 Element = ElementTree.Element
@@ -85,7 +85,7 @@ class MitsubaSurfaceWriter:
     def matrix(self, parent: Element, name: str, matrix: Matrix) -> None:
         """A transform."""
         holder = ElementTree.SubElement(parent, "transform", {"name": self.name(name)})
-        ElementTree.SubElement(holder, "matrix", {"value": " ".join(repr(float(value)) for value in matrix.ravel())})
+        ElementTree.SubElement(holder, "matrix", {"value": spaced(matrix.ravel())})
 
     def color(self, parent: Element, name: str, value: Rgb) -> None:
         """A colour, linear."""
@@ -110,10 +110,7 @@ class MitsubaSurfaceWriter:
             if self.modern:
                 kind = "nearest" if texture.filter == "nearest" else "bilinear"
             self.put(made, "string", "filterType", kind)
-            # the first row is at v = 0 here
-            self._uv(
-                made, (texture.uv_scale[0], -texture.uv_scale[1]), (texture.uv_offset[0], 1.0 - texture.uv_offset[1])
-            )
+            self._uv(made, *first_row_below(texture.uv_scale, texture.uv_offset))
         elif isinstance(texture, CheckerboardTexture):
             made = self.plugin("texture", "checkerboard", parent, name=self.name(name))
             self.texture(made, texture.even, "color0")

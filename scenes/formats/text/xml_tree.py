@@ -11,7 +11,7 @@ import defusedxml
 import defusedxml.expatreader
 
 from scenes.canonical import SceneError
-from scenes.formats.text.directives import Place
+from scenes.formats.text.places import Place
 
 DEPTH_MAX = 64
 NODES_MAX = 2_000_000

@@ -40,7 +40,8 @@ from scenes.formats.appearance.spectra import METALS
 from scenes.formats.appearance.spot_profiles import flux, reshaped
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
-from scenes.formats.geometry.meshed import FLIPPED, as_mesh
+from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.orientation import FLIPPED
 from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.revolution import area, lamp_sphere
 from scenes.formats.losses import LossReport

@@ -1,6 +1,6 @@
-"""The text of PBRT and LuxRender files: directives with values and typed parameters.
+"""The syntax of PBRT and LuxRender files: directives with values and typed parameters.
 
-Lists of numbers are one token each, so that a file of millions of vertices parses in the time that its numbers take.
+A list of numbers is one token, so that a file of millions of vertices takes no longer than its numbers do.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); LuxRender 1.x scene files use the same syntax.
 """
@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
+from scenes.formats.text.numbers import NUMBER_MAX
+from scenes.formats.text.places import Place
 
 _GRAMMAR = r"""
 start: directive*
@@ -34,9 +36,6 @@ COMMENT: /#[^\n]*/
 %ignore COMMENT
 """
 
-NUMBER_MAX = 1e30
-"""Greatest magnitude of a number in a scene; beyond it products of float32 overflow."""
-
 _PIECE = 1 << 20  # characters of a list of numbers that are read at a time
 
 Values = NDArray[np.float64] | tuple[str, ...]
@@ -46,18 +45,6 @@ Values = NDArray[np.float64] | tuple[str, ...]
 def _lexer() -> lark.Lark:
     """Only its tokens are needed: a directive is a name and all values up to the next."""
     return lark.Lark(_GRAMMAR, parser=None, lexer="basic")
-
-
-@dataclass(frozen=True)
-class Place:
-    """A place in a text, from 1."""
-
-    file: str
-    line: int
-    column: int
-
-    def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}"
 
 
 @dataclass(frozen=True)

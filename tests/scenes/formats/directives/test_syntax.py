@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenes.canonical import SceneError
-from scenes.formats.text.directives import parameters_of, parse_directives
+from scenes.formats.directives.syntax import parameters_of, parse_directives
 
 
 def only(text: str):

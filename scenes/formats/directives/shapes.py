@@ -12,10 +12,11 @@ import numpy as np
 
 from scenes.canonical import Disk, Mesh, SceneError, Shape, Sphere
 from scenes.canonical.values import Matrix
+from scenes.formats.directives.syntax import Parameters
 from scenes.formats.geometry import revolution
+from scenes.formats.geometry.orientation import facing_normals, turned
 from scenes.formats.geometry.ply_files import checked_mesh, read_ply
 from scenes.formats.losses import LossReport
-from scenes.formats.text.directives import Parameters
 from scenes.formats.text.scene_files import SceneFiles
 
 
@@ -130,22 +131,3 @@ def _apart(heights: tuple[float, float], parameters: Parameters) -> tuple[float,
     if heights[0] == heights[1]:
         raise SceneError(f"{parameters.place}: expected two different heights, got {heights[0]:g} twice")
     return heights
-
-
-def turned(mesh: Mesh) -> Mesh:
-    """The mesh with its outside in."""
-    normals = None if mesh.normals is None else -mesh.normals
-    return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
-
-
-def facing_normals(mesh: Mesh) -> Mesh:
-    """The mesh with every face counter-clockwise seen from where its normals point."""
-    if mesh.normals is None:
-        return mesh
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    wrong = (across * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
-    if not wrong.any():
-        return mesh
-    faces = np.where(wrong[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces).astype(np.int32)
-    return Mesh(mesh.vertices, faces, mesh.normals, mesh.uvs, mesh.source)

@@ -1,4 +1,4 @@
-"""Reads PBRT-like files: includes, transforms, attributes. What the other directives mean is the dialect's.
+"""Reads files of directives: includes, transforms and attributes. The dialect says what the other directives mean.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3).
 """
@@ -14,9 +14,9 @@ import numpy as np
 
 from scenes.canonical import Material, SceneError, Texture
 from scenes.canonical.values import Matrix
+from scenes.formats.directives.syntax import Directive, Parameters, parameters_of, parse_directives
 from scenes.formats.geometry.transform_stack import TransformStack, look_at, rotation, scaling, translation
 from scenes.formats.losses import LossReport
-from scenes.formats.text.directives import Directive, Parameters, Place, parameters_of, parse_directives
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
 SAVED_MAX = 1024
@@ -196,6 +196,3 @@ def checked(directive: Directive, found: Matrix) -> Matrix:
 def typed(directive: Directive) -> tuple[str, Parameters]:
     """Kind of a directive and its parameters."""
     return word(directive), parameters_of(directive, 1)
-
-
-__all__ = ["Attributes", "DirectiveReader", "Place", "checked", "matrix", "numbers", "typed", "word"]

@@ -1,0 +1,273 @@
+"""Reads scenes of directives: what PBRT and LuxRender share of the camera, lights, objects and shapes.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenes.arithmetic import arctan, product, products, tan
+from scenes.canonical import (
+    Camera,
+    ConstantTexture,
+    EnvironmentCamera,
+    Film,
+    Instance,
+    Integrator,
+    Light,
+    Masked,
+    Matte,
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    RealisticCamera,
+    Rgb,
+    RigidTrack,
+    Sampler,
+    Scene,
+    SceneError,
+)
+from scenes.canonical.values import Matrix
+from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.directives.reader import DirectiveReader, typed, word
+from scenes.formats.directives.shapes import ShapeReader
+from scenes.formats.directives.surfaces import Surfaces
+from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
+from scenes.formats.geometry.conventions import FAR, duration_s
+from scenes.formats.geometry.recognition import shape_of
+from scenes.formats.geometry.transform_stack import inverse, motion, moved_by
+
+FORWARD = np.diag([1.0, 1.0, -1.0, 1.0])
+"""From a camera that looks along +z with x to the right to the canonical one, which looks along -z."""
+
+FILTERS = {"box": "box", "triangle": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "sinc": "sinc"}
+_RADII = {"box": 0.5, "tent": 2.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 4.0}
+
+_DEFAULT = Matte(ConstantTexture((0.5, 0.5, 0.5)))
+_SHAPE_MAX = 1 << 20
+"""Greatest number of instances of a scene: nested object instances multiply."""
+
+
+@dataclass
+class SceneReader(DirectiveReader):
+    """State of a scene while its file is read; a dialect adds its film, samplers, integrators and lights."""
+
+    camera: Camera | None = None
+    film: Film = field(default_factory=Film)
+    sampler: Sampler = field(default_factory=lambda: Sampler("halton", 16))
+    integrator: Integrator = field(default_factory=lambda: Integrator("path", 5))
+    instances: list[Instance] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    objects: dict[str, list[Instance]] = field(default_factory=dict)
+    _object: list[Instance] | None = None
+
+    def __post_init__(self) -> None:
+        self.shapes = ShapeReader(self.files, self.report)
+        self.surfaces = self.make_surfaces()
+
+    def make_surfaces(self) -> Surfaces:
+        """What makes the textures and materials of the dialect."""
+        raise NotImplementedError
+
+    # --- directives ----------------------------------------------------------------------------------------------
+
+    def dialect(self) -> dict[str, Callable[[Directive], None]]:
+        return {
+            "Camera": self._read_camera, "PixelFilter": self.read_filter, "Accelerator": lambda d: None,
+            "WorldBegin": self._begin_world, "WorldEnd": lambda d: None,
+            "Texture": self.read_texture, "Material": self._read_material,
+            "MakeNamedMaterial": self._name_material, "NamedMaterial": self._take_material,
+            "Shape": self.read_shape,
+            "ObjectBegin": self._begin_object, "ObjectEnd": self._end_object, "ObjectInstance": self.place_object,
+            "MakeNamedMedium": self.lose_medium, "MediumInterface": self.lose_medium,
+        }  # fmt: skip
+
+    def _begin_world(self, directive: Directive) -> None:
+        self.transforms.replace(np.eye(4))
+
+    def lose_medium(self, directive: Directive) -> None:
+        named = f" {word(directive)!r}" if directive.values and isinstance(directive.values[0], tuple) else ""
+        self.report.add(str(directive.place), f"{directive.name}{named} (participating medium)")
+
+    def read_texture(self, directive: Directive) -> None:
+        name, kind = word(directive), word(directive, 2)
+        parameters = parameters_of(directive, 3)
+        self.textures[name] = self.surfaces.made_texture(kind, parameters)
+        self.left_over(parameters, f"texture {name!r}")
+
+    def _read_material(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        self.attributes.material = self.surfaces.material(kind, parameters)
+        self.left_over(parameters, f"material {kind!r}")
+
+    def _name_material(self, directive: Directive) -> None:
+        name, parameters = typed(directive)
+        self.materials[name] = self.surfaces.material(parameters.text("type", ""), parameters)
+        self.left_over(parameters, f"material {name!r}")
+
+    def _take_material(self, directive: Directive) -> None:
+        name = word(directive)
+        if name not in self.materials:
+            raise SceneError(f"{directive.place}: NamedMaterial: expected a material made before, got {name!r}")
+        self.attributes.material = self.materials[name]
+
+    # --- camera, film --------------------------------------------------------------------------------------------
+
+    def _read_camera(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        keys = [inverse(matrix) for matrix in self.transforms.current]
+        self.transforms.named["camera"] = keys
+        track = self._motion(keys, str(directive.place))
+        shutter = parameters.number("shutteropen", 0.0), parameters.number("shutterclose", 1.0)
+        if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
+            shutter = 0.0, 0.0  # the default of a still
+        half, mirror = self._window(parameters, directive)
+        placed = products(keys[0], FORWARD, mirror)
+        if parameters.number("frameaspectratio", 0.0):
+            self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
+        if kind == "perspective":
+            fov = self._field_of_view(parameters, half, directive)
+            lens, focus = parameters.number("lensradius", 0.0), parameters.number("focaldistance", FAR)
+            self.camera = PerspectiveCamera(placed, fov, lens, focus, track, shutter)
+        elif kind == "orthographic":
+            self.camera = OrthographicCamera(placed, half, track)
+        elif kind == "environment":
+            self.camera = EnvironmentCamera(placed)
+        elif kind == "realistic":
+            numbers = parameters.number("aperturediameter", 1.0), parameters.number("focusdistance", 10.0)
+            self.camera = RealisticCamera(placed, parameters.text("lensfile", ""), *numbers)
+        else:
+            raise SceneError(f"{directive.place}: expected a kind of camera, got {kind!r}")
+        self.left_over(parameters, f"camera {kind!r}")
+
+    def _field_of_view(self, parameters: Parameters, half: float, directive: Directive) -> float:
+        """Full angle of the shorter side, degrees, of a window whose shorter side is twice ``half``."""
+        fov = parameters.number("fov", 2.0 * parameters.number("halffov", 45.0))
+        if not 0.0 < fov < 180.0:
+            raise SceneError(f"{directive.place}: fov: expected an angle in (0, 180), got {fov:g}")
+        return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
+
+    def _window(self, parameters: Parameters, directive: Directive) -> tuple[float, Matrix]:
+        """Half of the window's shorter side, and its mirror where it runs from right to left.
+
+        A window off the middle is reported.
+        """
+        window = parameters.numbers("screenwindow", 4)
+        if window is None:
+            return 1.0, np.eye(4)
+        left, right, bottom, top = window
+        signs = np.sign([right - left, top - bottom])
+        if abs(left + right) > 1e-6 * abs(right) or abs(bottom + top) > 1e-6 * abs(top):
+            self.report.add(str(directive.place), "a screen window off the middle", "one about the middle")
+        if not signs.all():
+            raise SceneError(f"{directive.place}: screenwindow: expected left and right, bottom and top apart")
+        return 0.5 * float(min(abs(right - left), abs(top - bottom))), np.diag([*signs, 1.0, 1.0])
+
+    def read_size(self, parameters: Parameters, width_px: int, height_px: int) -> None:
+        """The size of the picture, by default the given one, and its file; the filter stays."""
+        size = [parameters.whole(f"{axis}resolution", px, 1, 32768) for axis, px in (("x", width_px), ("y", height_px))]
+        name = parameters.text("filename", "")
+        self.film = dataclasses.replace(self.film, width_px=size[0], height_px=size[1], filename=name)
+
+    def read_filter(self, directive: Directive) -> None:
+        """A filter of pixels."""
+        kind, parameters = typed(directive)
+        name = self.report.kind(FILTERS, kind, "filter", directive.place)
+        radius = parameters.number("xwidth", _RADII[name])
+        if parameters.number("ywidth", radius) != radius:
+            self.report.add(str(directive.place), "ywidth of the filter", "as wide as across")
+        self.film = dataclasses.replace(self.film, filter=name, filter_radius_px=radius)
+        self.left_over(parameters, f"filter {kind!r}")
+
+    # --- lights --------------------------------------------------------------------------------------------------
+
+    def placed(self, point: Any, default: tuple[float, float, float]) -> Rgb:
+        at = np.asarray(default if point is None else point, np.float64)
+        return rgb(product(self.transforms.current[0], np.append(at, 1.0))[:3])
+
+    # --- shapes --------------------------------------------------------------------------------------------------
+
+    def _begin_object(self, directive: Directive) -> None:
+        if self._object is not None:
+            raise SceneError(f"{directive.place}: ObjectBegin: expected ObjectEnd first")
+        self._begin("Object", directive)
+        self._object = self.objects[word(directive)] = []
+
+    def _end_object(self, directive: Directive) -> None:
+        self._end("Object", directive)
+        self._object = None
+
+    def place_object(self, directive: Directive) -> None:
+        name = word(directive)
+        if name not in self.objects or self._object is not None:
+            raise SceneError(f"{directive.place}: ObjectInstance: expected an object made before, got {name!r}")
+        start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
+        for part in self.objects[name]:
+            moved = track
+            if part.track is not None and track is None:
+                moved = moved_by(start, part.track)
+            elif part.track is not None:
+                self.report.add(str(directive.place), "a motion within a motion", "that of the instance")
+            self._keep(dataclasses.replace(part, to_world=product(start, part.to_world), track=moved), directive)
+
+    def _keep(self, instance: Instance, directive: Directive) -> None:
+        if len(self.instances) >= _SHAPE_MAX:
+            raise SceneError(f"{directive.place}: expected at most {_SHAPE_MAX:,} shapes")
+        (self.instances if self._object is None else self._object).append(instance)
+
+    def _motion(self, keys: Sequence[Matrix], where: str) -> RigidTrack | None:
+        return motion(keys, self.transforms.times_s, where, self.report)
+
+    def read_shape(self, directive: Directive) -> None:
+        kind, parameters = typed(directive)
+        made = self.shapes.made(kind, parameters, self.attributes.reversed, self.beside)
+        if made is None:
+            return
+        shape, local = made
+        material = self.attributes.material or _DEFAULT
+        if parameters.types.get("alpha") == "texture":
+            material = Masked(material, self.surfaces.texture(parameters, "alpha", grey(1.0)))
+        elif parameters.number("alpha", 1.0) != 1.0:
+            material = Masked(material, ConstantTexture(grey(parameters.number("alpha", 1.0))))
+        if "shadowalpha" in parameters:
+            parameters.asked.add("shadowalpha")
+            self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
+        if isinstance(shape, Mesh):
+            shape, local = shape_of(shape, material, str(directive.place), self.report)
+        start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
+        self._keep(
+            Instance(shape, material, product(start, local), track, emission=self.attributes.emission),
+            directive,
+        )
+        self.left_over(parameters, f"shape {kind!r}")
+
+
+def scene_of(reader: SceneReader, path: Path) -> Scene:
+    """Reads a file and makes a scene of it."""
+    main = reader.files.folder / Path(path).name
+    if not main.is_file():
+        raise SceneError(f"{path}: expected a scene file, found none")
+    reader.read(main)
+    reader.finish()
+    camera = reader.camera
+    if camera is None:
+        raise SceneError(f"{path}: expected a camera, found none")
+    return Scene(
+        camera,
+        tuple(reader.instances),
+        tuple(reader.lights),
+        reader.film,
+        reader.sampler,
+        reader.integrator,
+        materials=dict(reader.materials),
+        name=Path(path).stem,
+        duration_s=duration_s(camera, reader.instances),
+    )

@@ -1,0 +1,159 @@
+"""Textures and materials of the canonical scene as lines of directives: what PBRT and LuxRender share.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+from scenes.canonical import (
+    CheckerboardTexture,
+    ConstantTexture,
+    Emissive,
+    HeightField,
+    ImageTexture,
+    Material,
+    Matte,
+    Mirror,
+    MixTexture,
+    Rgb,
+    ScaleTexture,
+    Texture,
+)
+from scenes.formats.losses import LossReport
+from scenes.formats.text.numbers import listed, number
+from scenes.formats.text.output import Output
+
+Kind = Literal["color", "float"]
+Pair = tuple[float, float]
+
+
+@dataclass
+class SurfaceWriter:
+    """Lines of a scene, as they are made, and the names of what they define.
+
+    Attributes:
+        color_texture: type of the textures that hold colours.
+        color: type of the parameters that hold colours.
+        checkerboard_end: parameters of every checkerboard.
+    """
+
+    color_texture: ClassVar[str]
+    color: ClassVar[str]
+    checkerboard_end: ClassVar[str] = ""
+
+    output: Output
+    report: LossReport
+    lines: list[str] = field(default_factory=list)
+    _textures: dict[tuple[int, str], tuple[Texture, str]] = field(default_factory=dict)
+    _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
+    _taken: set[str] = field(default_factory=set)
+
+    # --- textures ------------------------------------------------------------------------------------------------
+
+    def texture(self, texture: Texture, name: str, kind: Kind = "color") -> str:
+        """A parameter of a material or texture; its texture is written before.
+
+        Args:
+            texture: what to write.
+            name: of the parameter.
+            kind: whether its values are colours or numbers.
+        """
+        if isinstance(texture, ConstantTexture):
+            return self.constant(name, texture.value, kind)
+        key = id(texture), kind
+        if key not in self._textures:
+            made = self._texture_line(texture, kind)
+            label = self.label("t", "")
+            self._textures[key] = texture, label
+            self.lines.append(f'\tTexture "{label}" "{self.color_texture if kind == "color" else kind}" {made}')
+        return f'"texture {name}" [ "{self._textures[key][1]}" ]'
+
+    def constant(self, name: str, value: Rgb, kind: Kind = "color") -> str:
+        """A colour, or its mean as a number."""
+        if kind == "float":
+            return f'"float {name}" [ {number(sum(value) / 3.0)} ]'
+        return f'"{self.color} {name}" {listed(value)}'
+
+    def _texture_line(self, texture: Texture, kind: Kind) -> str:
+        if isinstance(texture, ImageTexture):
+            return self.image_line(texture)
+        if isinstance(texture, CheckerboardTexture):
+            parts = f"{self.texture(texture.even, 'tex1', kind)} {self.texture(texture.odd, 'tex2', kind)}"
+            u, v = (number(value) for value in texture.uv_scale)
+            return f'"checkerboard" {parts} "float uscale" [ {u} ] "float vscale" [ {v} ]{self.checkerboard_end}'
+        assert isinstance(texture, MixTexture | ScaleTexture)
+        parts = f"{self.texture(texture.first, 'tex1', kind)} {self.texture(texture.second, 'tex2', kind)}"
+        if isinstance(texture, MixTexture):
+            return f'"mix" {parts} "float amount" [ {number(texture.amount)} ]'
+        return f'"scale" {parts}'
+
+    def image_line(self, texture: ImageTexture) -> str:
+        """The texture of a picture, by the rules of the dialect."""
+        raise NotImplementedError
+
+    def placed_image(self, file: str, texture: ImageTexture, more: str, scale: Pair, offset: Pair) -> str:
+        """The texture of a picture; ``more`` holds the parameters that the dialect alone has."""
+        return (
+            f'"imagemap" "string filename" [ "{file}" ] "string wrap" [ "{texture.wrap}" ] {more}'
+            f'"float uscale" [ {number(scale[0])} ] "float vscale" [ {number(scale[1])} ] '
+            f'"float udelta" [ {number(offset[0])} ] "float vdelta" [ {number(offset[1])} ]'
+        )
+
+    # --- materials -----------------------------------------------------------------------------------------------
+
+    def label(self, prefix: str, wanted: str = "") -> str:
+        """A name that nothing has yet: the wanted one where it is free and can be written."""
+        label, count = wanted or f"{prefix}1", 1
+        while label in self._taken or '"' in label or "\\" in label or "\n" in label:
+            count += 1
+            label = f"{prefix}{count}"
+        self._taken.add(label)
+        return label
+
+    def material(self, material: Material, name: str = "") -> str:
+        """Name of a material, which is written before where it is new."""
+        if id(material) not in self._materials:
+            made = self.material_line(material, name or type(material).__name__)
+            self.define(material, self.label("m", name), made)
+        return self._materials[id(material)][1]
+
+    def define(self, material: Material, label: str, line: str) -> None:
+        """Writes a material under a name."""
+        self._materials[id(material)] = material, label
+        self.lines.append(f'\tMakeNamedMaterial "{label}" {line}')
+
+    def material_line(self, material: Material, name: str) -> str:
+        """What a material is, without its name; a dialect adds what it writes otherwise."""
+        where = f"material {name!r}"
+        if isinstance(material, HeightField):
+            self.report.add(where, "a height field", "its material, flat")
+            return self.material_line(material.base, name)
+        kind, parameters = self.plain_material(material, where)
+        return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
+
+    def plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
+        """Kind and parameters of a material that holds no other one."""
+        if isinstance(material, Matte):
+            sigma = [f'"float sigma" [ {number(material.sigma_deg)} ]'] if material.sigma_deg else []
+            return "matte", [self.texture(material.reflectance, "Kd"), *sigma]
+        if isinstance(material, Mirror):
+            if material.spread_deg:
+                self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
+            return "mirror", [self.texture(material.reflectance, "Kr")]
+        assert isinstance(material, Emissive)
+        return "matte", [self.constant("Kd", (0.0, 0.0, 0.0))]
+
+
+def mixture_line(first: str, second: str, amount: str) -> str:
+    """A mixture of two materials by name."""
+    return (
+        f'"string type" [ "mix" ] "string namedmaterial1" [ "{first}" ] "string namedmaterial2" [ "{second}" ] {amount}'
+    )
+
+
+def roughness_pair(alphas: Pair) -> str:
+    """Roughness along both directions of a surface."""
+    return f'"float uroughness" [ {number(alphas[0])} ] "float vroughness" [ {number(alphas[1])} ]'

@@ -1,0 +1,60 @@
+"""Materials of files of directives, into those of the canonical scene.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on materials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from scenes.canonical import ConstantTexture, Material, Matte, SceneError
+from scenes.formats.appearance.spectra import grey
+from scenes.formats.directives.syntax import Parameters
+from scenes.formats.directives.textures import TextureReader
+
+Maker = Callable[[Parameters], Material]
+
+
+class Surfaces(TextureReader):
+    """Makes textures and materials of parameters; a dialect adds its kinds of materials."""
+
+    def makers(self) -> dict[str, Maker]:
+        """What makes the materials of each kind."""
+        raise NotImplementedError
+
+    def base_colors(self) -> dict[str, str]:
+        """Kinds of materials that become matte, and the parameters that hold their base colours."""
+        raise NotImplementedError
+
+    def material(self, kind: str, parameters: Parameters) -> Material:
+        """The material of a kind; a kind that is not known is reported."""
+        where, makers, base_colors = str(parameters.place), self.makers(), self.base_colors()
+        parameters.text("type", kind)
+        if kind in makers:
+            return makers[kind](parameters)
+        if kind in base_colors:
+            base = self.texture(parameters, base_colors[kind], grey(0.5))
+            parameters.asked.update(parameters.given)
+            self.report.add(where, f"material {kind!r}", "matte of its base colour")
+            return Matte(base)
+        parameters.asked.update(parameters.given)
+        self.report.unknown(where, "material", kind, "grey, matte")
+        return Matte(ConstantTexture(grey(0.5)))
+
+    def matte(self, parameters: Parameters) -> Material:
+        """A matte surface."""
+        return Matte(self.texture(parameters, "Kd", grey(0.5)), self.scalar(parameters, "sigma", 0.0))
+
+    def mixed(self, parameters: Parameters) -> list[Material]:
+        """The two materials that a mixture names.
+
+        Raises:
+            SceneError: a name is that of no material.
+        """
+        parts = []
+        for name in ("namedmaterial1", "namedmaterial2"):
+            wanted = parameters.text(name, "")
+            if wanted not in self.materials:
+                raise SceneError(f"{parameters.place}: {name}: expected a named material, got {wanted!r}")
+            parts.append(self.materials[wanted])
+        return parts

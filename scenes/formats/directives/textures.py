@@ -1,0 +1,169 @@
+"""Colours and textures of files of directives, into those of the canonical scene.
+
+Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on textures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenes.canonical import (
+    CheckerboardTexture,
+    ConstantTexture,
+    Material,
+    MixTexture,
+    Rgb,
+    SceneError,
+    Texture,
+)
+from scenes.formats.appearance.folding import mean_of, product_of
+from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb, sampled_rgb, xyz_to_rgb
+from scenes.formats.directives.syntax import Parameters
+from scenes.formats.losses import LossReport
+from scenes.formats.text.scene_files import SceneFiles
+
+_WRAPS = ("repeat", "clamp", "black")
+_NO_TEXTURES = ("windy", "fbm", "wrinkled", "marble", "dots", "uv", "bilerp")
+
+Pair = tuple[float, float]
+
+
+@dataclass
+class TextureReader:
+    """Makes textures of parameters.
+
+    Attributes:
+        files: for images.
+        report: of what could not be kept.
+        textures, materials: by name; filled by the reader.
+    """
+
+    files: SceneFiles
+    report: LossReport
+    textures: Mapping[str, Texture]
+    materials: Mapping[str, Material]
+
+    def color(self, parameters: Parameters, name: str, default: Rgb) -> Rgb:
+        """A colour, however it is given; raises SceneError where it cannot be read."""
+        if name not in parameters:
+            parameters.asked.add(name)
+            return default
+        kind, place = parameters.types[name], f"{parameters.place}: {name}"
+        if kind in ("rgb", "color"):
+            return rgb(_count(parameters, name, 3))
+        if kind == "xyz":
+            return xyz_to_rgb(_count(parameters, name, 3))
+        if kind == "blackbody":
+            values = parameters.numbers(name)
+            if values is None or len(values) not in (1, 2) or not 100.0 <= values[0] <= 1e6:
+                raise SceneError(f"{place}: expected a temperature of 100 to 1000000 K and a scale")
+            return blackbody_rgb(float(values[0]), float(values[1]) if len(values) == 2 else 1.0)
+        if kind == "float":
+            return rgb(np.full(3, parameters.number(name, 0.0)))
+        if kind == "spectrum":
+            return self._spectrum(parameters, name)
+        raise SceneError(f"{place}: expected a colour, got the type {kind!r}")
+
+    def _spectrum(self, parameters: Parameters, name: str) -> Rgb:
+        given = parameters.given[name]
+        if not isinstance(given, tuple):
+            values = _pairs(parameters, name)
+            return sampled_rgb(values[:, 0], values[:, 1])
+        file = parameters.text(name, "")
+        parts = Path(file).stem.split(".")[0].replace("metal-", "").split("-")
+        known = metal(parts[0])
+        if known is not None and parts[-1] in ("eta", "k"):
+            return known[0] if parts[-1] == "eta" else known[1]
+        where = str(parameters.place)
+        path = self.files.path(file, where)
+        numbers = " ".join(line.split("#")[0] for line in self.files.text(path, where).splitlines()).split()
+        try:
+            values = np.array([float(number) for number in numbers]).reshape(-1, 2)
+        except ValueError:
+            raise SceneError(f"{path}: expected pairs of a wavelength and a value") from None
+        if not len(values) or not np.isfinite(values).all():
+            raise SceneError(f"{path}: expected pairs of finite numbers")
+        return sampled_rgb(values[:, 0], values[:, 1])
+
+    def texture(self, parameters: Parameters, name: str, default: Rgb) -> Texture:
+        """A texture by name, or a constant."""
+        if parameters.types.get(name) != "texture":
+            return ConstantTexture(self.color(parameters, name, default))
+        found = self.textures.get(parameters.text(name, ""))
+        if found is None:
+            wanted = f"{name}: texture {parameters.text(name, '')!r}, which nothing defines"
+            self.report.add(str(parameters.place), wanted, f"the constant {default}")
+            return ConstantTexture(default)
+        return found
+
+    def scalar(self, parameters: Parameters, name: str, default: float) -> float:
+        """A number; a texture becomes its mean, which is reported."""
+        if parameters.types.get(name) != "texture":
+            return parameters.number(name, default)
+        value = float(np.mean(mean_of(self.texture(parameters, name, grey(default)))))
+        self.report.add(str(parameters.place), f"{name}: a texture", f"its mean, {value:g}")
+        return value
+
+    def made_texture(self, kind: str, parameters: Parameters) -> Texture:
+        """The texture that a ``Texture`` directive makes."""
+        where = str(parameters.place)
+        scale = (parameters.number("uscale", 1.0), parameters.number("vscale", 1.0))
+        offset = (parameters.number("udelta", 0.0), parameters.number("vdelta", 0.0))
+        mapping = parameters.text("mapping", "uv")
+        if mapping != "uv":
+            self.report.add(where, f"mapping {mapping!r} of a texture", "the mapping uv")
+        if kind == "constant":
+            return self.texture(parameters, "value", (1.0, 1.0, 1.0))
+        if kind == "scale":
+            return product_of(*(self.texture(parameters, f"tex{n}", (1.0, 1.0, 1.0)) for n in (1, 2)))
+        if kind == "mix":
+            amount = self.scalar(parameters, "amount", 0.5)
+            parts = self.texture(parameters, "tex1", grey(0.0)), self.texture(parameters, "tex2", grey(1.0))
+            return MixTexture(*parts, amount)
+        if kind == "checkerboard":
+            if parameters.whole("dimension", 2, 2, 3) == 3:
+                self.report.add(where, "a checkerboard in space", "one over u and v")
+            if parameters.text("aamode", "closedform") != "closedform":
+                self.report.add(where, "antialiasing of the checkerboard", "that of the renderer")
+            if offset != (0.0, 0.0):
+                self.report.add(where, "udelta, vdelta of a checkerboard", "none")
+            parts = self.texture(parameters, "tex1", grey(1.0)), self.texture(parameters, "tex2", grey(0.0))
+            return CheckerboardTexture(*parts, scale)
+        if kind == "imagemap":
+            return self.image(parameters, scale, offset)
+        parameters.asked.update(parameters.given)
+        if kind in _NO_TEXTURES:
+            self.report.add(where, f"texture {kind!r}", "the constant 0.5")
+        else:
+            self.report.unknown(where, "texture", kind, "the constant 0.5")
+        return ConstantTexture((0.5, 0.5, 0.5))
+
+    def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
+        """The texture of a picture, by the rules of the dialect."""
+        raise NotImplementedError
+
+    def image_path(self, parameters: Parameters) -> tuple[Path, str]:
+        """The file of a picture, and what lies beyond its edges."""
+        where = str(parameters.place)
+        path = self.files.path(parameters.text("filename", ""), where)
+        wrap = parameters.text("wrap", "repeat")
+        if wrap not in _WRAPS:
+            raise SceneError(f"{where}: wrap: expected one of {', '.join(_WRAPS)}, got {wrap!r}")
+        return path, wrap
+
+
+def _count(parameters: Parameters, name: str, count: int) -> np.ndarray:
+    found = parameters.numbers(name, count)
+    assert found is not None
+    return found
+
+
+def _pairs(parameters: Parameters, name: str) -> np.ndarray:
+    found = parameters.numbers(name)
+    if found is None or len(found) < 2 or len(found) % 2:
+        raise SceneError(f"{parameters.place}: {name}: expected pairs of a wavelength and a value")
+    return found.reshape(-1, 2)

@@ -1,0 +1,40 @@
+"""Which side of a mesh is its outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes.arithmetic import product
+from scenes.canonical import Mesh
+
+FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
+"""Mirrors z; a sphere stays, and its texture coordinate ``v`` is reversed."""
+
+
+def turned(mesh: Mesh) -> Mesh:
+    """The mesh with its inside out."""
+    normals = None if mesh.normals is None else -mesh.normals
+    return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
+
+
+def facing_normals(mesh: Mesh) -> Mesh:
+    """The mesh with every face counter-clockwise as seen from where its normals point."""
+    if mesh.normals is None:
+        return mesh
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    wrong = (across * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
+    if not wrong.any():
+        return mesh
+    faces = np.where(wrong[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces).astype(np.int32)
+    return Mesh(mesh.vertices, faces, mesh.normals, mesh.uvs, mesh.source)
+
+
+def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
+    """A mesh and its transform; where the transform mirrors, the mesh is mirrored in its stead."""
+    if np.linalg.det(matrix[:3, :3]) > 0.0:
+        return mesh, matrix
+    away = np.array([1.0, 1.0, -1.0], np.float32)
+    normals = None if mesh.normals is None else mesh.normals * away
+    mirrored = Mesh(mesh.vertices * away, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
+    return mirrored, product(matrix, FLIPPED)
