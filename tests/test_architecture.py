@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("tsar", "renderer", "scenes", "analysis", "scripts")
 
-RECORDS = ("tsar.types", "tsar.config", "tsar.morton", "tsar.memory", "tsar.named")
+RECORDS = ("tsar.types", "tsar.config", "tsar.morton", "tsar.memory", "tsar.named", "tsar.checks", "tsar.choices")
 CANONICAL = ("scenes.canonical", "scenes.arithmetic")
 POSED = (*CANONICAL, "scenes.animation")
 SHARED = tuple(f"scenes.formats.{room}" for room in ("text", "geometry", "appearance", "losses"))

@@ -6,13 +6,15 @@ import dataclasses
 import importlib
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
-from tsar.config import ConfigError, ErrorConfig, ResponseConfig, closed_choices
+from analysis.suitability.study import SuitabilityOptions
+from analysis.tracer.render_options import RenderOptions
+from tsar.config import ConfigError, ErrorConfig, ReconstructionConfig, ResponseConfig, closed_choices
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = "tsar", "renderer", "analysis"
@@ -53,7 +55,7 @@ def hints_of(record: type) -> dict[str, Any]:
 
 def test_no_record_takes_what_it_does_not_list() -> None:
     found = list(records_with_choices())
-    assert len(found) > 25 and (ErrorConfig, "norm") in found and (ResponseConfig, "solver") in found
+    assert len(found) > 25 and (ErrorConfig, "form") in found
     taken = []
     for record, name in found:
         many = get_origin(get_type_hints(record)[name]) is tuple
@@ -84,20 +86,35 @@ def make(record: type, **values: Any) -> None:
 
 
 def test_the_message_names_field_choices_and_value() -> None:
-    with pytest.raises(ConfigError, match=r"^error\.norm: expected one of l2, linf, got 'l1'$"):
-        make(ErrorConfig, norm="l1")
+    with pytest.raises(ConfigError, match=r"^error\.form: expected one of contrast, difference, got 'other'$"):
+        make(ErrorConfig, form="other")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ErrorConfig(norm="l1"), r"^error\.norm: expected one of l2, linf, got 'l1'$"),
+        (lambda: ResponseConfig(solver="waterfil"), r"^response\.solver: .*'waterfil' \(nearest: waterfill\)$"),
+        (lambda: ReconstructionConfig(method="x"), r"^reconstruction\.method: expected one of blend, got 'x'$"),
+        (lambda: RenderOptions("glass", point_set="y"), r"^point_set: expected one of hammersley, .*, got 'y'$"),
+        (lambda: SuitabilityOptions(solvers=("z",)), r"^solvers: expected one of waterfill, .*, got 'z'$"),
+    ],
+)
+def test_a_name_that_no_table_has_is_refused_with_those_that_it_has(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        make()
 
 
 @dataclasses.dataclass(frozen=True)
 @closed_choices()
 class Wider(ErrorConfig):
-    norm: Literal["l2", "linf", "l1"] = "l2"  # type: ignore[assignment]
+    form: Literal["contrast", "difference", "more"] = "contrast"  # type: ignore[assignment]
 
 
 def test_a_record_that_lists_more_takes_more() -> None:
-    assert Wider(norm="l1").norm == "l1"
-    with pytest.raises(ConfigError, match="norm: expected one of l2, linf, l1, got 'l3'"):
-        Wider(norm="l3")  # type: ignore[arg-type]
+    assert Wider(form="more").form == "more"
+    with pytest.raises(ConfigError, match="form: expected one of contrast, difference, more, got 'less'"):
+        Wider(form="less")  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="spatial_offset"):
         Wider(spatial_offset=1e9)
 

@@ -1,71 +1,31 @@
-"""Configuration: one frozen dataclass a stage, composed into :class:`TsarConfig`. Imports nothing, so that a command
-line can be made from it quickly."""
+"""Configuration: one frozen dataclass a stage, composed into :class:`TsarConfig`. Imports nothing large, so that a
+command line can be made from it quickly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
 from math import log2
-from types import UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Literal
 
-Solver = Literal["waterfill", "slow_greater", "scale_lesser", "square", "descend", "diffusion", "trivial"]
+from tsar.checks import ConfigError, closed_choices, require
+from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
+
+__all__ = [
+    "ConfigError",
+    "ErrorConfig",
+    "ReconstructionConfig",
+    "ResponseConfig",
+    "StagesName",
+    "TilingConfig",
+    "TsarConfig",
+    "closed_choices",
+    "require",
+    "tiles_at_least",
+    "tiles_at_most",
+]
 
 StagesName = Literal["compiled", "reference"]
 """What runs the stages around tracing: kernels on the CPU, or the tensor operations they are checked against."""
-
-
-class ConfigError(ValueError):
-    """A field out of range; the message names the field, what it expects and what arrived."""
-
-
-def require(condition: bool, name: str, expected: str, got: object) -> None:
-    """Raise :class:`ConfigError` unless the condition holds."""
-    if not condition:
-        raise ConfigError(f"{name}: expected {expected}, got {got!r}")
-
-
-Record = TypeVar("Record")
-
-
-def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
-    """Has a dataclass refuse what the ``Literal`` of a field does not list, before anything else is checked.
-
-    Stands beneath ``@dataclass``. The records made raise :class:`ConfigError`.
-
-    Args:
-        place: what goes before the field's name in the message.
-    """
-
-    def closed(record: type[Record]) -> type[Record]:
-        own = getattr(record, "__post_init__", None)
-
-        def __post_init__(self: Record) -> None:
-            for name, many, choices in _choices(type(self)):
-                value = getattr(self, name)
-                ok = all(item in choices for item in value) if many else value in choices
-                require(ok, place + name, f"{'some' if many else 'one'} of {', '.join(map(str, choices))}", value)
-            if own is not None:
-                own(self)
-
-        record.__post_init__ = __post_init__
-        return record
-
-    return closed
-
-
-@cache
-def _choices(record: type) -> tuple[tuple[str, bool, tuple[Any, ...]], ...]:
-    """Fields of closed choices: name, whether the field is a tuple of them, and the choices."""
-    found = []
-    for name, kind in get_type_hints(record).items():
-        many = get_origin(kind) is tuple
-        item = get_args(kind)[0] if many else kind
-        parts = get_args(item) if get_origin(item) in (Union, UnionType) else (item,)
-        if Literal in map(get_origin, parts):  # beside it there is None at most
-            found.append((name, many, tuple(choice for part in parts for choice in get_args(part) or (None,))))
-    return tuple(found)
 
 
 def tiles_at_most(count: int, level_min: int) -> int:
@@ -115,12 +75,13 @@ class ErrorConfig:
     """As spatial_offset, for the temporal octants."""
     temporal_slope: float = -1.0
     """As spatial_slope, for the temporal octants; the thesis sweeps to -9.6."""
-    norm: Literal["l2", "linf"] = "l2"
-    """Levelwise norm: total power, or the greatest power of one coefficient."""
+    norm: str = "l2"
+    """Levelwise norm: l2 (total power), linf (the greatest power of one coefficient), or one that was added."""
     form: Literal["contrast", "difference"] = "contrast"
     """(S - T) / (S + T), or the difference of log2 powers, divided by 8 octaves of power and clamped to [-1, 1]."""
 
     def __post_init__(self) -> None:
+        NORMS.require(self.norm, "error.norm")
         for name in ("spatial_offset", "spatial_slope", "temporal_offset", "temporal_slope"):
             value = getattr(self, name)
             require(-60.0 <= value <= 60.0, f"error.{name}", "a number in [-60, 60]", value)
@@ -131,8 +92,9 @@ class ErrorConfig:
 class ResponseConfig:
     """The control decision (chapter 6)."""
 
-    solver: Solver = "waterfill"
-    """Density transport: how freed density is handed out."""
+    solver: str = "waterfill"
+    """Density transport, how freed density is handed out: waterfill, slow_greater, scale_lesser, square, descend,
+    diffusion, trivial, or one that was added."""
     gain: float = 1.0
     """Distance moved in normalised density space per unit error (eq. 6.11 has 1), in [1e-6, 1e6]."""
     bias: float = 0.0
@@ -144,6 +106,7 @@ class ResponseConfig:
     must hold the coarsest tiling at this rate."""
 
     def __post_init__(self) -> None:
+        SOLVERS.require(self.solver, "response.solver")
         require(1e-6 <= self.gain <= 1e6, "response.gain", "a number in [1e-6, 1e6]", self.gain)
         require(-8.0 <= self.bias <= 8.0, "response.bias", "a number in [-8, 8]", self.bias)
         require(0 <= self.surplus_max <= 1, "response.surplus_max", "a share in [0, 1]", self.surplus_max)
@@ -157,8 +120,11 @@ class ReconstructionConfig:
 
     age_support_px: int = 9
     """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off."""
+    method: str = "blend"
+    """How cached framelets become an image: blend, or one that was added."""
 
     def __post_init__(self) -> None:
+        RECONSTRUCTIONS.require(self.method, "reconstruction.method")
         ok = self.age_support_px >= 1 and self.age_support_px % 2 == 1
         require(ok, "reconstruction.age_support_px", "an odd number of pixels, at least 1", self.age_support_px)
 

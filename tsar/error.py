@@ -5,7 +5,9 @@ Source: Stephens 2011, sec. 5.3.2–5.3.4.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import torch
 import torch.nn.functional as F
@@ -14,6 +16,7 @@ from torch import Tensor
 
 from tsar import haar
 from tsar.cache import FrameletCache
+from tsar.choices import NORMS
 from tsar.config import ErrorConfig, TsarConfig
 from tsar.morton import morton_to_raster, raster_to_morton, tile_interval
 from tsar.roots import square_root
@@ -91,11 +94,11 @@ def levelwise_power(
     """Localised levelwise norm: spatial and temporal power per octave at every position of the finest octave.
 
     Octants ghh, hgh, ggh make the spatial norm and hhg, hgg, ghg the temporal one; ggg is not used. A coefficient of a
-    coarse octave spreads over the positions it covers in equal shares (``l2``) or whole (``linf``).
+    coarse octave spreads over the positions it covers as the norm says: see :mod:`tsar.norms`.
 
     Source: Stephens 2011, sec. 5.3.2.
     """
-    spatial, temporal = [], []
+    norm, spatial, temporal = NORMS[config.norm], [], []
     positions = octaves[0].ghh.shape[1]
     for octave in octaves:
         repeat = positions // octave.ghh.shape[1]
@@ -103,8 +106,7 @@ def levelwise_power(
             (spatial, (octave.ghh, octave.hgh, octave.ggh)),
             (temporal, (octave.hhg, octave.hgg, octave.ghg)),
         ):
-            squared = torch.stack(octants).square()
-            power = squared.sum(0) / repeat if config.norm == "l2" else squared.amax(0)
+            power = norm(torch.stack(octants).square(), repeat)
             norms.append(power.repeat_interleave(repeat, dim=1))
     return torch.stack(spatial), torch.stack(temporal)
 
@@ -112,13 +114,26 @@ def levelwise_power(
 def template_power(octaves: int, offset: float, slope: float, config: ErrorConfig) -> Float[Tensor, " octaves"]:
     """Power the template tolerates per position, fine to coarse, on the normalisation of :func:`levelwise_power`.
 
-    ``log2 = offset + slope * f`` per coefficient with ``f = 0`` at the coarsest octave, times the three octants' share
-    that a position gets of a coefficient; float64, which holds every slope and offset of the configuration. Source:
-    Stephens 2011, sec. 5.3.3.2.
+    ``log2 = offset + slope * f`` per coefficient with ``f = 0`` at the coarsest octave, times the share of one
+    coefficient that the norm gives a position; float64, which holds every slope and offset of the configuration.
+    Source: Stephens 2011, sec. 5.3.3.2.
+
+    Raises:
+        ValueError: the norm gives a position nothing of a coefficient.
     """
-    share = 2.0 if config.norm == "l2" else 0.0
-    logarithms = (offset + slope * f + share * (f - (octaves - 1)) for f in range(octaves - 1, -1, -1))
+    finest = octaves - 1
+    logarithms = (offset + slope * f + _share_octaves(config.norm, 4 ** (finest - f)) for f in range(finest, -1, -1))
     return torch.tensor([2.0**power for power in logarithms], dtype=torch.float64)
+
+
+@lru_cache(maxsize=64)
+def _share_octaves(norm: str, repeat: int) -> float:
+    """log2 of the power that each of ``repeat`` positions gets of one coefficient of power 1."""
+    alone = torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64).reshape(3, 1, 1)
+    share = float(NORMS[norm](alone, repeat))
+    if not 0.0 < share < math.inf:
+        raise ValueError(f"error.norm: expected {norm} to give a position a share of a coefficient, got {share:g}")
+    return math.log2(share)
 
 
 def tolerated_power(octaves: int, offset: float, slope: float, config: ErrorConfig) -> float:

@@ -10,11 +10,28 @@ import difflib
 import importlib
 import importlib.metadata
 from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, cast
 
-from tsar.config import ConfigError
+from tsar.checks import ConfigError
 
 Entry = TypeVar("Entry")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where an entry comes from.
+
+    Attributes:
+        module: that it is imported from, or that it was made in.
+        distribution: the installed package that brought it; None where none did.
+        version: of that package.
+    """
+
+    module: str
+    distribution: str | None
+    version: str | None
 
 
 class Named(Generic[Entry]):
@@ -29,13 +46,30 @@ class Named(Generic[Entry]):
         """Takes the project's own entries."""
         self.kind, self.group = kind, group
         self._entries: dict[str, Entry | str] = dict(entries)
-        self._modules: dict[str, str] = {}
+        self._places: dict[str, str] = {name: place for name, place in entries.items() if isinstance(place, str)}
+        self._own = set(entries)
+        self._brought_by: dict[str, importlib.metadata.Distribution] = {}
         self._searched = False
 
     def add(self, name: str, entry: Entry | str) -> None:
         """Adds an entry, or puts it in the place of the one of that name."""
         self._entries[name] = entry
-        self._modules.pop(name, None)
+        self._places.pop(name, None)
+        self._brought_by.pop(name, None)
+        self._own.discard(name)
+        if isinstance(entry, str):
+            self._places[name] = entry
+
+    @contextmanager
+    def lent(self, **entries: Entry | str) -> Iterator[None]:
+        """Holds further entries for the length of a block; then the table is as it was before."""
+        before = dict(self._entries), dict(self._places), set(self._own), dict(self._brought_by)
+        for name, entry in entries.items():
+            self.add(name, entry)
+        try:
+            yield
+        finally:
+            self._entries, self._places, self._own, self._brought_by = before
 
     def names(self) -> tuple[str, ...]:
         """All names: the project's own first, then those that were added, then those of installed packages."""
@@ -43,10 +77,13 @@ class Named(Generic[Entry]):
         return tuple(self._entries)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.names()
+        return name in self._entries or name in self.names()
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names())
+
+    def __len__(self) -> int:
+        return len(self.names())
 
     def __getitem__(self, name: str) -> Entry:
         """The entry of a name.
@@ -78,26 +115,39 @@ class Named(Generic[Entry]):
         known = ", ".join(self._entries)
         raise ConfigError(f"{field or self.kind}: expected one of {known}, got {name!r}{hint}")
 
-    def origin(self, name: str) -> dict[str, str | None]:
-        """Where an entry comes from: its module, the distribution that holds it, and that one's version."""
-        entry = self[name]
-        module = self._modules.get(name) or getattr(entry, "__module__", None) or type(entry).__module__
-        package = module.partition(".")[0]
-        found = importlib.metadata.packages_distributions().get(package, [None])[0]
-        version = importlib.metadata.version(found) if found else None
-        return {"module": module, "distribution": found, "version": version}
+    def is_own(self, name: str) -> bool:
+        """Whether an entry is one of the project's own, rather than one that was added."""
+        return name in self._own
+
+    def origin(self, name: str) -> Origin:
+        """Where an entry comes from; nothing is imported where the table holds a place.
+
+        Raises:
+            ConfigError: no entry has this name.
+        """
+        self.require(name)
+        entry = self._entries[name]
+        module = self._places.get(name, "").partition(":")[0]
+        module = module or getattr(entry, "__module__", None) or type(entry).__module__
+        package = self._brought_by.get(name)
+        if package is None and module != "__main__":
+            found = importlib.metadata.packages_distributions().get(module.partition(".")[0])
+            package = importlib.metadata.distribution(found[0]) if found else None
+        return Origin(module, package.name, package.version) if package else Origin(module, None, None)
 
     def _search(self) -> None:
-        """Looks for entry points once; what was added by hand stays."""
+        """Looks for entry points once; what has a name already stays."""
         if self._searched:
             return
         self._searched = True
         for point in importlib.metadata.entry_points(group=self.group):
-            self._entries.setdefault(point.name, point.value)
+            if point.name not in self._entries:
+                self._entries[point.name] = self._places[point.name] = point.value
+                if point.dist is not None:
+                    self._brought_by[point.name] = point.dist
 
     def _imported(self, name: str, place: str) -> Any:
         module, _, attribute = place.partition(":")
-        self._modules[name] = module
         try:
             found: Any = importlib.import_module(module)
             for part in filter(None, attribute.split(".")):

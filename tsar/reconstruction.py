@@ -18,6 +18,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from tsar.cache import FrameletCache
+from tsar.choices import RECONSTRUCTIONS
 from tsar.config import TsarConfig
 from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
 from tsar.types import SampleMap
@@ -42,6 +43,11 @@ class Reconstruction:
 
 
 def reconstruct(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
+    """The image of a cache by the method of the configuration; arguments are those of :func:`blend`."""
+    return RECONSTRUCTIONS[config.reconstruction.method](cache, config, cycle_s)
+
+
+def blend(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
     """Accumulate every cached sample that is not older than the smoothed age field.
 
     Marks the framelets that did not pass anywhere as dead in the cache.

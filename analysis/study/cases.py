@@ -18,7 +18,7 @@ from analysis.metrics.cost_model import (
 )
 from analysis.metrics.display_model import DisplayModel
 from analysis.storage.files import plain
-from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
+from tsar.config import TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
 from tsar.policies import POLICIES
 
 INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
@@ -74,7 +74,7 @@ class Scale:
             sdf_side=base.sdf_side // divisor,
             cache_size=base.cache_size // area,
             tiling=dataclasses.replace(base.tiling, level_min=level_min, tile_count_max=0),
-            reconstruction=ReconstructionConfig(age_support_px=support + 1 - support % 2),
+            reconstruction=dataclasses.replace(base.reconstruction, age_support_px=support + 1 - support % 2),
         )
         if divisor == 1 and not base.tiling.tile_count_max:
             return small

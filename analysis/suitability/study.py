@@ -19,7 +19,8 @@ from analysis.command.cluster import ClusterOptions
 from analysis.metrics.cost_model import Ledger
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.cases import INPUTS, ROWS, SCALES, Case, framed_config
-from tsar.config import Solver, TsarConfig, closed_choices, require
+from tsar.choices import SOLVERS
+from tsar.config import TsarConfig, closed_choices, require
 from tsar.policies import POLICIES
 
 
@@ -41,7 +42,7 @@ class SuitabilityOptions:
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
     policies: tuple[str, ...] = ("framed supersampled", "frameless", "afr", "oracle")
     """Policies that are compared beside TSAR and the framed renderer, at one row."""
-    solvers: tuple[Solver, ...] = ("trivial",)
+    solvers: tuple[str, ...] = ("trivial",)
     """Solvers of TSAR that are compared beside the chosen one, at that row."""
     policy_row: int = 7
     """The row at which policies and solvers are compared."""
@@ -73,6 +74,8 @@ class SuitabilityOptions:
         require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
         for one in self.policies:
             POLICIES.require(one, "policies")
+        for one in self.solvers:
+            SOLVERS.require(one, "solvers")
         for name in ("inputs", "rows"):
             chosen = getattr(self, name)
             require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)

@@ -10,21 +10,8 @@ import tyro
 
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
+from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
-
-PointSetName = Literal[
-    "hammersley",
-    "stratified",
-    "poisson",
-    "halton",
-    "sobol",
-    "owen",
-    "cells-even",
-    "cells-space",
-    "cells-time",
-    "random",
-]
-"""Of ``renderer.sampling.point_sets``, which takes long to import."""
 
 LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
 """Samples per pixel of the motion-blur perception study."""
@@ -43,7 +30,7 @@ class GalleryOptions:
     """Height, pixels."""
     samples: int = 64
     """Samples per pixel; a cube for the point set stratified."""
-    point_set: PointSetName = "hammersley"
+    point_set: str = "hammersley"
     """Where in the pixel and when in the shutter's time they lie."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
@@ -57,6 +44,7 @@ class GalleryOptions:
     """Folder for NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
 
     def __post_init__(self) -> None:
+        POINT_SETS.require(self.point_set, "point_set")
         sides, samples = limits.SIDES_PX, (1, 1 << 16)
         limits.within(self, width_px=sides, height_px=sides, samples=samples, seed=limits.SEEDS, threads=limits.THREADS)
 
@@ -126,7 +114,7 @@ class TileOptions:
     """Height, pixels; 0 takes that of the scene's film."""
     samples: int = 32
     """Samples per pixel; a cube for the point set stratified."""
-    point_set: PointSetName = "hammersley"
+    point_set: str = "hammersley"
     """Where in the pixel and when in the shutter's time they lie."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
@@ -146,6 +134,7 @@ class TileOptions:
     """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
 
     def __post_init__(self) -> None:
+        POINT_SETS.require(self.point_set, "point_set")
         limits.within(
             self,
             width_px=(0, limits.SIDES_PX[1]),

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from analysis.command import limits
-from analysis.tracer.options import PointSetName
+from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices
 
 _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
@@ -32,7 +32,7 @@ class RenderOptions:
     samples: int = 0
     """Instead of that regular grid, this many samples of a point set per pixel, spread over the time the shutter is
     open as well."""
-    point_set: PointSetName = "hammersley"
+    point_set: str = "hammersley"
     """The point set; stratified takes cubes of samples only."""
     shift: Literal["white", "blue"] = "white"
     """How far each pixel shifts it: independently of its neighbours, or by spatiotemporal blue noise."""
@@ -62,6 +62,7 @@ class RenderOptions:
     """Folder for the results; frames that an interrupted run of the same job left there are kept."""
 
     def __post_init__(self) -> None:
+        POINT_SETS.require(self.point_set, "point_set")
         limits.within(
             self,
             width_px=limits.SIDES_PX,

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from renderer.sampling.blue_noise import FRAMES, SIDE_PX, mask
-from renderer.sampling.point_sets import GOLDEN, Points, PointSet, mixed_words, point_set
+from renderer.sampling.point_sets import GOLDEN, Points, mixed_words, point_set
 from scenes.arithmetic import cos, log1p, sin
 from tsar.config import closed_choices
 
@@ -93,7 +93,7 @@ def triangle_warp(t: Float[NDArray[np.float64], "*n"]) -> Float[NDArray[np.float
 
 
 @lru_cache(maxsize=64)
-def _cached_set(name: PointSet, count: int, seed: int) -> Points:
+def _cached_set(name: str, count: int, seed: int) -> Points:
     return point_set(name, count, seed)
 
 
@@ -104,7 +104,7 @@ class SamplePlan:
 
     samples_per_pixel: int = 16
     """Samples of a pixel; a cube for stratified."""
-    point_set: PointSet = "hammersley"
+    point_set: str = "hammersley"
     """The points that all pixels share, each shifted."""
     seed: int = 0
     """Of the set and of the shifts."""

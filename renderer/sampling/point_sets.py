@@ -7,30 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from renderer.sampling import POINT_SETS
 from scenes.arithmetic import log, power
 
 Points = Float[NDArray[np.float64], "n 3"]
-PointSet = Literal[
-    "hammersley",
-    "stratified",
-    "poisson",
-    "halton",
-    "sobol",
-    "owen",
-    "cells-even",
-    "cells-space",
-    "cells-time",
-    "random",
-]
-POINT_SETS: tuple[PointSet, ...] = get_args(PointSet)
-
 COUNT_MAX = 1 << 16
 """Points of a set at most."""
 
@@ -50,7 +36,7 @@ def mixed_words(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return words ^ (words >> np.uint64(31))
 
 
-def point_set(name: PointSet, count: int, seed: int = 0) -> Points:
+def point_set(name: str, count: int, seed: int = 0) -> Points:
     """Points ``(u, v, t)`` in [0, 1)³, float64.
 
     Args:
@@ -58,29 +44,31 @@ def point_set(name: PointSet, count: int, seed: int = 0) -> Points:
             in each cell of a cubic grid), ``poisson`` (no two closer than a distance round the torus), ``halton`` and
             ``sobol`` (scrambled digit by digit), ``owen`` (Sobol with Owen's nested scrambling), ``cells-even``,
             ``cells-space``, ``cells-time`` (one random point in each cell of a grid with about as many, an eighth and
-            eight times as many cells in time as along a side of the pixel), ``random``.
+            eight times as many cells in time as along a side of the pixel), ``random``, or one that was added to
+            :data:`renderer.sampling.POINT_SETS`.
         count: how many, at most 65,536; for ``stratified`` a cube.
         seed: of all but ``hammersley``.
 
     Raises:
-        ValueError: for another name, or a count that the set cannot have.
+        ValueError: for another name, a count that the set cannot have, or points that do not lie in the cube.
     """
-    if name not in _MAKERS:
-        raise ValueError(f"point set: expected one of {', '.join(POINT_SETS)}, got {name!r}")
+    POINT_SETS.require(name)
     most = _POISSON_MAX if name == "poisson" else COUNT_MAX
     if not 1 <= count <= most:
         raise ValueError(f"point set {name}: expected 1 to {most} points, got {count}")
-    points = np.minimum(_MAKERS[name](count, np.random.default_rng([seed, count])), BELOW_ONE)
+    points = np.minimum(POINT_SETS[name](count, np.random.default_rng([seed, count])), BELOW_ONE)
+    if points.shape != (count, 3) or not (points >= 0.0).all():
+        raise ValueError(f"point set {name}: expected ({count}, 3) numbers in [0, 1), got {points.shape} or others")
     points.flags.writeable = False
     return points
 
 
-def _hammersley(count: int, _rng: np.random.Generator) -> Points:
+def hammersley(count: int, _rng: np.random.Generator) -> Points:
     inverses = qmc.Halton(2, scramble=False).random(count)
     return np.column_stack([np.arange(count) / count, inverses])
 
 
-def _stratified(count: int, rng: np.random.Generator) -> Points:
+def stratified(count: int, rng: np.random.Generator) -> Points:
     side = round(power(count, 1.0 / 3.0))
     if math.prod((side,) * 3) != count:
         below = math.floor(power(count, 1.0 / 3.0) + 1e-9)
@@ -90,7 +78,7 @@ def _stratified(count: int, rng: np.random.Generator) -> Points:
     return (cells + rng.random((count, 3))) / side
 
 
-def _poisson(count: int, rng: np.random.Generator) -> Points:
+def poisson(count: int, rng: np.random.Generator) -> Points:
     """Darts that keep a distance; where no more fit, the distance shrinks, so that this ends."""
     radius = _POISSON_START * packing_distance(count)
     points = np.empty((count, 3))
@@ -121,15 +109,15 @@ def toroidal_distance(
     return np.linalg.norm(np.minimum(apart, 1.0 - apart), axis=-1)
 
 
-def _halton(count: int, rng: np.random.Generator) -> Points:
+def halton(count: int, rng: np.random.Generator) -> Points:
     return qmc.Halton(3, scramble=True, rng=rng).random(count)
 
 
-def _sobol(count: int, rng: np.random.Generator) -> Points:
+def sobol(count: int, rng: np.random.Generator) -> Points:
     return qmc.Sobol(3, scramble=True, rng=rng).random_base2(max(count - 1, 0).bit_length())[:count]
 
 
-def _owen(count: int, rng: np.random.Generator) -> Points:
+def owen(count: int, rng: np.random.Generator) -> Points:
     """Nested uniform scrambling: a bit is flipped or not by chance, by the bits before it alone."""
     digits = qmc.Sobol(3, scramble=False, bits=32).random_base2(max(count - 1, 0).bit_length())[:count]
     x = (digits * 2.0**32).astype(np.uint64)
@@ -170,19 +158,8 @@ def cell_counts(count: int, density_ratio: float) -> tuple[int, int, int]:
     return min(grids, key=far)
 
 
-def _random(count: int, rng: np.random.Generator) -> Points:
+def random(count: int, rng: np.random.Generator) -> Points:
     return rng.random((count, 3))
 
 
-_MAKERS: dict[str, Callable[[int, np.random.Generator], Points]] = {
-    "hammersley": _hammersley,
-    "stratified": _stratified,
-    "poisson": _poisson,
-    "halton": _halton,
-    "sobol": _sobol,
-    "owen": _owen,
-    "cells-even": _cells(1.0),
-    "cells-space": _cells(1.0 / 8.0),
-    "cells-time": _cells(8.0),
-    "random": _random,
-}
+cells_even, cells_space, cells_time = _cells(1.0), _cells(1.0 / 8.0), _cells(8.0)

@@ -28,7 +28,7 @@ _KNOWN: Mapping[str, Mapping[str, tuple[str, ...] | None]] = {
         **dict.fromkeys(("gain", "bias", "surplus_max", "temporal_min")),
         "solver": ("waterfill",),
     },
-    "reconstruction": {"age_support_px": None},
+    "reconstruction": {"age_support_px": None, "method": ("blend",)},
 }
 """Records of the configuration by name, and what is known of each: a field's choices, or None for what is a number."""
 

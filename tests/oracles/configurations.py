@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import random
-from typing import get_args
 
+from tsar.choices import SOLVERS
 from tsar.config import (
     ConfigError,
     ErrorConfig,
     ReconstructionConfig,
     ResponseConfig,
-    Solver,
     TilingConfig,
     TsarConfig,
     tiles_at_least,
@@ -54,13 +53,15 @@ def _drawn(draw: random.Random) -> TsarConfig:
             form=draw.choice(("contrast", "difference")),
         ),
         response=ResponseConfig(
-            solver=draw.choice(("waterfill", "waterfill", *get_args(Solver))),
+            solver=draw.choice(("waterfill", "waterfill", *SOLVERS)),
             gain=draw.choice((1.0, 10.0 ** draw.uniform(-6.0, 6.0), 1e-6, 1e6)),
             bias=_one_of(draw, 0.0, -8.0, 8.0),
             surplus_max=draw.choice((0.0, 1.0, draw.random())),
             temporal_min=min(draw.choice((1 / 16, 10.0 ** draw.uniform(-6.0, 0.0), batch / 4**low)), 1.0),
         ),
-        reconstruction=ReconstructionConfig(1 + 2 * draw.choice((0, 4, draw.randrange(resolution // 2)))),
+        reconstruction=ReconstructionConfig(
+            age_support_px=1 + 2 * draw.choice((0, 4, draw.randrange(resolution // 2)))
+        ),
     )
 
 

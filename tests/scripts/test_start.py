@@ -14,7 +14,7 @@ from tests.scripts.commands import ROOT
 SCRIPTS = sorted(path.name for path in (ROOT / "scripts").glob("*.py") if path.name != "__init__.py")
 HEAVY = (
     *("torch", "warp", "kornia", "scipy", "matplotlib", "pandas", "pyarrow", "av", "trimesh", "OpenEXR", "mitsuba"),
-    *("embreex", "pywt", "dask", "distributed", "renderer", "scenes"),
+    *("embreex", "pywt", "dask", "distributed", "scenes"),
 )
 PROGRAM = """
 import json, runpy, sys

@@ -4,12 +4,12 @@ import pytest
 import torch
 
 from tests.oracles import pictures, runs
+from tsar.choices import SOLVERS
 from tsar.clock import StageTimer, fixed_clock, wall_clock
 from tsar.config import ConfigError, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
 from tsar.policies.framed import Framed
 from tsar.policy import Setting
-from tsar.response.transport import SOLVERS
 from tsar.types import SampleBatch
 
 CYCLE = 1 / 60

@@ -6,12 +6,13 @@ import torch
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tsar.choices import SOLVERS
 from tsar.config import ResponseConfig, TsarConfig
 from tsar.morton import interleave
 from tsar.response import initial_densities, respond
 from tsar.response.local import Box, constrain, exit_distance
 from tsar.response.mixture import mix, smallest_root
-from tsar.response.transport import SOLVERS, fill
+from tsar.response.transport import fill
 from tsar.types import Densities, Errors
 
 BOX = Box(spatial_min=1 / 256, temporal_min=1 / 64)
@@ -102,7 +103,7 @@ def test_every_solver_conserves_and_stays_within_bounds(name, seed, share, ceili
     tilt = torch.where(local.desired_change > 0, 10.0 ** max(lean, 0.0), 10.0 ** max(-lean, 0.0))
     desired, bound = local.desired_change * tilt, local.max_change * tilt
     surplus = share * ceiling
-    change = SOLVERS[name].solve(desired, bound, surplus, ceiling)
+    change = SOLVERS[name](desired, bound, surplus, ceiling)
     scale = float(change.abs().sum()) + ceiling + 1e-30
     assert bool((change * desired >= 0).all())
     assert bool((change.abs() <= bound.abs() * (1 + 1e-12)).all())
@@ -117,7 +118,7 @@ def test_every_solver_conserves_and_stays_within_bounds(name, seed, share, ceili
 def test_the_whole_decision_conserves_at_the_extremes(name, seed, surplus, bias):
     """Constraints, transport and mixture: the densities that come out hold what the transport granted, in the box."""
     local = extreme_problem(seed)
-    change = SOLVERS[name].solve(local.desired_change, local.max_change, surplus, 2.0)
+    change = SOLVERS[name](local.desired_change, local.max_change, surplus, 2.0)
     b_s, b_t = mix(local, change, BOX, bias)
     assert b_s.min() >= BOX.spatial_min * (1 - 1e-12) and b_s.max() <= 1 + 1e-12
     assert b_t.min() >= BOX.temporal_min * (1 - 1e-12) and b_t.max() <= 1 + 1e-12
@@ -159,8 +160,8 @@ def test_waterfill_is_not_held_back_by_the_elements_at_their_bound():
     bound = desired.clone()
     bound[:3] = 50.0
     desired, bound = torch.cat((desired, -desired * 2)), torch.cat((bound, -bound * 4))
-    slow = SOLVERS["scale_lesser"].solve(desired, bound, 0.0, 0.0)
-    free = SOLVERS["waterfill"].solve(desired, bound, 0.0, 0.0)
+    slow = SOLVERS["scale_lesser"](desired, bound, 0.0, 0.0)
+    free = SOLVERS["waterfill"](desired, bound, 0.0, 0.0)
     assert slow[:3].tolist() == [1.0] * 3 and free[:3].min() > 20.0
     assert abs(float(free.sum())) < 1e-9
 
@@ -168,9 +169,9 @@ def test_waterfill_is_not_held_back_by_the_elements_at_their_bound():
 def test_square_favours_large_responses_and_descend_serves_them_first():
     desired = torch.tensor([4.0, 2.0, 1.0, -1.0], dtype=torch.float64)
     bound = desired * 1.5
-    square = SOLVERS["square"].solve(desired, bound, 0.0, 0.0)
+    square = SOLVERS["square"](desired, bound, 0.0, 0.0)
     assert square[0] / square[1] == pytest.approx(4.0)
-    descend = SOLVERS["descend"].solve(desired, bound, 0.0, 0.0)
+    descend = SOLVERS["descend"](desired, bound, 0.0, 0.0)
     assert descend.tolist() == [1.5, 0.0, 0.0, -1.5]
 
 
@@ -185,7 +186,7 @@ def test_diffusion_serves_the_neighbours_of_what_is_freed():
         desired[element(x, 3)] = -0.5
     near, far = element(5, 3), element(12, 12)
     desired[near] = desired[far] = 1.0
-    change = SOLVERS["diffusion"].solve(desired, 2 * desired, 0.0, 0.0)
+    change = SOLVERS["diffusion"](desired, 2 * desired, 0.0, 0.0)
     assert change[near] > 0.3 and change[far] == 0.0
     assert float(change.sum()) == pytest.approx(0.0, abs=1e-15)
     assert change[element(4, 3)] < change[element(1, 3)] < 0.0
@@ -194,13 +195,13 @@ def test_diffusion_serves_the_neighbours_of_what_is_freed():
 
 def test_diffusion_moves_nothing_where_all_want_the_same():
     desired = torch.full((64,), 0.3, dtype=torch.float64)
-    assert not SOLVERS["diffusion"].solve(desired, desired, 0.0, 1.0).any()
+    assert not SOLVERS["diffusion"](desired, desired, 0.0, 1.0).any()
 
 
 def test_surplus_serves_those_who_ask_when_nobody_frees():
     desired = torch.tensor([1.0, 3.0], dtype=torch.float64)
-    assert SOLVERS["waterfill"].solve(desired, desired, 2.0, 5.0).sum() == pytest.approx(2.0)
-    assert SOLVERS["waterfill"].solve(-desired, -desired, 2.0, 5.0).sum() == pytest.approx(-3.0)
+    assert SOLVERS["waterfill"](desired, desired, 2.0, 5.0).sum() == pytest.approx(2.0)
+    assert SOLVERS["waterfill"](-desired, -desired, 2.0, 5.0).sum() == pytest.approx(-3.0)
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1))
@@ -262,7 +263,7 @@ def test_quadratic_survives_a_vanishing_leading_term():
 def test_mixture_hits_the_granted_density_inside_the_box(bias):
     for seed in range(20):
         local = random_problem(seed)
-        change = SOLVERS["waterfill"].solve(local.desired_change, local.max_change, 0.0, 0.0)
+        change = SOLVERS["waterfill"](local.desired_change, local.max_change, 0.0, 0.0)
         b_s, b_t = mix(local, change, BOX, bias)
         assert b_s.min() >= BOX.spatial_min * (1 - 1e-12) and b_s.max() <= 1 + 1e-12
         assert b_t.min() >= BOX.temporal_min * (1 - 1e-12) and b_t.max() <= 1 + 1e-12
@@ -313,7 +314,7 @@ def test_a_side_that_gets_all_it_wants_gets_it_to_the_bit(sign):
     g = torch.Generator().manual_seed(5)
     desired = sign * (0.1 + torch.rand(999, generator=g, dtype=torch.float64))
     bound = desired * (0.9 + torch.rand(999, generator=g, dtype=torch.float64)).clamp(min=1.0)
-    assert torch.equal(SOLVERS["waterfill"].solve(desired, bound, 2e3, 4e3), desired)
+    assert torch.equal(SOLVERS["waterfill"](desired, bound, 2e3, 4e3), desired)
 
 
 @pytest.mark.parametrize("name", [n if n == "waterfill" else pytest.param(n, marks=pytest.mark.slow) for n in SOLVERS])

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import torch
 
+from tsar.choices import SOLVERS
 from tsar.config import TsarConfig
 from tsar.morton import total
 from tsar.response.local import Box, constrain
 from tsar.response.mixture import mix
-from tsar.response.transport import SOLVERS
 from tsar.types import Densities, Errors
 
 
@@ -31,8 +31,8 @@ def respond(densities: Densities, errors: Errors, config: TsarConfig) -> Densiti
         densities.spatial / spatial_high, densities.temporal / temporal_high, errors, box, config.response.gain
     )
     surplus_max = config.response.surplus_max * config.budget / unit
-    solver = SOLVERS[config.response.solver]
-    change = solver.solve(local.desired_change, local.max_change, densities.surplus / unit, surplus_max)
+    solve = SOLVERS[config.response.solver]
+    change = solve(local.desired_change, local.max_change, densities.surplus / unit, surplus_max)
     b_s, b_t = mix(local, change, box, config.response.bias)
     # Elements without an error keep their exact bits: dividing by the maximum and multiplying again would not.
     after = replace(

@@ -12,8 +12,7 @@ Deviation: eq. 6.27 has a sign slip. Freed density that nobody takes adds to the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable
 
 import torch
 import torch.nn.functional as F
@@ -21,11 +20,11 @@ import torch.nn.functional as F
 from tsar.morton import morton_to_raster, raster_to_morton, total
 from tsar.response.local import Field
 
+TransportSolver = Callable[[Field, Field, float, float], Field]
+"""``(desired, bound, surplus, surplus_max) -> change``: one way to pick a solution out of the set of eq. 6.36."""
 
-class TransportSolver(Protocol):
-    """One way to pick a solution out of the set of eq. 6.36."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field: ...
+_DIFFUSION_STEPS = 32
+"""Explicit steps of diffusion: density travels about the square root of that many elements a decision."""
 
 
 def fill(direction: Field, bound: Field, target: float) -> Field:
@@ -72,21 +71,15 @@ def _max_weight(desired: Field, bound: Field) -> float:
     return float((bound[active] / desired[active]).min()) if bool(active.any()) else 0.0
 
 
-@dataclass(frozen=True)
-class Trivial:
+def trivial(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """No change of combined density (fig. 6.5c)."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        return torch.zeros_like(desired)
+    return torch.zeros_like(desired)
 
 
-@dataclass(frozen=True)
-class SlowGreater:
+def slow_greater(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """Point b: the side that wants more is slowed to the other; no surplus is used or made (fig. 6.5d, 6.8)."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        ask, _, free, _ = _sides(desired, bound)
-        return _slowed(ask, free)
+    ask, _, free, _ = _sides(desired, bound)
+    return _slowed(ask, free)
 
 
 def _slowed(ask: Field, free: Field) -> Field:
@@ -96,56 +89,47 @@ def _slowed(ask: Field, free: Field) -> Field:
     return _scaled(ask, total_ask, flux) - _scaled(free, total_free, flux)
 
 
-@dataclass(frozen=True)
-class ScaleLesser:
+def scale_lesser(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """Point e with a running surplus: the lesser side is sped up by one weight as far as its tightest element allows,
     and the surplus takes or gives what is left (sec. 6.3.2.3)."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        ask, ask_bound, free, free_bound = _sides(desired, bound)
-        total_ask, total_free = total(ask), total(free)
-        if total_ask >= total_free:
-            most_free = total_free * _max_weight(free, free_bound)
-            given = min(total_ask, most_free + surplus)
-            freed = min(most_free, given)
-        else:
-            most_ask = total_ask * _max_weight(ask, ask_bound)
-            freed = min(total_free, most_ask + surplus_max - surplus)
-            given = min(most_ask, freed)
-        return _scaled(ask, total_ask, given) - _scaled(free, total_free, freed)
+    ask, ask_bound, free, free_bound = _sides(desired, bound)
+    total_ask, total_free = total(ask), total(free)
+    if total_ask >= total_free:
+        most_free = total_free * _max_weight(free, free_bound)
+        given = min(total_ask, most_free + surplus)
+        freed = min(most_free, given)
+    else:
+        most_ask = total_ask * _max_weight(ask, ask_bound)
+        freed = min(total_free, most_ask + surplus_max - surplus)
+        given = min(most_ask, freed)
+    return _scaled(ask, total_ask, given) - _scaled(free, total_free, freed)
 
 
 def _scaled(side: Field, present: float, wanted: float) -> Field:
     return side * (wanted / present) if present > 0.0 else torch.zeros_like(side)
 
 
-@dataclass(frozen=True)
-class Square:
+def square(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """The side that wants more is squared before it is normalised to the other, so that large responses are slowed
     least (fig. 6.5e); elements at their bound pass the rest on."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        ask, ask_bound, free, free_bound = _sides(desired, bound)
-        total_ask, total_free = total(ask), total(free)
-        flux = min(total_ask, total_free)
-        if total_ask >= total_free:
-            return fill(ask.square(), ask_bound, flux) - fill(free, free_bound, flux)
-        return fill(ask, ask_bound, flux) - fill(free.square(), free_bound, flux)
+    ask, ask_bound, free, free_bound = _sides(desired, bound)
+    total_ask, total_free = total(ask), total(free)
+    flux = min(total_ask, total_free)
+    if total_ask >= total_free:
+        return fill(ask.square(), ask_bound, flux) - fill(free, free_bound, flux)
+    return fill(ask, ask_bound, flux) - fill(free.square(), free_bound, flux)
 
 
-@dataclass(frozen=True)
-class Descend:
+def descend(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """The lesser side goes to its bounds; the greater is served in descending order until the sums meet, the rest gets
     nothing (fig. 6.5f)."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        ask, ask_bound, free, free_bound = _sides(desired, bound)
-        total_ask, total_free = total(ask), total(free)
-        if total_ask >= total_free:
-            flux = min(total(free_bound), total_ask)
-            return _largest_first(ask, flux) - fill(free, free_bound, flux)
-        flux = min(total(ask_bound), total_free)
-        return fill(ask, ask_bound, flux) - _largest_first(free, flux)
+    ask, ask_bound, free, free_bound = _sides(desired, bound)
+    total_ask, total_free = total(ask), total(free)
+    if total_ask >= total_free:
+        flux = min(total(free_bound), total_ask)
+        return _largest_first(ask, flux) - fill(free, free_bound, flux)
+    flux = min(total(ask_bound), total_free)
+    return fill(ask, ask_bound, flux) - _largest_first(free, flux)
 
 
 def _largest_first(side: Field, flux: float) -> Field:
@@ -158,32 +142,28 @@ def _largest_first(side: Field, flux: float) -> Field:
     return granted
 
 
-@dataclass(frozen=True)
-class Waterfill:
+def waterfill(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """``clip(λ * desired, bound)`` with one λ a side: each element is sped up or slowed alike until its own bound, so
     that the many elements at a bound do not hold back the few that are not (sec. 6.3.2.4).
 
     The side that wants less is sped up towards the other as far as its bounds allow; what is missing comes out of the
     surplus, what is left over goes into it.
     """
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        ask, ask_bound, free, free_bound = _sides(desired, bound)
-        total_ask, total_free = total(ask), total(free)
-        if total_ask >= total_free:
-            freed = min(total(free_bound), total_ask)
-            given = min(total_ask, freed + surplus)
-        else:
-            given = min(total(ask_bound), total_free)
-            freed = min(total_free, given + surplus_max - surplus)
-        # A side that gets all it wants gets exactly that: what an element may do beside hangs on it, and must not hang
-        # on how a sum was rounded.
-        gains = ask if given == total_ask else fill(ask, ask_bound, given)
-        return gains - (free if freed == total_free else fill(free, free_bound, freed))
+    ask, ask_bound, free, free_bound = _sides(desired, bound)
+    total_ask, total_free = total(ask), total(free)
+    if total_ask >= total_free:
+        freed = min(total(free_bound), total_ask)
+        given = min(total_ask, freed + surplus)
+    else:
+        given = min(total(ask_bound), total_free)
+        freed = min(total_free, given + surplus_max - surplus)
+    # A side that gets all it wants gets exactly that: what an element may do beside hangs on it, and must not hang
+    # on how a sum was rounded.
+    gains = ask if given == total_ask else fill(ask, ask_bound, given)
+    return gains - (free if freed == total_free else fill(free, free_bound, freed))
 
 
-@dataclass(frozen=True)
-class Diffusion:
+def diffusion(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
     """Density flows between neighbouring elements, from those that free it to those that ask, as heat does.
 
     What is left to hand out is a field that starts as the desired change and diffuses over the elements that have an
@@ -192,33 +172,17 @@ class Diffusion:
 
     Source: Stephens 2011, sec. 8.4, which names transport by a physical process and gives no equation.
     """
-
-    steps: int = 32
-    """Explicit steps: density travels about ``sqrt(steps)`` elements a decision."""
-
-    def solve(self, desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-        side = round(desired.numel() ** 0.5)
-        left = desired[raster_to_morton(side)].reshape(side, side)
-        open_ = left != 0
-        across, down = 0.25 * (open_[:, 1:] & open_[:, :-1]), 0.25 * (open_[1:] & open_[:-1])
-        for _ in range(self.steps):
-            flow_x, flow_y = across * (left[:, :-1] - left[:, 1:]), down * (left[:-1] - left[1:])
-            left = left - F.pad(flow_x, (0, 1)) + F.pad(flow_x, (1, 0))
-            left = left - F.pad(flow_y, (0, 0, 0, 1)) + F.pad(flow_y, (0, 0, 1, 0))
-        flowed = desired - left.reshape(-1)[morton_to_raster(side)]
-        ask, ask_bound, free, free_bound = _sides(desired, bound)
-        return _slowed(
-            torch.minimum(torch.where(ask > 0, flowed, 0.0).clamp(min=0.0), ask_bound),
-            torch.minimum(torch.where(free > 0, -flowed, 0.0).clamp(min=0.0), free_bound),
-        )
-
-
-SOLVERS: dict[str, TransportSolver] = {
-    "waterfill": Waterfill(),
-    "slow_greater": SlowGreater(),
-    "scale_lesser": ScaleLesser(),
-    "square": Square(),
-    "descend": Descend(),
-    "diffusion": Diffusion(),
-    "trivial": Trivial(),
-}
+    side = round(desired.numel() ** 0.5)
+    left = desired[raster_to_morton(side)].reshape(side, side)
+    open_ = left != 0
+    across, down = 0.25 * (open_[:, 1:] & open_[:, :-1]), 0.25 * (open_[1:] & open_[:-1])
+    for _ in range(_DIFFUSION_STEPS):
+        flow_x, flow_y = across * (left[:, :-1] - left[:, 1:]), down * (left[:-1] - left[1:])
+        left = left - F.pad(flow_x, (0, 1)) + F.pad(flow_x, (1, 0))
+        left = left - F.pad(flow_y, (0, 0, 0, 1)) + F.pad(flow_y, (0, 0, 1, 0))
+    flowed = desired - left.reshape(-1)[morton_to_raster(side)]
+    ask, ask_bound, free, free_bound = _sides(desired, bound)
+    return _slowed(
+        torch.minimum(torch.where(ask > 0, flowed, 0.0).clamp(min=0.0), ask_bound),
+        torch.minimum(torch.where(free > 0, -flowed, 0.0).clamp(min=0.0), free_bound),
+    )

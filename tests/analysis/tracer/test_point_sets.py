@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.tracer.options import PointSetName
 from analysis.tracer.point_sets import (
     INTEGRANDS,
     SETS,
@@ -21,7 +18,7 @@ from analysis.tracer.point_sets import (
     slopes,
     squared_error,
 )
-from renderer.sampling.point_sets import POINT_SETS, point_set
+from renderer.sampling.point_sets import point_set
 
 
 def grid(side: int) -> np.ndarray:
@@ -84,7 +81,3 @@ def test_tables_and_slopes() -> None:
     table = mean_errors(errors, 64).set_index("set")
     assert table.loc["hammersley", "moving edge"] < 0.5 * table.loc["random", "moving edge"]
     assert isinstance(even, pd.DataFrame)
-
-
-def test_the_command_line_offers_every_set_there_is() -> None:
-    assert get_args(PointSetName) == POINT_SETS

@@ -8,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest, norm, triang
 
+from renderer.sampling import POINT_SETS
 from renderer.sampling.blue_noise import FRAMES, SIDE_PX, mask
 from renderer.sampling.plan import SamplePlan, blue_shift, box_warp, gaussian_warp, pixel_shift, triangle_warp
 from renderer.sampling.point_sets import (
     BELOW_ONE,
-    POINT_SETS,
-    PointSet,
     cell_counts,
     packing_distance,
     point_set,

@@ -16,11 +16,11 @@ from tests.oracles.batches import make_batch
 from tests.renderer.stages.builders import CONFIGS, CYCLE_S, moments, small
 from tsar import response
 from tsar.cache import FrameletCache
+from tsar.choices import SOLVERS
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import ResponseConfig, TilingConfig, TsarConfig
 from tsar.decision import Decision
 from tsar.response import initial_densities
-from tsar.response.transport import SOLVERS
 from tsar.selection import Request, initial_history, request
 from tsar.stages import REFERENCE
 from tsar.tiling import build, uniform

@@ -12,24 +12,25 @@ import torch
 import tsar.accounting
 import tsar.decision
 import tsar.error
-import tsar.reconstruction
 from renderer.stages.control import Control, compiled_stages
 from renderer.stages.coverage import _KNOWN, StageName, covers
 from renderer.stages.reconstruction import Display
 from tests.oracles import pictures, runs
 from tests.renderer.stages.builders import CONFIGS, CYCLE_S, small
+from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
 from tsar.config import (
     ErrorConfig,
     ReconstructionConfig,
     ResponseConfig,
-    Solver,
     TilingConfig,
     TsarConfig,
     closed_choices,
 )
+from tsar.norms import total_power
 from tsar.policies.adaptive import State
 from tsar.policy import Cycle, Moment, step
-from tsar.response.transport import SOLVERS, Waterfill
+from tsar.reconstruction import blend
+from tsar.response.transport import waterfill
 from tsar.stages import REFERENCE, Stages
 
 STAGES: tuple[StageName, ...] = get_args(StageName)
@@ -37,18 +38,7 @@ STAGES: tuple[StageName, ...] = get_args(StageName)
 
 @dataclass(frozen=True)
 class MoreErrors(ErrorConfig):
-    norm: Literal["l2", "linf", "l1"] = "l2"  # type: ignore[assignment]
     form: Literal["contrast", "difference", "ratio"] = "contrast"  # type: ignore[assignment]
-
-
-@dataclass(frozen=True)
-class MoreSolvers(ResponseConfig):
-    solver: Solver | Literal["half"] = "waterfill"  # type: ignore[assignment]
-
-
-@dataclass(frozen=True)
-class MoreReconstructions(ReconstructionConfig):
-    method: Literal["blend", "negative"] = "blend"
 
 
 @dataclass(frozen=True)
@@ -91,44 +81,37 @@ def assert_handed_over(config: TsarConfig, known: TsarConfig, stage: StageName, 
 @pytest.fixture(autouse=True)
 def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Adds to the reference the norm ``l1``, the form ``ratio``, the solver ``half``, and negatives of its images."""
-    power, error, image = tsar.error.levelwise_power, tsar.error.signed_error, tsar.reconstruction.reconstruct
-
-    def levelwise_power(octaves, config):
-        return tuple(part.sqrt() if config.norm == "l1" else part for part in power(octaves, config))
+    error = tsar.error.signed_error
 
     def signed_error(signal, offset, slope, config):
         return -error(signal, offset, slope, config) if config.form == "ratio" else error(signal, offset, slope, config)
 
-    class Half(Waterfill):
-        def solve(self, desired, bound, surplus, surplus_max):
-            return 0.5 * super().solve(desired, bound, surplus, surplus_max)
+    def rooted(squared, repeat):
+        return total_power(squared, repeat).sqrt()
 
-    def reconstruct(cache, config, cycle_s):
-        made = image(cache, config, cycle_s)
-        if getattr(config.reconstruction, "method", "blend") == "negative":
-            made = replace(made, image=-made.image)
-        return made
+    def half(desired, bound, surplus, surplus_max):
+        return 0.5 * waterfill(desired, bound, surplus, surplus_max)
 
-    monkeypatch.setattr(tsar.error, "levelwise_power", levelwise_power)
+    def negative(cache, config, cycle_s):
+        made = blend(cache, config, cycle_s)
+        return replace(made, image=-made.image)
+
     monkeypatch.setattr(tsar.error, "signed_error", signed_error)
-    monkeypatch.setitem(SOLVERS, "half", Half())
-    original = REFERENCE.reconstruct
-    object.__setattr__(REFERENCE, "reconstruct", reconstruct)
-    yield
-    object.__setattr__(REFERENCE, "reconstruct", original)
+    with NORMS.lent(l1=rooted), SOLVERS.lent(half=half), RECONSTRUCTIONS.lent(negative=negative):
+        yield
 
 
-@pytest.mark.parametrize("error", [MoreErrors(norm="l1"), MoreErrors(form="ratio")], ids=["norm", "form"])
-def test_an_error_that_is_not_compiled_is_estimated_by_the_reference(error: ErrorConfig) -> None:
-    assert_handed_over(small(error=error), small(), "observe")
+@pytest.mark.parametrize("error", [{"norm": "l1"}, {"form": "ratio"}], ids=["norm", "form"])
+def test_an_error_that_is_not_compiled_is_estimated_by_the_reference(error: dict) -> None:
+    assert_handed_over(small(error=MoreErrors(**error)), small(), "observe")
 
 
 def test_a_solver_that_is_not_compiled_is_the_references() -> None:
-    assert_handed_over(small(response=MoreSolvers(solver="half")), small(), "respond", exact=False)
+    assert_handed_over(small(response=ResponseConfig(solver="half")), small(), "respond", exact=False)
 
 
 def test_a_reconstruction_that_is_not_compiled_is_the_references() -> None:
-    negative = small(reconstruction=MoreReconstructions(method="negative"))
+    negative = small(reconstruction=ReconstructionConfig(method="negative"))
     assert_handed_over(negative, small(), "reconstruct", exact=False)
 
 
@@ -161,7 +144,7 @@ def test_a_field_that_no_stage_knows_goes_to_the_reference_throughout(config: Ts
 def test_everything_that_there_is_today_is_compiled(name: str) -> None:
     """But for the solvers that are not; so that a new field does not make all runs slow unnoticed."""
     assert all(covers(CONFIGS[name], stage) for stage in STAGES)
-    for solver in get_args(Solver):
+    for solver in SOLVERS:
         config = replace(CONFIGS[name], response=replace(CONFIGS[name].response, solver=solver))
         assert covers(config, "respond") == (solver == "waterfill") and covers(config, "decide")
 

@@ -1,0 +1,60 @@
+"""Checks of the fields of a configuration, and the error that they raise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+
+class ConfigError(ValueError):
+    """A field out of range; the message names the field, what it expects and what arrived."""
+
+
+def require(condition: bool, name: str, expected: str, got: object) -> None:
+    """Raise :class:`ConfigError` unless the condition holds."""
+    if not condition:
+        raise ConfigError(f"{name}: expected {expected}, got {got!r}")
+
+
+Record = TypeVar("Record")
+
+
+def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
+    """Has a dataclass refuse what the ``Literal`` of a field does not list, before anything else is checked.
+
+    Stands beneath ``@dataclass``. The records made raise :class:`ConfigError`.
+
+    Args:
+        place: what goes before the field's name in the message.
+    """
+
+    def closed(record: type[Record]) -> type[Record]:
+        own = getattr(record, "__post_init__", None)
+
+        def __post_init__(self: Record) -> None:
+            for name, many, choices in _choices(type(self)):
+                value = getattr(self, name)
+                ok = all(item in choices for item in value) if many else value in choices
+                require(ok, place + name, f"{'some' if many else 'one'} of {', '.join(map(str, choices))}", value)
+            if own is not None:
+                own(self)
+
+        record.__post_init__ = __post_init__
+        return record
+
+    return closed
+
+
+@cache
+def _choices(record: type) -> tuple[tuple[str, bool, tuple[Any, ...]], ...]:
+    """Fields of closed choices: name, whether the field is a tuple of them, and the choices."""
+    found = []
+    for name, kind in get_type_hints(record).items():
+        many = get_origin(kind) is tuple
+        item = get_args(kind)[0] if many else kind
+        parts = get_args(item) if get_origin(item) in (Union, UnionType) else (item,)
+        if Literal in map(get_origin, parts):  # beside it there is None at most
+            found.append((name, many, tuple(choice for part in parts for choice in get_args(part) or (None,))))
+    return tuple(found)

@@ -1,0 +1,42 @@
+"""What a configuration chooses by name: transport solvers, error norms and reconstructions.
+
+The tables hold places, so that a name can be checked before anything large is imported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from tsar.named import Named
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from tsar.cache import FrameletCache
+    from tsar.config import TsarConfig
+    from tsar.reconstruction import Reconstruction
+    from tsar.response.transport import TransportSolver
+
+    Norm = Callable[[Tensor, int], Tensor]
+    Reconstruct = Callable[[FrameletCache, TsarConfig, float], Reconstruction]
+
+SOLVERS: Named[TransportSolver] = Named(
+    "solver",
+    "tsar.solvers",
+    {
+        "waterfill": "tsar.response.transport:waterfill",
+        "slow_greater": "tsar.response.transport:slow_greater",
+        "scale_lesser": "tsar.response.transport:scale_lesser",
+        "square": "tsar.response.transport:square",
+        "descend": "tsar.response.transport:descend",
+        "diffusion": "tsar.response.transport:diffusion",
+        "trivial": "tsar.response.transport:trivial",
+    },
+)
+
+NORMS: Named[Norm] = Named("norm", "tsar.norms", {"l2": "tsar.norms:total_power", "linf": "tsar.norms:greatest_power"})
+
+RECONSTRUCTIONS: Named[Reconstruct] = Named(
+    "reconstruction", "tsar.reconstructions", {"blend": "tsar.reconstruction:blend"}
+)
