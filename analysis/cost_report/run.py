@@ -26,6 +26,7 @@ from analysis.metrics.cost_model import (
     stage_flops,
     sweep,
 )
+from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json
 
 if TYPE_CHECKING:
@@ -241,10 +242,10 @@ def _draw(options: CostReportOptions, summary: Mapping[str, Any]) -> None:
     out, measurement, title = options.out, summary["measurement"], f"ledger {options.ledger}"
     for number, found in enumerate(sweeps(options).values(), 3):
         crossing = summary["crossing_batch"] if found.name == "batch_size" else None
-        plots.save(plots.cost_figure(found, title, crossing), out / f"fig_7_{number}.png")
+        save(plots.cost_figure(found, title, crossing), out / f"fig_7_{number}.png")
     measured = measurement["advantages"] if measurement else []
     at_side = [row for row in measured if row["resolution_px"] ** 2 == options.parameters.recon_res]
-    plots.save(plots.advantage_figure(*advantages_by_batch(options), at_side), out / "advantage.png")
+    save(plots.advantage_figure(*advantages_by_batch(options), at_side), out / "advantage.png")
     surface = equal_cost_surface(options)
     with atomic(out / "fig_7_6.vtp") as temporary:
         surface.save(temporary)
@@ -252,8 +253,8 @@ def _draw(options: CostReportOptions, summary: Mapping[str, Any]) -> None:
     limits = (SURFACE_BATCHES[1], SURFACE_SEGMENTS[1], SURFACE_SIDES_PX[1])
     plots.surface_picture(surface, rows, limits, out / "fig_7_6.png")
     if measurement:
-        plots.save(plots.refit_figure(measurement["refit"]), out / "refit.png")
+        save(plots.refit_figure(measurement["refit"]), out / "refit.png")
         figure = plots.scaling_figure(measurement["cells"], measurement["exponents"], options.measurement.centre)
-        plots.save(figure, out / "scaling.png")
+        save(figure, out / "scaling.png")
         if measurement["memory"]:
-            plots.save(plots.memory_figure(measurement["memory_trace"], measurement["memory"]), out / "memory.png")
+            save(plots.memory_figure(measurement["memory_trace"], measurement["memory"]), out / "memory.png")

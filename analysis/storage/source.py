@@ -9,14 +9,22 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib.metadata
+import importlib.util
+import re
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from tsar.named import Named
+
 _NO_DATA = (".pyc", ".md", ".html", ".js")
 """Endings of files beside the code that decide no result: pages only show them."""
+
+_PLACE = re.compile(r"[a-z_]\w*(\.\w+)+:\w+")
+"""A place in a table of names, as ``module:attribute``: it is imported when it is asked for."""
 
 _DISTRIBUTIONS = {"warp": "warp-lang", "PIL": "pillow", "pycvvdp": "cvvdp", "flip_evaluator": "flip-evaluator"}
 """Names under which packages are installed, where they are not those that they are imported by."""
@@ -62,6 +70,51 @@ def _found(makers: Sequence[Any]) -> tuple[Path, list[Path]]:
     return files[0].parents[makers[0].__module__.count(".")], files
 
 
+@dataclass(frozen=True)
+class Brought:
+    """An entry of a table that is not the project's own.
+
+    Attributes:
+        kind, name: what it is, and under which name it stands in its table.
+        module, distribution, version: where it comes from; see :class:`tsar.named.Origin`.
+        content: hash of the files of its package, or of its module where that lies in none; None where it has no file.
+    """
+
+    kind: str
+    name: str
+    module: str
+    distribution: str | None
+    version: str | None
+    content: str | None
+
+
+def brought(*chosen: tuple[Named[Any], str]) -> list[Brought]:
+    """Of entries by their tables and names those that are not the project's own: no hash of its code covers them."""
+    found = []
+    for table, name in chosen:
+        if not table.is_own(name):
+            origin = table.origin(name)
+            content = _content(origin.module)
+            found.append(Brought(table.kind, name, origin.module, origin.distribution, origin.version, content))
+    return found
+
+
+def _content(module: str) -> str | None:
+    """Hash of all files of the package that a module lies in, or of its own file."""
+    top = module.partition(".")[0]
+    spec = None if top == "__main__" else importlib.util.find_spec(top)
+    if spec is not None and spec.submodule_search_locations:
+        paths = sorted(path for folder in spec.submodule_search_locations for path in Path(folder).rglob("*"))
+        paths = [path for path in paths if path.is_file() and path.suffix != ".pyc"]
+    else:
+        file = spec.origin if spec else getattr(sys.modules.get(top), "__file__", None)
+        paths = [Path(file)] if file and Path(file).is_file() else []
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()[:16] if paths else None
+
+
 def version_of(library: str) -> str | None:
     """Version of an installed library by the name it is imported by; None where it is not installed."""
     try:
@@ -78,7 +131,10 @@ def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
         if path in modules:
             continue
         modules.add(path)
-        for name in _imports(path.read_bytes(), path.parent.relative_to(root).parts):
+        content = path.read_bytes()
+        for place in _places(content):
+            waiting += _module(root, place)
+        for name in _imports(content, path.parent.relative_to(root).parts):
             found = _module(root, name)
             waiting += found
             top = name.partition(".")[0]
@@ -108,6 +164,13 @@ def _module(root: Path, name: str) -> list[Path]:
 def _imports(content: bytes, package: tuple[str, ...]) -> tuple[str, ...]:
     """Dotted names of what a module of a package imports, wherever in it that stands but for type checkers."""
     return tuple(_names(ast.parse(content), package))
+
+
+@lru_cache(maxsize=4096)
+def _places(content: bytes) -> tuple[str, ...]:
+    """Dotted names of modules whose entries a table of names holds by their place."""
+    texts = (node.value for node in ast.walk(ast.parse(content)) if isinstance(node, ast.Constant))
+    return tuple(text.replace(":", ".") for text in texts if isinstance(text, str) and _PLACE.fullmatch(text))
 
 
 def _names(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:

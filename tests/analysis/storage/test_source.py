@@ -18,6 +18,7 @@ from analysis.storage import source
 from analysis.storage.source import code_hash, hash_of_modules, modules_of, version_of
 from analysis.study.evaluation import evaluate
 from renderer.trace import Renderer
+from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
 from tsar.named import Named
 from tsar.policies import POLICIES
 
@@ -176,9 +177,17 @@ def test_no_module_is_imported_by_a_name_that_cannot_be_read() -> None:
         assert not names & {"import_module", "__import__", "exec"}, module
 
 
-@pytest.mark.parametrize("table", [POLICIES, METRICS], ids=lambda table: table.kind)
+@pytest.mark.parametrize("table", [POLICIES, METRICS, SOLVERS, NORMS, RECONSTRUCTIONS], ids=lambda table: table.kind)
 def test_what_a_table_names_decides_a_result(table: Named) -> None:
     reached = modules_of(evaluate)[0]
     for name in table:
-        place = Path(sys.modules[table.origin(name)["module"]].__file__ or "")
+        table[name]
+        place = Path(sys.modules[table.origin(name).module].__file__ or "")
         assert place in reached, name
+
+
+def test_a_place_in_a_table_is_followed(house: Path) -> None:
+    (house / "house/start.py").write_text('TABLE = {"red": "house.cellar.barrels.red:Wine"}')
+    before = hash_of_modules(house, [house / "house/start.py"])
+    (house / "house/cellar/barrels/red.py").write_text("class Wine: ...")
+    assert hash_of_modules(house, [house / "house/start.py"]) != before
