@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from tsar import haar
@@ -55,11 +55,27 @@ def estimate(
     return Estimate(Errors(fields[0], fields[1]), color, coefficients, nonfinite)
 
 
+def count_nonfinite(color: Float[Tensor, "*n 3"]) -> int:
+    """How many samples :func:`replace_nonfinite` would replace."""
+    if color.numel() == 0:
+        return 0
+    least, most = torch.aminmax(color)
+    # one pass over the samples where all are finite, as they nearly always are; NaN passes through
+    if least >= -RADIANCE_MAX and most <= RADIANCE_MAX:
+        return 0
+    return int(_bad(color).sum())
+
+
+def _bad(color: Float[Tensor, "*n 3"]) -> Bool[Tensor, "*n"]:
+    """Which samples have a channel that is not finite, or beyond ``RADIANCE_MAX``."""
+    return ~(color.abs() <= RADIANCE_MAX).all(dim=-1)
+
+
 def replace_nonfinite(color: Float[Tensor, "n samples 3"], side: int) -> tuple[Float[Tensor, "n samples 3"], int]:
     """Replace samples with a channel that is not finite, or beyond ``RADIANCE_MAX``, by the mean of their finite 3 x 3
     neighbours within the framelet, or of the whole framelet where there are none, or by black where nothing is finite.
     Returns how many were replaced."""
-    bad = ~(color.abs() <= RADIANCE_MAX).all(dim=2)
+    bad = _bad(color)
     count = int(bad.sum())
     if count == 0:
         return color, 0

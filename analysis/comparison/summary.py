@@ -155,7 +155,7 @@ def summarise(measured: Measured) -> dict[str, Any]:
         "conclusion_changes_with_ledger": len({n >= 1 for n in cycles_per_image(measured).values()}) > 1,
         "invariants": measured.invariants,
         "nonfinite": {
-            **{name: one.nonfinite + measured.runs[name].totals.nonfinite for name, one in seen.items()},
+            **{name: one.nonfinite + measured.runs[name].nonfinite_samples for name, one in seen.items()},
             "fields": sum(run.totals.nonfinite_fields for run in measured.runs.values()),
             "reference": measured.reference_nonfinite,
         },

@@ -222,6 +222,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "case": case,
         "images": seen.images,
         "nonfinite": seen.nonfinite,
+        "nonfinite_samples": made.nonfinite_samples,
         "reference_nonfinite": reference.nonfinite,
         "jod": _score(case, seen),
         "regions": seen.regions(),
@@ -244,7 +245,6 @@ def _cycles(totals: Totals) -> dict[str, Any]:
         "cycles": totals.cycles,
         "cycle_s": totals.simulated_s / totals.cycles,
         "age_spread_s": totals.age_spread_s / totals.cycles,
-        "nonfinite_samples": totals.nonfinite,
         "invariants": totals.invariants,
     }
 

@@ -12,6 +12,7 @@ from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds
 from analysis.metrics.quality import Shown
 from analysis.storage.records import InvariantCheck, RecordLimits
 from tsar.config import StagesName, TsarConfig, closed_choices
+from tsar.error import count_nonfinite
 from tsar.policies import POLICIES
 from tsar.policy import Policy, Price, Setting, run
 from tsar.types import FrameletBatch, SampleBatch, StepRecord, Trace
@@ -23,12 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass
 class Meter:
-    """A renderer that counts: work by kind, calls and seconds. Changes in place."""
+    """A renderer that counts: work by kind, calls, seconds, and samples that are not finite. Changes in place."""
 
     trace: Trace
     counters: Counter[str] = field(default_factory=Counter)
     calls: int = 0
     wall_s: float = 0.0
+    nonfinite: int = 0
 
     def __call__(self, batch: FrameletBatch) -> SampleBatch:
         began = time.perf_counter()
@@ -36,6 +38,7 @@ class Meter:
         self.wall_s += time.perf_counter() - began
         self.calls += 1
         self.counters.update(samples.counters)
+        self.nonfinite += count_nonfinite(samples.color)
         return samples
 
 
@@ -105,6 +108,11 @@ class PolicyRun:
     meter: Meter
     totals: Totals
     images: Iterator[Shown]
+
+    @property
+    def nonfinite_samples(self) -> int:
+        """Samples that were not finite: of the cycles within the span where the policy records them, else of all."""
+        return self.totals.nonfinite if self.totals.recorded else self.meter.nonfinite
 
 
 def begin(
