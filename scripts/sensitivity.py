@@ -16,7 +16,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from analysis.command.cli import bad_input, full_disk, parse, require_unbroken, run_cli
 from analysis.command.extras import require_extra
 from analysis.command.ownership import own_folder, writable_folder
-from analysis.sensitivity.study import AXES, BEST, SensitivityOptions, optimum_table, runs, setting_table, sweeps
+from analysis.sensitivity.options import SensitivityOptions
+from analysis.sensitivity.runs import AXES, runs, sweeps
+from analysis.sensitivity.tables import BEST, optimum_table, setting_table
 from analysis.storage.files import atomic, write_json
 
 

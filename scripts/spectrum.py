@@ -16,7 +16,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.command.cli import parse, run_cli
-from analysis.spectrum.spectra import SpectrumOptions
+from analysis.spectrum.options import SpectrumOptions
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.command.cli import parse, require_unbroken, run_cli
 from analysis.command.extras import require_extra
-from analysis.suitability.study import SuitabilityOptions
+from analysis.suitability.options import SuitabilityOptions
 
 
 def main() -> None:

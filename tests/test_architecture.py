@@ -179,7 +179,7 @@ def test_warp_is_started_in_one_place() -> None:
         ("analysis/metrics/a.py", "from tsar.selection import select"),
         ("analysis/command/a.py", "from analysis.storage.files import atomic"),
         ("analysis/study/a.py", "from analysis.comparison.experiment import run_experiment"),
-        ("analysis/comparison/a.py", "from analysis.suitability.study import runs"),
+        ("analysis/comparison/a.py", "from analysis.suitability.runs import runs"),
         ("analysis/comparison/experiment.py", "import warp"),
         ("renderer/trace.py", "import warp as wp\nwp.init()"),
         ("renderer/trace.py", "import warp\ndef f():\n    warp.init()"),

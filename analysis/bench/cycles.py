@@ -9,7 +9,7 @@ from itertools import islice
 
 import torch
 
-from analysis.storage.records import unbroken
+from analysis.storage.invariants import unbroken
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TsarConfig
 from tsar.policies.adaptive import Adaptive

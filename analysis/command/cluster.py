@@ -71,17 +71,16 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
         return
     with contextlib.ExitStack() as held:
         with _interrupts_blocked():
-            cluster = held.enter_context(
-                LocalCluster(
-                    n_workers=options.processes,
-                    threads_per_worker=1,
-                    processes=True,
-                    host=LOOPBACK,
-                    dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not meet
-                    memory_limit=0,
-                    silence_logs=logging.CRITICAL,
-                )
+            cluster = LocalCluster(
+                n_workers=options.processes,
+                threads_per_worker=1,
+                processes=True,
+                host=LOOPBACK,
+                dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not meet
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
             )
+            held.enter_context(cluster)
         client = held.enter_context(Client(cluster))
         try:
             yield client

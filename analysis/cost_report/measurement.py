@@ -6,20 +6,19 @@ imported when a measurement begins.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from statistics import median
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from analysis.command import limits
 from analysis.command.cli import bad_input, require_memory
+from analysis.cost_report.options import MeasurementOptions
 from analysis.cost_report.refit import Cell, MemoryTrace
 from analysis.metrics.cost_model import RAYS
-from tsar.config import TsarConfig, closed_choices, require
+from tsar.config import TsarConfig
 
 if TYPE_CHECKING:
     from analysis.command.progress import Bars
@@ -28,84 +27,6 @@ if TYPE_CHECKING:
     from tsar.policy import Policy
 
 _BYTES_PER_PIXEL = 320  # images and age fields in flight, and the framed image
-_FEWEST_BATCHES, _FEWEST_RESOLUTIONS = 3, 3
-
-
-@dataclass(frozen=True)
-@closed_choices()
-class MeasurementOptions:
-    """What is run to hold against the model."""
-
-    input: str = "fly-by"
-    """Built-in input, by name or number."""
-    measured_batches: tuple[int, ...] = (32, 64, 128, 256, 512)
-    """Batch sizes measured at the output side measured_resolution."""
-    measured_resolutions: tuple[int, ...] = (128, 256, 512, 1024)
-    """Output sides measured at the batch size measured_batch, pixels."""
-    measured_batch: int = 128
-    """Batch size at which output sides are compared."""
-    measured_resolution: int = 512
-    """Output side at which batch sizes are compared, pixels."""
-    repetitions: int = 10
-    """Turns of each setting."""
-    cycles_per_turn: int = 4
-    """Pipeline cycles a setting runs in its turn."""
-    cycle_s: float = 0.02
-    """Animation time a cycle takes, seconds; the ledger thesis gives about this at the defaults."""
-    measured_warmup: int = 0
-    """Cycles of every setting before it is measured; 0 runs until the cache is full, 48 at least."""
-    memory_cycles: int = 600
-    """Cycles over which resident memory is watched; 0 leaves it out."""
-    memory_every: int = 10
-    """Cycles between two looks at resident memory."""
-    device: Literal["cpu", "cuda:0"] = "cpu"
-    """Where rays are traced."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
-
-    def __post_init__(self) -> None:
-        for name in ("measured_batches", "measured_resolutions"):
-            least = _FEWEST_BATCHES if name == "measured_batches" else _FEWEST_RESOLUTIONS
-            values = getattr(self, name)
-            require(len(set(values)) >= least, name, f"at least {least} different values", values)
-        limits.within(
-            self,
-            measured_batches=(1, 8192),
-            measured_batch=(1, 8192),
-            measured_resolutions=(64, 8192),
-            measured_resolution=(64, 8192),
-            repetitions=limits.REPETITIONS,
-            cycles_per_turn=(1, 10_000),
-            cycle_s=(1e-6, 3600.0),
-            measured_warmup=(0, 100_000),
-            memory_cycles=(0, limits.CYCLES_MOST),
-            memory_every=(1, limits.CYCLES_MOST),
-            threads=limits.THREADS,
-        )
-        asked = self.repetitions * self.cycles_per_turn * len(self.settings)
-        limits.require_count("repetitions", self.repetitions, asked, "cycles measured")
-        few = self.memory_cycles == 0 or self.memory_cycles >= 4 * self.memory_every
-        require(few, "memory_cycles", "0, or at least 4 times memory_every", self.memory_cycles)
-        for setting in self.settings:
-            self.pipeline(*setting)
-
-    @property
-    def settings(self) -> list[tuple[int, int]]:
-        """Batch size and output side of every setting."""
-        batches = [(batch, self.measured_resolution) for batch in self.measured_batches]
-        sides = [(self.measured_batch, side) for side in self.measured_resolutions]
-        return sorted({*batches, *sides, self.centre})
-
-    @property
-    def centre(self) -> tuple[int, int]:
-        """The setting at which all ledgers are compared."""
-        return self.measured_batch, self.measured_resolution
-
-    def pipeline(self, batch_size: int, resolution_px: int) -> TsarConfig:
-        """Configuration of a setting; what is not said here is the pipeline's own."""
-        config = TsarConfig(batch_size=batch_size, resolution_px=resolution_px)
-        full = max(config.warmup_cycles, -(-config.cache_slots // batch_size))
-        return dataclasses.replace(config, warmup_cycles=self.measured_warmup or full)
 
 
 def _segments(counters: Sequence[Mapping[str, int]]) -> float:
@@ -188,7 +109,7 @@ class _Adaptive:
     counters: list[dict[str, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        from analysis.storage.records import unbroken
+        from analysis.storage.invariants import unbroken
         from tsar.clock import fixed_clock
         from tsar.policy import run
 
@@ -287,7 +208,7 @@ def watch_memory(
     """Resident memory over a run of the centre setting that takes ``span_s`` of animation time at most."""
     import psutil
 
-    from analysis.storage.records import unbroken
+    from analysis.storage.invariants import unbroken
     from tsar.clock import fixed_clock
     from tsar.policy import run
 

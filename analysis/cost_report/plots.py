@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from analysis.cost_report.refit import Cell, MemoryTrace, PowerLaw, StageFit
-    from analysis.metrics.cost_model import Sweep
+    from analysis.cost_report.sweeps import Sweep
 
 __all__ = [
     "advantage_figure",

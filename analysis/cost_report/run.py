@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.ownership import own_folder
-from analysis.cost_report.measurement import MeasurementOptions, measure, prepare
-from analysis.cost_report.options import CostReportOptions
+from analysis.cost_report.measurement import measure, prepare
+from analysis.cost_report.options import CostReportOptions, MeasurementOptions
 from analysis.cost_report.refit import Cell
+from analysis.cost_report.sweeps import admitted_rows, crossing_batch, sweep
 from analysis.metrics.cost_model import (
     MODELLED,
     CostParameters,
     Ledger,
     adaptive_flops,
-    admitted_rows,
     advantage,
-    crossing_batch,
     naive_per_pixel,
     nonadaptive_flops,
     stage_flops,
-    sweep,
 )
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from analysis.cost_report.measurement import Measurement
-    from analysis.metrics.cost_model import Sweep
+    from analysis.cost_report.sweeps import Sweep
 
 ROOT = Path(__file__).resolve().parents[2]
 SURFACE_BATCHES = (16.0, 1536.0)

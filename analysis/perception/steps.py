@@ -160,7 +160,7 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
     steps(3)
     pairs = analyses.strongest(tested)
     tables = {"fits": fitted, "tests": tested, "pairs": pairs}
-    if options.power_repetitions and trials["samples"].nunique() > 1:
+    if options.power_repetitions and len(set(trials["samples"])) > 1:
         levels = sorted(int(level) for level in trials["samples"].unique())
         jnds = (analyses.THESIS_JND["planescene"], analyses.THESIS_JND["spheresscene"])
         width = float(np.nanmedian(fitted["sigma"].to_numpy(np.float64))) if "sigma" in fitted else 1.5

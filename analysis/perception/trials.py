@@ -97,10 +97,10 @@ def _check_sides(trials: pd.DataFrame, name: str) -> None:
         InputError: a trial says otherwise.
     """
     given = trials["answer"].isin(_SIDES) & trials["differing_side"].isin(_SIDES)
-    wrong = given & ((trials["answer"] == trials["differing_side"]) != trials["correct"])
-    if wrong.any():
-        row = trials.loc[wrong].iloc[0]
+    wrong = np.flatnonzero(given & ((trials["answer"] == trials["differing_side"]) != trials["correct"]))
+    if len(wrong):
+        row = trials.iloc[wrong[0]]
         raise InputError(
-            f"{name}: column correct, row {trials.index[wrong][0]}: expected {row['answer'] == row['differing_side']} "
+            f"{name}: column correct, row {trials.index[wrong[0]]}: expected {row['answer'] == row['differing_side']} "
             f"for the answer {row['answer']} where {row['differing_side']} differs, got {bool(row['correct'])}"
         )

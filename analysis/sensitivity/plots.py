@@ -19,7 +19,8 @@ from analysis.page.figures import ADAPTIVE, FRAMED, OTHER, save
 from analysis.page.pictures import RATE_MAP, number
 
 if TYPE_CHECKING:
-    from analysis.sensitivity.study import SensitivityOptions, Setting
+    from analysis.sensitivity.options import SensitivityOptions
+    from analysis.sensitivity.runs import Setting
     from analysis.study.evaluation import Place
 
 Lines = Sequence[Mapping[str, Any]]

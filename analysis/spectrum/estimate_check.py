@@ -18,7 +18,7 @@ from scipy.stats import rankdata
 from torch import Tensor
 
 from analysis.spectrum.ideal_density import ideal_band, octant_power, power_norm, raster, share_of_total, tile_volume
-from analysis.spectrum.spectra import FRAMELET_SIDE, SpectrumOptions
+from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
 from tsar import haar
 from tsar.config import ErrorConfig
 from tsar.error import levelwise_power, signed_error

@@ -13,10 +13,10 @@ from analysis.comparison.experiment import ROOT
 from analysis.page.figures import save
 from analysis.spectrum import plots
 from analysis.spectrum.estimate_check import check_estimate, measure_example, measure_input
+from analysis.spectrum.options import SpectrumOptions
 from analysis.spectrum.spectra import (
     PHOTOGRAPHS,
     Spectrum,
-    SpectrumOptions,
     group_statistics,
     input_spectra,
     open_input,

@@ -5,11 +5,9 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-import math
 import os
 import platform
 import subprocess
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,15 +17,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from torch import Tensor
 
-from analysis.command.cli import BrokenInvariants
 from analysis.command.extras import DISTRIBUTION
 from analysis.storage.files import PARTIAL, plain
-from tsar.types import Display, StepRecord
+from tsar.types import StepRecord
 
 _META = b"tsar"
-_CONSERVATION = 1e-5
-_ROUNDING = 1e-6  # densities are stored as float32
-_MUST_BE_FINITE = ("density_spatial", "density_temporal", "error_spatial", "error_temporal")
 
 _FIELDS: dict[str, pa.DataType] = {
     "cycle": pa.int64(),
@@ -69,8 +63,8 @@ def _flat(tensor: Tensor, dtype: type) -> np.ndarray:
     return tensor.detach().cpu().numpy().astype(dtype)
 
 
-def _fields(record: StepRecord) -> dict[str, np.ndarray]:
-    """Arrays of a record that its invariants are checked from, as they are stored."""
+def checked_fields(record: StepRecord) -> dict[str, np.ndarray]:
+    """The arrays of a record that its invariants are checked on, as they are stored."""
     return {
         "tile_level": _flat(record.tiling.level, np.int8),
         "tile_index": _flat(record.tiling.index, np.int32),
@@ -116,7 +110,7 @@ class StepWriter:
             "nonfinite_fields": record.nonfinite_fields,
             "age_spread_s": record.age_spread_s,
             "tile_count": record.tiling.tile_count,
-            **_fields(record),
+            **checked_fields(record),
         }
         row |= {f"stage_{name}_s": seconds for name, seconds in record.stage_s.items()}
         row |= {f"count_{name}": count for name, count in record.counters.items()}
@@ -172,115 +166,6 @@ def read_limits(path: Path) -> RecordLimits:
     return RecordLimits(
         found["batch_size"], found["budget"], tuple(found["density_spatial"]), tuple(found["density_temporal"])
     )
-
-
-def check_invariants(path: Path) -> dict[str, Any]:
-    """Checks every cycle of a run from its records alone.
-
-    Args:
-        path: file of step records.
-
-    Returns:
-        ``cycles``; the greatest ``conservation_residual``, recorded or recomputed from the stored densities; cycles in
-        which densities were out of bounds, the tiling did not cover the image exactly once, the batch was not full, or
-        densities or errors were not finite (``nonfinite``); and ``ok``.
-    """
-    check = InvariantCheck(read_limits(path))
-    columns = ["conservation_residual", "surplus", "tile_level", "tile_index", "selected"]
-    columns += ["density_spatial", "density_temporal", "error_spatial", "error_temporal"]
-    for part in pq.ParquetFile(path).iter_batches(batch_size=16, columns=columns):
-        values = {name: part.column(name) for name in columns}
-        for row in range(part.num_rows):
-            item = {name: values[name][row] for name in columns}
-            fields = {name: item[name].values.to_numpy() for name in columns[2:]}
-            check.add_fields(fields, item["surplus"].as_py(), item["conservation_residual"].as_py())
-    return check.result()
-
-
-class InvariantCheck:
-    """What :func:`check_invariants` finds, from records as they come. Changes in place."""
-
-    _COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full", "nonfinite")
-
-    def __init__(self, limits: RecordLimits) -> None:
-        self._limits = limits
-        self._found: dict[str, Any] = {"cycles": 0, "conservation_residual": 0.0, **dict.fromkeys(self._COUNTED, 0)}
-
-    def add(self, record: StepRecord) -> None:
-        """Checks one cycle; densities are rounded to float32 as they are in a file."""
-        fields = _fields(record)
-        self.add_fields(fields, record.surplus, record.conservation_residual)
-
-    def add_fields(self, fields: dict[str, np.ndarray], surplus: float, recorded: float) -> None:
-        """Checks one cycle from its arrays, the surplus, and the residual that the pipeline found."""
-        found, limits = self._found, self._limits
-        worst = max(_or_infinite(_residual(fields, surplus, limits)), _or_infinite(recorded))
-        found["cycles"] += 1
-        found["conservation_residual"] = max(found["conservation_residual"], worst)
-        found["densities_out_of_bounds"] += not _within(fields, limits)
-        found["tiling_not_a_cover"] += not covers_once(fields["tile_level"], fields["tile_index"])
-        found["batch_not_full"] += not _full(fields, limits)
-        found["nonfinite"] += not all(np.isfinite(fields[name]).all() for name in _MUST_BE_FINITE)
-
-    def result(self) -> dict[str, Any]:
-        """Counts and ``ok``."""
-        counts = (self._found[name] for name in self._COUNTED)
-        kept = self._found["conservation_residual"] <= _CONSERVATION and not any(counts)
-        ok = kept and self._found["cycles"] > 0  # nothing held where nothing ran
-        return {**self._found, "ok": bool(ok)}
-
-
-def unbroken(cycles: Iterable[tuple[StepRecord | None, Display]]) -> Iterator[StepRecord]:
-    """Records of cycles as they come, checked by what the pipeline itself counted: measurements of time go on
-    undisturbed.
-
-    Raises:
-        BrokenInvariants: density is lost or gained, or a density or an error is not finite.
-    """
-    for record, _ in cycles:
-        if record is None:
-            continue
-        residual, nonfinite = record.conservation_residual, record.nonfinite_fields
-        if not residual <= _CONSERVATION or nonfinite:
-            found = f"conservation residual {residual:g}, {nonfinite} values not finite"
-            raise BrokenInvariants(f"invariants are broken in cycle {record.cycle}: {found}")
-        yield record
-
-
-def _residual(fields: dict[str, np.ndarray], surplus: float, limits: RecordLimits) -> float:
-    combined = fields["density_spatial"].astype(np.float64) * fields["density_temporal"]
-    return abs(float(combined.sum()) + surplus - limits.budget) / limits.budget
-
-
-def _or_infinite(residual: float) -> float:
-    """NaN would lose every comparison and so pass for the least."""
-    return math.inf if math.isnan(residual) else residual
-
-
-def _within(fields: dict[str, np.ndarray], limits: RecordLimits) -> bool:
-    for name in ("density_spatial", "density_temporal"):
-        low, high = getattr(limits, name)
-        inside = (fields[name] >= low * (1 - _ROUNDING)) & (fields[name] <= high * (1 + _ROUNDING))
-        if not inside.all():
-            return False
-    return True
-
-
-def covers_once(level: np.ndarray, index: np.ndarray) -> bool:
-    """Whether tiles are disjoint intervals of the Morton curve that fill it: in order, each begins where one ends."""
-    if level.size == 0:
-        return False
-    shift = 2 * (int(level.max()) - level.astype(np.int64))
-    first, last = index.astype(np.int64) << shift, (index.astype(np.int64) + 1) << shift
-    order = np.argsort(first, kind="stable")
-    first, last = first[order], last[order]
-    return bool(first[0] == 0 and last[-1] == 4 ** int(level.max()) and (first[1:] == last[:-1]).all())
-
-
-def _full(fields: dict[str, np.ndarray], limits: RecordLimits) -> bool:
-    selected = fields["selected"]
-    distinct = np.unique(selected).size == selected.size == limits.batch_size
-    return bool(distinct and selected.min() >= 0 and selected.max() < fields["tile_level"].size)
 
 
 def density_quantiles(path: Path, percents: tuple[float, ...] = (5.0, 25.0, 50.0, 75.0, 95.0)) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import resource
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -109,7 +109,7 @@ def times_of(key: str, place: Place) -> pd.DataFrame:
     return pd.read_parquet(io.BytesIO(content))
 
 
-def broken(found: Iterable[dict[str, Any] | None]) -> list[str]:
+def broken(found: Iterable[Mapping[str, Any] | None]) -> list[str]:
     """Names of the results, of some summaries, whose cycles broke an invariant; only adaptive runs have any."""
     return [one["key"] for one in found if one and not one.get("invariants", {"ok": True})["ok"]]
 

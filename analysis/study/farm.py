@@ -70,7 +70,8 @@ def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Cas
     pending, seen_s = set(waiting), time.monotonic()
     while pending:
         try:
-            done, pending = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
+            outcome: Any = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
+            done, pending = outcome
         except TimeoutError:
             done = set[Any]()
         except Exception as error:  # of whatever library the connection is made of
@@ -90,7 +91,8 @@ def _failure(future: Future) -> str | None:
     if future.status == "finished":
         return None
     if future.status == "error":
-        return _reason(future.exception())
+        error: Any = future.exception()
+        return _reason(error)
     return "the scheduler or its workers were ended"
 
 

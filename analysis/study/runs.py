@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds
 from analysis.metrics.quality import Shown
-from analysis.storage.records import InvariantCheck, RecordLimits
+from analysis.storage.invariants import InvariantCheck
+from analysis.storage.records import RecordLimits
 from tsar.config import StagesName, TsarConfig, closed_choices
 from tsar.error import count_nonfinite
 from tsar.policies import POLICIES
@@ -77,7 +78,7 @@ class Totals:
 
     @property
     def invariants(self) -> dict[str, Any]:
-        """What :meth:`analysis.storage.records.InvariantCheck.result` found."""
+        """What :meth:`analysis.storage.invariants.InvariantCheck.result` found."""
         return self._check.result()
 
 

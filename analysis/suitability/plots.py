@@ -15,7 +15,8 @@ from analysis.metrics.quality import WHISKERS, percentile
 from analysis.page.figures import ADAPTIVE, FRAMED, save
 from analysis.study.cases import INPUTS, ROWS, SCALES, Case
 from analysis.study.evaluation import Place
-from analysis.suitability.study import STILLS, SuitabilityOptions
+from analysis.suitability.options import SuitabilityOptions
+from analysis.suitability.runs import STILLS
 from analysis.suitability.tables import Result, Results, ratios
 
 _GRID = {"color": "0.88", "linewidth": 0.6}

@@ -20,7 +20,8 @@ from analysis.study.cases import ROWS, SCALES, Case
 from analysis.study.evaluation import ROOT, Place, broken, finished, times_of
 from analysis.study.farm import describe_failures, run_cases
 from analysis.suitability import plots
-from analysis.suitability.study import Run, SuitabilityOptions, runs
+from analysis.suitability.options import SuitabilityOptions
+from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import (
     Result,
     Results,

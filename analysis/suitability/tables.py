@@ -16,7 +16,7 @@ from scipy.stats import spearmanr
 from analysis.metrics.quality import ratio, ratio_statistics, suitable_percentile
 from analysis.study.cases import INPUTS, ROWS
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
-from analysis.suitability.study import Run
+from analysis.suitability.runs import Run
 
 Floats = NDArray[np.float64]
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-import analysis.storage.records
+import analysis.storage.invariants
 from analysis.bench.cycles import cycles, synthetic_trace
 from analysis.command.cli import BrokenInvariants
-from analysis.cost_report.measurement import MeasurementOptions, measure_cells, prepare, watch_memory
+from analysis.cost_report.measurement import measure_cells, prepare, watch_memory
+from analysis.cost_report.options import MeasurementOptions
 from analysis.perception import adaptive
 from analysis.perception.options import AdaptiveOptions
 from analysis.study.cases import SCALES
@@ -26,7 +27,7 @@ BROKEN = {"ok": False, "conservation_residual": 0.74}
 @pytest.fixture
 def strict(monkeypatch: pytest.MonkeyPatch) -> None:
     """No residual is small enough."""
-    monkeypatch.setattr(analysis.storage.records, "_CONSERVATION", -1.0)
+    monkeypatch.setattr(analysis.storage.invariants, "_CONSERVATION", -1.0)
 
 
 def last_line(capsys: pytest.CaptureFixture) -> str:

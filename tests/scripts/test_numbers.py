@@ -22,9 +22,9 @@ from analysis.perception.options import (
     SimulateOptions,
     StimuliOptions,
 )
-from analysis.sensitivity.study import SensitivityOptions
-from analysis.spectrum.spectra import SpectrumOptions
-from analysis.suitability.study import SuitabilityOptions
+from analysis.sensitivity.options import SensitivityOptions
+from analysis.spectrum.options import SpectrumOptions
+from analysis.suitability.options import SuitabilityOptions
 from analysis.tracer.options import AcceleratorOptions, GalleryOptions, JobOptions, PointSetOptions, TileOptions
 from analysis.tracer.render_options import RenderOptions
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script

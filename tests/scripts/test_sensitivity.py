@@ -13,8 +13,9 @@ import pytest
 from PIL import Image
 
 from analysis.command.cli import parse
-from analysis.sensitivity import study as sensitivity
-from analysis.sensitivity.study import Run, SensitivityOptions, Setting, runs
+from analysis.sensitivity import runs as sensitivity
+from analysis.sensitivity.options import SensitivityOptions
+from analysis.sensitivity.runs import Run, Setting, runs
 from analysis.study import cases, farm
 from analysis.study.cases import Case, Scale
 from analysis.study.evaluation import Place, finished, source_of_results

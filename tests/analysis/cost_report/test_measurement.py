@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from analysis.cost_report.measurement import MeasurementOptions, measure, prepare
+from analysis.cost_report.measurement import measure, prepare
+from analysis.cost_report.options import MeasurementOptions
 from analysis.cost_report.refit import (
     Cell,
     MemoryTrace,

@@ -13,8 +13,8 @@ import pyvista
 import torch
 from PIL import Image
 
-from analysis.cost_report.measurement import Measurement, MeasurementOptions
-from analysis.cost_report.options import CostReportOptions, TableParameters
+from analysis.cost_report.measurement import Measurement
+from analysis.cost_report.options import CostReportOptions, MeasurementOptions, TableParameters
 from analysis.cost_report.refit import Cell, MemoryTrace
 from analysis.cost_report.run import (
     advantages_by_batch,
@@ -28,6 +28,7 @@ from analysis.cost_report.run import (
     sweeps,
     write_report,
 )
+from analysis.cost_report.sweeps import admitted_rows, crossing_batch, sweep
 from analysis.cost_report.tables import tables
 from analysis.metrics.cost_model import (
     MODELLED,
@@ -35,12 +36,9 @@ from analysis.metrics.cost_model import (
     CostParameters,
     adaptive_flops,
     admitted,
-    admitted_rows,
     advantage,
-    crossing_batch,
     nonadaptive_flops,
     stage_flops,
-    sweep,
 )
 
 DEFAULT = CostReportOptions(measure=False)

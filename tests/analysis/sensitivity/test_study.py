@@ -17,19 +17,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from analysis.sensitivity import plots
-from analysis.sensitivity.study import (
-    ALL,
-    Results,
-    SensitivityOptions,
-    Setting,
-    beyond_spread,
-    bowl,
-    edge,
-    optimum_table,
-    runs,
-    setting_table,
-    sweeps,
-)
+from analysis.sensitivity.options import SensitivityOptions
+from analysis.sensitivity.runs import Setting, runs, sweeps
+from analysis.sensitivity.tables import ALL, Results, beyond_spread, bowl, edge, optimum_table, setting_table
 from analysis.study.cases import INPUTS, SCALES, framed_config
 from tsar.config import ConfigError, ErrorConfig, ResponseConfig, TsarConfig
 

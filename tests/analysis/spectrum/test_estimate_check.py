@@ -19,7 +19,7 @@ from analysis.spectrum.estimate_check import (
     streaming_error,
 )
 from analysis.spectrum.ideal_density import ideal_band, power_norm, share_of_total
-from analysis.spectrum.spectra import SpectrumOptions
+from analysis.spectrum.options import SpectrumOptions
 from tests.analysis.signals import disk, noise, separable
 from tsar import haar
 from tsar.config import ErrorConfig

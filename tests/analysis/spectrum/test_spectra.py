@@ -10,9 +10,9 @@ import torch
 from PIL import Image
 
 from analysis.command.cli import InputError
+from analysis.spectrum.options import SpectrumOptions
 from analysis.spectrum.spectra import (
     Spectrum,
-    SpectrumOptions,
     fit_slope,
     group_statistics,
     picture_spectrum,

@@ -15,15 +15,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.storage.records import (
-    InvariantCheck,
-    StepWriter,
-    check_invariants,
-    covers_once,
-    density_quantiles,
-    provenance,
-    read_limits,
-)
+from analysis.storage.invariants import InvariantCheck, check_invariants, covers_once
+from analysis.storage.records import StepWriter, density_quantiles, provenance, read_limits
 from tests.analysis.builders import ELEMENTS, LIMITS, SPATIAL, TEMPORAL, good_record, random_tiling, tiling
 from tsar.morton import deinterleave
 from tsar.types import Errors, StepRecord

@@ -10,8 +10,9 @@ import pytest
 
 from analysis.study.cases import INPUTS, ROWS
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
+from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.plots import boxes
-from analysis.suitability.study import Run, SuitabilityOptions, runs
+from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import (
     Result,
     Results,

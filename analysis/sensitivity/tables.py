@@ -1,29 +1,17 @@
-"""How much the result depends on the error estimate's template and on the bias between space and time.
-
-The slopes of the template are varied together, its offsets and the bias one at a time.
-
-Source: Stephens 2011, sec. 7.3.2. Deviation: the thesis compares pictures of nine slope pairs of one input by eye; here
-every input is also measured against the framed renderer, and offsets and bias are varied beside the slopes.
-"""
+"""From the results of a sensitivity study to its tables: which settings are best, and how flat the optimum is."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
 
-from analysis.command import limits
-from analysis.command.cluster import ClusterOptions
-from analysis.metrics.cost_model import Ledger
-from analysis.study.cases import INPUTS, ROWS, SCALES, Case, framed_config
-from tsar.config import TsarConfig, closed_choices, require
+from analysis.sensitivity.options import SensitivityOptions
+from analysis.sensitivity.runs import AXES, Setting, sweeps
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,154 +25,10 @@ BEST = ("to_default", "edge", "low", "high", "held_out", "beyond_spread")
 _FLAT = 1e-9
 _DRAWS = 4000
 
-
-@dataclass(frozen=True)
-@closed_choices()
-class SensitivityOptions:
-    """Runs over a grid of spatial and temporal slopes, and over offsets and bias. Runs on disk are not repeated."""
-
-    inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs."""
-    row: int = 7
-    """Row of table 7.2 that gives batch and resolution, 0 to 15; 7 is batch 128 at 512²."""
-    scale: Literal["thesis", "half", "quick"] = "quick"
-    """thesis: its resolution and batch. half: half the side, and a quarter of the samples, tiles and machine. quick: a
-    quarter of the side, against a reference half as often."""
-    spatial_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
-    """Spatial slopes of the grid, steepest first."""
-    temporal_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
-    """Temporal slopes of the grid, steepest first."""
-    offsets: tuple[float, ...] = (-4.0, -2.0, 0.0, 2.0, 4.0)
-    """Added to the spatial offset and, in runs of their own, to the temporal one."""
-    biases: tuple[float, ...] = (-2.0, -1.0, 0.0, 1.0, 2.0)
-    """Biases, octaves; positive towards space."""
-    repetitions: int = 1
-    """Runs of each: repetition r has seed r and phase r / repetitions."""
-    figure_input: str = "fast-crossing"
-    """The input that is shown as pictures."""
-    still_s: float = 0.65
-    """When the pictures are taken, seconds after the start."""
-    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
-    """The default setting, marked by an asterisk; batch and resolution come from the row, seed from the repetition."""
-    ledger: Ledger = "thesis"
-    """How cost is counted; wall is refused, for it gives no result twice."""
-    farm: Annotated[ClusterOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
-        default_factory=ClusterOptions
-    )
-    """Where the runs are made."""
-    out: Path = Path("out/sensitivity")
-    """Folder for the results."""
-    cache: Path = Path(".cache/reference")
-    """Folder for references, shared by all runs."""
-
-    def __post_init__(self) -> None:
-        require(set(self.inputs) <= set(INPUTS), "inputs", f"names out of {', '.join(INPUTS)}", self.inputs)
-        for name in ("inputs", "spatial_slopes", "temporal_slopes"):
-            require(len(getattr(self, name)) > 0, name, "at least one", getattr(self, name))
-        for name in ("inputs", "spatial_slopes", "temporal_slopes", "offsets", "biases"):
-            chosen = getattr(self, name)
-            require(len(chosen) == len(set(chosen)), name, "none twice", chosen)
-        require(0 <= self.row < len(ROWS), "row", f"a number from 0 to {len(ROWS) - 1}", self.row)
-        slopes, changes = (-60.0, 60.0), (-120.0, 120.0)
-        limits.within(self, spatial_slopes=slopes, temporal_slopes=slopes, offsets=changes, biases=(-8.0, 8.0))
-        limits.within(self, repetitions=limits.REPETITIONS)
-        require(self.figure_input in self.inputs, "figure_input", "one of the inputs", self.figure_input)
-        seconds = SCALES[self.scale].seconds
-        require(0 <= self.still_s < seconds, "still_s", f"a time within the run's {seconds:g} s", self.still_s)
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What is varied."""
-
-    spatial_slope: float
-    temporal_slope: float
-    spatial_offset: float
-    temporal_offset: float
-    bias: float
-
-    @classmethod
-    def of(cls, tsar: TsarConfig) -> Setting:
-        e = tsar.error
-        return cls(e.spatial_slope, e.temporal_slope, e.spatial_offset, e.temporal_offset, tsar.response.bias)
-
-    def changed(self, **values: float) -> Setting:
-        # adding zero turns -0.0 into 0.0: equal settings must not have two names
-        return dataclasses.replace(self, **{name: float(value) + 0.0 for name, value in values.items()})
-
-    def applied(self, tsar: TsarConfig) -> TsarConfig:
-        """The configuration at this setting."""
-        values = dataclasses.asdict(self)
-        response = dataclasses.replace(tsar.response, bias=values.pop("bias"))
-        return dataclasses.replace(tsar, error=dataclasses.replace(tsar.error, **values), response=response)
-
-
-AXES = {
-    "slopes": ("spatial_slope", "temporal_slope"),
-    "spatial offset": ("spatial_offset",),
-    "temporal offset": ("temporal_offset",),
-    "bias": ("bias",),
-}
-"""Sweeps, and what each varies."""
-
-
-def sweeps(options: SensitivityOptions) -> dict[str, list[Setting]]:
-    """Settings of every sweep; of the slopes, rows of temporal ones, each with the steepest spatial one first."""
-    base = Setting.of(options.tsar)
-    slopes = itertools.product(sorted(options.temporal_slopes), sorted(options.spatial_slopes))
-    offsets = sorted(options.offsets)
-    return {
-        "slopes": [base.changed(spatial_slope=spatial, temporal_slope=temporal) for temporal, spatial in slopes],
-        "spatial offset": [base.changed(spatial_offset=base.spatial_offset + change) for change in offsets],
-        "temporal offset": [base.changed(temporal_offset=base.temporal_offset + change) for change in offsets],
-        "bias": [base.changed(bias=bias) for bias in sorted(options.biases)],
-    }
-
-
 Line = dict[str, Any]
 """Of a table, by column."""
 Results = Mapping[tuple[str, "Setting | None", int], "pd.DataFrame"]
 """Tables over the reference times by input, setting and repetition. Runs that failed are missing."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """A case and its place in the study; the framed renderer has no setting."""
-
-    input: str
-    setting: Setting | None
-    repetition: int
-    case: Case
-
-    @property
-    def place(self) -> tuple[str, Setting | None, int]:
-        return self.input, self.setting, self.repetition
-
-
-def runs(options: SensitivityOptions) -> list[Run]:
-    """Every run once: the framed renderer, the default setting, and all others.
-
-    Raises:
-        ConfigError: a setting is out of range.
-    """
-    scale = SCALES[options.scale]
-    row = scale.config(options.row, options.tsar)
-    settings = dict.fromkeys([Setting.of(options.tsar), *itertools.chain(*sweeps(options).values())])
-    framed, found = framed_config(row.resolution_px), []
-    for repetition, name in itertools.product(range(options.repetitions), options.inputs):
-        seeded = dataclasses.replace(row, seed=repetition)
-        for setting in (None, *settings):
-            case = Case(
-                input=name,
-                policy="tsar" if setting else "framed",
-                tsar=setting.applied(seeded) if setting else framed,
-                scale=scale,
-                phase=repetition / options.repetitions,
-                ledger=options.ledger,
-                stills_s=(options.still_s,) if repetition == 0 else (),
-            )
-            found.append(Run(name, setting, repetition, case))
-    return found
 
 
 def errors(results: Results, name: str, settings: Sequence[Setting | None], repetitions: int) -> Floats:

@@ -1,0 +1,70 @@
+"""Options of the sensitivity study."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from analysis.command import limits
+from analysis.command.cluster import ClusterOptions
+from analysis.metrics.cost_model import Ledger
+from analysis.study.cases import INPUTS, ROWS, SCALES
+from tsar.config import TsarConfig, closed_choices, require
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class SensitivityOptions:
+    """Runs over a grid of spatial and temporal slopes, and over offsets and bias. Runs on disk are not repeated."""
+
+    inputs: tuple[str, ...] = INPUTS
+    """Built-in inputs."""
+    row: int = 7
+    """Row of table 7.2 that gives batch and resolution, 0 to 15; 7 is batch 128 at 512²."""
+    scale: Literal["thesis", "half", "quick"] = "quick"
+    """thesis: its resolution and batch. half: half the side, and a quarter of the samples, tiles and machine. quick: a
+    quarter of the side, against a reference half as often."""
+    spatial_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
+    """Spatial slopes of the grid, steepest first."""
+    temporal_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
+    """Temporal slopes of the grid, steepest first."""
+    offsets: tuple[float, ...] = (-4.0, -2.0, 0.0, 2.0, 4.0)
+    """Added to the spatial offset and, in runs of their own, to the temporal one."""
+    biases: tuple[float, ...] = (-2.0, -1.0, 0.0, 1.0, 2.0)
+    """Biases, octaves; positive towards space."""
+    repetitions: int = 1
+    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    figure_input: str = "fast-crossing"
+    """The input that is shown as pictures."""
+    still_s: float = 0.65
+    """When the pictures are taken, seconds after the start."""
+    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    """The default setting, marked by an asterisk; batch and resolution come from the row, seed from the repetition."""
+    ledger: Ledger = "thesis"
+    """How cost is counted; wall is refused, for it gives no result twice."""
+    farm: Annotated[ClusterOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
+        default_factory=ClusterOptions
+    )
+    """Where the runs are made."""
+    out: Path = Path("out/sensitivity")
+    """Folder for the results."""
+    cache: Path = Path(".cache/reference")
+    """Folder for references, shared by all runs."""
+
+    def __post_init__(self) -> None:
+        require(set(self.inputs) <= set(INPUTS), "inputs", f"names out of {', '.join(INPUTS)}", self.inputs)
+        for name in ("inputs", "spatial_slopes", "temporal_slopes"):
+            require(len(getattr(self, name)) > 0, name, "at least one", getattr(self, name))
+        for name in ("inputs", "spatial_slopes", "temporal_slopes", "offsets", "biases"):
+            chosen = getattr(self, name)
+            require(len(chosen) == len(set(chosen)), name, "none twice", chosen)
+        require(0 <= self.row < len(ROWS), "row", f"a number from 0 to {len(ROWS) - 1}", self.row)
+        slopes, changes = (-60.0, 60.0), (-120.0, 120.0)
+        limits.within(self, spatial_slopes=slopes, temporal_slopes=slopes, offsets=changes, biases=(-8.0, 8.0))
+        limits.within(self, repetitions=limits.REPETITIONS)
+        require(self.figure_input in self.inputs, "figure_input", "one of the inputs", self.figure_input)
+        seconds = SCALES[self.scale].seconds
+        require(0 <= self.still_s < seconds, "still_s", f"a time within the run's {seconds:g} s", self.still_s)

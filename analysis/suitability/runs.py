@@ -1,0 +1,83 @@
+"""Which runs the suitability study has: five inputs, sixteen settings, repeated over seeds and phases.
+
+Source: Stephens 2011, sec. 7.2.5.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from analysis.study.cases import SCALES, Case, framed_config
+from analysis.suitability.options import SuitabilityOptions
+from tsar.config import TsarConfig
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case and its place in the study.
+
+    Attributes:
+        label: who decides what is sampled: a policy, or ``tsar`` and a solver.
+        row: of table 7.2; None for a framed renderer, which serves all rows of its resolution.
+        side_px: output resolution.
+        repetition: 0, 1, …
+    """
+
+    label: str
+    row: int | None
+    side_px: int
+    repetition: int
+    case: Case
+
+
+STILLS = (0.35, 0.85)
+"""Where in the run pictures are kept, as shares of its length."""
+
+
+def runs(options: SuitabilityOptions) -> list[Run]:
+    """Every run, framed ones once per resolution."""
+    found = []
+    for repetition, name in itertools.product(range(options.repetitions), options.inputs):
+        found += _runs_of(options, name, repetition)
+    return found
+
+
+def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterator[Run]:
+    scale = SCALES[options.scale]
+    rows = [(row, scale.config(row, dataclasses.replace(options.tsar, seed=repetition))) for row in options.rows]
+    at_row = scale.config(options.policy_row, dataclasses.replace(options.tsar, seed=repetition))
+    compared = [] if options.policy_row not in options.rows else options.policies
+
+    def run(label: str, row: int | None, policy: str, config: TsarConfig) -> Run:
+        case = Case(
+            input=name,
+            policy=policy,
+            tsar=config,
+            scale=scale,
+            phase=repetition / options.repetitions,
+            ledger=options.ledger,
+            framed_rate_hz=options.framed_rate_hz,
+            trace_segments=options.trace_segments,
+            start_s=options.start_s,
+            jod_span_s=options.jod_span_s if repetition < options.jod_repetitions else None,
+            display=options.display,
+            stills_s=tuple(share * scale.seconds for share in STILLS),
+        )
+        return Run(label, row, config.resolution_px, repetition, case)
+
+    for side in sorted({config.resolution_px for _, config in rows}):
+        yield run("framed", None, "framed", framed_config(side))
+    for row, config in rows:
+        yield run("tsar", row, "tsar", config)
+    for policy in compared:
+        if policy == "framed supersampled":
+            yield run(policy, None, policy, framed_config(at_row.resolution_px))
+        elif policy not in ("framed", "tsar"):
+            yield run(policy, options.policy_row, policy, at_row)
+    for solver in options.solvers if options.policy_row in options.rows else ():
+        if solver != at_row.response.solver:
+            changed = dataclasses.replace(at_row, response=dataclasses.replace(at_row.response, solver=solver))
+            yield run(f"tsar {solver}", options.policy_row, "tsar", changed)
