@@ -1,30 +1,28 @@
-"""Built-in scenes by name."""
+"""Scenes by name: the project's own, those of installed packages, those added from Python, and those of files.
+
+A package offers scenes through entry points of the group ``tsar.scenes``; ``SCENES.add(name, make)`` adds one.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from scenes.canonical import Scene, SceneError
-from scenes.driving.animations import ANIMATIONS
-from scenes.driving.animations import load as load_driving
+from scenes.driving import animations
 from scenes.effects import report_images as report
 from scenes.effects import scenes as effects
 from scenes.loading import asset
+from tsar.named import Named
 
-NAMES: tuple[str, ...] = tuple(ANIMATIONS)
-"""Names of the driving scenes, the inputs of experiments; they also go by their number."""
+MakeScene = Callable[[float], Scene]
+"""Makes a scene; takes its phase, a fraction in [0, 1) by which a repetition of an animation is ahead."""
+
+NAMES: tuple[str, ...] = tuple(animations.ANIMATIONS)
+"""Names of the driving scenes, the inputs of experiments; their numbers also name them."""
 
 BLUR_SCENES = {"planescene": "plane/planescene.txt", "spheresscene": "spheres/spheresscene.txt"}
 """The two scenes of the motion-blur perception study, and their files among the assets."""
-
-
-FILE_ENDINGS = (".pbrt", ".lxs", ".xml")
-"""Of scene files of other renderers."""
-
-
-def all_names() -> tuple[str, ...]:
-    """Names of all built-in scenes."""
-    return (*NAMES, *BLUR_SCENES, *effects.EFFECTS, *report.IMAGES)
 
 
 def blur_scene_file(name: str) -> Path:
@@ -32,20 +30,66 @@ def blur_scene_file(name: str) -> Path:
     return asset(BLUR_SCENES[name])
 
 
-def is_scene_file(name: str) -> bool:
-    """Whether a name is that of a scene file of another renderer."""
-    return Path(name).suffix.lower() in FILE_ENDINGS
+def _blurred(name: str) -> Scene:
+    from scenes.formats.blocks.read import load_blocks
+
+    return load_blocks(blur_scene_file(name))[0]
+
+
+def _driving(name: str) -> MakeScene:
+    return lambda phase: animations.load(name, phase)
+
+
+def _without_phases(name: str, load: Callable[[str], Scene]) -> MakeScene:
+    def make(phase: float) -> Scene:
+        if phase != 0.0:
+            raise SceneError(f"phase: expected 0 for the scene {name}, which has no phases, got {phase}")
+        return load(name)
+
+    return make
+
+
+SCENES: Named[MakeScene] = Named(
+    "scene",
+    "tsar.scenes",
+    {
+        **{name: _driving(name) for name in NAMES},
+        **{name: _without_phases(name, _blurred) for name in BLUR_SCENES},
+        **{name: _without_phases(name, effects.load) for name in effects.EFFECTS},
+        **{name: _without_phases(name, report.load) for name in report.IMAGES},
+    },
+)
+
+
+def load(scene: str | Scene, phase: float = 0.0) -> Scene:
+    """A scene by its name, or the scene itself.
+
+    Args:
+        scene: a name in :data:`SCENES`, the number of a driving scene in :data:`NAMES`, or a scene.
+        phase: fraction of a wheel's turn by which the car of a driving scene is ahead, in [0, 1). Repetitions differ
+            in it. Other scenes take 0 alone.
+
+    Raises:
+        ConfigError: no scene has this name; the message has the known names and the nearest of them.
+        SceneError: the scene does not have this phase.
+    """
+    if not 0.0 <= phase < 1.0:
+        raise SceneError(f"phase: expected a fraction of a wheel's turn in [0, 1), got {phase}")
+    if isinstance(scene, Scene):
+        return _without_phases(scene.name or "given", lambda name: scene)(phase)
+    numbered = scene.isdecimal() and int(scene) < len(NAMES)
+    return SCENES[NAMES[int(scene)] if numbered else scene](phase)
 
 
 def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
-    """A scene file of another renderer, as this one can draw it, and what was lost on the way.
+    """The scene of a file, as this project's renderer can draw it, and what was lost on the way.
 
     Args:
-        name: of the file.
-        camera_path: ``turntable`` or ``fly-through`` for motion where the file has none; empty for none.
+        name: of the file; its ending tells the format.
+        camera_path: ``turntable`` or ``fly-through`` moves the camera of a file without motion; empty for none.
 
     Raises:
-        SceneError: it cannot be read.
+        SceneError: the file cannot be read.
     """
     from scenes.camera_paths import on_a_path
     from scenes.formats.conversion import load_scene_file
@@ -59,36 +103,21 @@ def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]
     return scene, tuple(str(loss) for loss in losses.losses)
 
 
-def load_any(name: str, phase: float = 0.0, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
-    """A built-in scene or that of a file, and what was lost; a camera path is for files alone."""
-    if is_scene_file(name):
-        return load_file(name, camera_path)
-    if camera_path:
-        raise SceneError(f"camera_path: expected none for a built-in scene, got {camera_path}")
-    return load(name, phase), ()
-
-
-def load(name: str, phase: float = 0.0) -> Scene:
-    """A built-in scene.
+def load_any(scene: str | Path | Scene, phase: float = 0.0, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
+    """A scene by its name, that of a file, or the scene itself; and what was lost.
 
     Args:
-        name: one of :func:`all_names`, or the place of a driving scene among :data:`NAMES`.
-        phase: of the animation of a driving scene, for repetitions; see :func:`scenes.driving.animations.load`.
+        scene: as in :func:`load`, or a file whose name has an ending.
+        phase: as in :func:`load`; files have none.
+        camera_path: as in :func:`load_file`, for files alone.
 
     Raises:
-        SceneError: there is none of that name, or the phase is not in [0, 1) or another than 0 for a scene without.
+        ConfigError: no scene has this name.
+        SceneError: the file cannot be read, or the scene does not have the phase or takes no camera path.
     """
-    found = NAMES[int(name)] if name.isdecimal() and int(name) < len(NAMES) else name
-    if found not in all_names():
-        raise SceneError(f"scene: expected one of {', '.join(all_names())} or 0 to {len(NAMES) - 1}, got {name!r}")
-    if not 0.0 <= phase < 1.0:
-        raise SceneError(f"phase: expected a fraction of a wheel's turn in [0, 1), got {phase}")
-    if found in NAMES:
-        return load_driving(found, phase)
-    if phase != 0.0:
-        raise SceneError(f"phase: expected 0 for the scene {found}, which has no phases, got {phase}")
-    if found in BLUR_SCENES:
-        from scenes.formats.blocks.read import load_blocks
-
-        return load_blocks(blur_scene_file(found))[0]
-    return report.load(found) if found in report.IMAGES else effects.load(found)
+    if not isinstance(scene, Scene) and str(scene) not in SCENES and Path(scene).suffix:
+        return load_file(str(scene), camera_path)
+    if camera_path:
+        what = "a scene that is given" if isinstance(scene, Scene) else "a built-in scene"
+        raise SceneError(f"camera_path: expected none for {what}, got {camera_path}")
+    return load(scene if isinstance(scene, Scene) else str(scene), phase), ()

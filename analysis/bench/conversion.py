@@ -16,7 +16,7 @@ import numpy as np
 
 from analysis.bench.growth import exponent_row
 from analysis.bench.turns import BenchOptions, Row, counted, limit_row
-from scenes.formats.conversion import ENDINGS, load_scene_file, save_scene_file
+from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.geometry.ply_files import ply_bytes
 from scenes.loading import ASSETS
 
@@ -31,6 +31,7 @@ LARGE_MB = 200
 LARGE_LIMIT = 4.0
 """Peak memory of a conversion over the size of its scene: the text or mesh, its numbers, and the mesh made of them."""
 
+ENDINGS = (".pbrt", ".lxs", ".xml")
 DELIVERED = tuple(ASSETS / "cornell-box" / f"cornell-box{ending}" for ending in (".pbrt", ".xml", ".lxs"))
 
 # the kernel's own high-water mark: that of getrusage starts with the memory of the process that started this one

@@ -1,1 +1,25 @@
-"""Scene files of other programs."""
+"""Formats of scene files by name: the project's own, those of installed packages, and those added from Python.
+
+A package offers formats through entry points of the group ``tsar.scene_formats``; ``FORMATS.add(name, format)`` adds
+one. Everything that takes a scene file then takes files with its endings.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tsar.named import Named
+
+if TYPE_CHECKING:
+    from scenes.formats.text.format import Format
+
+FORMATS: Named[Format] = Named(
+    "scene format",
+    "tsar.scene_formats",
+    {
+        "pbrt": "scenes.formats.pbrt.declared:PBRT",
+        "luxrender": "scenes.formats.luxrender.declared:LUXRENDER",
+        "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
+        "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
+    },
+)

@@ -2,48 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import difflib
 from pathlib import Path
-from typing import Literal
 
 from scenes.canonical import Scene, SceneError
+from scenes.formats import FORMATS
 from scenes.formats.losses import LossReport
-from scenes.formats.luxrender.read import load_luxrender
-from scenes.formats.luxrender.write import save_luxrender
-from scenes.formats.mitsuba.read import load_mitsuba
-from scenes.formats.mitsuba.write import save_mitsuba, save_mitsuba3
-from scenes.formats.pbrt.read import load_pbrt
-from scenes.formats.pbrt.write import save_pbrt
 from scenes.formats.text.output import Output
 
-FormatName = Literal["pbrt", "luxrender", "mitsuba", "mitsuba3"]
 
-ENDINGS: dict[str, FormatName] = {".pbrt": "pbrt", ".lxs": "luxrender", ".xml": "mitsuba"}
-"""Formats by how the names of their files end."""
+def format_of(path: Path) -> str:
+    """The name of the format of a file, by the ending of its name.
 
-_LOADERS: dict[FormatName, Callable[[Path, Path | None, LossReport], Scene]] = {
-    "pbrt": load_pbrt,
-    "luxrender": load_luxrender,
-    "mitsuba": load_mitsuba,
-}
-_SAVERS: dict[FormatName, Callable[[Scene, Output, LossReport], None]] = {
-    "pbrt": save_pbrt,
-    "luxrender": save_luxrender,
-    "mitsuba": save_mitsuba,
-    "mitsuba3": save_mitsuba3,
-}
-
-
-def format_of(path: Path) -> FormatName:
-    """The format of a file by its name; raises SceneError for another ending."""
+    Raises:
+        SceneError: no format has the ending; the message has the known endings and the nearest of them.
+    """
     ending = Path(path).suffix.lower()
-    if ending not in ENDINGS:
-        raise SceneError(f"{path}: expected a name that ends in {', '.join(ENDINGS)}, got {ending!r}")
-    return ENDINGS[ending]
+    known: dict[str, str] = {}
+    for name in FORMATS:
+        for other in FORMATS[name].endings:
+            known.setdefault(other, name)
+    if ending not in known:
+        near = difflib.get_close_matches(ending, known, n=1)
+        hint = f" (nearest: {near[0]})" if near else ""
+        raise SceneError(f"{path}: expected a name that ends in {', '.join(known)}, got {ending!r}{hint}")
+    return known[ending]
 
 
 def load_scene_file(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
-    """Reads a scene of any format.
+    """Reads a scene file of any format.
 
     Args:
         path: the file.
@@ -51,30 +38,36 @@ def load_scene_file(path: Path, root: Path | None = None, report: LossReport | N
         report: receives what could not be kept.
 
     Raises:
-        SceneError: it cannot be read; file, line, column.
+        SceneError: it cannot be read; the message has file, line and column.
     """
-    return _LOADERS[format_of(path)](Path(path), root, report or LossReport())
+    found = FORMATS[format_of(path)]
+    if found.read is None:
+        raise SceneError(f"{path}: expected a format that can be read, {found.name} can be written only")
+    return found.read(Path(path), root, report or LossReport())
 
 
 def save_scene_file(
-    scene: Scene, path: Path, to: FormatName | None = None, report: LossReport | None = None, strict: bool = False
+    scene: Scene, path: Path, to: str | None = None, report: LossReport | None = None, strict: bool = False
 ) -> None:
-    """Writes a scene, its meshes and pictures; all of it, or nothing.
+    """Writes a scene with its meshes and pictures; all of it, or nothing.
 
     Args:
         scene: what to write.
         path: the file; meshes and pictures go to folders beside it.
-        to: its format, by default that of the file's name.
+        to: name of its format, by default that of its ending.
         report: receives what could not be kept.
         strict: whether a loss in the report, also one from reading, is an error.
 
     Raises:
-        SceneError: it cannot be written, or was not to lose anything and would.
+        ConfigError: ``to`` names no format.
+        SceneError: the scene cannot be written, or would lose something and must not.
     """
-    found = report or LossReport()
+    found, wanted = report or LossReport(), FORMATS[to or format_of(path)]
+    if wanted.write is None:
+        raise SceneError(f"{path}: expected a format that can be written, {wanted.name} can be read only")
     output = Output(path)
     try:
-        _SAVERS[to or format_of(path)](scene, output, found)
+        wanted.write(scene, output, found)
         if strict:
             found.refuse_any()
         output.place()

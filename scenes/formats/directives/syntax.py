@@ -11,15 +11,17 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import lark
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
 from scenes.formats.text.numbers import NUMBER_MAX
 from scenes.formats.text.places import Place
+
+if TYPE_CHECKING:
+    import lark
 
 _GRAMMAR = r"""
 start: directive*
@@ -43,7 +45,9 @@ Values = NDArray[np.float64] | tuple[str, ...]
 
 @lru_cache(maxsize=1)
 def _lexer() -> lark.Lark:
-    """Only its tokens are needed: a directive is a name and all values up to the next."""
+    """A lexer alone: a directive is a name and all values up to the next name."""
+    import lark
+
     return lark.Lark(_GRAMMAR, parser=None, lexer="basic")
 
 
@@ -145,7 +149,9 @@ def parse_directives(text: str, file: str) -> Iterator[Directive]:
 
 
 def _tokens(text: str, file: str) -> Iterator[Any]:
-    """One after the other, so that no more than one list of numbers is there as text and as numbers."""
+    """Tokens one by one, so that at most one list of numbers is held both as text and as numbers."""
+    import lark
+
     try:
         yield from _lexer().lex(text)
     except lark.exceptions.UnexpectedCharacters as error:

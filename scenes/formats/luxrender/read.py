@@ -271,6 +271,10 @@ class LuxReader(SceneReader):
             self.instances[-1] = dataclasses.replace(lamp, emission=radiance)
 
 
-def load_luxrender(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
-    """Reads a scene; see :func:`scenes.formats.pbrt.read.load_pbrt`."""
-    return scene_of(LuxReader(SceneFiles(path, root), report or LossReport()), path)
+def load_luxrender(path: Path, root: Path | None, report: LossReport) -> Scene:
+    """Reads a scene; see :data:`scenes.formats.text.format.Read`.
+
+    Raises:
+        SceneError: something cannot be read; the message has file, line and column.
+    """
+    return scene_of(LuxReader(SceneFiles(path, root), report), path)

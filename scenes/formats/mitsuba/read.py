@@ -304,9 +304,13 @@ class MitsubaReader:
         return np.array([east, up, -north])
 
 
-def load_mitsuba(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
-    """Reads a scene; see :func:`scenes.formats.pbrt.read.load_pbrt`."""
-    reader = MitsubaReader(SceneFiles(path, root), report or LossReport())
+def load_mitsuba(path: Path, root: Path | None, report: LossReport) -> Scene:
+    """Reads a scene; see :data:`scenes.formats.text.format.Read`.
+
+    Raises:
+        SceneError: something cannot be read; the message has file, line and column.
+    """
+    reader = MitsubaReader(SceneFiles(path, root), report)
     main = reader.files.folder / Path(path).name
     if not main.is_file():
         raise SceneError(f"{path}: expected a scene file, found none")

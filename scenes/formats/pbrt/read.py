@@ -108,15 +108,10 @@ class PbrtReader(SceneReader):
         self.left_over(parameters, "area light")
 
 
-def load_pbrt(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
-    """Reads a scene.
-
-    Args:
-        path: the file.
-        root: folder that nothing is read outside of; by default the file's own.
-        report: receives what could not be kept.
+def load_pbrt(path: Path, root: Path | None, report: LossReport) -> Scene:
+    """Reads a scene; see :data:`scenes.formats.text.format.Read`.
 
     Raises:
-        SceneError: something cannot be read; file, line, column.
+        SceneError: something cannot be read; the message has file, line and column.
     """
-    return scene_of(PbrtReader(SceneFiles(path, root), report or LossReport()), path)
+    return scene_of(PbrtReader(SceneFiles(path, root), report), path)

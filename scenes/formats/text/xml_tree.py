@@ -7,9 +7,6 @@ import xml.sax
 from dataclasses import dataclass, field
 from typing import Any
 
-import defusedxml
-import defusedxml.expatreader
-
 from scenes.canonical import SceneError
 from scenes.formats.text.places import Place
 
@@ -65,6 +62,9 @@ def parse_xml(content: bytes, file: str) -> Node:
     Raises:
         SceneError: it is not well-formed, or declares entities or a document type; file, line, column.
     """
+    import defusedxml
+    import defusedxml.expatreader
+
     builder = _Builder(file)
     parser = defusedxml.expatreader.create_parser(forbid_dtd=True)
     parser.setContentHandler(builder)

@@ -100,7 +100,7 @@ def test_a_shift_by_a_multiple_of_the_step_changes_no_bit() -> None:
     assert np.array_equal(near, far)
 
 
-@pytest.mark.parametrize("name", catalog.all_names())
+@pytest.mark.parametrize("name", catalog.SCENES.names())
 def test_built_in_scenes_stay_where_they_are(name: str) -> None:
     scene = catalog.load(name)
     with warnings.catch_warnings():

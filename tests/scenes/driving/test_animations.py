@@ -14,6 +14,7 @@ from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from scenes.driving import body, car, wheel, world
 from scenes.driving.animations import DURATION_S, LEAD_S
 from tests.scenes.builders import Array, moving, placed, pose, project
+from tsar.config import ConfigError
 
 NAMES = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
 SPAN = np.linspace(0.0, 2.0, 21).tolist()
@@ -58,7 +59,7 @@ def test_inputs_are_in_order_and_go_by_number(scenes: dict[str, Scene]) -> None:
 
 @pytest.mark.parametrize("name", ["", "nonsense", "5", "-1", "Chase", "1.0", "²", "../chase"])
 def test_unknown_names_are_refused(name: str) -> None:
-    with pytest.raises(SceneError, match=r"^scene: expected one of corner-exit, .* or 0 to 4, got ") as caught:
+    with pytest.raises(ConfigError, match=r"^scene: expected one of corner-exit, chase, .*, got ") as caught:
         catalog.load(name)
     assert repr(name) in str(caught.value) and "\n" not in str(caught.value)
 

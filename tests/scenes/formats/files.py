@@ -8,7 +8,6 @@ import pytest
 
 from scenes.formats.conversion import load_scene_file
 from scenes.formats.losses import LossReport
-from scenes.formats.mitsuba.read import load_mitsuba
 from scenes.loading import ASSETS
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "scenes"
@@ -40,4 +39,4 @@ def mitsuba(folder: Path, body: str, sensor: str = SENSOR):
     """The same of a Mitsuba text."""
     (folder / "a.xml").write_text(f'<scene version="0.5.0">\n{sensor}\n{body}</scene>')
     report = LossReport()
-    return load_mitsuba(folder / "a.xml", None, report), [str(loss) for loss in report.losses]
+    return load_scene_file(folder / "a.xml", None, report), [str(loss) for loss in report.losses]

@@ -35,7 +35,6 @@ from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.geometry.mesh_files import read_serialized
 from scenes.formats.losses import LossReport
-from scenes.formats.mitsuba.read import load_mitsuba
 from tests.scenes.formats.files import DATA, MITSUBA, REAL, SENSOR, mitsuba, needs_data
 
 
@@ -77,7 +76,7 @@ def test_the_same_scene_in_two_formats_has_the_same_camera(name: str) -> None:
 @needs_data
 def test_every_shape_and_light_of_the_feature_scene() -> None:
     report = LossReport()
-    scene = load_mitsuba(DATA / "mitsuba/features-0.5/scene.xml", None, report)
+    scene = load_scene_file(DATA / "mitsuba/features-0.5/scene.xml", None, report)
     kinds = [type(one.shape).__name__ for one in scene.instances]
     # one cube and the disk have textures, which lie on meshes as they do on those of Mitsuba; the third is a cylinder
     assert kinds.count("Sphere") == 3 and kinds.count("Cube") == 2 and kinds.count("Rectangle") == 3
@@ -245,7 +244,7 @@ OUTSIDE = """<?xml version="1.0"?><!DOCTYPE scene [<!ENTITY x SYSTEM "file:///et
 def test_bombs_and_outside_entities_are_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.xml").write_text(text)
     with pytest.raises(SceneError, match="expected no document type and no entities"):
-        load_mitsuba(tmp_path / "a.xml")
+        load_scene_file(tmp_path / "a.xml")
 
 
 @pytest.mark.parametrize(
