@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from PIL import Image
 from analysis.command.cli import InputError
 from analysis.metrics.display_model import DisplayModel
 from analysis.perception.options import StimuliOptions
-from analysis.storage.files import write_json
+from analysis.storage.journal import Journal
 from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
 from analysis.storage.store import Store
@@ -76,8 +75,13 @@ def render_stimuli(options: StimuliOptions, task: Callable[[str, int], Callable[
                 }
             )
     manifest = {"frame_rate_hz": work.settings.frame_rate_hz, "size_px": list(work.size_px), "stimuli": rows}
-    write_json(options.out / MANIFEST, manifest)
+    write_manifest(options.out, manifest)
     return manifest
+
+
+def write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
+    """Writes a manifest with its checksum."""
+    Store(folder, MANIFEST).write_json(MANIFEST, manifest)
 
 
 def _film(files: Sequence[Path], rate_hz: float) -> dict[str, str]:
@@ -108,10 +112,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """The manifest of a folder of stimuli.
 
     Raises:
-        InputError: there is none, or it cannot be read.
+        InputError: there is none, it is not as it was written, or it cannot be read.
     """
     try:
-        found = json.loads((folder / MANIFEST).read_bytes())
+        found = Store(folder, MANIFEST, say=lambda line: None).read_json(MANIFEST, dict)
+        if found is None:
+            raise ValueError("there is none as it was written")
         whole = float(found["frame_rate_hz"]) > 0.0 and len(found["size_px"]) == 2
         for row in found["stimuli"]:
             whole = whole and all(name in row for name in COLUMNS) and row["samples"] > 0
@@ -180,7 +186,7 @@ def differences(
 ) -> pd.DataFrame:
     """How many JOD every stimulus is from the one with the most samples of its scene, set and filter.
 
-    Scores are kept in ``jod.json`` of the folder, by the hashes of both stimuli, the display and the metric.
+    Scores are kept in ``jod.journal`` of the folder, by the hashes of both stimuli, the display and the metric.
 
     Args:
         folder: of the stimuli.
@@ -191,8 +197,8 @@ def differences(
     from analysis.metrics.perceptual import jod
 
     manifest, code = read_manifest(folder), code_hash(jod)
-    kept_file = folder / "jod.json"
-    kept: dict[str, float] = json.loads(kept_file.read_text()) if kept_file.exists() else {}
+    journal = Journal(folder / "jod.journal")
+    kept = {row["key"]: float(row["jod"]) for row in journal.rows()}
     table = pd.DataFrame(manifest["stimuli"])
     total(len(table))
     rows = []
@@ -208,7 +214,7 @@ def differences(
                     reference_frames = frames_of(folder, reference)
                 score = jod(frames_of(folder, row), reference_frames, manifest["frame_rate_hz"], display)
                 kept[key] = 10.0 - score
-                write_json(kept_file, kept)
+                journal.append({"key": key, "jod": kept[key]})
             rows.append(
                 {name: row[name] for name in ("scene", "point_set", "time_filter", "samples")} | {"jod": kept[key]}
             )

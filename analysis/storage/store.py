@@ -94,14 +94,15 @@ class Making:
 class Store:
     """The files of one key in a folder. Processes that may make the same file at once need a lock of their own."""
 
-    def __init__(self, folder: Path, key: str) -> None:
+    def __init__(self, folder: Path, key: str, say: Callable[[str], None] = warn) -> None:
         """Opens a folder, which need not exist.
 
         Args:
             folder: where the files lie.
             key: hash of everything that decides what they hold.
+            say: told of files that are damaged.
         """
-        self.folder, self.key = folder, key
+        self.folder, self.key, self._say = folder, key, say
         self._files = _Files(Journal(folder / JOURNAL))
         self._warned: set[str] = set()
 
@@ -213,7 +214,7 @@ class Store:
         same = [entry for entry in entries if entry.sha256 == digest]
         if not same and name not in self._warned:
             self._warned.add(name)
-            warn(f"{self.folder / name}: is damaged, or was changed since it was written; it is made again")
+            self._say(f"{self.folder / name}: is damaged, or was changed since it was written; it is made again")
         return next((entry for entry in reversed(same) if entry.key == self.key), None)
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from analysis.perception.stimuli import MANIFEST, hash_of
-from analysis.storage.files import write_json
+from analysis.perception.stimuli import hash_of, write_manifest
 
 LEVELS = (1, 8, 64)
 
@@ -36,5 +35,5 @@ def write_stimuli(folder: Path, side: int = 24, frames: int = 3, scenes: tuple[s
                     "sha256": hash_of(files),
                 }
             )
-    write_json(folder / MANIFEST, {"frame_rate_hz": 30.0, "size_px": [side, side], "stimuli": rows})
+    write_manifest(folder, {"frame_rate_hz": 30.0, "size_px": [side, side], "stimuli": rows})
     return folder

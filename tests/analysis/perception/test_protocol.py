@@ -15,7 +15,7 @@ import pytest
 from analysis.command.cli import InputError
 from analysis.perception.observers import COLUMNS
 from analysis.perception.protocol import Session
-from analysis.perception.stimuli import MANIFEST
+from analysis.perception.stimuli import MANIFEST, write_manifest
 from analysis.storage.files import write_json
 from tests.analysis.perception.builders import LEVELS, write_stimuli
 
@@ -151,12 +151,21 @@ def test_a_session_belongs_to_one_person_and_its_stimuli(tmp_path: Path, stimuli
 
 def test_a_manifest_that_says_something_else_is_another_session(tmp_path: Path, stimuli: Path) -> None:
     opened(tmp_path, stimuli).close()
-    file = stimuli / MANIFEST
-    whole = file.read_text()
-    file.write_text(whole.replace('"samples": 8', '"samples": 9'))
+    whole = (stimuli / MANIFEST).read_text()
+    write_manifest(stimuli, json.loads(whole.replace('"samples": 8', '"samples": 9')))
     with pytest.raises(InputError, match="with these stimuli, found another"):
         opened(tmp_path, stimuli)
-    for damaged in ("{}", "[]", whole.replace('"folder"', '"golder"'), whole.replace('"samples": 8', '"samples": "8"')):
-        file.write_text(damaged)
+    for other in ("{}", whole.replace('"folder"', '"golder"'), whole.replace('"samples": 8', '"samples": "8"')):
+        write_manifest(stimuli, json.loads(other))
         with pytest.raises(InputError, match=r"expected .*manifest.json, written by the command 'stimuli'"):
             opened(tmp_path, stimuli)
+
+
+def test_a_manifest_is_as_it_was_written(tmp_path: Path, stimuli: Path, capsys: pytest.CaptureFixture) -> None:
+    """A level that flipped would put answers beside the wrong number of samples."""
+    whole = (stimuli / MANIFEST).read_text()
+    for damaged in (whole.replace('"samples": 8', '"samples": 9'), whole[:-20], "[]"):
+        (stimuli / MANIFEST).write_text(damaged)
+        with pytest.raises(InputError, match=r"expected .*manifest.json, written by the command 'stimuli'"):
+            opened(tmp_path, stimuli)
+    assert capsys.readouterr().err == "", "the error says it all"

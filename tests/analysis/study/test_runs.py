@@ -31,8 +31,9 @@ def test_totals_leave_out_warm_up() -> None:
     totals = Totals(TsarConfig())
     assert not totals.recorded
     for cycle in (-2, -1, 0, 1, 2):
-        totals.add(good_record(1, cycle=cycle, nonfinite=abs(cycle), cost_s=0.02))
+        totals.add(good_record(1, cycle=cycle, nonfinite=abs(cycle), nonfinite_fields=2 * abs(cycle), cost_s=0.02))
     assert (totals.cycles, totals.warmup_cycles, totals.nonfinite) == (3, 2, 3) and totals.recorded
+    assert totals.nonfinite_fields == 6
     assert totals.simulated_s == pytest.approx(0.06) and totals.age_spread_s == pytest.approx(0.375)
     assert totals.stage_s == {"tracing": 1.5, "error": 0.75}
     assert totals.counters == {"primary_rays": 3072, "shadow_rays": 30}
