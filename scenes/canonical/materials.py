@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene; conventions as in :mod:`scenes.canonical`."""
+"""Materials of the canonical scene; conventions as in :mod:`scenes.canonical`."""
 
 from __future__ import annotations
 
@@ -8,79 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.canonical.textures import WHITE, Texture
 from scenes.canonical.values import Rgb, SceneError
-
-# --- textures --------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class ConstantTexture:
-    """One colour everywhere."""
-
-    value: Rgb
-
-
-@dataclass(frozen=True, eq=False)
-class ImageTexture:
-    """An image looked up at ``uv * uv_scale + uv_offset``.
-
-    Attributes:
-        image: ``(height, width, 3)`` float32, linear RGB, row 0 at the top (``v = 1``).
-        wrap: what lies outside ``[0, 1]``.
-        filter: ``mipmap`` is bilinear within a level chosen by the ray's footprint.
-        source: the file it came from, for export and for messages.
-    """
-
-    image: NDArray[np.float32]
-    uv_scale: tuple[float, float] = (1.0, 1.0)
-    uv_offset: tuple[float, float] = (0.0, 0.0)
-    wrap: Literal["repeat", "clamp", "black"] = "repeat"
-    filter: Literal["nearest", "bilinear", "mipmap"] = "mipmap"
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        if self.image.ndim != 3 or self.image.shape[2] != 3 or min(self.image.shape[:2]) < 1:
-            raise SceneError(f"ImageTexture {self.source!r}: expected (h, w, 3) with h, w >= 1, got {self.image.shape}")
-        if not np.isfinite(self.image).all():
-            raise SceneError(f"ImageTexture {self.source!r}: holds non-finite values")
-
-
-@dataclass(frozen=True)
-class CheckerboardTexture:
-    """Two textures in alternating unit squares of ``uv * uv_scale``."""
-
-    even: Texture
-    odd: Texture
-    uv_scale: tuple[float, float] = (1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class ScaleTexture:
-    """The product of two textures."""
-
-    first: Texture
-    second: Texture
-
-
-@dataclass(frozen=True)
-class MixTexture:
-    """``(1 - amount) * first + amount * second``."""
-
-    first: Texture
-    second: Texture
-    amount: float = 0.5
-
-
-Texture = ConstantTexture | ImageTexture | CheckerboardTexture | ScaleTexture | MixTexture
 
 
 def _check_spread(name: str, spread_deg: float) -> None:
     """Raises SceneError unless a cone of rays fits above a surface."""
     if not 0.0 <= spread_deg <= 180.0:
         raise SceneError(f"{name}: expected an angle in [0, 180], got {spread_deg}")
-
-
-# --- materials -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -135,7 +70,7 @@ class Matte:
 class Mirror:
     """Specular reflection: perfect, or glossy over an even cone of full angle ``spread_deg`` about the mirrored ray."""
 
-    reflectance: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    reflectance: Texture = WHITE
     spread_deg: float = 0.0
 
     def __post_init__(self) -> None:
@@ -154,8 +89,8 @@ class Glass:
         spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill evenly.
     """
 
-    reflectance: Texture = ConstantTexture((1.0, 1.0, 1.0))
-    transmittance: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    reflectance: Texture = WHITE
+    transmittance: Texture = WHITE
     ior: float = 1.5
     roughness: tuple[float, float] = (0.0, 0.0)
     thin: bool = False
@@ -174,7 +109,7 @@ class Metal:
     eta: Rgb
     k: Rgb
     roughness: tuple[float, float] = (0.0, 0.0)
-    reflectance_scale: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    reflectance_scale: Texture = WHITE
     distribution: Literal["beckmann", "ggx"] = "ggx"
 
 
@@ -192,7 +127,7 @@ class Plastic:
     """A dielectric coat of index ``ior`` over a diffuse base."""
 
     diffuse: Texture
-    specular: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    specular: Texture = WHITE
     ior: float = 1.5
     roughness: float = 0.0
 
@@ -213,7 +148,7 @@ class Uber:
     specular: Texture
     reflectance: Texture
     transmittance: Texture
-    opacity: Texture = ConstantTexture((1.0, 1.0, 1.0))
+    opacity: Texture = WHITE
     ior: float = 1.5
     roughness: tuple[float, float] = (0.1, 0.1)
 

@@ -76,11 +76,9 @@ def test_commands_take_the_scene_and_the_format_of_an_installed_package(site: Pa
     assert "ends in .pbrt, .lxs, .xml, .balls, got '.lxss' (nearest: .lxs)" in " ".join(done.stderr.split())
     script = "from scenes.catalog import SCENES, load, load_any; "
     script += "print(len(load_any('a.balls')[0].instances), load('juggled', 0.5).instances[0].shape.radius); "
-    script += "print(SCENES.origin('juggled'))"
+    script += "found = SCENES.origin('juggled'); print(found.module, found.distribution, found.version)"
     done = run("-c", script)
-    assert done.stdout.splitlines() == ["2 1.5", "{'module': 'balls', 'distribution': 'balls', 'version': '1.0'}"], (
-        done.stderr
-    )
+    assert done.stdout.splitlines() == ["2 1.5", "balls balls 1.0"], done.stderr
 
 
 def test_a_scene_stands_where_a_name_is_taken() -> None:

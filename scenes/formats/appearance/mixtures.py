@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 
 from scenes.canonical import ConstantTexture, Material, Matte, Metal, MixMaterial, Texture
+from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.spectra import grey
 
-WHITE = ConstantTexture(grey(1.0))
 BLACK = Matte(ConstantTexture(grey(0.0)))
 
 

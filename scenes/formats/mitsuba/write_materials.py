@@ -35,6 +35,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.canonical.textures import WHITE
 from scenes.canonical.values import Matrix, Rgb
 from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.spectra import rgb
@@ -222,7 +223,7 @@ class MitsubaSurfaceWriter:
             self.color(made, "k", material.k)
             if not self.modern:
                 self.put(made, "float", "extEta", "1")
-            if material.reflectance_scale != ConstantTexture((1.0, 1.0, 1.0)):
+            if material.reflectance_scale != WHITE:
                 self.texture(made, material.reflectance_scale, "specularReflectance")
             if not smooth:
                 self.put(made, "string", "distribution", material.distribution)
@@ -259,7 +260,7 @@ class MitsubaSurfaceWriter:
         else:
             assert isinstance(material, Phong)
             alpha = math.sqrt(2.0 / (material.exponent + 2.0))
-            parts = material.diffuse, ConstantTexture((1.0, 1.0, 1.0)), 1.5, alpha
+            parts = material.diffuse, WHITE, 1.5, alpha
             self.report.add(where, "Phong reflection", f"rough plastic of alpha {alpha:.3g}")
         made = self.plugin("bsdf", "roughplastic" if parts[3] > 0.0 else "plastic")
         self.texture(made, parts[0], "diffuseReflectance")
@@ -291,7 +292,7 @@ class MitsubaSurfaceWriter:
             (material.reflectance, "specularReflectance"),
             (material.transmittance, "specularTransmittance"),
         ):
-            if texture != ConstantTexture((1.0, 1.0, 1.0)):
+            if texture != WHITE:
                 self.texture(made, texture, name)
         if kind == "roughdielectric":
             self.put(made, "string", "distribution", "ggx")

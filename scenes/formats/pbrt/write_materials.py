@@ -23,7 +23,8 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
-from scenes.formats.appearance.mixtures import WHITE, dimmed
+from scenes.canonical.textures import WHITE
+from scenes.formats.appearance.mixtures import dimmed
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.surface_writer import Pair, SurfaceWriter, mixture_line, roughness_pair
 from scenes.formats.text.numbers import number
