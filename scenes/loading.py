@@ -1,4 +1,7 @@
-"""Files to arrays: textures, high-dynamic-range images, meshes. A failure is a SceneError naming file and reason."""
+"""Pictures of files as arrays, and the files delivered with the project.
+
+A failure is a SceneError that names the file and the reason.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from scenes.arithmetic import power
-from scenes.canonical import Mesh, SceneError
-from scenes.canonical.values import vertices_of
+from scenes.canonical import SceneError
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -136,41 +138,3 @@ def clamp_radiance(image: Picture, limit: float) -> Picture:
     """
     peak = image.max(axis=-1, keepdims=True)
     return (image * np.minimum(1.0, limit / np.maximum(peak, 1e-12))).astype(np.float32)
-
-
-def read_mesh(path: Path) -> Mesh:
-    """Reads OBJ, PLY, STL, GLB or what else trimesh knows as one mesh in the file's own frame.
-
-    Args:
-        path: the file; scenes of several parts are joined, with their transforms applied.
-
-    Returns:
-        Vertices, faces, and where the file has them normals and texture coordinates.
-
-    Raises:
-        SceneError: if the file is missing, cannot be read, or holds no triangles.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise SceneError(f"mesh {path}: expected a mesh file, found none")
-    import trimesh  # slow, and the built-in scenes read no mesh
-
-    try:
-        loaded = trimesh.load_mesh(path, process=False)
-        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
-        faces = np.asarray(mesh.faces, np.int32)
-    except Exception as error:  # parsers raise what they like on broken files
-        raise SceneError(f"mesh {path}: cannot be read: {one_line(error)}") from error
-    if len(faces) == 0:
-        raise SceneError(f"mesh {path}: expected triangles, found none")
-    uvs = getattr(mesh.visual, "uv", None)
-    normals = np.array(mesh.vertex_normals, np.float32)
-    lengths = np.linalg.norm(normals, axis=1)
-    normals[lengths < 1e-6] = (0.0, 0.0, 1.0)  # vertices of no triangle
-    return Mesh(
-        vertices=vertices_of(np.array(mesh.vertices)),
-        faces=faces,
-        normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
-        uvs=None if uvs is None or len(uvs) != len(mesh.vertices) else np.array(uvs, np.float32),
-        source=str(path),
-    )

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenes.animation import UP, Path, Pose, PoseFunction, Times, camera_to_world, look_at, sample_track
 from scenes.canonical import Integrator, PerspectiveCamera, RigidTrack, Scene
-from scenes.driving import car, world
+from scenes.driving import car, sky, world
 from scenes.driving.wheel import RADIUS_M
 
 DURATION_S = 6.0
@@ -101,10 +101,10 @@ def load(name: str, phase: float = 0.0) -> Scene:
     return Scene(
         camera=animation.view(path),
         instances=(*world.instances(), *car.instances(path, -LEAD_S, DURATION_S)),
-        lights=(world.sun(),),
+        lights=(sky.sun(),),
         integrator=Integrator("whitted", depth=2),
         ambient=world.AMBIENT,
         name=name,
         duration_s=DURATION_S,
-        background=world.sky(),
+        background=sky.sky(),
     )

@@ -194,9 +194,3 @@ def _wheel_turn(path: Path, steered: bool, side: float) -> Callable[[Times], Rot
         return rotation_about(UP, steer) * rotation_about((0.0, 1.0, 0.0), rolled / RADIUS_M) * outward
 
     return turn
-
-
-def triangle_count() -> int:
-    """Triangles of the whole car."""
-    wheel = sum(len(mesh.faces) for mesh in (tyre(), rim(), brake()))
-    return sum(len(mesh.faces) for mesh in body_parts().values()) + len(WHEELS) * wheel

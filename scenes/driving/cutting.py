@@ -1,4 +1,4 @@
-"""Cutting procedural meshes along curves, and the edges that are left open."""
+"""Cutting procedural meshes along curves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenes.driving.meshing import Array, Indices, Surface, join, unit
+from scenes.driving.meshing import Array, Surface, join, unit
 
 
 def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
@@ -62,10 +62,3 @@ def carve(surface: Surface, *sides: Callable[[Array], Array]) -> tuple[Surface, 
         inside, outside = cut(inside, side(inside.vertices))
         rest.append(outside)
     return inside, join(rest)
-
-
-def boundary_edges(surface: Surface) -> Indices:
-    """Edges ``(k, 2)`` that belong to one triangle only, in that triangle's direction."""
-    edges = np.concatenate([surface.faces[:, [i, (i + 1) % 3]] for i in range(3)])
-    _, place, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    return edges[place[count == 1]]

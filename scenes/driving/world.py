@@ -1,5 +1,4 @@
-"""The world of the driving scenes: a paved crossing among lawns, with kerbs, markings, houses, trees and lamp posts,
-under a sky with hills on the horizon.
+"""The world of the driving scenes: a paved crossing among lawns, with kerbs, markings, houses, trees and lamp posts.
 
 ``+z`` is up, lengths are metres, the crossing is at the origin; one road runs along x, the other along y.
 
@@ -13,122 +12,34 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
 
-from scenes.arithmetic import cos, exp, power, product, sin
+from scenes.arithmetic import cos, sin
 from scenes.canonical import (
     ConstantTexture,
-    DirectionalLight,
-    EnvironmentLight,
     ImageTexture,
     Instance,
     Phong,
     Rectangle,
     Rgb,
 )
-from scenes.driving.meshing import Array, Surface, box, boxes, ellipsoid, extrude, grid, grids, join, moved, tube
-from scenes.loading import FileState, asset, clamp_radiance, read_image, state_of
+from scenes.driving.meshing import Surface, box, boxes, ellipsoid, extrude, grid, grids, join, moved, tube
+from scenes.driving.sky import blurred
+from scenes.loading import FileState, asset, read_image, state_of
 
 ROAD_HALF_WIDTH_M = 6.0
 ROAD_LENGTH_M = 240.0
 PAVING_M = 1.1
 """Width of one repetition of the paving texture."""
 
-SKY_LIMIT = 6.0
-"""Greatest radiance of the sky; the sun's disk is a directional light."""
-
-SUN_IRRADIANCE: Rgb = (3.1, 2.95, 2.65)
 AMBIENT: Rgb = (0.46, 0.53, 0.66)
 """Radiance of the sky on surfaces, as a constant."""
-
-_SKY_PX = (1536, 3072)
-_HORIZON_DEG = 10.0  # what the strip of hills spans above the horizon
-_SEAM_PX = 384  # columns by which the hills and their mirror image are shifted: the joints then lie behind houses
-_Y_UP_TO_Z_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-_SUN_UV = (0.595, 0.232)  # where the sun stands in the sky picture
-
-
-def sun_towards() -> Array:
-    """Unit vector towards the sun."""
-    turn, polar = 2.0 * np.pi * _SUN_UV[0], np.pi * _SUN_UV[1]
-    local = np.array(
-        [
-            sin(turn) * sin(polar),
-            cos(polar),
-            -cos(turn) * sin(polar),
-        ]
-    )
-    return product(_Y_UP_TO_Z_UP[:3, :3], local)
-
-
-def _gaussian(sigma: float, radius: int) -> Array:
-    """Weights of a filter, which add up to one."""
-    weights = exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    return weights / weights.sum()
-
-
-def _blurred(image: Array, sigma: float) -> Array:
-    """A Gaussian over ``(h, w)`` that wraps around, cut off at four deviations."""
-    weights = _gaussian(sigma, int(4.0 * sigma + 0.5))
-    return correlate1d(correlate1d(image, weights, 0, mode="wrap"), weights, 1, mode="wrap")
-
-
-def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    """Bilinear, after a Gaussian along what becomes smaller; as ``kornia.geometry.transform.resize`` with antialias."""
-    planes = image.astype(np.float64)
-    factors = image.shape[0] / height, image.shape[1] / width
-    for axis, factor in enumerate(factors):
-        if max(factors) > 1.0:
-            sigma = max((factor - 1.0) / 2.0, 1e-3)
-            planes = correlate1d(planes, _gaussian(sigma, int(max(4.0 * sigma, 3.0)) // 2), axis, mode="mirror")
-    for axis, (factor, count) in enumerate(zip(factors, (height, width), strict=True)):
-        last = image.shape[axis] - 1
-        # places in float32, as there
-        at = np.clip((np.float64(np.float32(factor)) * (np.arange(count) + 0.5) - 0.5).astype(np.float32), 0.0, last)
-        first = at.astype(np.int64)
-        share = np.expand_dims(at - first, (1, 2) if axis == 0 else (0, 2))
-        near, far = (np.take(planes, index, axis) for index in (first, np.minimum(first + 1, last)))
-        planes = near * (1.0 - share) + far * share
-    return planes.astype(np.float32)
-
-
-def sky() -> EnvironmentLight:
-    """Sky with a strip of hills, whose upper edge fades into the haze."""
-    return _sky(*(state_of(asset(name)) for name in ("sky.exr", "landscape_band.jpg")))
-
-
-@lru_cache(maxsize=1)
-def _sky(*states: FileState | None) -> EnvironmentLight:
-    height, width = _SKY_PX
-    horizon, tall = height // 2, round(_HORIZON_DEG / 180.0 * height)
-    picture = read_image(asset("sky.exr"))
-    scale = height // len(picture)
-    above = clamp_radiance(picture[: horizon // scale + 1], SKY_LIMIT)  # what the last row above the horizon is made of
-    image = np.empty((height, width, 3), np.float32)
-    image[:horizon] = _resized(above, scale * len(above), width)[:horizon]
-    hills = np.ascontiguousarray(_resized(read_image(asset("landscape_band.jpg"))[:190], tall, width // 2))
-    strip = np.roll(np.concatenate([hills, hills[:, ::-1]], axis=1), _SEAM_PX, axis=1)
-    fade = power(np.linspace(0.0, 1.0, tall), 0.45)[:, None, None]
-    haze = image[horizon - tall : horizon].mean(axis=(0, 1))
-    solid = np.clip(fade * 1.6, 0.0, 1.0)
-    distant = 0.75 * haze * (1.0 - fade) + strip * 1.25 * fade
-    image[horizon - tall : horizon] = image[horizon - tall : horizon] * (1.0 - solid) + distant * solid
-    image[horizon:] = strip[-1].mean(axis=0) * 1.25
-    image.flags.writeable = False
-    return EnvironmentLight(image, _Y_UP_TO_Z_UP, source="sky.exr, landscape_band.jpg")
-
-
-def sun() -> DirectionalLight:
-    """Sunlight from where the sky picture has the sun."""
-    x, y, z = (-sun_towards()).tolist()
-    return DirectionalLight((x, y, z), SUN_IRRADIANCE)
 
 
 @lru_cache(maxsize=1)
 def _grass() -> NDArray[np.float32]:
     """Blades and patches: tileable noise of three scales."""
     noise = np.random.default_rng(11).standard_normal((3, 256, 256))
-    scales = [_blurred(layer, width) for layer, width in zip(noise, (0.6, 4.0, 18.0), strict=True)]
+    scales = [blurred(layer, width) for layer, width in zip(noise, (0.6, 4.0, 18.0), strict=True)]
     fine, middle, coarse = (layer / layer.std() for layer in scales)
     light = np.clip(1.0 + 0.28 * fine + 0.16 * middle + 0.14 * coarse, 0.3, 2.0)[..., None]
     dry = np.clip(0.5 + 0.2 * coarse + 0.1 * middle, 0.0, 1.0)[..., None]

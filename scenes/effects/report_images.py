@@ -29,7 +29,7 @@ from scenes.canonical import (
     Scene,
     SceneError,
 )
-from scenes.driving import world
+from scenes.driving import sky
 
 IMAGES = ("report-one", "report-two")
 """Names of the scenes."""
@@ -103,7 +103,7 @@ def _scene(name: str, model: Mesh, material: Material, size_px: tuple[int, int],
         film=Film(*size_px),
         integrator=Integrator(depth=4, reflection_rays=8, refraction_rays=refraction_rays),
         ambient=(0.12, 0.13, 0.15),
-        background=EnvironmentLight(haze.astype(np.float32), world.sky().to_world),
+        background=EnvironmentLight(haze.astype(np.float32), sky.sky().to_world),
         name=name,
     )
 

@@ -35,7 +35,7 @@ from scenes.canonical import (
     Sphere,
     SpotLight,
 )
-from scenes.driving import world
+from scenes.driving import sky
 from scenes.effects.stage import (
     AMBIENT,
     BLUE,
@@ -124,11 +124,11 @@ def sun_disc() -> Scene:
 
 def environment_light() -> Scene:
     """Light from the whole of a sky picture."""
-    sky = world.sky()
+    light = sky.sky()
     balls = pair(paint((0.8, 0.8, 0.8), ambient=0.0), Mirror())
     floor = Instance(Rectangle(), paint(GREY, ambient=0.0), placed((0, 6, 0), (12, 12, 1)), name="floor")
     camera = PerspectiveCamera(camera_to_world(np.array(EYE), np.array(TARGET)), 38.0)
-    return Scene(camera, (floor, *balls), (sky,))
+    return Scene(camera, (floor, *balls), (light,))
 
 
 def glossy_reflection() -> Scene:

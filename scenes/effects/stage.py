@@ -23,7 +23,7 @@ from scenes.canonical import (
     Scene,
     Sphere,
 )
-from scenes.driving import world
+from scenes.driving import sky
 
 EYE, TARGET = (0.0, -9.0, 3.4), (0.0, 0.0, 1.0)
 GREY, RED, BLUE = (0.55, 0.55, 0.55), (0.75, 0.12, 0.1), (0.12, 0.25, 0.7)
@@ -65,7 +65,7 @@ def haze() -> EnvironmentLight:
     """A plain gradient behind everything: dark below, bright at the horizon, blue above."""
     heights = np.linspace(1.0, -1.0, 64)[:, None, None]
     above = np.array([0.75, 0.82, 0.9]) + np.clip(heights, 0.0, 1.0) * np.array([-0.55, -0.42, -0.15])
-    return EnvironmentLight(np.where(heights > 0.0, above, 0.25).astype(np.float32), world.sky().to_world)
+    return EnvironmentLight(np.where(heights > 0.0, above, 0.25).astype(np.float32), sky.sky().to_world)
 
 
 def lamp(at: tuple[float, float, float], half: float, radiance: float) -> Instance:

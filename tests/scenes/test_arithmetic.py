@@ -16,9 +16,10 @@ ROOT = Path(__file__).resolve().parents[2]
 ANGLES = np.random.default_rng(0).uniform(-20.0, 20.0, 1000)
 SHARES = np.random.default_rng(1).uniform(-1.0, 1.0, 1000)
 
-TABLES = "blue_noise buffers light_table materials merging meshes origin point_sets sampling tracks viewing".split()
-LEFT = ("scenes/formats/geometry/recognition.py", "scenes/arithmetic.py")
-"""The one finds shapes in meshes of files by least squares, the other is what all others are to use."""
+ROOMS = ("scenes", "renderer/tables", "renderer/sampling")
+LEFT = tuple(f"scenes/formats/geometry/{name}.py" for name in ("recognition", "cubes", "round_shapes"))
+LEFT += ("scenes/arithmetic.py",)
+"""The first find shapes in meshes of files by least squares; the last is what all others use."""
 
 BANNED = {
     "np": "sin cos tan exp log log2 log10 hypot sinh cosh tanh expm1 log1p cbrt arcsin arccos arctan arctan2".split(),
@@ -54,9 +55,9 @@ def breaches(source: str) -> list[str]:
 
 
 def builders() -> list[str]:
-    """Files of the code that makes scenes and the renderer's tables."""
-    scenes = (path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "scenes").rglob("*.py")))
-    return [*(path for path in scenes if path not in LEFT), *(f"renderer/{name}.py" for name in TABLES)]
+    """Files of the code that makes scenes, the tables of the renderer and the points that it samples."""
+    paths = (path.relative_to(ROOT).as_posix() for room in ROOMS for path in sorted((ROOT / room).rglob("*.py")))
+    return [path for path in paths if path not in LEFT]
 
 
 @pytest.mark.parametrize("path", builders())

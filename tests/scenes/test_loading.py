@@ -14,12 +14,8 @@ from PIL import Image
 
 from scenes import loading
 from scenes.canonical import SceneError
-from scenes.loading import asset, clamp_radiance, read_image, read_mesh
+from scenes.loading import asset, clamp_radiance, read_image
 
-SAMPLES = Path(__file__).resolve().parents[3] / "shared" / "data" / "assets"
-MESHES = sorted(path for path in SAMPLES.rglob("*") if path.suffix.lower() in (".glb", ".obj", ".stl"))
-
-TRIANGLE = b"v 0 0 0\nv 2 0 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 BINARY = bytes(range(256)) * 8
 
 
@@ -52,15 +48,16 @@ def test_a_picture_is_read_once_and_again_when_it_changes(tmp_path: Path) -> Non
 
 
 def test_a_changed_asset_changes_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from scenes.driving import world
 
-    before = world.sky()
-    assert world.sky() is before
+    from scenes.driving import sky
+
+    before = sky.sky()
+    assert sky.sky() is before
     shutil.copytree(loading.ASSETS, tmp_path / "assets")
     monkeypatch.setattr(loading, "ASSETS", tmp_path / "assets")
     height, width = read_image(asset("sky.exr")).shape[:2]
     write_exr(asset("sky.exr"), {"RGB": np.full((height, width, 3), 0.25, np.float32)})
-    assert (world.sky().image != before.image).any()
+    assert (sky.sky().image != before.image).any()
 
 
 def test_png_is_decoded_to_linear_values(tmp_path: Path) -> None:
@@ -181,81 +178,3 @@ def test_clamping_keeps_hue_and_never_brightens(texels: list[tuple[float, ...]],
     kept = peak[..., 0] <= limit
     assert np.array_equal(found[kept], image[kept]), "what is below the limit stays"
     assert after[..., 0][~kept] == pytest.approx(limit, rel=1e-5)
-
-
-# --- meshes ----------------------------------------------------------------------------------------------------------
-
-
-def test_obj_is_read_with_texture_coordinates(tmp_path: Path) -> None:
-    (tmp_path / "a.obj").write_bytes(TRIANGLE)
-    mesh = read_mesh(tmp_path / "a.obj")
-    order = mesh.faces[0]
-    assert mesh.faces.dtype == np.int32 and mesh.vertices.dtype == np.float32 and mesh.source == str(tmp_path / "a.obj")
-    assert mesh.vertices[order] == pytest.approx(np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 3.0, 0.0)]))
-    assert mesh.uvs is not None and mesh.uvs[order] == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]))
-    assert mesh.normals is not None and mesh.normals[order] == pytest.approx(np.tile([0.0, 0.0, 1.0], (3, 1)))
-
-
-def test_other_formats_hold_the_same_triangles(tmp_path: Path) -> None:
-    import trimesh
-
-    ball = trimesh.creation.icosphere(1)
-    for ending in ("ply", "stl", "glb", "obj"):
-        ball.export(tmp_path / f"ball.{ending}")
-        mesh = read_mesh(tmp_path / f"ball.{ending}")
-        assert len(mesh.faces) == 80
-        points = mesh.vertices.astype(np.float64)[mesh.faces]
-        volume = np.einsum("ij,ij->i", points[:, 0], np.cross(points[:, 1], points[:, 2])).sum() / 6.0
-        assert volume == pytest.approx(ball.volume, rel=1e-4)
-
-
-def test_parts_are_placed_by_their_transforms(tmp_path: Path) -> None:
-    import trimesh
-
-    whole = trimesh.Scene()
-    for at in (0.0, 10.0):
-        whole.add_geometry(trimesh.creation.box(), transform=trimesh.transformations.translation_matrix([at, 0.0, 0.0]))
-    whole.export(tmp_path / "two.glb")
-    mesh = read_mesh(tmp_path / "two.glb")
-    assert len(mesh.faces) == 24
-    assert (mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()) == pytest.approx((-0.5, 10.5))
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("missing.obj", None),
-        ("missing.glb", None),
-        ("empty.obj", b""),
-        ("empty.glb", b""),
-        ("empty.stl", b""),
-        ("empty.ply", b""),
-        ("garbage.obj", BINARY),
-        ("garbage.glb", BINARY),
-        ("garbage.stl", BINARY),
-        ("garbage.ply", BINARY),
-        ("unknown.xyzzy", TRIANGLE),
-        ("comment.obj", b"# nothing\n"),
-        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"),
-        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
-        ("half.obj", TRIANGLE[:-6]),
-        ("holes.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-    ],
-)
-def test_broken_meshes_are_named(tmp_path: Path, name: str, content: bytes | None) -> None:
-    path = tmp_path / name
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(SceneError) as caught:
-        read_mesh(path)
-    message = str(caught.value)
-    assert str(path) in message and "\n" not in message and "mesh" in message.lower()
-
-
-@pytest.mark.skipif(not MESHES, reason="no sample meshes beside the project")
-@pytest.mark.parametrize("path", MESHES, ids=lambda path: path.name)
-def test_sample_meshes_are_read(path: Path) -> None:
-    mesh = read_mesh(path)
-    assert len(mesh.faces) > 100 and np.ptp(mesh.vertices, axis=0).min() > 0.0
-    assert mesh.normals is not None and np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0, abs=1e-5)
-    assert mesh.uvs is None or np.isfinite(mesh.uvs).all()

@@ -118,6 +118,8 @@ def broken(folder: Path, kind: str) -> Path:
         "no number": SQUARE.replace("v 2 3 0", "v 2 nan 0") + FACES,
         "no library": "mtllib gone.mtl\n" + SQUARE + FACES,
         "nothing": "",
+        "index beyond": SQUARE + "f 1 2 9\n",
+        "half a face": SQUARE + "f 1 2",
     }.get(kind)
     if kind == "no texture":
         return written(folder, "newmtl paint\nmap_Kd gone.png\n")
@@ -142,6 +144,8 @@ def broken(folder: Path, kind: str) -> Path:
         ("no library", "gone.mtl"),
         ("no texture", "gone.png"),
         ("nothing", "cannot be read|at least one face"),
+        ("index beyond", "cannot be read"),
+        ("half a face", "cannot be read|at least one face"),
         ("latin", "expected UTF-8 text, byte 2"),
         ("other kind", "expected a file that ends in .obj"),
         ("not glb", "cannot be read"),
@@ -151,6 +155,16 @@ def broken(folder: Path, kind: str) -> Path:
 def test_faults_are_named_in_one_line(kind: str, message: str, tmp_path: Path) -> None:
     path = broken(tmp_path, kind)
     with pytest.raises(SceneError, match=message) as caught:
+        read_model(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", bytes(range(256)) * 8])
+@pytest.mark.parametrize("ending", [".obj", ".glb", ".stl", ".ply"])
+def test_files_that_hold_no_mesh_are_named_in_one_line(ending: str, content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / f"a{ending}"
+    path.write_bytes(content)
+    with pytest.raises(SceneError) as caught:
         read_model(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 

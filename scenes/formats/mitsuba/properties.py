@@ -109,9 +109,11 @@ class Properties:
             )
         return [transform_of(step) for step in steps], times_s
 
-    def unasked(self) -> list[str]:
-        """Names of what was given and not asked for."""
-        return [name for name in self.given if name not in self.asked]
+    def left_over(self) -> None:
+        """Reports properties that nothing asked for."""
+        for name in self.given:
+            if name not in self.asked:
+                self.report.add(self.where, f"{self.node.get('type')}: property {name!r}")
 
 
 def numbers(node: Node, text: str, count: int | None) -> list[float]:

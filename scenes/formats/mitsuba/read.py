@@ -10,34 +10,25 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes import loading
-from scenes.arithmetic import arctan, hypot, norm, product, tan
+from scenes.arithmetic import arctan, hypot, product, tan
 from scenes.canonical import (
     Camera,
-    DirectionalLight,
     EnvironmentCamera,
-    EnvironmentLight,
     Film,
     Instance,
     Integrator,
-    Light,
     Material,
     OrthographicCamera,
     PerspectiveCamera,
-    PointLight,
     Sampler,
     Scene,
     SceneError,
-    SpotLight,
-    SunSky,
 )
-from scenes.canonical.values import Matrix
-from scenes.daylight import sun_at
-from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.geometry.conventions import FAR, duration_s
 from scenes.formats.geometry.transform_stack import motion
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.mitsuba.read_lights import MitsubaLights
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
 from scenes.formats.mitsuba.read_shapes import MitsubaShapes
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
@@ -55,7 +46,6 @@ INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "dir
                "bdpt": "bidirectional", "mlt": "metropolis", "pssmlt": "metropolis", "erpt": "metropolis",
                "photonmapper": "photonmap", "ppm": "photonmap", "sppm": "photonmap", "ptracer": "path",
                "adaptive": "path", "irrcache": "path", "vpl": "path"}  # fmt: skip
-_TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
 
 
 class MitsubaReader:
@@ -71,7 +61,7 @@ class MitsubaReader:
         self.camera: Camera | None = None
         self.film, self.sampler, self.integrator = Film(768, 576), Sampler("independent", 4), Integrator("path", -1)
         self.instances: list[Instance] = []
-        self.lights: list[Light] = []
+        self.lights = MitsubaLights(files, report)
 
     # --- the tree ------------------------------------------------------------------------------------------------
 
@@ -139,7 +129,7 @@ class MitsubaReader:
         elif node.tag == "shape":
             self.instances += self.shapes.read(node)
         elif node.tag == "emitter":
-            self._emitter(node)
+            self.lights.read(node)
         elif node.tag in ("medium", "phase", "volume", "subsurface"):
             named = f" {node.get('id')!r}" if node.get("id") else ""
             self.report.add(str(node.place), f"{node.tag}{named} (participating medium)")
@@ -156,7 +146,7 @@ class MitsubaReader:
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
         # it counts the edges of a path, the canonical scene its bounces
         self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
-        self.surfaces.left_over(properties)
+        properties.left_over()
 
     def _film(self, node: Node) -> None:
         properties = Properties(node, self.report)
@@ -167,18 +157,18 @@ class MitsubaReader:
                 inner = Properties(child, self.report)
                 name = self.report.kind(FILTERS, child.get("type"), "filter", child.place)
                 radius = inner.number("radius", _RADII[name])
-                self.surfaces.left_over(inner)
+                inner.left_over()
         width = _RADII[name] if radius is None else radius
         self.film = Film(*size, name, width, properties.text("filename", ""))  # type: ignore[arg-type]
         for setting in ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod"):
             properties.asked.add(setting)
-        self.surfaces.left_over(properties)
+        properties.left_over()
 
     def _sampler(self, node: Node) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
         name = self.report.kind(SAMPLERS, kind, "sampler", node.place)
         self.sampler = Sampler(name, properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
-        self.surfaces.left_over(properties)
+        properties.left_over()
 
     def _sensor(self, node: Node) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
@@ -199,7 +189,7 @@ class MitsubaReader:
             self.camera = EnvironmentCamera(to_world)
         else:
             raise SceneError(f"{node.place}: expected a kind of sensor, got {kind!r}")
-        self.surfaces.left_over(properties)
+        properties.left_over()
 
     def _field(self, properties: Properties) -> float:
         """Field of view of the shorter side, degrees."""
@@ -228,81 +218,6 @@ class MitsubaReader:
             return fov
         return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * min(width, height) / sides[axis]))
 
-    # --- lights --------------------------------------------------------------------------------------------------
-
-    def _emitter(self, node: Node) -> None:
-        kind, properties = node.get("type"), Properties(node, self.report)
-        matrix = properties.transform()
-        if kind == "point":
-            place = product(matrix, np.append(properties.vector("position", grey(0.0)), 1.0))
-            self.lights.append(PointLight(rgb(place[:3]), properties.color("intensity", grey(1.0))))
-        elif kind == "spot":
-            outer = properties.number("cutoffAngle", 20.0)
-            inner = properties.number("beamWidth", 0.75 * outer)
-            ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / norm(matrix[:3, 2]))
-            if any(child.tag in ("texture", "ref") for child in properties.rest):
-                self.report.add(properties.where, "a picture in a spot light", "none")
-            self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
-        elif kind in ("directional", "collimated"):
-            direction = properties.vector("direction", rgb(matrix[:3, 2]))
-            if not norm(direction) > 0.0:
-                raise SceneError(f"{properties.where}: direction: expected one")
-            if kind == "collimated":
-                self.report.add(properties.where, "a beam of no width", "a parallel light")
-            unit = rgb(direction / norm(direction))
-            self.lights.append(DirectionalLight(unit, properties.color("irradiance", grey(1.0))))
-        elif kind == "constant":
-            radiance = properties.color("radiance", grey(1.0))
-            self.lights.append(EnvironmentLight(np.array([[list(radiance)]], np.float32)))
-        elif kind == "envmap":
-            path = self.files.path(properties.text("filename", ""), properties.where)
-            matrix[:3, 3] = 0.0
-            image = loading.read_image(path)
-            self.lights.append(EnvironmentLight(image, matrix, properties.number("scale", 1.0), str(path)))
-        elif kind in ("sun", "sky", "sunsky"):
-            self._daylight(kind, properties, matrix)
-        elif kind == "area":
-            raise SceneError(f"{node.place}: area: expected it inside a shape")
-        else:
-            properties.asked.update(properties.given)
-            self.report.unknown(node.place, "emitter", kind)
-        if "samplingWeight" in properties:
-            self.report.add(properties.where, "samplingWeight of a light", "the renderer's own choice")
-            properties.asked.add("samplingWeight")
-        self.surfaces.left_over(properties)
-
-    def _daylight(self, kind: str, properties: Properties, matrix: Matrix) -> None:
-        turned = matrix[:3, :3]
-        direction = properties.vector("sunDirection", (0.0, 1.0, 0.0))
-        if "sunDirection" not in properties:
-            direction = product(turned, self._by_time(properties))
-        if not norm(direction) > 0.0:
-            raise SceneError(f"{properties.where}: sunDirection: expected a direction")
-        unit, up = rgb(direction / norm(direction)), rgb(turned[:, 1] / norm(turned[:, 1]))
-        turbidity, scale = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
-        albedo = float(np.mean(properties.color("albedo", grey(0.15))))
-        shares = {part: properties.number(f"{part}Scale", 1.0) for part in ("sun", "sky")}
-        if kind != "sunsky" or shares["sun"] == shares["sky"]:
-            part = "both" if kind == "sunsky" else kind
-            factor = scale * (shares["sky"] if kind == "sunsky" else 1.0)
-            self.lights.append(SunSky(unit, turbidity, factor, part, up, albedo))  # type: ignore[arg-type]
-            return
-        for part, share in shares.items():
-            self.lights.append(SunSky(unit, turbidity, scale * share, part, up, albedo))  # type: ignore[arg-type]
-
-    def _by_time(self, properties: Properties) -> np.ndarray:
-        """Towards the sun, by date and place; east is x, north -z."""
-        names = zip(_TIME_AND_PLACE, (2010, 7, 10, 15, 0, 0, 35.6894, 139.6917, 9), strict=True)
-        values = {name: properties.number(name, default) for name, default in names}
-        hour = values["hour"] + values["minute"] / 60.0 + values["second"] / 3600.0
-        date = int(values["year"]), int(values["month"]), int(values["day"])
-        try:
-            east, north, up = sun_at(date, hour, values["latitude"], values["longitude"], values["timezone"])
-        except (ValueError, OverflowError) as error:
-            raise SceneError(f"{properties.where}: expected a date and time, got {error}") from None
-        self.report.add(properties.where, "the sun's place by time and latitude", "its direction, x to the east")
-        return np.array([east, up, -north])
-
 
 def load_mitsuba(path: Path, root: Path | None, report: LossReport) -> Scene:
     """Reads a scene; see :data:`scenes.formats.text.format.Read`.
@@ -317,6 +232,6 @@ def load_mitsuba(path: Path, root: Path | None, report: LossReport) -> Scene:
     reader.read(main)
     if reader.camera is None:
         raise SceneError(f"{path}: expected a sensor, found none")
-    parts = tuple(reader.instances), tuple(reader.lights), reader.film, reader.sampler, reader.integrator
+    parts = tuple(reader.instances), tuple(reader.lights.lights), reader.film, reader.sampler, reader.integrator
     lasts = duration_s(reader.camera, reader.instances)
     return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem, duration_s=lasts)

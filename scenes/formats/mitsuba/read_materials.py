@@ -6,20 +6,16 @@ Source: Mitsuba 0.5 documentation, sections on scattering models and textures.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenes import loading
-from scenes.arithmetic import arctan, power
+from scenes.arithmetic import arctan
 from scenes.canonical import (
     Bumped,
-    CheckerboardTexture,
     ConstantTexture,
     Glass,
     Glossy,
-    ImageTexture,
     Masked,
     Material,
     Matte,
@@ -27,108 +23,24 @@ from scenes.canonical import (
     MixMaterial,
     Phong,
     Plastic,
-    Rgb,
     SceneError,
-    Texture,
     Translucent,
 )
-from scenes.formats.appearance.folding import mean_of, product_of
+from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import grey, metal
-from scenes.formats.geometry.conventions import first_row_below
-from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties, ior
-from scenes.formats.text.scene_files import SceneFiles
+from scenes.formats.mitsuba.read_textures import MitsubaTextures
 from scenes.formats.text.xml_tree import Node
 
-_WRAPS = {"repeat": "repeat", "clamp": "clamp", "zero": "black", "mirror": "repeat", "one": "clamp"}
-_FILTERS = {"nearest": "nearest", "trilinear": "mipmap", "ewa": "mipmap"}
 _NESTED_MAX = 32
 
 
 @dataclass
-class MitsubaSurfaces:
-    """Makes textures and materials of elements.
+class MitsubaSurfaces(MitsubaTextures):
+    """Makes textures and materials of elements."""
 
-    Attributes:
-        files: for images.
-        report: of what could not be kept.
-        find: the element that a reference names.
-    """
-
-    files: SceneFiles
-    report: LossReport
-    find: Callable[[Node], Node]
     made: dict[int, Material] = field(default_factory=dict)
-    textures: dict[int, Texture] = field(default_factory=dict)
     _deep: int = 0
-
-    def left_over(self, properties: Properties) -> None:
-        """Reports properties that nothing asked for."""
-        for name in properties.unasked():
-            self.report.add(properties.where, f"{properties.node.get('type')}: property {name!r}")
-
-    # --- textures ------------------------------------------------------------------------------------------------
-
-    def texture(self, properties: Properties, name: str, default: Rgb) -> Texture:
-        """A texture, a reference to one, or a colour."""
-        for child in properties.rest:
-            if child.tag in ("texture", "ref") and child.get("name") == name:
-                node = self.find(child) if child.tag == "ref" else child
-                if node.tag != "texture":
-                    raise SceneError(f"{child.place}: {name}: expected a texture, got {node.tag!r}")
-                return self.made_texture(node)
-        return ConstantTexture(properties.color(name, default))
-
-    def made_texture(self, node: Node) -> Texture:
-        """The texture of an element, made once."""
-        if id(node) not in self.textures:
-            properties = Properties(node, self.report)
-            self.textures[id(node)] = self._texture(properties)
-            self.left_over(properties)
-        return self.textures[id(node)]
-
-    def _texture(self, properties: Properties) -> Texture:
-        kind = properties.node.get("type")
-        even = properties.number("uvscale", 1.0)
-        scale = properties.number("uscale", even), properties.number("vscale", even)
-        offset = properties.number("uoffset", 0.0), properties.number("voffset", 0.0)
-        if kind == "checkerboard":
-            if offset != (0.0, 0.0):
-                self.report.add(properties.where, "offset of a checkerboard", "none")
-            parts = self.texture(properties, "color0", grey(0.4)), self.texture(properties, "color1", grey(0.2))
-            # a square of its checks is half a unit wide
-            return CheckerboardTexture(*parts, (2.0 * scale[0], 2.0 * scale[1]))
-        if kind == "scale":
-            inner = next((child for child in properties.rest if child.tag in ("texture", "ref")), None)
-            base = self.made_texture(self.find(inner) if inner.tag == "ref" else inner) if inner else None
-            factor = ConstantTexture(properties.color("scale", grey(1.0)))
-            return factor if base is None else product_of(base, factor)
-        if kind == "bitmap":
-            return self._bitmap(properties, scale, offset)
-        properties.asked.update(properties.given)
-        self.report.add(properties.where, f"texture {kind!r}", "the constant 0.5")
-        return ConstantTexture(grey(0.5))
-
-    def _bitmap(self, properties: Properties, scale: tuple[float, float], offset: tuple[float, float]) -> Texture:
-        where = properties.where
-        path = self.files.path(properties.text("filename", ""), where)
-        image = loading.read_image(path)
-        gamma = properties.number("gamma", -1.0)
-        if gamma > 0.0 and path.suffix.lower() != ".exr":
-            image = power(loading.encoded_srgb(image), np.float32(gamma)).astype(np.float32)
-        wrap = properties.text("wrapMode", "repeat")
-        if wrap not in _WRAPS:
-            raise SceneError(f"{where}: wrapMode: expected one of {', '.join(_WRAPS)}, got {wrap!r}")
-        if wrap in ("mirror", "one"):
-            self.report.add(where, f"wrapMode {wrap!r}", _WRAPS[wrap])
-        kind = properties.text("filterType", "ewa")
-        if kind not in _FILTERS:
-            raise SceneError(f"{where}: filterType: expected one of {', '.join(_FILTERS)}, got {kind!r}")
-        properties.number("maxAnisotropy", 20.0)
-        size, start = first_row_below(scale, offset)
-        return ImageTexture(image, size, start, _WRAPS[wrap], _FILTERS[kind], str(path))  # type: ignore[arg-type]
-
-    # --- materials -----------------------------------------------------------------------------------------------
 
     def material(self, node: Node) -> Material:
         """The material of an element, made once; one that Mitsuba does not have is reported."""
@@ -148,7 +60,7 @@ class MitsubaSurfaces:
             raise SceneError(f"{node.place}: expected at most {_NESTED_MAX} materials inside each other")
         if kind in makers:
             made = makers[kind](properties)
-            self.left_over(properties)
+            properties.left_over()
         elif kind in ("null", "hk", "irawan", "sssbrdf", "normalmap", "rmbrdf", "dipole"):
             self.report.add(properties.where, f"material {kind!r}", "grey, matte")
             made = Matte(ConstantTexture(grey(0.5)))

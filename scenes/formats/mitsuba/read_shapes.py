@@ -75,7 +75,7 @@ class MitsubaShapes:
         shape, local = self._made(kind, properties, material)
         if properties.truth("flipNormals", False):
             shape = turned(as_mesh(shape))
-        self.surfaces.left_over(properties)
+        properties.left_over()
         return [Instance(shape, material, product(keys[0], local), track, node.get("id"), emission)]
 
     def _instances(self, properties: Properties) -> list[Instance]:
@@ -84,7 +84,7 @@ class MitsubaShapes:
         for child in properties.rest:
             group = self.find(child) if child.tag == "ref" else child
             if id(group) in self.groups:
-                self.surfaces.left_over(properties)
+                properties.left_over()
                 parts = self.groups[id(group)]
                 if track is not None and any(part.track is not None for part in parts):
                     self.report.add(properties.where, "a motion within a motion", "that of the instance")
@@ -111,7 +111,7 @@ class MitsubaShapes:
                 if "samplingWeight" in inner:
                     self.report.add(inner.where, "samplingWeight of a light", "the renderer's own choice")
                     inner.asked.add("samplingWeight")
-                self.surfaces.left_over(inner)
+                inner.left_over()
             elif node.tag in ("medium", "subsurface"):
                 self.report.add(str(node.place), f"{node.tag} (participating medium)")
             elif node.tag not in ("texture",):

@@ -40,7 +40,8 @@ from scenes.formats.geometry.orientation import FLIPPED
 from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read import FILTERS, FORWARD
-from scenes.formats.mitsuba.write_materials import Element, MitsubaSurfaceWriter
+from scenes.formats.mitsuba.write_elements import Element
+from scenes.formats.mitsuba.write_materials import MitsubaSurfaceWriter
 from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
 

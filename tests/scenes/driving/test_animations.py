@@ -11,7 +11,7 @@ import pytest
 from analysis.storage.reference import content_hash
 from scenes import catalog, loading
 from scenes.canonical import PerspectiveCamera, Scene, SceneError
-from scenes.driving import body, car, wheel, world
+from scenes.driving import body, car, sky, wheel, world
 from scenes.driving.animations import DURATION_S, LEAD_S
 from tests.scenes.builders import Array, moving, placed, pose, project
 from tsar.config import ConfigError
@@ -194,7 +194,7 @@ def test_phase_moves_the_car_ahead_and_nothing_else(scenes: dict[str, Scene], na
 def forget() -> None:
     """Drops what was built before, so that the next load builds it again."""
     for kept in (
-        car.body_parts, wheel.tyre, wheel.rim, wheel.brake, world._sky, world._instances, world._grass,
+        car.body_parts, wheel.tyre, wheel.rim, wheel.brake, sky._sky, world._instances, world._grass,
         world._facade, loading._image,
     ):  # fmt: skip
         kept.cache_clear()

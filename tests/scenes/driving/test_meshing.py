@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.driving.cutting import boundary_edges, carve, cut
+from scenes.driving.cutting import carve, cut
 from scenes.driving.meshing import (
     Surface,
     box,
@@ -98,7 +98,7 @@ def test_a_grid_faces_along_the_product_of_its_directions() -> None:
     assert sheet.normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (16, 1)))
     assert face_normals(sheet)[:, 2].min() > 0.0
     assert sheet.uvs == pytest.approx(sheet.vertices[:, :2])
-    assert len(boundary_edges(sheet)) == 4 * 3
+    assert len(open_edges(sheet)) == 4 * 3
 
 
 def test_corners_of_a_lathe_stay_sharp_and_gentle_bends_do_not() -> None:

@@ -15,7 +15,7 @@ from PIL import Image
 from analysis.storage.reference import content_hash
 from scenes import catalog
 from scenes.canonical import ConstantTexture, EnvironmentLight, ImageTexture, Instance, Mesh, Phong, Rectangle
-from scenes.driving import world
+from scenes.driving import sky, world
 from scenes.loading import ASSETS, asset, read_image
 from tests.scenes.builders import areas, corners, face_normals
 
@@ -42,16 +42,16 @@ def direction(light: EnvironmentLight, row: float, column: float) -> np.ndarray:
 
 
 def test_the_sky_is_finite_and_bounded() -> None:
-    image = world.sky().image
+    image = sky.sky().image
     assert image.dtype == np.float32 and image.ndim == 3 and image.shape[1] == 2 * image.shape[0]
     assert bool(np.isfinite(image).all()) and image.min() >= 0.0
-    assert image.max() <= world.SKY_LIMIT * (1.0 + 1e-6)
-    assert image.max() > 0.5 * world.SKY_LIMIT, "the glow around the sun is kept"
+    assert image.max() <= sky.SKY_LIMIT * (1.0 + 1e-6)
+    assert image.max() > 0.5 * sky.SKY_LIMIT, "the glow around the sun is kept"
     assert not image.flags.writeable, "shared by all scenes"
 
 
 def test_the_sky_is_above() -> None:
-    light = world.sky()
+    light = sky.sky()
     assert direction(light, 0, 7)[2] > 0.99 and direction(light, light.image.shape[0] - 1, 7)[2] < -0.99
     assert np.linalg.det(light.to_world) == pytest.approx(1.0)
     upper, lower = np.split(light.image, 2)
@@ -60,7 +60,7 @@ def test_the_sky_is_above() -> None:
 
 
 def test_hills_stand_at_the_horizon_without_a_seam() -> None:
-    image = world.sky().image
+    image = sky.sky().image
     ring = image[len(image) // 2 - 20]
     assert ring.std(axis=0).max() > 0.01
     steps = np.abs(np.diff(ring, axis=0, append=ring[:1])).max(axis=1)
@@ -69,13 +69,13 @@ def test_hills_stand_at_the_horizon_without_a_seam() -> None:
 
 def test_the_sun_shines_from_where_the_picture_has_it() -> None:
     picture = read_image(asset("sky.exr"))
-    light = EnvironmentLight(picture, world.sky().to_world)
+    light = EnvironmentLight(picture, sky.sky().to_world)
     row, column = np.unravel_index(int(picture.sum(axis=2).argmax()), picture.shape[:2])
-    towards = world.sun_towards()
+    towards = sky.sun_towards()
     assert np.linalg.norm(towards) == pytest.approx(1.0) and towards[2] > 0.3
-    assert picture.max() > 10.0 * world.SKY_LIMIT, "the picture has a sun"
+    assert picture.max() > 10.0 * sky.SKY_LIMIT, "the picture has a sun"
     assert towards @ direction(light, float(row), float(column)) > np.cos(np.radians(2.0))
-    assert np.array(world.sun().direction) == pytest.approx(-towards) and min(world.sun().irradiance) > 0.0
+    assert np.array(sky.sun().direction) == pytest.approx(-towards) and min(sky.sun().irradiance) > 0.0
 
 
 def test_everything_has_a_name_of_its_own_and_stands_still() -> None:
@@ -176,14 +176,14 @@ def test_pictures_are_the_same_on_any_number_of_threads(tmp_path: Path) -> None:
 
 def test_the_sky_and_the_textures_are_the_same_on_any_number_of_threads() -> None:
     one, two = (
-        afresh_on(threads, lambda: (content_hash(world.sky()), content_hash(world.instances()))) for threads in (1, 2)
+        afresh_on(threads, lambda: (content_hash(sky.sky()), content_hash(world.instances()))) for threads in (1, 2)
     )
     assert one == two
 
 
 def test_making_the_sky_leaves_the_number_of_threads_alone() -> None:
     def number_after() -> int:
-        world.sky()
+        sky.sky()
         return torch.get_num_threads()
 
     assert [afresh_on(threads, number_after) for threads in (1, 2)] == [1, 2]

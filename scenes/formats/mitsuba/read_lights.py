@@ -1,0 +1,111 @@
+"""Lights of Mitsuba 0.5, into those of the canonical scene.
+
+Source: Mitsuba 0.5 documentation, section on emitters.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes import loading
+from scenes.arithmetic import norm, product
+from scenes.canonical import (
+    DirectionalLight,
+    EnvironmentLight,
+    Light,
+    PointLight,
+    SceneError,
+    SpotLight,
+    SunSky,
+)
+from scenes.canonical.values import Matrix
+from scenes.daylight import sun_at
+from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.text.scene_files import SceneFiles
+from scenes.formats.text.xml_tree import Node
+
+_TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
+
+
+class MitsubaLights:
+    """Makes lights of elements."""
+
+    def __init__(self, files: SceneFiles, report: LossReport) -> None:
+        self.files, self.report = files, report
+        self.lights: list[Light] = []
+
+    def read(self, node: Node) -> None:
+        """Reads an emitter that stands by itself."""
+        kind, properties = node.get("type"), Properties(node, self.report)
+        matrix = properties.transform()
+        if kind == "point":
+            place = product(matrix, np.append(properties.vector("position", grey(0.0)), 1.0))
+            self.lights.append(PointLight(rgb(place[:3]), properties.color("intensity", grey(1.0))))
+        elif kind == "spot":
+            outer = properties.number("cutoffAngle", 20.0)
+            inner = properties.number("beamWidth", 0.75 * outer)
+            ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / norm(matrix[:3, 2]))
+            if any(child.tag in ("texture", "ref") for child in properties.rest):
+                self.report.add(properties.where, "a picture in a spot light", "none")
+            self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
+        elif kind in ("directional", "collimated"):
+            direction = properties.vector("direction", rgb(matrix[:3, 2]))
+            if not norm(direction) > 0.0:
+                raise SceneError(f"{properties.where}: direction: expected one")
+            if kind == "collimated":
+                self.report.add(properties.where, "a beam of no width", "a parallel light")
+            unit = rgb(direction / norm(direction))
+            self.lights.append(DirectionalLight(unit, properties.color("irradiance", grey(1.0))))
+        elif kind == "constant":
+            radiance = properties.color("radiance", grey(1.0))
+            self.lights.append(EnvironmentLight(np.array([[list(radiance)]], np.float32)))
+        elif kind == "envmap":
+            path = self.files.path(properties.text("filename", ""), properties.where)
+            matrix[:3, 3] = 0.0
+            image = loading.read_image(path)
+            self.lights.append(EnvironmentLight(image, matrix, properties.number("scale", 1.0), str(path)))
+        elif kind in ("sun", "sky", "sunsky"):
+            self._daylight(kind, properties, matrix)
+        elif kind == "area":
+            raise SceneError(f"{node.place}: area: expected it inside a shape")
+        else:
+            properties.asked.update(properties.given)
+            self.report.unknown(node.place, "emitter", kind)
+        if "samplingWeight" in properties:
+            self.report.add(properties.where, "samplingWeight of a light", "the renderer's own choice")
+            properties.asked.add("samplingWeight")
+        properties.left_over()
+
+    def _daylight(self, kind: str, properties: Properties, matrix: Matrix) -> None:
+        turned = matrix[:3, :3]
+        direction = properties.vector("sunDirection", (0.0, 1.0, 0.0))
+        if "sunDirection" not in properties:
+            direction = product(turned, self._by_time(properties))
+        if not norm(direction) > 0.0:
+            raise SceneError(f"{properties.where}: sunDirection: expected a direction")
+        unit, up = rgb(direction / norm(direction)), rgb(turned[:, 1] / norm(turned[:, 1]))
+        turbidity, scale = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
+        albedo = float(np.mean(properties.color("albedo", grey(0.15))))
+        shares = {part: properties.number(f"{part}Scale", 1.0) for part in ("sun", "sky")}
+        if kind != "sunsky" or shares["sun"] == shares["sky"]:
+            part = "both" if kind == "sunsky" else kind
+            factor = scale * (shares["sky"] if kind == "sunsky" else 1.0)
+            self.lights.append(SunSky(unit, turbidity, factor, part, up, albedo))  # type: ignore[arg-type]
+            return
+        for part, share in shares.items():
+            self.lights.append(SunSky(unit, turbidity, scale * share, part, up, albedo))  # type: ignore[arg-type]
+
+    def _by_time(self, properties: Properties) -> np.ndarray:
+        """Towards the sun, by date and place; east is x, north -z."""
+        names = zip(_TIME_AND_PLACE, (2010, 7, 10, 15, 0, 0, 35.6894, 139.6917, 9), strict=True)
+        values = {name: properties.number(name, default) for name, default in names}
+        hour = values["hour"] + values["minute"] / 60.0 + values["second"] / 3600.0
+        date = int(values["year"]), int(values["month"]), int(values["day"])
+        try:
+            east, north, up = sun_at(date, hour, values["latitude"], values["longitude"], values["timezone"])
+        except (ValueError, OverflowError) as error:
+            raise SceneError(f"{properties.where}: expected a date and time, got {error}") from None
+        self.report.add(properties.where, "the sun's place by time and latitude", "its direction, x to the east")
+        return np.array([east, up, -north])

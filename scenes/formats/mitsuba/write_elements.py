@@ -1,0 +1,109 @@
+"""Elements, properties and textures of a Mitsuba file.
+
+Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+
+from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture, Texture
+from scenes.canonical.values import Matrix, Rgb
+from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.geometry.conventions import first_row_below
+from scenes.formats.losses import LossReport
+from scenes.formats.text.numbers import number, spaced
+from scenes.formats.text.output import Output
+
+Element = ElementTree.Element
+
+_NEW_NAMES = {"toWorld": "to_world", "intIOR": "int_ior", "extIOR": "ext_ior"}
+
+
+@dataclass
+class ElementWriter:
+    """Elements of a scene, as they are made; ``modern`` is Mitsuba 3."""
+
+    output: Output
+    report: LossReport
+    modern: bool = False
+    root: Element = field(default_factory=lambda: Element("scene"))
+    _folded: dict[int, tuple[Texture, Texture]] = field(default_factory=dict)
+    _taken: set[str] = field(default_factory=set)
+
+    def name(self, text: str) -> str:
+        """A property's name in the flavour that is written."""
+        if not self.modern:
+            return text
+        return _NEW_NAMES.get(text) or re.sub(r"(?<!^)(?=[A-Z])", "_", text).lower()
+
+    def plugin(self, tag: str, kind: str, parent: Element | None = None, **named: str) -> Element:
+        """An element of a kind."""
+        made = Element(tag, {"type": kind, **named})
+        if parent is not None:
+            parent.append(made)
+        return made
+
+    def put(self, parent: Element, tag: str, name: str, value: str) -> None:
+        """A property."""
+        ElementTree.SubElement(parent, tag, {"name": self.name(name), "value": value})
+
+    def matrix(self, parent: Element, name: str, matrix: Matrix) -> None:
+        """A transform."""
+        holder = ElementTree.SubElement(parent, "transform", {"name": self.name(name)})
+        ElementTree.SubElement(holder, "matrix", {"value": spaced(matrix.ravel())})
+
+    def color(self, parent: Element, name: str, value: Rgb) -> None:
+        """A colour, linear."""
+        self.put(parent, "rgb", name, ", ".join(number(part) for part in value))
+
+    def texture(self, parent: Element, texture: Texture, name: str) -> None:
+        """A texture or colour as a property."""
+        if id(texture) not in self._folded:
+            self._folded[id(texture)] = texture, folded(texture)
+        texture = self._folded[id(texture)][1]
+        if isinstance(texture, ConstantTexture):
+            self.color(parent, name, texture.value)
+            return
+        if isinstance(texture, ImageTexture):
+            made = self.plugin("texture", "bitmap", parent, name=self.name(name))
+            self.put(made, "string", "filename", self.output.picture(texture.image, texture.source))
+            self.put(made, "string", "wrapMode", "clamp" if texture.wrap == "black" and self.modern else
+                     {"repeat": "repeat", "clamp": "clamp", "black": "zero"}[texture.wrap])  # fmt: skip
+            kind = {"nearest": "nearest", "bilinear": "trilinear", "mipmap": "ewa"}[texture.filter]
+            if texture.filter == "bilinear" and not self.modern:
+                self.report.add(name, "a texture without levels of detail", "trilinear")
+            if self.modern:
+                kind = "nearest" if texture.filter == "nearest" else "bilinear"
+            self.put(made, "string", "filterType", kind)
+            self._uv(made, *first_row_below(texture.uv_scale, texture.uv_offset))
+        elif isinstance(texture, CheckerboardTexture):
+            made = self.plugin("texture", "checkerboard", parent, name=self.name(name))
+            self.texture(made, texture.even, "color0")
+            self.texture(made, texture.odd, "color1")
+            self._uv(made, (0.5 * texture.uv_scale[0], 0.5 * texture.uv_scale[1]), (0.0, 0.0))
+        else:
+            self.report.add(name, f"texture {type(texture).__name__}", "its mean")
+            self.color(parent, name, mean_of(texture))
+
+    def _uv(self, made: Element, scale: tuple[float, float], offset: tuple[float, float]) -> None:
+        if self.modern:
+            holder = ElementTree.SubElement(made, "transform", {"name": "to_uv"})
+            size = {"x": number(scale[0]), "y": number(scale[1]), "z": "1"}
+            ElementTree.SubElement(holder, "scale", size)
+            ElementTree.SubElement(holder, "translate", {"x": number(offset[0]), "y": number(offset[1]), "z": "0"})
+            return
+        for name, value in zip(("uscale", "vscale", "uoffset", "voffset"), (*scale, *offset), strict=True):
+            if value != (0.0 if name.endswith("offset") else 1.0):
+                self.put(made, "float", name, number(value))
+
+    def label(self, wanted: str) -> str:
+        """An identifier that nothing has yet."""
+        label, count = wanted, 1
+        while label in self._taken:
+            count += 1
+            label = f"{wanted}{count}"
+        self._taken.add(label)
+        return label
