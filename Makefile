@@ -29,6 +29,7 @@ demo: $(BASE)
 
 lint: $(STAMP)
 	$(VENV)/bin/ruff check .
+	$(VENV)/bin/clang-format --dry-run --Werror renderer/*/native/*.h
 	$(VENV)/bin/pyright
 
 test: $(STAMP)

@@ -18,6 +18,7 @@ from renderer.kernels import entry as kernels
 from renderer.kernels import packets as packet_kernels
 from renderer.kernels.shading import stack_size
 from renderer.layout.features import ALL, PACKETS, Feature
+from renderer.layout.sizes import BLOCK_PX
 from renderer.layout.structs import Ray, ViewData
 from renderer.tables.accelerators import STRUCTURES, Structure
 from renderer.tables.buffers import build_buffers
@@ -31,7 +32,6 @@ from tsar.types import FrameletBatch, SampleBatch
 _RANGE = 1024  # samples or pixels per launch without packets: few enough that threads end together
 _RANGE_CUDA = 1 << 18  # few enough that the rays waiting to be followed fit into memory
 _SECONDARY = "shadow_rays", "reflection_rays", "refraction_rays"
-_BLOCK_PX = 16  # as the kernels' order of pixels
 
 
 class Renderer:
@@ -172,7 +172,7 @@ class Renderer:
         view = self._view(width_px / height_px, min(width_px, height_px) * samples_per_axis)
         self._pose(view, float(time_s))
         shared = samples_per_axis, wp.float64(time_s), wp.from_torch(image, dtype=wp.vec3)
-        pixels = -(-width_px // _BLOCK_PX) * -(-height_px // _BLOCK_PX) * _BLOCK_PX**2
+        pixels = -(-width_px // BLOCK_PX) * -(-height_px // BLOCK_PX) * BLOCK_PX**2
         self._launch(self._kernels.render_pixels, view, shared, pixels)
         return image.cpu()
 

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from tsar.config import TsarConfig
 from tsar.haar import state_size
+from tsar.morton import node_number
 from tsar.types import FrameletBatch
 
 EMPTY = -1
@@ -42,7 +43,7 @@ class FrameletCache:
         self.index = torch.zeros(slots, dtype=torch.int64)
         self.time_s = torch.full((slots,), -torch.inf, dtype=torch.float64)
         self.dead = torch.ones(slots, dtype=torch.bool)
-        self.slot_of_node = torch.full((_node_id(self.level_max + 1, 0),), EMPTY, dtype=torch.int64)
+        self.slot_of_node = torch.full((node_number(self.level_max + 1, 0),), EMPTY, dtype=torch.int64)
 
     @property
     def occupied(self) -> Bool[Tensor, " slots"]:
@@ -52,7 +53,7 @@ class FrameletCache:
         self, level: Int64[Tensor, " n"], index: Int64[Tensor, " n"]
     ) -> tuple[Float[Tensor, "n state"], Bool[Tensor, " n"]]:
         """Wavelet state of the newest cached framelet of each tile, and whether there is one."""
-        slot = self.slot_of_node[_node_id(level, index)]
+        slot = self.slot_of_node[node_number(level, index)]
         return self.coefficients[slot.clamp(min=0)], slot != EMPTY
 
     def insert(
@@ -70,16 +71,11 @@ class FrameletCache:
         self.index[slot] = batch.index
         self.time_s[slot] = batch.times[:, 0].to(torch.float64)
         self.dead[slot] = False
-        self.slot_of_node[_node_id(batch.level, batch.index)] = slot
+        self.slot_of_node[node_number(batch.level, batch.index)] = slot
         return slot
 
     def _forget(self, slot: Int64[Tensor, " n"]) -> None:
         """Drop the look-up entries that still point at these slots (a newer framelet of the tile may have taken it)."""
         used = slot[self.level[slot] != EMPTY]
-        node = _node_id(self.level[used], self.index[used])
+        node = node_number(self.level[used], self.index[used])
         self.slot_of_node[node[self.slot_of_node[node] == used]] = EMPTY
-
-
-def _node_id(level, index):
-    """Dense number of a quadtree node: nodes of coarser levels first."""
-    return (4**level - 1) // 3 + index

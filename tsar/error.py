@@ -20,10 +20,11 @@ from tsar.choices import NORMS
 from tsar.config import ErrorConfig, TsarConfig
 from tsar.morton import morton_to_raster, raster_to_morton, tile_interval
 from tsar.roots import square_root
-from tsar.types import Errors, FrameletBatch
+from tsar.types import LUMINANCE, Errors, FrameletBatch
 
-_REC709 = (0.2126, 0.7152, 0.0722)
-_OCTAVES_OF_FULL_ERROR = 8.0
+OCTAVES_OF_FULL_ERROR = 8.0
+"""Ratio of signal and template, as a power of two, from which a signed difference is ±1."""
+
 _POWER_LEAST, _POWER_MOST = torch.finfo(torch.float32).tiny, 2.0**100
 
 RADIANCE_MAX = 1e30
@@ -99,7 +100,7 @@ def compressed_luminance(color: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n"]:
     display's encoding does. Negative luminance counts as black.
     """
     # no matrix product: some libraries round it differently by the number of threads
-    red, green, blue = (share * part for share, part in zip(_REC709, color.unbind(-1), strict=True))
+    red, green, blue = (share * part for share, part in zip(LUMINANCE, color.unbind(-1), strict=True))
     luminance = (red + green + blue).clamp(min=0.0)
     return square_root(luminance / (1.0 + luminance))
 
@@ -175,7 +176,7 @@ def signed_error(
     floor = torch.finfo(signal.dtype).tiny
     # float64, for the last digit of a logarithm depends on the processor
     octaves = torch.log2((signal.clamp(min=floor) / template).to(torch.float64)).to(signal.dtype)
-    return (octaves / _OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)
+    return (octaves / OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)
 
 
 def scatter_to_field(values: Float[Tensor, "k n p"], batch: FrameletBatch, config: TsarConfig) -> Float[Tensor, "k e"]:

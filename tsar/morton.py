@@ -37,6 +37,16 @@ def deinterleave(index: Int64[Tensor, "*n"]) -> tuple[Int64[Tensor, "*n"], Int64
     return pair[0], pair[1]
 
 
+def first_node(level):
+    """Nodes of all levels above one, a number or a tensor: nodes are numbered level after level from the coarsest."""
+    return (4**level - 1) // 3
+
+
+def node_number(level, index):
+    """Number of the node with a Morton index within its level."""
+    return first_node(level) + index
+
+
 def floor_log2(k: Int64[Tensor, "*n"]) -> Int64[Tensor, "*n"]:
     """``floor(log2 k)`` for ``1 <= k < 2^53``, exact: float64 holds such integers without rounding."""
     return torch.frexp(k.to(torch.float64)).exponent.to(torch.int64) - 1

@@ -23,8 +23,12 @@ from tsar.config import TsarConfig
 from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
 from tsar.types import SampleMap
 
-_SHIFT_CYCLES = 0.5
-_AGE_STEPS = 2.0**16
+SHIFT_CYCLES = 0.5
+"""What the temporal weight of a framelet is greater by than the cycles by which it is newer than the age field."""
+AGE_STEPS = 2.0**16
+"""Steps to a cycle that ages are rounded to before they are smoothed."""
+AGE_MOST = 1.0e6
+"""Greatest age, cycles."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ def blend(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstru
     newest = samples.newest_s
     reference = newest[torch.isfinite(newest)].max() if bool(torch.isfinite(newest).any()) else newest.new_zeros(())
     # Relative to the newest sample, in cycles: small numbers that float32 holds well.
-    age = ((newest - reference) / cycle_s).clamp(min=-1e6).to(torch.float32)
+    age = ((newest - reference) / cycle_s).clamp(min=-AGE_MOST).to(torch.float32)
     threshold = smooth_age(age, config.resolution_px, config.reconstruction.age_support_px)
     total = _Accumulator(config, threshold, cache, ((cache.time_s - reference) / cycle_s).to(torch.float32))
     for level in range(config.level_min, config.level_max + 1):
@@ -103,8 +107,8 @@ def smooth_age(newest: Float[Tensor, "side side"], resolution: int, support_px: 
     if support_px == 1:
         return pixels
     box = _box_matrix(resolution, newest.shape[0], support_px)
-    steps = (newest.to(torch.float64) * _AGE_STEPS).round()
-    return torch.minimum(pixels, (box @ steps @ box.T).to(torch.float32) / (_AGE_STEPS * support_px**2))
+    steps = (newest.to(torch.float64) * AGE_STEPS).round()
+    return torch.minimum(pixels, (box @ steps @ box.T).to(torch.float32) / (AGE_STEPS * support_px**2))
 
 
 @lru_cache(maxsize=8)
@@ -223,7 +227,7 @@ class _Accumulator:
     def _temporal_weight(self, slot: Int64[Tensor, " n"], threshold: Float[Tensor, "n p"]) -> Float[Tensor, "n p"]:
         """Cycles by which a framelet is newer than the age field, plus half a cycle; 0 where it is older."""
         newer = self.time[slot][:, None] - threshold
-        return torch.where(newer >= 0, newer + _SHIFT_CYCLES, 0.0)
+        return torch.where(newer >= 0, newer + SHIFT_CYCLES, 0.0)
 
     def normalised(self) -> Float[Tensor, "h w 3"]:
         """Divide by the weight; where nothing passed, fill from the surroundings."""

@@ -13,6 +13,9 @@ import torch
 from jaxtyping import Float, Float64, Int64
 from torch import Tensor
 
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Shares of linear red, green and blue in luminance, by Rec. 709."""
+
 
 @dataclass(frozen=True)
 class Tiling:

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 PHOTOGRAPHS = ("landscape_band.jpg", "sky.exr")
-_REC709 = np.array((0.2126, 0.7152, 0.0722))
 _LEAST_SIDE = 32
 _ROUNDING = 1e-18  # a constant picture has 1e-28 at most, one pixel of 2048² that is off by 1/255 has 3e-11
 _FIRST_BIN = 2
@@ -103,11 +102,12 @@ def spectrum_of(planes: Callable[[Floats], Floats], color: NDArray[np.float32], 
     import torch
 
     from tsar.error import compressed_luminance
+    from tsar.types import LUMINANCE
 
     compressed = compressed_luminance(torch.from_numpy(np.array(color))).numpy().astype(np.float64)
     power = radial_power(planes(compressed))
     slope, offset = fit_slope(power)
-    linear, _ = fit_slope(radial_power(planes(color.astype(np.float64) @ _REC709)))
+    linear, _ = fit_slope(radial_power(planes(color.astype(np.float64) @ LUMINANCE)))
     return Spectrum(power=power, slope=slope, offset=offset, slope_linear=linear, **names)
 
 

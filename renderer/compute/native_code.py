@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import warp as wp
+
+from renderer.compute import sizes
 
 _NATIVE = sorted(path for path in Path(__file__).resolve().parents[1].glob("*/native"))
 _QUIET = '#pragma clang diagnostic ignored "-Wpsabi"\n'
@@ -13,11 +16,28 @@ _QUIET = '#pragma clang diagnostic ignored "-Wpsabi"\n'
 code compiled for wider ones would call it differently. All of a module is compiled at once, for one processor."""
 
 
-def module_options(*headers: str) -> dict[str, Any]:
-    """Options of a Warp module whose kernels call functions of these headers."""
+def module_options(*headers: str, given: Mapping[str, float] | None = None) -> dict[str, Any]:
+    """Options of a Warp module whose kernels call functions of these headers.
+
+    Args:
+        headers: names of files in a room's ``native/``.
+        given: constants that the headers find in the namespace ``given``, beside those of
+            :mod:`renderer.compute.sizes`.
+    """
+    constants = declarations({**sizes.GIVEN, **(given or {})})
     build = wp.ModuleBuildOptions(
         extra_cpu_include_dirs=[str(folder) for folder in _NATIVE],
-        extra_cpu_preamble=_QUIET + "".join(f'#include "{header}"\n' for header in headers),
+        extra_cpu_preamble=_QUIET + constants + "".join(f'#include "{header}"\n' for header in headers),
         extra_build_dependencies=[str(header) for folder in _NATIVE for header in sorted(folder.glob("*.h"))],
     )
     return {"enable_backward": False, "extra_build_options": build}
+
+
+def declarations(given: Mapping[str, float]) -> str:
+    """C++ that declares constants: whole numbers as ``int``, others as ``float``."""
+    kinds = {True: ("int", ""), False: ("float", "f")}
+    lines = []
+    for name, value in given.items():
+        kind, suffix = kinds[isinstance(value, int)]
+        lines.append(f"constexpr {kind} {name} = {value!r}{suffix};\n")
+    return "namespace given {\n" + "".join(lines) + "}\n"

@@ -17,20 +17,18 @@ import torch
 from renderer.compute import device as devices
 from renderer.compute import team_kernels as kernels
 from renderer.compute.launching import Command, address
+from renderer.compute.sizes import MAIL_WORDS, Mail, State
 
 PATIENCE_US = 1000
 """How long a helper waits actively: longer than any pause between the launches of one cycle."""
-
-_STATE, _ANSWER, _REST = 0, 4, 5  # places in a mailbox, as in ``native/team.h``
-_PARKED = 3
 
 
 class _Helper:
     """A thread that runs one launch at a time for another."""
 
     def __init__(self, patience_us: int) -> None:
-        self._mail = np.zeros(16, np.int64)
-        self._mail[_STATE] = _PARKED
+        self._mail = np.zeros(MAIL_WORDS, np.int64)
+        self._mail[Mail.STATE] = State.PARKED
         where = address("mail", self._mail, torch.int64, len(self._mail))
         self._serve = Command(kernels.serve, where, patience_us)
         self._post, self._join = Command(kernels.post, where), Command(kernels.join, where)
@@ -45,22 +43,22 @@ class _Helper:
     def start(self, command: Command) -> None:
         """Hands a launch over; the command must not change until :meth:`finish`."""
         self._post(*command.entry)
-        if self._mail[_ANSWER]:
+        if self._mail[Mail.ANSWER]:
             self._wake.release()
 
     def finish(self, command: Command) -> None:
         """Waits for the launch, or runs it here if the helper has not begun."""
         self._join.launch()
-        if self._mail[_ANSWER]:
+        if self._mail[Mail.ANSWER]:
             command.launch()
 
     def rest(self) -> None:
         """Parks; returns when the thread has left the kernel, or does not within a second."""
-        self._mail[_REST] = 1
+        self._mail[Mail.REST] = 1
         until = time.monotonic() + 1.0
-        while self._mail[_STATE] != _PARKED and time.monotonic() < until:
+        while self._mail[Mail.STATE] != State.PARKED and time.monotonic() < until:
             time.sleep(1e-4)
-        self._mail[_REST] = 0
+        self._mail[Mail.REST] = 0
 
 
 class Team:

@@ -10,15 +10,15 @@ from renderer.compute.native_code import module_options
 wp.set_module_options(module_options("team.h"))
 
 
-@wp.func_native("team::serve(*(team::Mailbox*)mailbox, patience_us);")
+@wp.func_native("team::serve((long long*)mailbox, patience_us);")
 def native_serve(mailbox: Address, patience_us: wp.int64): ...
 
 
-@wp.func_native("team::post(*(team::Mailbox*)mailbox, function, bounds, arguments);")
+@wp.func_native("team::post((long long*)mailbox, function, bounds, arguments);")
 def native_post(mailbox: Address, function: wp.int64, bounds: wp.int64, arguments: wp.int64): ...
 
 
-@wp.func_native("team::join(*(team::Mailbox*)mailbox);")
+@wp.func_native("team::join((long long*)mailbox);")
 def native_join(mailbox: Address): ...
 
 

@@ -6,15 +6,9 @@ import warp as wp
 
 from renderer.kernels.randomness import PURPOSE_LENS, draw_2d
 from renderer.layout.features import Feature
-from renderer.layout.structs import CAMERA_PANORAMA, CAMERA_PARALLEL, Draw, SceneData, ViewData
-
-_LENS = wp.constant(int(Feature.LENS))
-_PARALLEL = wp.constant(int(Feature.PARALLEL))
-_PANORAMA = wp.constant(int(Feature.PANORAMA))
-_MOTION = wp.constant(int(Feature.MOTION))
-_KIND_PARALLEL = wp.constant(CAMERA_PARALLEL)
-_KIND_PANORAMA = wp.constant(CAMERA_PANORAMA)
-_PURPOSE_LENS = wp.constant(PURPOSE_LENS)
+from renderer.layout.kinds import CameraKind
+from renderer.layout.sizes import SLERP_ANGLE_LEAST
+from renderer.layout.structs import Draw, SceneData, ViewData
 
 
 @wp.func
@@ -22,8 +16,7 @@ def rotation_between(a: wp.quat, b: wp.quat, angle: wp.float32, fraction: wp.flo
     """Spherical interpolation; ``angle`` lies between the quaternions, radians."""
     weight_a = 1.0 - fraction
     weight_b = fraction
-    # below this the weights differ from the linear ones by less than float32 can tell
-    if angle > 1.0e-3:
+    if angle > SLERP_ANGLE_LEAST:
         inverse = 1.0 / wp.sin(angle)
         weight_a = wp.sin(weight_a * angle) * inverse
         weight_b = wp.sin(fraction * angle) * inverse
@@ -73,22 +66,22 @@ def camera_ray(features: wp.int32, scene: SceneData, view: ViewData, draw: Draw,
     y = (1.0 - 2.0 * position[1]) * view.tan_y
     start = wp.vec3(0.0, 0.0, 0.0)
     towards = wp.vec3(x, y, -1.0)
-    if (features & _LENS) != 0 and view.lens_radius > 0.0:
-        sample = draw_2d(draw, _PURPOSE_LENS)
+    if (features & Feature.LENS) != 0 and view.lens_radius > 0.0:
+        sample = draw_2d(draw, PURPOSE_LENS)
         radius = view.lens_radius * wp.sqrt(sample[0])
         turn = 2.0 * wp.pi * sample[1]
         start = wp.vec3(radius * wp.cos(turn), radius * wp.sin(turn), 0.0)
         towards = view.focal_distance * towards - start
-    if (features & _PARALLEL) != 0 and view.kind == _KIND_PARALLEL:
+    if (features & Feature.PARALLEL) != 0 and view.kind == CameraKind.PARALLEL:
         start = wp.vec3(x, y, 0.0)
         towards = wp.vec3(0.0, 0.0, -1.0)
-    if (features & _PANORAMA) != 0 and view.kind == _KIND_PANORAMA:
+    if (features & Feature.PANORAMA) != 0 and view.kind == CameraKind.PANORAMA:
         turn = 2.0 * wp.pi * (position[0] - 0.5)
         polar = wp.pi * position[1]
         towards = wp.vec3(wp.sin(turn) * wp.sin(polar), wp.cos(polar), -wp.cos(turn) * wp.sin(polar))
     origin = view.from_camera * start + view.from_camera_offset
     direction = view.from_camera * towards
-    if (features & _MOTION) != 0 and view.camera_track != 0:
+    if (features & Feature.MOTION) != 0 and view.camera_track != 0:
         rotation = track_rotation(scene, view, view.camera_track, time_s)
         origin = wp.quat_rotate(rotation, origin) + track_translation(scene, view, view.camera_track, time_s)
         direction = wp.quat_rotate(rotation, direction)

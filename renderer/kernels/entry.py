@@ -16,6 +16,7 @@ from renderer.kernels.packets import MODULE_OPTIONS
 from renderer.kernels.randomness import group_draw
 from renderer.kernels.shading import radiance
 from renderer.layout.features import ALL, Feature
+from renderer.layout.sizes import BLOCK_PX
 from renderer.layout.structs import Ray, SceneData, ViewData
 
 
@@ -103,13 +104,15 @@ def specialised(features: Feature) -> ShadingKernels:
         image: wp.array2d(dtype=wp.vec3),
     ):
         """Renders pixels, each the mean of a regular grid of ``samples`` squared samples, ``first`` counted like
-        threads: along the Morton curve within blocks of 16 x 16 pixels, those by rows."""
+        threads: along the Morton curve within blocks of ``BLOCK_PX`` squared pixels, those by rows."""
         pixel = first + wp.tid()
         height = image.shape[0]
         width = image.shape[1]
-        columns = (width + 15) / 16
-        column = ((pixel / 256) % columns) * 16 + every_second_bit(pixel % 256)
-        row = ((pixel / 256) / columns) * 16 + every_second_bit((pixel % 256) >> 1)
+        columns = (width + BLOCK_PX - 1) / BLOCK_PX
+        block = pixel / (BLOCK_PX * BLOCK_PX)
+        within = pixel % (BLOCK_PX * BLOCK_PX)
+        column = (block % columns) * BLOCK_PX + every_second_bit(within)
+        row = (block / columns) * BLOCK_PX + every_second_bit(within >> 1)
         if column < width and row < height:
             total = wp.vec3(0.0, 0.0, 0.0)
             leader = grid_position(column, row, 0, samples, width, height)

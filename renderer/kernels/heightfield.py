@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import warp as wp
 
+from renderer.layout.sizes import TINY
 from renderer.layout.structs import Hit, InstanceRecord, LevelRecord, LocalSurface, ReliefRecord, SceneData
 
-_TINY = wp.constant(1.0e-20)
 _SECANTS = wp.constant(32)  # at most; a few are enough where the sheet is smooth
 _FEWEST_STEPS = wp.constant(4)
 
@@ -127,7 +127,7 @@ def passage(relief: ReliefRecord, origin: wp.vec3, direction: wp.vec3, reach: wp
     far = wp.float32(reach)
     entered = wp.int32(-1)
     for axis in range(3):
-        if wp.abs(direction[axis]) > _TINY:
+        if wp.abs(direction[axis]) > TINY:
             a = (lower[axis] - origin[axis]) / direction[axis]
             b = (upper[axis] - origin[axis]) / direction[axis]
             far = wp.min(far, wp.max(a, b))
@@ -142,7 +142,7 @@ def passage(relief: ReliefRecord, origin: wp.vec3, direction: wp.vec3, reach: wp
         start[axis] = wp.clamp(start[axis], lower[axis], upper[axis])
         if entered == axis:
             start[axis] = wp.where(direction[axis] > 0.0, lower[axis], upper[axis])
-        if wp.abs(direction[axis]) > _TINY:
+        if wp.abs(direction[axis]) > TINY:
             leave = wp.where(direction[axis] > 0.0, upper[axis], lower[axis])
             way = wp.min(way, (leave - start[axis]) / direction[axis])
     if near > far:

@@ -8,33 +8,8 @@ from renderer.kernels.camera import track_rotation, track_translation
 from renderer.kernels.heightfield import relief_distance
 from renderer.kernels.shapes import cube_distance, meets_box, misses_sphere, plane_distance, reciprocal, sphere_distance
 from renderer.layout.features import Feature
-from renderer.layout.structs import (
-    SHAPE_CUBE,
-    SHAPE_DISK,
-    SHAPE_MESH,
-    SHAPE_RECTANGLE,
-    SHAPE_RELIEF,
-    SHAPE_SPHERE,
-    Hit,
-    InstanceRecord,
-    SceneData,
-    ViewData,
-)
-
-_MESH = wp.constant(SHAPE_MESH)
-_SPHERE = wp.constant(SHAPE_SPHERE)
-_DISK = wp.constant(SHAPE_DISK)
-_RECTANGLE = wp.constant(SHAPE_RECTANGLE)
-_CUBE = wp.constant(SHAPE_CUBE)
-_RELIEF = wp.constant(SHAPE_RELIEF)
-_HAS_MESH = wp.constant(int(Feature.MESH))
-_HAS_SPHERE = wp.constant(int(Feature.SPHERE))
-_HAS_FLAT = wp.constant(int(Feature.FLAT))
-_HAS_CUBE = wp.constant(int(Feature.CUBE))
-_HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
-_HAS_MOTION = wp.constant(int(Feature.MOTION))
-_HAS_WARP_TREES = wp.constant(int(Feature.WARP_TREES))
-
+from renderer.layout.kinds import Shape
+from renderer.layout.structs import Hit, InstanceRecord, SceneData, ViewData
 
 # On a GPU no mesh comes without a tree of Warp's, so that this is never called there.
 _NATIVE = """
@@ -89,8 +64,8 @@ def meet_instance(
     towards = towards / stretch
     reach = t_max * stretch
     t = wp.float32(-1.0)
-    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
-        if (features & _HAS_WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
+    if (features & Feature.MESH) != 0 and record.shape == Shape.MESH:
+        if (features & Feature.WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
             query = wp.mesh_query_ray(scene.meshes[record.mesh].id, start, towards, reach)
             if query.result:
                 t = query.t
@@ -103,13 +78,13 @@ def meet_instance(
             hit.u = found[1]
             hit.v = found[2]
             hit.face = wp.cast(found[3], wp.int32)
-    elif (features & _HAS_SPHERE) != 0 and record.shape == _SPHERE:
+    elif (features & Feature.SPHERE) != 0 and record.shape == Shape.SPHERE:
         t = sphere_distance(start, towards)
-    elif (features & _HAS_FLAT) != 0 and (record.shape == _DISK or record.shape == _RECTANGLE):
-        t = plane_distance(start, towards, record.shape == _DISK)
-    elif (features & _HAS_RELIEF) != 0 and record.shape == _RELIEF:
+    elif (features & Feature.FLAT) != 0 and (record.shape == Shape.DISK or record.shape == Shape.RECTANGLE):
+        t = plane_distance(start, towards, record.shape == Shape.DISK)
+    elif (features & Feature.HEIGHT_FIELD) != 0 and record.shape == Shape.RELIEF:
         t = relief_distance(scene, record, start, towards, reach)
-    elif (features & _HAS_CUBE) != 0 and record.shape == _CUBE:
+    elif (features & Feature.CUBE) != 0 and record.shape == Shape.CUBE:
         distance, face = cube_distance(start, towards)
         t = distance
         hit.face = face
@@ -130,12 +105,12 @@ def instance_blocks(
     t_max: wp.float32,
 ) -> wp.bool:
     """Whether an instance lies along a ray in track space before ``t_max``; any hit will do."""
-    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
+    if (features & Feature.MESH) != 0 and record.shape == Shape.MESH:
         start = record.to_local * origin + record.to_local_offset
         towards = record.to_local * direction
         stretch = wp.length(towards)
         reach = t_max * stretch
-        if (features & _HAS_WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
+        if (features & Feature.WARP_TREES) != 0 and scene.meshes[record.mesh].id != wp.uint64(0):
             return wp.mesh_query_ray_anyhit(scene.meshes[record.mesh].id, start, towards / stretch, reach)
         found = any_in_mesh(scene, record.mesh, start, towards / stretch, reach, view.work)
         return found[0] >= 0.0
@@ -162,7 +137,7 @@ def closest_hit(
         start = wp.vec3(origin[0], origin[1], origin[2])
         towards = wp.vec3(direction[0], direction[1], direction[2])
         missed = wp.bool(False)
-        if (features & _HAS_MOTION) != 0 and group.track != 0:
+        if (features & Feature.MOTION) != 0 and group.track != 0:
             start = origin - track_translation(scene, view, group.track, time_s)
             missed = misses_sphere(start, direction, group.radius, best.t)
             if not missed:
@@ -201,7 +176,7 @@ def occluded(
         start = wp.vec3(origin[0], origin[1], origin[2])
         towards = wp.vec3(direction[0], direction[1], direction[2])
         missed = wp.bool(False)
-        if (features & _HAS_MOTION) != 0 and group.track != 0:
+        if (features & Feature.MOTION) != 0 and group.track != 0:
             start = origin - track_translation(scene, view, group.track, time_s)
             missed = misses_sphere(start, direction, group.radius, t_max)
             if not missed:

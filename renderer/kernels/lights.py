@@ -8,38 +8,9 @@ from renderer.kernels.camera import track_rotation, track_translation
 from renderer.kernels.randomness import cone_direction
 from renderer.kernels.textures import image_bilinear_wrapped_around
 from renderer.layout.features import Feature
-from renderer.layout.structs import (
-    LIGHT_DIRECTIONAL,
-    LIGHT_ENVIRONMENT,
-    LIGHT_POINT,
-    LIGHT_QUAD,
-    LIGHT_SPHERE,
-    LIGHT_SPOT,
-    LIGHT_SUN_DISC,
-    LightRecord,
-    SceneData,
-    ViewData,
-)
-
-_POINT = wp.constant(LIGHT_POINT)
-_DIRECTIONAL = wp.constant(LIGHT_DIRECTIONAL)
-_SUN_DISC = wp.constant(LIGHT_SUN_DISC)
-_SPOT = wp.constant(LIGHT_SPOT)
-_QUAD = wp.constant(LIGHT_QUAD)
-_SPHERE = wp.constant(LIGHT_SPHERE)
-_ENVIRONMENT = wp.constant(LIGHT_ENVIRONMENT)
-_HAS_POINT = wp.constant(int(Feature.POINT))
-_HAS_DIRECTIONAL = wp.constant(int(Feature.DIRECTIONAL))
-_HAS_SUN_DISC = wp.constant(int(Feature.SUN_DISC))
-_HAS_SPOT = wp.constant(int(Feature.SPOT))
-_HAS_QUAD = wp.constant(int(Feature.QUAD))
-_HAS_SPHERE = wp.constant(int(Feature.SPHERE_LIGHT))
-_HAS_ENVIRONMENT = wp.constant(int(Feature.ENVIRONMENT))
-_HAS_MOTION = wp.constant(int(Feature.MOTION))
-_HAS_SKY = wp.constant(int(Feature.SKY))
-_FAR = wp.constant(1.0e30)
-# a shadow ray ends just short of its light, so that a lamp's own shape at that place does not count as an occluder
-_SHORT = wp.constant(0.9999)
+from renderer.layout.kinds import LightKind
+from renderer.layout.sizes import FAR, SHORT
+from renderer.layout.structs import LightRecord, SceneData, ViewData
 
 
 @wp.struct
@@ -54,7 +25,7 @@ class Arriving:
 @wp.func
 def has_extent(record: LightRecord) -> wp.bool:
     """Whether a light is seen in more than one direction, of which :func:`arriving_light` takes one."""
-    return record.kind != _POINT and record.kind != _DIRECTIONAL and record.kind != _SPOT
+    return record.kind != LightKind.POINT and record.kind != LightKind.DIRECTIONAL and record.kind != LightKind.SPOT
 
 
 @wp.func
@@ -65,7 +36,7 @@ def from_point(record: LightRecord, position: wp.vec3) -> Arriving:
     distance = wp.length(towards)
     light.direction = towards / distance
     light.irradiance = record.color / (distance * distance)
-    light.reach = distance * _SHORT
+    light.reach = distance * SHORT
     return light
 
 
@@ -85,7 +56,7 @@ def from_sun(record: LightRecord, sample: wp.vec2) -> Arriving:
     light = Arriving()
     light.direction = cone_direction(record.place, record.cos_inner, sample)
     light.irradiance = record.color
-    light.reach = _FAR
+    light.reach = FAR
     return light
 
 
@@ -101,7 +72,7 @@ def from_quad(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arrivi
     area_normal = 4.0 * wp.cross(record.across, record.along)
     facing = -wp.dot(area_normal, light.direction)
     light.irradiance = record.color * (wp.max(facing, 0.0) / squared)
-    light.reach = distance * _SHORT
+    light.reach = distance * SHORT
     return light
 
 
@@ -122,7 +93,7 @@ def from_sphere(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arri
     along = wp.dot(towards, light.direction)
     aside = towards - along * light.direction
     inside = wp.max(record.radius * record.radius - wp.dot(aside, aside), 0.0)
-    light.reach = (along - wp.sqrt(inside)) * _SHORT
+    light.reach = (along - wp.sqrt(inside)) * SHORT
     return light
 
 
@@ -173,7 +144,7 @@ def from_environment(scene: SceneData, sample: wp.vec2) -> Arriving:
     density = row_chance * column_chance * wp.float32(width * height)
     radiance = map_radiance(scene, scene.lighting_level, scene.lighting_to_map, scene.lighting_scale, light.direction)
     light.irradiance = radiance * (solid_angle / density)
-    light.reach = _FAR
+    light.reach = FAR
     return light
 
 
@@ -192,29 +163,31 @@ def arriving_light(
     Of a light with an extent ``sample``, in [0, 1)², picks a point; the irradiance is then such that its mean over
     even samples, weighed by the cosine of each, is the light's.
     """
-    if (features & _HAS_POINT) != 0 and record.kind == _POINT:
+    if (features & Feature.POINT) != 0 and record.kind == LightKind.POINT:
         return from_point(record, position)
-    if (features & _HAS_SPOT) != 0 and record.kind == _SPOT:
+    if (features & Feature.SPOT) != 0 and record.kind == LightKind.SPOT:
         return from_spot(record, position)
-    if (features & _HAS_SUN_DISC) != 0 and record.kind == _SUN_DISC:
+    if (features & Feature.SUN_DISC) != 0 and record.kind == LightKind.SUN_DISC:
         return from_sun(record, sample)
-    if (features & _HAS_ENVIRONMENT) != 0 and record.kind == _ENVIRONMENT:
+    if (features & Feature.ENVIRONMENT) != 0 and record.kind == LightKind.ENVIRONMENT:
         return from_environment(scene, sample)
     light = Arriving()
-    if (features & _HAS_DIRECTIONAL) != 0 and record.kind == _DIRECTIONAL:
+    if (features & Feature.DIRECTIONAL) != 0 and record.kind == LightKind.DIRECTIONAL:
         light.direction = record.place
         light.irradiance = record.color
-        light.reach = _FAR
-    if (features & (_HAS_QUAD | _HAS_SPHERE)) != 0 and (record.kind == _QUAD or record.kind == _SPHERE):
+        light.reach = FAR
+    if (features & (Feature.QUAD | Feature.SPHERE_LIGHT)) != 0 and (
+        record.kind == LightKind.QUAD or record.kind == LightKind.SPHERE
+    ):
         start = wp.vec3(position[0], position[1], position[2])
         rotation = wp.quat(0.0, 0.0, 0.0, 1.0)
-        moves = (features & _HAS_MOTION) != 0 and record.track != 0
+        moves = (features & Feature.MOTION) != 0 and record.track != 0
         if moves:
             rotation = track_rotation(scene, view, record.track, time_s)
             start = wp.quat_rotate_inv(rotation, position - track_translation(scene, view, record.track, time_s))
-        if (features & _HAS_QUAD) != 0 and record.kind == _QUAD:
+        if (features & Feature.QUAD) != 0 and record.kind == LightKind.QUAD:
             light = from_quad(record, sample, start)
-        if (features & _HAS_SPHERE) != 0 and record.kind == _SPHERE:
+        if (features & Feature.SPHERE_LIGHT) != 0 and record.kind == LightKind.SPHERE:
             light = from_sphere(record, sample, start)
         if moves:
             light.direction = wp.quat_rotate(rotation, light.direction)
@@ -224,6 +197,6 @@ def arriving_light(
 @wp.func
 def environment_radiance(features: wp.int32, scene: SceneData, direction: wp.vec3) -> wp.vec3:
     """Radiance that is seen at infinity along a unit world direction."""
-    if (features & _HAS_SKY) == 0 or scene.environment_level < 0:
+    if (features & Feature.SKY) == 0 or scene.environment_level < 0:
         return wp.vec3(0.0, 0.0, 0.0)
     return map_radiance(scene, scene.environment_level, scene.environment_to_map, scene.environment_scale, direction)

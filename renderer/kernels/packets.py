@@ -12,14 +12,10 @@ import warp as wp
 
 from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
+from renderer.compute.sizes import LANES
+from renderer.layout import sizes
 from renderer.layout.features import PACKETS, Feature
 from renderer.layout.structs import SceneData, ViewData
-
-LANES = wp.constant(16)
-"""Samples a kernel thread handles, as in ``native/lanes.h``."""
-
-NODE_FLOATS, BLOCK_FLOATS = 64, 40
-"""Sizes of a tree's records in units of four bytes, as in ``native/tree.h``."""
 
 
 @wp.struct
@@ -42,7 +38,7 @@ def suffice_for(features: Feature) -> bool:
     return features | PACKETS == PACKETS
 
 
-MODULE_OPTIONS = module_options("queries.h", "samples.h")
+MODULE_OPTIONS = module_options("queries.h", "samples.h", given=sizes.GIVEN)
 wp.set_module_options(MODULE_OPTIONS)
 
 

@@ -24,19 +24,10 @@ from renderer.kernels.randomness import (
 from renderer.kernels.surface import surface_at
 from renderer.kernels.textures import texture_color
 from renderer.layout.features import Feature
+from renderer.layout.sizes import ABOVE_LEAST, FAR, SLANT_LEAST
 from renderer.layout.structs import Draw, MaterialRecord, Ray, SceneData, Surface, ViewData
 
-_FAR = wp.constant(1.0e30)
-_REFLECT = wp.constant(PURPOSE_REFLECT)
-_REFRACT = wp.constant(PURPOSE_REFRACT)
-_LIGHT = wp.constant(PURPOSE_LIGHT)
-_HIGHLIGHT = wp.constant(int(Feature.HIGHLIGHT))
-_MIRROR = wp.constant(int(Feature.MIRROR))
-_GLOSSY = wp.constant(int(Feature.GLOSSY))
-_GLASS = wp.constant(int(Feature.GLASS))
-_MANY_RAYS = wp.constant(int(Feature.MANY_RAYS))
 _EXTENDED = wp.constant(int(Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT))
-_ALL_CELLS = wp.constant(int(Feature.ALL_CELLS))
 
 
 @wp.func
@@ -65,22 +56,22 @@ def direct_light(
         if extended:
             extended = has_extent(record)
         cells = wp.int32(1)
-        if (features & _ALL_CELLS) != 0 and extended:
+        if (features & Feature.ALL_CELLS) != 0 and extended:
             cells = scene.light_cells
         sample = wp.vec2(0.0, 0.0)
         if extended and cells == 1:
-            sample = draw_2d(draw, _LIGHT + light)
+            sample = draw_2d(draw, PURPOSE_LIGHT + light)
         share = 1.0 / wp.float32(cells * cells)
         for cell in range(cells * cells):
             if cells > 1:
-                sample = cell_2d(draw, _LIGHT + light, cell, cells)
+                sample = cell_2d(draw, PURPOSE_LIGHT + light, cell, cells)
             arriving = arriving_light(features, scene, view, time_s, record, sample, start)
             towards = arriving.direction
             cosine = wp.dot(surface.normal, towards)
             # light from behind the true surface must not leak in over a smooth normal
             if cosine > 0.0 and wp.dot(surface.geometric_normal, towards) > 0.0 and wp.max(arriving.irradiance) > 0.0:
                 reflected = albedo * (cosine / wp.pi)
-                if (features & _HIGHLIGHT) != 0:
+                if (features & Feature.HIGHLIGHT) != 0:
                     lobe = wp.max(wp.dot(mirrored, towards), 0.0)
                     gloss = wp.pow(lobe, material.exponent) * (material.exponent + 2.0) * (0.5 / wp.pi)
                     reflected = reflected + material.specular * gloss
@@ -94,8 +85,8 @@ def direct_light(
 def above(towards: wp.vec3, normal: wp.vec3) -> wp.vec3:
     """A direction kept above a surface, where a smooth normal or the spread of rays would send it below."""
     height = wp.dot(towards, normal)
-    if height < 1.0e-4:
-        towards = towards + (1.0e-4 - height) * normal
+    if height < ABOVE_LEAST:
+        towards = towards + (ABOVE_LEAST - height) * normal
     return wp.normalize(towards)
 
 
@@ -124,10 +115,10 @@ def sent_by(
     direction: wp.vec3,
 ) -> Sent:
     """What leaves a surface along the perfect directions."""
-    if (features & _GLASS) != 0 and material.transmission >= 0:
+    if (features & Feature.GLASS) != 0 and material.transmission >= 0:
         return sent_by_glass(features, scene, surface, material, cosine, footprint, direction)
     sent = Sent()
-    if (features & _MIRROR) != 0:
+    if (features & Feature.MIRROR) != 0:
         sent.reflection = material.mirror_tint * fresnel(material, cosine)
         if material.mirror >= 0:
             color = texture_color(features, scene, material.mirror, surface.uv, footprint)
@@ -148,13 +139,13 @@ def sent_on(
     purpose: wp.int32,
 ) -> Ray:
     """One of the ``rays`` that go on about a perfect direction: up for reflection, down for refraction."""
-    side = wp.where(purpose == _REFLECT, 1.0, -1.0)
+    side = wp.where(purpose == PURPOSE_REFLECT, 1.0, -1.0)
     normal = side * surface.geometric_normal
     child = Ray()
     child.draw = branched(ray.draw, number, rays, purpose)
     child.start = surface.position + surface.offset * normal
     child.towards = perfect
-    if (features & _GLOSSY) != 0 and material.cos_spread < 1.0:
+    if (features & Feature.GLOSSY) != 0 and material.cos_spread < 1.0:
         spread = cone_direction(perfect, material.cos_spread, draw_2d(child.draw, purpose))
         child.towards = above(spread, normal)
     child.weight = weight
@@ -188,7 +179,7 @@ def leave_waiting(
 @wp.func
 def bundle_size(features: wp.int32, material: MaterialRecord, ray: Ray, rays: wp.int32) -> wp.int32:
     """Rays to send about a perfect direction: several at the first surface, where it spreads them."""
-    if (features & _MANY_RAYS) != 0 and ray.bounces == 0 and material.cos_spread < 1.0:
+    if (features & Feature.MANY_RAYS) != 0 and ray.bounces == 0 and material.cos_spread < 1.0:
         return rays
     return 1
 
@@ -212,7 +203,7 @@ def left_by(
         glow = glow + surface.emission
     if material.diffuse >= 0:
         albedo = texture_color(features, scene, material.diffuse, surface.uv, footprint)
-        if (features & _MIRROR) != 0:
+        if (features & Feature.MIRROR) != 0:
             albedo = albedo * (1.0 - fresnel(material, cosine))
         lit, rays = direct_light(features, scene, view, time_s, ray.draw, surface, material, albedo, ray.towards)
         shadow_rays = rays
@@ -247,7 +238,7 @@ def radiance(
     alive = wp.bool(True)
     while alive:
         alive = False
-        hit = closest_hit(features, scene, view, time_s, ray.start, ray.towards, _FAR)
+        hit = closest_hit(features, scene, view, time_s, ray.start, ray.towards, FAR)
         if hit.instance < 0:
             total = total + wp.cw_mul(ray.weight, environment_radiance(features, scene, ray.towards))
         else:
@@ -255,20 +246,31 @@ def radiance(
             material = scene.materials[surface.material]
             ray.travelled = ray.travelled + hit.t
             cosine = -wp.dot(surface.normal, ray.towards)
-            slant = wp.max(wp.abs(wp.dot(surface.geometric_normal, ray.towards)), 1.0e-4)
+            slant = wp.max(wp.abs(wp.dot(surface.geometric_normal, ray.towards)), SLANT_LEAST)
             footprint = (view.width + view.spread * ray.travelled) / slant * surface.uv_density
             glow, rays = left_by(features, scene, view, time_s, surface, material, ray, cosine, footprint)
             counts[0] = counts[0] + rays
             total = total + wp.cw_mul(ray.weight, glow)
-            if (features & _MIRROR) != 0 and ray.bounces < scene.depth:
+            if (features & Feature.MIRROR) != 0 and ray.bounces < scene.depth:
                 sent = sent_by(features, scene, surface, material, cosine, footprint, ray.towards)
                 weight = wp.cw_mul(ray.weight, sent.refraction)
-                if (features & _GLASS) != 0 and wp.max(weight) > scene.throughput_cutoff:
+                if (features & Feature.GLASS) != 0 and wp.max(weight) > scene.throughput_cutoff:
                     rays = bundle_size(features, material, ray, scene.refraction_rays)
                     weight = weight / wp.float32(rays)
                     counts[2] = counts[2] + rays
                     waiting = leave_waiting(
-                        features, surface, material, ray, sent.through, weight, 0, rays, _REFRACT, stack, row, waiting
+                        features,
+                        surface,
+                        material,
+                        ray,
+                        sent.through,
+                        weight,
+                        0,
+                        rays,
+                        PURPOSE_REFRACT,
+                        stack,
+                        row,
+                        waiting,
                     )
                 weight = wp.cw_mul(ray.weight, sent.reflection)
                 if wp.max(weight) > scene.throughput_cutoff:
@@ -276,13 +278,24 @@ def radiance(
                     weight = weight / wp.float32(rays)
                     counts[1] = counts[1] + rays
                     mirrored = mirror_direction(surface, ray.towards)
-                    if (features & _MANY_RAYS) != 0:
+                    if (features & Feature.MANY_RAYS) != 0:
                         waiting = leave_waiting(
-                            features, surface, material, ray, mirrored, weight, 1, rays, _REFLECT, stack, row, waiting
+                            features,
+                            surface,
+                            material,
+                            ray,
+                            mirrored,
+                            weight,
+                            1,
+                            rays,
+                            PURPOSE_REFLECT,
+                            stack,
+                            row,
+                            waiting,
                         )
-                    ray = sent_on(features, surface, material, ray, mirrored, weight, 0, rays, _REFLECT)
+                    ray = sent_on(features, surface, material, ray, mirrored, weight, 0, rays, PURPOSE_REFLECT)
                     alive = True
-        if (features & (_GLASS | _MANY_RAYS)) != 0 and not alive and waiting > 0:
+        if (features & (Feature.GLASS | Feature.MANY_RAYS)) != 0 and not alive and waiting > 0:
             waiting = waiting - 1
             ray = stack[row, waiting]
             alive = True

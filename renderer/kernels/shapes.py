@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import warp as wp
 
-_TINY = wp.constant(1.0e-20)
+from renderer.layout.sizes import FAR, SPHERE_SLACK, TINY
 
 
 @wp.func
 def reciprocal(direction: wp.vec3) -> wp.vec3:
     """Component-wise 1 / x, large but finite for zero so that slab tests meet no NaN."""
-    x = wp.where(wp.abs(direction[0]) > _TINY, direction[0], _TINY)
-    y = wp.where(wp.abs(direction[1]) > _TINY, direction[1], _TINY)
-    z = wp.where(wp.abs(direction[2]) > _TINY, direction[2], _TINY)
+    x = wp.where(wp.abs(direction[0]) > TINY, direction[0], TINY)
+    y = wp.where(wp.abs(direction[1]) > TINY, direction[1], TINY)
+    z = wp.where(wp.abs(direction[2]) > TINY, direction[2], TINY)
     return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
 
 
@@ -72,8 +72,8 @@ def plane_distance(origin: wp.vec3, direction: wp.vec3, disk: wp.bool) -> wp.flo
 def cube_distance(origin: wp.vec3, direction: wp.vec3):
     """Distance to the cube [-1, 1]³ (negative for none) and its face: axis, plus 3 for the negative side."""
     inverse = reciprocal(direction)
-    near = wp.float32(-1.0e30)
-    far = wp.float32(1.0e30)
+    near = wp.float32(-FAR)
+    far = wp.float32(FAR)
     near_face = wp.int32(0)
     far_face = wp.int32(0)
     for axis in range(3):
@@ -103,4 +103,4 @@ def misses_sphere(from_center: wp.vec3, direction: wp.vec3, radius: wp.float32, 
         return False
     nearest = from_center - b * direction
     # the slack covers what rounding takes from a far start
-    return b > 0.0 or -b - radius > t_max or wp.dot(nearest, nearest) > radius * radius + 4.0e-6 * squared
+    return b > 0.0 or -b - radius > t_max or wp.dot(nearest, nearest) > radius * radius + SPHERE_SLACK * squared

@@ -7,33 +7,9 @@ import warp as wp
 from renderer.kernels.camera import track_rotation, track_translation
 from renderer.kernels.heightfield import relief_surface
 from renderer.layout.features import Feature
-from renderer.layout.structs import (
-    SHAPE_DISK,
-    SHAPE_MESH,
-    SHAPE_RECTANGLE,
-    SHAPE_RELIEF,
-    SHAPE_SPHERE,
-    Hit,
-    InstanceRecord,
-    LocalSurface,
-    SceneData,
-    Surface,
-    ViewData,
-)
-
-_MESH = wp.constant(SHAPE_MESH)
-_SPHERE = wp.constant(SHAPE_SPHERE)
-_DISK = wp.constant(SHAPE_DISK)
-_RECTANGLE = wp.constant(SHAPE_RECTANGLE)
-_RELIEF = wp.constant(SHAPE_RELIEF)
-_HAS_MESH = wp.constant(int(Feature.MESH))
-_HAS_SPHERE = wp.constant(int(Feature.SPHERE))
-_HAS_FLAT = wp.constant(int(Feature.FLAT))
-_HAS_RELIEF = wp.constant(int(Feature.HEIGHT_FIELD))
-_HAS_MOTION = wp.constant(int(Feature.MOTION))
-
-# Eight units in the last place of float32: a hit is carried through two transforms of some roundings each.
-_OFFSET = wp.constant(1.0e-6)
+from renderer.layout.kinds import Shape
+from renderer.layout.sizes import EDGE_ON, OFFSET, PATCH_LEAST, RING_LEAST, SMOOTH_LEAST
+from renderer.layout.structs import Hit, InstanceRecord, LocalSurface, SceneData, Surface, ViewData
 
 
 @wp.func
@@ -58,7 +34,7 @@ def mesh_surface(scene: SceneData, record: InstanceRecord, hit: Hit) -> LocalSur
             + scene.normals[mesh.first_normal + face[1]] * hit.v
             + scene.normals[mesh.first_normal + face[2]] * w
         )
-        if wp.dot(smooth, smooth) > 1.0e-12:
+        if wp.dot(smooth, smooth) > SMOOTH_LEAST:
             local.normal = smooth
     if mesh.first_uv >= 0:
         uv_a = scene.uvs[mesh.first_uv + face[0]]
@@ -82,7 +58,7 @@ def sphere_surface(point: wp.vec3) -> LocalSurface:
     turn = wp.atan2(p[1], p[0]) * (0.5 / wp.pi)
     local.uv = wp.vec2(turn - wp.floor(turn), 1.0 - wp.acos(wp.clamp(p[2], -1.0, 1.0)) / wp.pi)
     # away from the poles: tangents of unit length
-    ring = wp.max(wp.sqrt(p[0] * p[0] + p[1] * p[1]), 1.0e-3)
+    ring = wp.max(wp.sqrt(p[0] * p[0] + p[1] * p[1]), RING_LEAST)
     local.tangent_u = wp.vec3(-p[1], p[0], 0.0) / ring
     local.tangent_v = wp.cross(p, local.tangent_u)
     local.uv_area = 1.0 / (2.0 * wp.pi * wp.pi * ring)
@@ -116,13 +92,13 @@ def local_surface(
     features: wp.int32, scene: SceneData, record: InstanceRecord, hit: Hit, point: wp.vec3
 ) -> LocalSurface:
     """The hit in the unit space of its shape; ``point`` is the hit along the ray, snapped onto the shape here."""
-    if (features & _HAS_MESH) != 0 and record.shape == _MESH:
+    if (features & Feature.MESH) != 0 and record.shape == Shape.MESH:
         return mesh_surface(scene, record, hit)
-    if (features & _HAS_SPHERE) != 0 and record.shape == _SPHERE:
+    if (features & Feature.SPHERE) != 0 and record.shape == Shape.SPHERE:
         return sphere_surface(point)
-    if (features & _HAS_RELIEF) != 0 and record.shape == _RELIEF:
+    if (features & Feature.HEIGHT_FIELD) != 0 and record.shape == Shape.RELIEF:
         return relief_surface(scene, record, hit, point)
-    if (features & _HAS_FLAT) != 0 and (record.shape == _DISK or record.shape == _RECTANGLE):
+    if (features & Feature.FLAT) != 0 and (record.shape == Shape.DISK or record.shape == Shape.RECTANGLE):
         return flat_surface(wp.vec3(point[0], point[1], 0.0), 2, 1.0)
     axis = hit.face % 3
     side = wp.where(hit.face < 3, 1.0, -1.0)
@@ -160,7 +136,7 @@ def surface_at(
     translation = wp.vec3(0.0, 0.0, 0.0)
     rotation = wp.quat(0.0, 0.0, 0.0, 1.0)
     point = origin + hit.t * direction
-    if (features & _HAS_MOTION) != 0 and record.track != 0:
+    if (features & Feature.MOTION) != 0 and record.track != 0:
         translation = track_translation(scene, view, record.track, time_s)
         rotation = track_rotation(scene, view, record.track, time_s)
         point = wp.quat_rotate_inv(rotation, point - translation)
@@ -171,7 +147,7 @@ def surface_at(
     patch = wp.length(wp.cross(record.from_local * local.tangent_u, record.from_local * local.tangent_v))
     position = record.from_local * local.position + record.from_local_offset
     magnitude = record.extent
-    if (features & _HAS_MOTION) != 0 and record.track != 0:
+    if (features & Feature.MOTION) != 0 and record.track != 0:
         magnitude = magnitude + greatest(position) + greatest(translation)
         position = wp.quat_rotate(rotation, position) + translation
         geometric = wp.quat_rotate(rotation, geometric)
@@ -185,12 +161,12 @@ def surface_at(
         shading = -shading
     # a smooth normal that faces away from the viewer is bent back until it is seen edge-on
     away = wp.dot(shading, direction)
-    if away > -1.0e-3:
-        shading = wp.normalize(shading - (away + 1.0e-3) * direction)
+    if away > -EDGE_ON:
+        shading = wp.normalize(shading - (away + EDGE_ON) * direction)
     surface.normal = shading
     surface.uv = local.uv
-    surface.uv_density = wp.sqrt(local.uv_area / wp.max(patch, 1.0e-30))
-    surface.offset = (magnitude + greatest(position)) * _OFFSET
+    surface.uv_density = wp.sqrt(local.uv_area / wp.max(patch, PATCH_LEAST))
+    surface.offset = (magnitude + greatest(position)) * OFFSET
     surface.emission = record.emission
     surface.material = record.material
     if record.material < 0:

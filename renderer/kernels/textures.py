@@ -5,26 +5,9 @@ from __future__ import annotations
 import warp as wp
 
 from renderer.layout.features import Feature
-from renderer.layout.structs import (
-    FILTER_MIPMAP,
-    FILTER_NEAREST,
-    TEXTURE_CHECKERBOARD,
-    TEXTURE_CONSTANT,
-    WRAP_BLACK,
-    WRAP_REPEAT,
-    LevelRecord,
-    SceneData,
-    TextureRecord,
-)
-
-_CONSTANT = wp.constant(TEXTURE_CONSTANT)
-_CHECKERBOARD = wp.constant(TEXTURE_CHECKERBOARD)
-_REPEAT = wp.constant(WRAP_REPEAT)
-_BLACK = wp.constant(WRAP_BLACK)
-_NEAREST = wp.constant(FILTER_NEAREST)
-_MIPMAP = wp.constant(FILTER_MIPMAP)
-_HAS_IMAGE = wp.constant(int(Feature.IMAGE))
-_HAS_CHECKERBOARD = wp.constant(int(Feature.CHECKERBOARD))
+from renderer.layout.kinds import Filter, TextureKind, Wrap
+from renderer.layout.sizes import TEXELS_MOST, UV_LEAST, UV_MOST
+from renderer.layout.structs import LevelRecord, SceneData, TextureRecord
 
 
 @wp.func
@@ -32,12 +15,12 @@ def wrapped(index: wp.int32, count: wp.int32, wrap: wp.int32) -> wp.int32:
     """Texel index inside ``0..count - 1``, or negative where the texture is black."""
     if index >= 0 and index < count:
         return index
-    if wrap == _REPEAT:
+    if wrap == Wrap.REPEAT:
         rest = index % count
         if rest < 0:
             rest = rest + count
         return rest
-    if wrap == _BLACK:
+    if wrap == Wrap.BLACK:
         return -1
     return wp.clamp(index, 0, count - 1)
 
@@ -74,7 +57,7 @@ def image_bilinear_wrapped_around(scene: SceneData, index: wp.int32, u: wp.float
     level = scene.levels[index]
     x = (u - wp.floor(u)) * wp.float32(level.width)
     y = v * wp.float32(level.height)
-    return bilinear(scene, level, x, y, _REPEAT, _REPEAT + 1)
+    return bilinear(scene, level, x, y, Wrap.REPEAT, Wrap.CLAMP)
 
 
 @wp.func
@@ -95,22 +78,21 @@ def image_lookup(scene: SceneData, record: TextureRecord, uv: wp.vec2, footprint
     """
     u = uv[0] * record.uv_scale[0] + record.uv_offset[0]
     v = uv[1] * record.uv_scale[1] + record.uv_offset[1]
-    if record.wrap == _REPEAT:
+    if record.wrap == Wrap.REPEAT:
         # before scaling to texels, so that far repetitions keep their precision
         u = u - wp.floor(u)
         v = v - wp.floor(v)
     else:
-        # far outside only the border is seen, and the texel index must stay within int32
-        u = wp.clamp(u, -8.0, 9.0)
-        v = wp.clamp(v, -8.0, 9.0)
-    if record.filter == _NEAREST:
+        u = wp.clamp(u, UV_LEAST, UV_MOST)
+        v = wp.clamp(v, UV_LEAST, UV_MOST)
+    if record.filter == Filter.NEAREST:
         level = scene.levels[record.first_level]
         column = wrapped(wp.int32(wp.floor(u * wp.float32(level.width))), level.width, record.wrap)
         row = wrapped(wp.int32(wp.floor((1.0 - v) * wp.float32(level.height))), level.height, record.wrap)
         return texel(scene, level, column, row)
     detail = wp.float32(0.0)
-    if record.filter == _MIPMAP:
-        detail = wp.log2(wp.clamp(footprint_uv * record.texel_scale, 1.0, 1.0e9))
+    if record.filter == Filter.MIPMAP:
+        detail = wp.log2(wp.clamp(footprint_uv * record.texel_scale, 1.0, TEXELS_MOST))
         detail = wp.min(detail, wp.float32(record.level_count - 1))
     first = wp.int32(detail)
     blend = detail - wp.float32(first)
@@ -127,13 +109,13 @@ def texture_color(
     """Colour of a texture; descends through checkerboards to the constant or image below."""
     record = scene.textures[texture]
     tint = record.value
-    while (features & _HAS_CHECKERBOARD) != 0 and record.kind == _CHECKERBOARD:
+    while (features & Feature.CHECKERBOARD) != 0 and record.kind == TextureKind.CHECKERBOARD:
         square = wp.floor(uv[0] * record.uv_scale[0]) + wp.floor(uv[1] * record.uv_scale[1])
         if square - 2.0 * wp.floor(square * 0.5) == 0.0:
             record = scene.textures[record.even]
         else:
             record = scene.textures[record.odd]
         tint = wp.cw_mul(tint, record.value)
-    if (features & _HAS_IMAGE) != 0 and record.kind != _CONSTANT:
+    if (features & Feature.IMAGE) != 0 and record.kind != TextureKind.CONSTANT:
         tint = wp.cw_mul(tint, image_lookup(scene, record, uv, footprint_uv))
     return tint

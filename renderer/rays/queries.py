@@ -10,12 +10,12 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.compute.launching import shared
+from renderer.compute.sizes import LANES
 from renderer.kernels import packets
+from renderer.layout.sizes import FAR
 from renderer.tables.trees import aligned, build_tree
 
 _RANGE_RAYS = 1 << 14
-FAR = 1.0e30
-"""How far a ray reaches that has no end of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class RayQueries:
         rays.t, rays.u, rays.v = (shared(part, wp.float32) for part in (hits.t, hits.u, hits.v))
 
         def run(first: int) -> None:
-            dim = -(-min(_RANGE_RAYS, count - first) // packets.LANES)
+            dim = -(-min(_RANGE_RAYS, count - first) // LANES)
             wp.launch(packets.trace_queries, dim=dim, inputs=[rays, first, int(nearest)], device="cpu")
 
         for _ in (map if self._pool is None else self._pool.map)(run, range(0, count, _RANGE_RAYS)):

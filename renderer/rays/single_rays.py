@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.compute import device as devices
 from renderer.compute.launching import shared
 from renderer.kernels import packets
+from renderer.layout.sizes import FAR
 from renderer.layout.structs import MeshRecord, SceneData
-from renderer.rays.queries import FAR, RayHits
-from renderer.tables.accelerators import STRUCTURES, Structure, build_structure
+from renderer.rays.queries import RayHits
+from renderer.tables.accelerators import Structure, build_structure, number_of
 from renderer.tables.trees import aligned
 
 _RANGE_RAYS = 1 << 12
@@ -54,7 +55,7 @@ class SingleRays:
         record = np.zeros(1, MeshRecord.numpy_dtype())
         record["face_count"] = len(corners)
         self._scene = SceneData()
-        self._scene.structure = STRUCTURES.index(structure)
+        self._scene.structure = number_of(structure)
         self._scene.meshes = wp.array(record, dtype=MeshRecord, device="cpu")
         self._scene.tree_blocks = shared(aligned(self.blocks), wp.float32)
         if self.nodes is not None:

@@ -60,43 +60,12 @@ class DisplayPlan:
     """int32, per slot."""
 
 
-@wp.func_native("""
-    const long long *l = (const long long*)level, *at = (const long long*)index;
-    const double* t = (const double*)time_s;
-    double* newest = (double*)plan.node_time;
-    int* from = (int*)plan.node_level;
-    const int last = ((1 << (2 * plan.level_high + 2)) - 1) / 3;
-    for (int node = 0; node < last; ++node) newest[node] = -INFINITY;
-    for (int i = 0; i < slots; ++i) {
-        if (l[i] < 0) continue;
-        const long long node = ((1ll << (2 * l[i])) - 1) / 3 + at[i];
-        newest[node] = wp::max(newest[node], t[i]);
-    }
-    for (int here = plan.level_low; here <= plan.level_high; ++here) {
-        const int base = ((1 << (2 * here)) - 1) / 3, above = ((1 << (2 * here - 2)) - 1) / 3;
-        const bool top = here == plan.level_low;
-        for (int i = 0; i < 1 << (2 * here); ++i) {
-            const double inherited = top ? -INFINITY : newest[above + i / 4];
-            const bool own = newest[base + i] >= inherited & newest[base + i] > -INFINITY;
-            from[base + i] = (own | top) ? here : from[above + i / 4];
-            newest[base + i] = wp::max(newest[base + i], inherited);
-        }
-    }
-    const int side = 1 << plan.level_high, base = ((1 << (2 * plan.level_high)) - 1) / 3;
-    double *map = (double*)newest_s, reference = -INFINITY;
-    long long* source = (long long*)newest_level;
-    for (int i = 0; i < side * side; ++i) {
-        int x = 0, y = 0;
-        for (int bit = 0; bit < 9; ++bit) {  // unrolled, and so vectorised; no level is finer
-            x |= ((i >> (2 * bit)) & 1) << bit;
-            y |= ((i >> (2 * bit + 1)) & 1) << bit;
-        }
-        map[y * side + x] = newest[base + i];
-        source[y * side + x] = from[base + i];
-        reference = wp::max(reference, newest[base + i]);
-    }
-    return reference > -INFINITY ? reference : 0.0;
-""")
+@wp.func_native(
+    """
+    return display::map_newest(plan, slots, (const long long*)level, (const long long*)index, (const double*)time_s,
+                               (double*)newest_s, (long long*)newest_level);
+    """
+)
 def map_newest(
     plan: DisplayPlan,
     slots: wp.int32,
@@ -110,68 +79,18 @@ def map_newest(
     ...
 
 
-@wp.func_native("""
-    const double* map = (const double*)newest_s;
-    const int side = 1 << plan.level_high, n = plan.resolution, width = n >> plan.level_high, half = plan.half;
-    float* age = (float*)plan.cell_age;
-    for (int i = 0; i < side * side; ++i) age[i] = (float)wp::max((map[i] - reference) / cycle_s, -1e6);
-    double* __restrict__ upto = (double*)plan.row_integral;  // the integral up to each pixel, borders repeated
-    for (int row = 0; row < side; ++row) {
-        double sum = 0.0, here = 0.0;
-        int at = 0;
-        for (int cell = -1; cell <= side; ++cell) {
-            // Whole numbers of 1 / 65536 cycles, which float64 adds without rounding, in any order.
-            here = __builtin_rint((double)age[row * side + wp::min(wp::max(cell, 0), side - 1)] * 65536.0);
-            const int pixels = cell < 0 ? half : cell < side ? width : half + 1;
-            for (int i = 0; i < pixels; ++i) upto[at + i] = sum + here * i;
-            sum += here * pixels, at += pixels;
-        }
-        double* __restrict__ out = (double*)plan.row_sum + (long long)row * n;
-        for (int x = 0; x < n; ++x) out[x] = upto[x + 2 * half + 1] - upto[x];
-    }
-""")
+@wp.func_native("display::smooth_rows(plan, reference, cycle_s, (const double*)newest_s);")
 def smooth_rows(plan: DisplayPlan, reference: wp.float64, cycle_s: wp.float64, newest_s: Address):
     """Ages of the cells in cycles, and their sums along rows."""
     ...
 
 
-@wp.func_native("""
-    const int side = 1 << plan.level_high;
-    const float* age = (const float*)plan.cell_age;
-    float *least = (float*)plan.cell_least, *__restrict__ across = least + side * side;
-    for (int y = 0; y < side; ++y) {
-        for (int x = 0; x < side; ++x) across[y * side + x] = 0.0f;
-        for (int by = -plan.reach; by <= plan.reach; ++by)
-            for (int x = wp::max(-by, 0); x < wp::min(side - by, side); ++x)
-                across[y * side + x] = wp::min(across[y * side + x], age[y * side + x + by]);
-    }
-    for (int y = 0; y < side; ++y) {
-        for (int x = 0; x < side; ++x) least[y * side + x] = 0.0f;
-        for (int i = wp::max(y - plan.reach, 0); i <= wp::min(y + plan.reach, side - 1); ++i)
-            for (int x = 0; x < side; ++x) least[y * side + x] = wp::min(least[y * side + x], across[i * side + x]);
-    }
-    const long long *l = (const long long*)level, *at = (const long long*)index;
-    const double* t = (const double*)time_s;
-    float* own = (float*)plan.slot_age;
-    int *out = (int*)plan.candidate, *flag = (int*)plan.seen, count = 0;
-    for (int i = 0; i < slots; ++i) {
-        flag[i] = 0;
-        if (l[i] < 0) continue;
-        own[i] = (float)((t[i] - reference) / cycle_s);
-        int x = 0, y = 0;
-        for (int bit = 0; bit < l[i]; ++bit) {
-            x |= ((at[i] >> (2 * bit)) & 1) << bit;
-            y |= ((at[i] >> (2 * bit + 1)) & 1) << bit;
-        }
-        const int shift = plan.level_high - (int)l[i], cells = 1 << shift;
-        float low = 0.0f;
-        for (int v = y << shift; v < (y << shift) + cells; ++v)
-            for (int u = x << shift; u < (x << shift) + cells; ++u) low = wp::min(low, least[v * side + u]);
-        // One step of the rounding of ages to spare.
-        if (own[i] >= low - 2e-5f - 1e-6f * wp::abs(low)) out[count++] = i;
-    }
-    return count;
-""")
+@wp.func_native(
+    """
+    return display::list_candidates(plan, reference, cycle_s, slots, (const long long*)level, (const long long*)index,
+                                    (const double*)time_s);
+    """
+)
 def list_candidates(
     plan: DisplayPlan,
     reference: wp.float64,

@@ -38,17 +38,7 @@ class ClaimMemory:
     """uint8, one a slot, all 0 between calls."""
 
 
-@wp.func_native("""
-    const double* t = (const double*)cache.time_s;
-    const unsigned char* gone = (const unsigned char*)cache.dead;
-    double* v = (double*)age;
-    int all_dead = 0;
-    for (int i = 0; i < cache.slots; ++i) all_dead += gone[i] != 0;
-    const bool among_dead = all_dead >= wanted;
-    // What is not ranked is newer than everything.
-    for (int i = 0; i < cache.slots; ++i) v[i] = (gone[i] != 0) == among_dead ? -t[i] : -INFINITY;
-    return among_dead ? 0 : all_dead;
-""")
+@wp.func_native("return claims::rank_slots(cache, wanted, (double*)age);")
 def rank_slots(cache: CacheView, wanted: wp.int32, age: Address) -> wp.int32:
     """Ages to choose victims by: of the dead slots where they are enough, else of the live ones.
 
@@ -58,15 +48,9 @@ def rank_slots(cache: CacheView, wanted: wp.int32, age: Address) -> wp.int32:
     ...
 
 
-@wp.func_native("""
-    const unsigned long long* k = (const unsigned long long*)key;
-    const unsigned char* gone = (const unsigned char*)cache.dead;
-    long long* out = (long long*)slot;
-    for (int i = 0, found = 0; i < cache.slots; ++i) {
-        const bool old = k[i] > threshold || (k[i] == threshold && ties-- > 0);
-        if (old || (with_dead && gone[i])) out[found++] = i;
-    }
-""")
+@wp.func_native(
+    "claims::list_victims(cache, (const ranking::Key*)key, threshold, ties, with_dead != 0, (long long*)slot);"
+)
 def list_victims(
     cache: CacheView, key: Address, threshold: wp.uint64, ties: wp.int32, with_dead: wp.int32, slot: Address
 ):
@@ -74,37 +58,9 @@ def list_victims(
     ...
 
 
-@wp.func_native("""
-    const long long *slots = (const long long*)memory.slot, *l = (const long long*)level, *at = (const long long*)index;
-    long long *cached_level = (long long*)cache.level, *cached_index = (long long*)cache.index;
-    long long* newest = (long long*)cache.slot_of_node;
-    const long long bytes = 4ll * cache.state;
-    unsigned char* taken = (unsigned char*)memory.marks;
-    for (int row = 0; row < count; ++row) taken[slots[row]] = 1;
-    for (int row = 0; row < count; ++row) {
-        const long long last = newest[((1ll << (2 * l[row])) - 1) / 3 + at[row]];
-        char* state = last < 0 ? nullptr : (char*)cache.coefficients + bytes * last;
-        if (state && taken[last]) {  // another framelet's state is about to be written there
-            char* aside = (char*)memory.spare + bytes * row;
-            memcpy(aside, state, bytes);
-            state = aside;
-        }
-        ((char**)memory.past)[row] = state;
-    }
-    for (int row = 0; row < count; ++row) {
-        taken[slots[row]] = 0;
-        if (cached_level[slots[row]] < 0) continue;
-        const long long node = ((1ll << (2 * cached_level[slots[row]])) - 1) / 3 + cached_index[slots[row]];
-        if (newest[node] == slots[row]) newest[node] = -1;  // else a newer framelet of the tile has taken it
-    }
-    for (int row = 0; row < count; ++row) {
-        cached_level[slots[row]] = l[row];
-        cached_index[slots[row]] = at[row];
-        ((double*)cache.time_s)[slots[row]] = ((const double*)time_s)[row];
-        ((unsigned char*)cache.dead)[slots[row]] = 0;
-        newest[((1ll << (2 * l[row])) - 1) / 3 + at[row]] = slots[row];
-    }
-""")
+@wp.func_native(
+    "claims::sign_over(cache, memory, count, (const long long*)level, (const long long*)index, (const double*)time_s);"
+)
 def sign_over(
     cache: CacheView,
     memory: ClaimMemory,

@@ -30,12 +30,9 @@ class ErrorPlan:
     radiance_max: wp.float32
 
 
-@wp.func_native("""
-    const long long bytes = 4ll << (2 * plan.field_level);
-    memset((void*)errors_spatial, 0, bytes);
-    memset((void*)errors_temporal, 0, bytes);
-    memset((void*)pending, 1, count);
-""")
+@wp.func_native(
+    "framelets::start(plan, count, (unsigned char*)pending, (float*)errors_spatial, (float*)errors_temporal);"
+)
 def start_observing(
     plan: ErrorPlan, count: wp.int32, pending: Address, errors_spatial: Address, errors_temporal: Address
 ):

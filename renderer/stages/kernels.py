@@ -10,14 +10,24 @@ import warp as wp
 
 from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
+from renderer.stages import sizes
 from renderer.stages.cache import CacheView, ClaimMemory, choose_victims, sign_over
 from renderer.stages.estimate import ErrorPlan, observe_framelets, start_observing
 from renderer.stages.ranking import count_above, kth_greatest, rank_keys
 from renderer.stages.response import ResponsePlan, decide
 from renderer.stages.selection import Due, SelectionPlan, gather_credit, place_framelets, refresh_due
-from renderer.stages.tiling import are_densities, count_exceeding, emit_tiles, mark_splits, sum_account, sum_nodes
+from renderer.stages.tiling import (
+    are_densities,
+    count_exceeding,
+    emit_tiles,
+    first_node,
+    mark_splits,
+    sum_account,
+    sum_nodes,
+)
 
-wp.set_module_options(module_options("framelets.h", "response.h", "selection.h", "ticks.h"))
+_HEADERS = "account.h", "claims.h", "framelets.h", "response.h", "selection.h", "ticks.h", "tiling.h"
+wp.set_module_options(module_options(*_HEADERS, given=sizes.GIVEN))
 
 
 @wp.struct
@@ -97,7 +107,7 @@ def observe_batch(
 def build_tiling(plan: TilingPlan, density: Address, level: Address, index: Address) -> wp.int32:
     """The tiling of a density field. Returns the number of tiles."""
     sum_nodes(plan.field_level, plan.level_low, density, plan.sums)
-    base, end = (wp.int32(1) << (2 * plan.level_low)) / 3, (wp.int32(1) << (2 * plan.level_high)) / 3
+    base, end = first_node(plan.level_low), first_node(plan.level_high)
     nodes, values = end - base, plan.sums + Address(8 * base)
     splits = wp.max(count_exceeding(values, nodes, plan.threshold), plan.splits_least)
     splits = wp.min(wp.min(splits, plan.splits_most), nodes)

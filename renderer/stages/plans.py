@@ -8,14 +8,15 @@ from renderer.compute.memory import Memory
 from renderer.stages.cache import CacheView, ClaimMemory
 from renderer.stages.estimate import ErrorPlan
 from renderer.stages.kernels import Scratch, TilingPlan
-from renderer.stages.response import COLUMNS, ResponsePlan
+from renderer.stages.response import ResponsePlan
 from renderer.stages.selection import SelectionPlan
+from renderer.stages.sizes import COLUMNS
 from renderer.stages.views import point_at_cache
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
 from tsar.error import RADIANCE_MAX, tolerated_power
 from tsar.haar import octave_count, state_size
-from tsar.morton import deinterleave
+from tsar.morton import deinterleave, first_node
 from tsar.selection import cell_centres
 from tsar.tiling import split_bounds, tie_order
 
@@ -82,7 +83,7 @@ def tiling_plan(config: TsarConfig, memory: Memory) -> TilingPlan:
     plan.splits_least, plan.splits_most = split_bounds(config)
     plan.threshold = config.tiling.threshold_samples
     order = tie_order(low, high) if high > low else torch.empty(0, dtype=_I64)
-    plan.order = memory.keep("order", order, _I64, (4**high - 4**low) // 3)
+    plan.order = memory.keep("order", order, _I64, first_node(high) - first_node(low))
     plan.sums, plan.key = memory.room("node sums", nodes, _F64), memory.room("node keys", nodes, _F64)
     plan.split = memory.room("splits", nodes, torch.uint8)
     return plan

@@ -15,39 +15,13 @@ import warp as wp
 from renderer.compute.launching import Address
 
 
-@wp.func_native("""
-    const double* v = (const double*)value;
-    unsigned long long* k = (unsigned long long*)key;
-    for (int i = 0; i < count; ++i) {
-        const double plain = v[i] + 0.0;  // -0 counts as 0
-        unsigned long long bits;
-        memcpy(&bits, &plain, 8);
-        // Negative numbers order by their bits the wrong way round, and belong below the positive ones.
-        k[i] = bits ^ ((bits >> 63) ? ~0ull : 1ull << 63);
-    }
-""")
+@wp.func_native("ranking::rank_keys((const double*)value, count, (ranking::Key*)key);")
 def rank_keys(value: Address, count: wp.int32, key: Address):
     """Unsigned keys that order as the float64 values do; no NaN among them."""
     ...
 
 
-@wp.func_native("""
-    const unsigned long long* k = (const unsigned long long*)key;
-    if (count < wanted) return 0;
-    unsigned long long all = ~0ull, any = 0;
-    for (int i = 0; i < count; ++i) all &= k[i], any |= k[i];
-    if (all == any) return all;
-    const int top = 63 - __builtin_clzll(all ^ any);  // above it all keys are alike
-    unsigned long long found = top == 63 ? 0 : all >> (top + 1) << (top + 1);
-    for (int bit = top; bit >= 0; --bit) {
-        const unsigned long long trial = found | (1ull << bit);
-        long long at_least = 0;
-        for (int i = 0; i < count; ++i) at_least += k[i] >= trial;
-        if (at_least >= wanted) found = trial;
-        if (at_least == wanted) break;
-    }
-    return found;
-""")
+@wp.func_native("return ranking::kth_greatest((const ranking::Key*)key, count, wanted);")
 def kth_greatest(key: Address, count: wp.int32, wanted: wp.int32) -> wp.uint64:
     """A bound that the ``wanted`` greatest keys reach, and of the others only those equal to the least of them: keys
     above the bound are all taken. 0 where there are not so many keys.
@@ -55,12 +29,7 @@ def kth_greatest(key: Address, count: wp.int32, wanted: wp.int32) -> wp.uint64:
     ...
 
 
-@wp.func_native("""
-    const unsigned long long* k = (const unsigned long long*)key;
-    int above = 0;
-    for (int i = 0; i < count; ++i) above += k[i] > threshold;
-    return above;
-""")
+@wp.func_native("return ranking::count_above((const ranking::Key*)key, count, (ranking::Key)threshold);")
 def count_above(key: Address, count: wp.int32, threshold: wp.uint64) -> wp.int32:
     """How many keys exceed the threshold."""
     ...

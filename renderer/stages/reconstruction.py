@@ -12,15 +12,16 @@ from torch import Tensor
 from renderer.compute import device as devices
 from renderer.compute.launching import Command, address, require_same
 from renderer.compute.memory import Memory
+from renderer.compute.sizes import LANES
 from renderer.compute.team import TEAM
 from renderer.stages import reconstruction_kernels as kernels
 from renderer.stages.ages import DisplayPlan
-from renderer.stages.bands import PLANES
 from renderer.stages.coverage import covers
+from renderer.stages.sizes import PLANES
 from renderer.stages.views import PerCache, point_at_cache
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
-from tsar.morton import raster_to_morton
+from tsar.morton import first_node, raster_to_morton
 from tsar.reconstruction import Reconstruction, spatial_weights
 from tsar.stages import REFERENCE
 from tsar.types import SampleMap
@@ -28,8 +29,8 @@ from tsar.types import SampleMap
 _BAND_PIXELS = 1 << 15
 """About as many pixels to a band, 20 bytes each, as a second-level cache holds beside the framelets."""
 _BAND_ROWS_LEAST = 8
-_SPARE = 16
-"""Elements behind arrays that are read or written sixteen at a time."""
+_SPARE = LANES
+"""Elements behind arrays that are read or written so many at a time."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class Display:
         width = resolution // cells
         plan.reach = -(-plan.half // width) - (-max(margins) // width)
         plan.order = keep("order", raster_to_morton(side).to(torch.int32), torch.int32, side**2)
-        nodes = (4 ** (high + 1) - 1) // 3
+        nodes = first_node(high + 1)
         plan.node_time = zeros("node_time", nodes, torch.float64)
         plan.node_level = zeros("node_level", nodes, torch.int32)
         plan.cell_age = zeros("cell_age", cells**2)

@@ -6,10 +6,11 @@ import warp as wp
 
 from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
+from renderer.stages import sizes
 from renderer.stages.ages import DisplayPlan, list_candidates, map_newest, smooth_rows
 from renderer.stages.bands import begin_band, blend_rows, bury, corner, expand_rows, finish_band, passes
 
-wp.set_module_options(module_options("display.h"))
+wp.set_module_options(module_options("ages.h", "bands.h", "display.h", given=sizes.GIVEN))
 
 
 @wp.struct

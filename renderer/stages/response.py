@@ -27,10 +27,6 @@ class ResponsePlan:
     """Working memory: int32, one for each element."""
 
 
-COLUMNS = 8
-"""Quantities of an element that the passes hand on, as in ``native/response.h``."""
-
-
 @wp.func_native("""
     return response::respond(plan, surplus, (const double*)spatial, (const double*)temporal,
                              (const float*)error_spatial, (const float*)error_temporal, (double*)spatial_after,

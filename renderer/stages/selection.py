@@ -30,15 +30,12 @@ class Due:
     position: wp.uint64
 
 
-@wp.func_native("""
-    const long long *l = (const long long*)level, *at = (const long long*)index;
-    for (int tile = 0; tile < tiles; ++tile) {
-        const int shift = 2 * (field_level - (int)l[tile]);
-        const long long first = at[tile] << shift;
-        ((double*)overdue)[tile] = selection::gather_tile(1 << shift, (const double*)history + first,
-                                                          (const double*)temporal + first, (double*)credit + first);
-    }
-""")
+@wp.func_native(
+    """
+    selection::gather_credit(tiles, field_level, (const long long*)level, (const long long*)index,
+                             (const double*)temporal, (const double*)history, (double*)overdue, (double*)credit);
+    """
+)
 def gather_credit(
     tiles: wp.int32,
     field_level: wp.int32,
@@ -53,20 +50,12 @@ def gather_credit(
     ...
 
 
-@wp.func_native("""
-    const long long *l = (const long long*)level, *at = (const long long*)index;
-    const unsigned long long* k = (const unsigned long long*)key;
-    const double* mean = (const double*)overdue;
-    long long* chosen = (long long*)due.selected;
-    double* now = (double*)due.history;
-    for (int tile = 0, out = 0; tile < tiles; ++tile) {
-        if (k[tile] < threshold || (k[tile] == threshold && ties-- <= 0)) continue;
-        chosen[out++] = tile;
-        const double left = wp::min(wp::max(mean[tile] - 1.0, -1.0), 1.0);
-        const int shift = 2 * (field_level - (int)l[tile]);
-        for (long long i = at[tile] << shift; i < (at[tile] + 1) << shift; ++i) now[i] = left;
-    }
-""")
+@wp.func_native(
+    """
+    selection::refresh_due(tiles, field_level, (const long long*)level, (const long long*)index,
+                           (const double*)overdue, (const ranking::Key*)key, threshold, ties, due);
+    """
+)
 def refresh_due(
     tiles: wp.int32,
     field_level: wp.int32,
@@ -82,17 +71,7 @@ def refresh_due(
     ...
 
 
-@wp.func_native("""
-    const long long *l = (const long long*)level, *at = (const long long*)index;
-    const long long* chosen = (const long long*)due.selected;
-    long long *due_level = (long long*)due.level, *due_index = (long long*)due.index;
-    for (int row = 0; row < plan.batch; ++row) {
-        due_level[row] = l[chosen[row]];
-        due_index[row] = at[chosen[row]];
-        framelets::place(due_level[row], due_index[row], plan.samples, (const float*)plan.centre,
-                         (float*)due.position + 2ll * plan.samples * row);
-    }
-""")
+@wp.func_native("selection::place_framelets(plan, (const long long*)level, (const long long*)index, due);")
 def place_framelets(plan: SelectionPlan, level: Address, index: Address, due: Due):
     """The tiles of a batch, and the positions of its samples."""
     ...

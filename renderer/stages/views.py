@@ -14,6 +14,7 @@ from renderer.compute.launching import address
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
 from tsar.haar import state_size
+from tsar.morton import first_node
 
 _TENSORS = "level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"
 
@@ -34,7 +35,7 @@ def point_at_cache(view: Any, cache: FrameletCache, config: TsarConfig) -> None:
         "dead": (torch.bool, slots),
         "color": (torch.float32, slots * samples * 3),
         "coefficients": (torch.float32, slots * state_size(samples)),
-        "slot_of_node": (torch.int64, (4 ** (config.level_max + 1) - 1) // 3),
+        "slot_of_node": (torch.int64, first_node(config.level_max + 1)),
     }
     view.slots = slots
     for name, (dtype, count) in expected.items():

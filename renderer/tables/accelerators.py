@@ -9,32 +9,26 @@ pass far away.)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
-from renderer.kernels.packets import BLOCK_FLOATS
+from renderer.layout.kinds import StructureKind
+from renderer.layout.sizes import BLOCK_FLOATS, BLOCK_WIDTH, KD_DEPTH_MAX, KD_FLOATS, KD_LEAF
 from renderer.tables.trees import build_tree
 
 Structure = Literal["bvh", "kdtree", "brute"]
-STRUCTURES: tuple[Structure, ...] = ("bvh", "kdtree", "brute")
-"""In the order of their numbers in kernels."""
+STRUCTURES: tuple[Structure, ...] = get_args(Structure)
 
 CANDIDATES = 32
 """Planes tried along each axis of a node."""
-DEPTH_MAX = 20
 LEAF_TRIANGLES = 9
 """A node of so many triangles is not split further: fewer than ten."""
 TRAVERSAL_COST, TEST_COST = 1.0, 1.0
 """Of stepping into a node and of testing a triangle, in the surface area heuristic."""
 
-KD_FLOATS = 4
-"""Size of a kd-tree's node in units of four bytes, as in ``native/structures.h``."""
-
-_BLOCK_WIDTH = 4
-_LEAF_AXIS = 3
 _KD_NODE = np.dtype([("split", np.float32), ("axis", np.int32), ("first", np.int32), ("count", np.int32)])
 
 
@@ -51,6 +45,11 @@ class KdTree:
     nodes: NDArray[np.void]
     blocks: Float[NDArray[np.float32], "m 40"]
     depth: int
+
+
+def number_of(structure: Structure) -> int:
+    """Number of a structure in kernels."""
+    return StructureKind[structure.upper()]
 
 
 def build_structure(
@@ -90,9 +89,9 @@ def build_kdtree(vertices: Float[NDArray[np.float32], "v 3"], faces: Int[NDArray
     while len(index):
         counts = np.bincount(owner, minlength=len(index))
         axis, plane = _cheapest(box, owner, lower[item], upper[item], counts)
-        splits = (counts > LEAF_TRIANGLES) & (depth < DEPTH_MAX) & (axis < _LEAF_AXIS)
+        splits = (counts > LEAF_TRIANGLES) & (depth < KD_DEPTH_MAX) & (axis < KD_LEAF)
         row = np.zeros(len(index), _KD_NODE)
-        row["axis"] = np.where(splits, axis, _LEAF_AXIS)
+        row["axis"] = np.where(splits, axis, KD_LEAF)
         row["split"] = np.where(splits, plane, 0.0)
         row["first"] = np.where(splits, used + 2 * (np.cumsum(splits) - 1), -1)
         row["count"] = np.where(splits, 0, counts)
@@ -107,7 +106,7 @@ def build_kdtree(vertices: Float[NDArray[np.float32], "v 3"], faces: Int[NDArray
     leaf, held = (np.concatenate(part) for part in zip(*leaf_items, strict=True))
     order = np.lexsort((held, leaf))
     leaf, held = leaf[order], held[order]
-    leaves = np.flatnonzero(nodes["axis"] == _LEAF_AXIS)
+    leaves = np.flatnonzero(nodes["axis"] == KD_LEAF)
     first = np.searchsorted(leaf, leaves)
     blocks, first_block = _blocks(triangles.astype(np.float32), held, first, nodes["count"][leaves])
     nodes["first"][leaves] = first_block
@@ -126,7 +125,7 @@ def _cheapest(
     extent = box[:, 1] - box[:, 0]
     whole = _area(extent)
     best = np.full(nodes, np.inf)
-    axis_of, plane_of = np.full(nodes, _LEAF_AXIS), np.zeros(nodes)
+    axis_of, plane_of = np.full(nodes, KD_LEAF), np.zeros(nodes)
     share = np.arange(1, CANDIDATES + 1) / (CANDIDATES + 1.0)
     for axis in range(3):
         planes = box[:, 0, axis, None] + share * extent[:, axis, None]
@@ -155,7 +154,7 @@ def _cheapest(
         best = np.where(better, value, best)
         axis_of = np.where(better, axis, axis_of)
         plane_of = np.where(better, planes[np.arange(nodes), choice], plane_of)
-    axis_of[best >= TEST_COST * counts] = _LEAF_AXIS  # testing all is no dearer
+    axis_of[best >= TEST_COST * counts] = KD_LEAF  # testing all is no dearer
     return axis_of, plane_of.astype(np.float32).astype(np.float64)
 
 
@@ -195,16 +194,17 @@ def _blocks(
     triangles: NDArray[np.float32], held: NDArray[np.int64], first: NDArray[np.int64], count: NDArray[np.int64]
 ) -> tuple[Float[NDArray[np.float32], "m 40"], NDArray[np.int64]]:
     """Blocks of four for runs of triangles, and the first block of each run."""
-    blocks_of = -(-count // _BLOCK_WIDTH)
+    blocks_of = -(-count // BLOCK_WIDTH)
     first_block = np.cumsum(blocks_of) - blocks_of
     run = np.repeat(np.arange(len(count)), count)
     within = np.arange(len(run)) - np.repeat(np.cumsum(count) - count, count)
-    slot = first_block[run] * _BLOCK_WIDTH + within
-    faces = np.full(int(blocks_of.sum()) * _BLOCK_WIDTH, -1, np.int32)
+    slot = first_block[run] * BLOCK_WIDTH + within
+    faces = np.full(int(blocks_of.sum()) * BLOCK_WIDTH, -1, np.int32)
     corners = np.zeros((len(faces), 3, 3), np.float32)
     chosen = held[first[run] + within]
     faces[slot], corners[slot] = chosen, triangles[chosen]
-    blocks = np.empty((len(faces) // _BLOCK_WIDTH, BLOCK_FLOATS), np.float32)
-    blocks[:, :36] = np.moveaxis(corners.reshape(-1, _BLOCK_WIDTH, 3, 3), 1, 3).reshape(-1, 36)
-    blocks[:, 36:] = faces.reshape(-1, _BLOCK_WIDTH).view(np.float32)
+    blocks = np.empty((len(faces) // BLOCK_WIDTH, BLOCK_FLOATS), np.float32)
+    corner_floats = 9 * BLOCK_WIDTH
+    blocks[:, :corner_floats] = np.moveaxis(corners.reshape(-1, BLOCK_WIDTH, 3, 3), 1, 3).reshape(-1, corner_floats)
+    blocks[:, corner_floats:] = faces.reshape(-1, BLOCK_WIDTH).view(np.float32)
     return blocks, first_block

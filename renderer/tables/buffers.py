@@ -7,13 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from renderer.layout.kinds import Shape
 from renderer.layout.structs import (
-    SHAPE_CUBE,
-    SHAPE_DISK,
-    SHAPE_MESH,
-    SHAPE_RECTANGLE,
-    SHAPE_RELIEF,
-    SHAPE_SPHERE,
     GroupRecord,
     InstanceRecord,
     LevelRecord,
@@ -26,7 +21,7 @@ from renderer.layout.structs import (
     TextureRecord,
     TrackRecord,
 )
-from renderer.tables.accelerators import STRUCTURES, Structure
+from renderer.tables.accelerators import Structure, number_of
 from renderer.tables.checks import check_affine, check_finite, check_light
 from renderer.tables.hierarchy import box_tree
 from renderer.tables.lights import LightTable
@@ -51,7 +46,7 @@ from scenes.canonical import (
 DEPTH_MAX = 64
 """Bounces followed at most, also where the scene sets no limit: facing mirrors end here."""
 
-_UNIT_SHAPES = {Sphere: SHAPE_SPHERE, Disk: SHAPE_DISK, Rectangle: SHAPE_RECTANGLE, Cube: SHAPE_CUBE}
+_UNIT_SHAPES = {Sphere: Shape.SPHERE, Disk: Shape.DISK, Rectangle: Shape.RECTANGLE, Cube: Shape.CUBE}
 
 
 @dataclass
@@ -96,7 +91,7 @@ class _Builder:
         """Adds meshes that became one."""
         indices = [self.materials.add(part.material, part.name) for part in assembly.parts]
         unit = self.meshes.add(assembly.mesh, np.repeat(indices, assembly.face_counts))
-        row = {"shape": SHAPE_MESH, "track": self.tracks.add(assembly.track), "material": -1}
+        row = {"shape": Shape.MESH, "track": self.tracks.add(assembly.track), "material": -1}
         self._place(row, unit, np.eye(4), assembly.parts[0].name)
 
     def instance(self, instance: Instance) -> None:
@@ -110,7 +105,7 @@ class _Builder:
             self._relief(row, instance, instance.material)
             return
         if isinstance(shape, Mesh):
-            self._place({"shape": SHAPE_MESH, **row}, self.meshes.add(shape), instance.to_world, name)
+            self._place({"shape": Shape.MESH, **row}, self.meshes.add(shape), instance.to_world, name)
             return
         if type(shape) not in _UNIT_SHAPES:
             raise SceneError(f"Instance {name!r}: shape {type(shape).__name__} is not supported")
@@ -135,7 +130,7 @@ class _Builder:
             raise SceneError(f"Instance {name!r}: expected no emission of a HeightField, got {instance.emission}")
         planes = material.height if material.height.ndim == 3 else material.height[..., None]
         level, _ = self.materials.add_image(np.repeat(planes[..., :1], 3, axis=2), mipmap=False)
-        row |= {"shape": SHAPE_RELIEF, "relief": len(self.reliefs)}
+        row |= {"shape": Shape.RELIEF, "relief": len(self.reliefs)}
         self.reliefs.append({"level": level, "depth": material.depth, "steps": material.steps})
         lower, upper = np.array([-1.0, -1.0, -material.depth]), np.array([1.0, 1.0, 0.0])
         self._place(row, UnitMesh(-1, np.zeros(3), 1.0, lower, upper), instance.to_world, name)
@@ -209,7 +204,7 @@ class _Builder:
         data.nodes = _upload(nodes, NodeRecord, device)
         data.instances = _upload([row for row, _, _ in self.instance_rows], InstanceRecord, device)
         data.meshes = _upload(self.meshes.rows, MeshRecord, device)
-        data.structure = STRUCTURES.index(self.meshes.structure) if self.meshes.structure is not None else -1
+        data.structure = number_of(self.meshes.structure) if self.meshes.structure is not None else -1
         for name, pool in self.meshes.pools.items():
             setattr(data, name, pool.upload(device))
         data.materials = _upload(self.materials.rows, MaterialRecord, device)

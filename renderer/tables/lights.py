@@ -9,16 +9,8 @@ import warp as wp
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-from renderer.layout.structs import (
-    LIGHT_DIRECTIONAL,
-    LIGHT_ENVIRONMENT,
-    LIGHT_POINT,
-    LIGHT_QUAD,
-    LIGHT_SPHERE,
-    LIGHT_SPOT,
-    LIGHT_SUN_DISC,
-    SceneData,
-)
+from renderer.layout.kinds import LightKind
+from renderer.layout.structs import SceneData
 from renderer.tables.checks import check_affine, check_finite, check_light
 from renderer.tables.materials import MaterialTable
 from scenes.arithmetic import cos, inverse, norm, product
@@ -33,8 +25,7 @@ from scenes.canonical import (
     Sphere,
     SpotLight,
 )
-
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+from tsar.types import LUMINANCE
 
 
 @dataclass
@@ -53,7 +44,7 @@ class LightTable:
         if isinstance(light, PointLight):
             check_finite(light.position, "PointLight.position")
             check_light(light.intensity, "PointLight.intensity")
-            self.rows.append({"kind": LIGHT_POINT, "place": light.position, "color": light.intensity})
+            self.rows.append({"kind": LightKind.POINT, "place": light.position, "color": light.intensity})
         elif isinstance(light, DirectionalLight):
             self.rows.append(_directional_row(light))
         elif isinstance(light, SpotLight):
@@ -65,7 +56,7 @@ class LightTable:
             self.environment = light
             # a black one would have no texel to choose
             if light.scale > 0.0 and np.max(light.image) > 0.0:
-                self.rows.append({"kind": LIGHT_ENVIRONMENT})
+                self.rows.append({"kind": LightKind.ENVIRONMENT})
         else:
             raise SceneError(f"light {type(light).__name__} is not supported yet")
 
@@ -85,12 +76,12 @@ class LightTable:
         if isinstance(instance.shape, Rectangle):
             # the cross product of the edges points outside: of a mirrored rectangle, against the turn of its axes
             along = linear[:, 1] * np.sign(np.linalg.det(linear))
-            self.rows.append({**row, "kind": LIGHT_QUAD, "across": linear[:, 0], "along": along})
+            self.rows.append({**row, "kind": LightKind.QUAD, "across": linear[:, 0], "along": along})
             return
         stretch = np.linalg.svd(linear, compute_uv=False)
         if stretch[0] > stretch[2] * (1.0 + 1e-6):
             raise SceneError(f"{name}: emission: expected a Sphere scaled alike along all axes, got {stretch.tolist()}")
-        self.rows.append({**row, "kind": LIGHT_SPHERE, "radius": instance.shape.radius * norm(linear[:, 0])})
+        self.rows.append({**row, "kind": LightKind.SPHERE, "radius": instance.shape.radius * norm(linear[:, 0])})
 
     def place_environment(self, data: SceneData, materials: MaterialTable, seen: EnvironmentLight | None) -> None:
         """Fills what kernels read of the environment.
@@ -143,7 +134,7 @@ def summed_chances(
 
     Source: Pharr, Jakob and Humphreys 2016, "Physically Based Rendering", sec. 14.2.4.
     """
-    bright = product(image.astype(np.float64), _LUMINANCE)
+    bright = product(image.astype(np.float64), LUMINANCE)
     # the integral of a linear interpolation over a cell: an eighth comes from each neighbour
     bright = 0.75 * bright + 0.125 * (np.roll(bright, 1, axis=1) + np.roll(bright, -1, axis=1))
     above, below = np.vstack([bright[:1], bright[:-1]]), np.vstack([bright[1:], bright[-1:]])
@@ -165,13 +156,13 @@ def _directional_row(light: DirectionalLight) -> dict:
     if not 0.0 <= light.angle_deg < 180.0:
         raise SceneError(f"DirectionalLight.angle_deg: expected an angle in [0, 180), got {light.angle_deg}")
     check_light(light.irradiance, "DirectionalLight.irradiance")
-    row = {"kind": LIGHT_DIRECTIONAL, "place": -np.asarray(light.direction) / length, "color": light.irradiance}
+    row = {"kind": LightKind.DIRECTIONAL, "place": -np.asarray(light.direction) / length, "color": light.irradiance}
     if light.angle_deg == 0.0:
         return row
     cosine = cos(np.radians(light.angle_deg) / 2.0)
     # the mean cosine over the disc is (1 + cosine) / 2: a surface that faces its middle gets the whole irradiance
     color = np.asarray(light.irradiance) * 2.0 / (1.0 + cosine)
-    return row | {"kind": LIGHT_SUN_DISC, "cos_inner": cosine, "color": color}
+    return row | {"kind": LightKind.SUN_DISC, "cos_inner": cosine, "color": color}
 
 
 def _spot_row(light: SpotLight) -> dict:
@@ -188,5 +179,5 @@ def _spot_row(light: SpotLight) -> dict:
     if light.profile != "hermite":
         raise SceneError(f"SpotLight.profile: expected hermite, which the renderer draws, got {light.profile}")
     cosines = cos(np.radians([light.inner_deg, light.outer_deg]))
-    row = {"kind": LIGHT_SPOT, "place": light.position, "color": light.intensity, "across": axis / length}
+    row = {"kind": LightKind.SPOT, "place": light.position, "color": light.intensity, "across": axis / length}
     return row | {"cos_inner": cosines[0], "cos_outer": cosines[1]}

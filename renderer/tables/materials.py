@@ -6,17 +6,7 @@ import numpy as np
 import torch
 import warp as wp
 
-from renderer.layout.structs import (
-    FILTER_BILINEAR,
-    FILTER_MIPMAP,
-    FILTER_NEAREST,
-    TEXTURE_CHECKERBOARD,
-    TEXTURE_CONSTANT,
-    TEXTURE_IMAGE,
-    WRAP_BLACK,
-    WRAP_CLAMP,
-    WRAP_REPEAT,
-)
+from renderer.layout.kinds import Filter, TextureKind, Wrap
 from renderer.tables.checks import check_finite, check_light
 from scenes.arithmetic import cos
 from scenes.canonical import (
@@ -34,8 +24,8 @@ from scenes.canonical import (
     Texture,
 )
 
-_WRAPS = {"repeat": WRAP_REPEAT, "clamp": WRAP_CLAMP, "black": WRAP_BLACK}
-_FILTERS = {"nearest": FILTER_NEAREST, "bilinear": FILTER_BILINEAR, "mipmap": FILTER_MIPMAP}
+_WRAPS = {"repeat": Wrap.REPEAT, "clamp": Wrap.CLAMP, "black": Wrap.BLACK}
+_FILTERS = {"nearest": Filter.NEAREST, "bilinear": Filter.BILINEAR, "mipmap": Filter.MIPMAP}
 _WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 
@@ -106,7 +96,7 @@ class MaterialTable:
     def _texture_row(self, texture: Texture, where: str) -> dict:
         if isinstance(texture, ConstantTexture):
             check_light(texture.value, f"{where}: ConstantTexture")
-            return {"kind": TEXTURE_CONSTANT, "value": texture.value}
+            return {"kind": TextureKind.CONSTANT, "value": texture.value}
         if isinstance(texture, ImageTexture):
             name = f"{where}: ImageTexture {texture.source!r}"
             check_light(texture.image, name)
@@ -115,7 +105,7 @@ class MaterialTable:
             height, width = texture.image.shape[:2]
             area = height * width * abs(texture.uv_scale[0] * texture.uv_scale[1])
             return {
-                "kind": TEXTURE_IMAGE,
+                "kind": TextureKind.IMAGE,
                 "value": _WHITE,
                 "uv_scale": texture.uv_scale,
                 "uv_offset": texture.uv_offset,
@@ -128,7 +118,7 @@ class MaterialTable:
         if isinstance(texture, CheckerboardTexture):
             check_finite(texture.uv_scale, f"{where}: CheckerboardTexture.uv_scale")
             return {
-                "kind": TEXTURE_CHECKERBOARD,
+                "kind": TextureKind.CHECKERBOARD,
                 "value": _WHITE,
                 "uv_scale": texture.uv_scale,
                 "even": self.add_texture(texture.even, where),

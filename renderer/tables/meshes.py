@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from renderer.kernels.packets import BLOCK_FLOATS, NODE_FLOATS
-from renderer.tables.accelerators import KD_FLOATS, Structure, build_structure
+from renderer.layout.sizes import BLOCK_FLOATS, KD_FLOATS, NODE_FLOATS
+from renderer.tables.accelerators import Structure, build_structure
 from renderer.tables.trees import aligned
 from scenes.canonical import Mesh, SceneError
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.compute import device as devices
 from renderer.compute.launching import shared
 from renderer.kernels import packets
-from renderer.kernels.packets import BLOCK_FLOATS, NODE_FLOATS
+from renderer.layout.sizes import BLOCK_FLOATS, NODE_FLOATS
 
 _LINE_FLOATS = 16  # of a cache line
 _COORDINATE_MAX = 1.0e18

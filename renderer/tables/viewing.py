@@ -7,7 +7,8 @@ import math
 import numpy as np
 import warp as wp
 
-from renderer.layout.structs import CAMERA_PANORAMA, CAMERA_PARALLEL, CAMERA_PERSPECTIVE, ViewData
+from renderer.layout.kinds import CameraKind
+from renderer.layout.structs import ViewData
 from renderer.tables.checks import check_affine, check_finite
 from renderer.tables.tracks import TrackTable
 from scenes.arithmetic import tan
@@ -50,16 +51,16 @@ def camera_view(camera: ViewingCamera, tracks: TrackTable, aspect: float, footpr
     view.camera_track = tracks.add(getattr(camera, "track", None))
     half = 1.0
     if isinstance(camera, PerspectiveCamera):
-        view.kind = CAMERA_PERSPECTIVE
+        view.kind = CameraKind.PERSPECTIVE
         half = tan(math.radians(camera.fov_deg) / 2.0)
         view.spread = 2.0 * half / footprint_px
         view.lens_radius, view.focal_distance = camera.lens_radius, camera.focal_distance
     elif isinstance(camera, OrthographicCamera):
-        view.kind = CAMERA_PARALLEL
+        view.kind = CameraKind.PARALLEL
         half = camera.half_width
         view.width = 2.0 * half / footprint_px
     else:
-        view.kind = CAMERA_PANORAMA
+        view.kind = CameraKind.PANORAMA
         view.spread = math.pi / footprint_px
     view.tan_x, view.tan_y = half * max(aspect, 1.0), half * max(1.0 / aspect, 1.0)
     return view

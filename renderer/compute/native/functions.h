@@ -5,8 +5,6 @@
 
 namespace packets {
 
-constexpr float PI = 3.14159265358979f;
-
 // Twice the series of the inverse hyperbolic tangent on [sqrt(1/2), sqrt(2)], plus the exponent. For positive, normal numbers.
 inline f16 vlog2(f16 x) {
     const i16 raw = __builtin_bit_cast(i16, x);
@@ -19,7 +17,8 @@ inline f16 vlog2(f16 x) {
 
 // Taylor series of exp(f ln 2) on [-1/2, 1/2], times a power of two; 0 below the least normal number.
 inline f16 vexp2(f16 x) {
-    const f16 bounded = clamped(x, -126.0f, 127.0f), whole = vfloor(bounded + 0.5f), f = (bounded - whole) * 0.693147181f;
+    const f16 bounded = clamped(x, -126.0f, 127.0f), whole = vfloor(bounded + 0.5f),
+              f = (bounded - whole) * 0.693147181f;
     const f16 tail = 1.0f / 120.0f + f * (1.0f / 720.0f + f * (1.0f / 5040.0f));
     const f16 series = 1.0f + f * (1.0f + f * (0.5f + f * (1.0f / 6.0f + f * (1.0f / 24.0f + f * tail))));
     const f16 power = __builtin_bit_cast(f16, (to_int(whole) + 127) << 23);

@@ -9,18 +9,27 @@ namespace packets {
 typedef float f4 __attribute__((ext_vector_type(4)));
 typedef float f8 __attribute__((ext_vector_type(8)));
 typedef float f16 __attribute__((ext_vector_type(16)));
+typedef double d8 __attribute__((ext_vector_type(8)));
+typedef decltype(d8() < d8()) l8;
 typedef int i4 __attribute__((ext_vector_type(4)));
 typedef int i8 __attribute__((ext_vector_type(8)));
 typedef int i16 __attribute__((ext_vector_type(16)));
 
-constexpr int LANES = 16;
-constexpr unsigned ALL = 0xffffu;
-constexpr float FAR = 1.0e30f;
+using namespace given;
+
+static_assert(sizeof(f16) == LANES * sizeof(float));
+constexpr unsigned ALL = (1u << LANES) - 1;
 
 template <class F> struct IntOf;
-template <> struct IntOf<f4> { typedef i4 type; };
-template <> struct IntOf<f8> { typedef i8 type; };
-template <> struct IntOf<f16> { typedef i16 type; };
+template <> struct IntOf<f4> {
+    typedef i4 type;
+};
+template <> struct IntOf<f8> {
+    typedef i8 type;
+};
+template <> struct IntOf<f16> {
+    typedef i16 type;
+};
 
 typedef bool b4 __attribute__((ext_vector_type(4)));
 typedef bool b8 __attribute__((ext_vector_type(8)));
@@ -36,7 +45,7 @@ inline i16 lanes_of(unsigned mask) {
 
 inline int first_bit(unsigned mask) { return __builtin_ctz(mask); }
 
-// One instruction each on x86, unlike the builtins, which spend two more on what is no number: here `b` is the answer.
+// One instruction each on x86, unlike the builtins, which spend two more on NaN: here `b` is the answer then.
 template <class F> inline F vmin(F a, F b) { return a < b ? a : b; }
 template <class F> inline F vmax(F a, F b) { return a > b ? a : b; }
 template <class F> inline F vabs(F a) { return __builtin_elementwise_abs(a); }

@@ -7,18 +7,11 @@ extern "C" int sched_yield(void);
 
 namespace team {
 
-enum State : long long { IDLE, POSTED, RUNNING, PARKED };
+using namespace given;
 
-struct Mailbox {
-    long long state;
-    long long function, bounds, arguments;  // a launch as Warp makes it: a compiled kernel and its two parameters
-    long long answer;                       // of `post` and `join`
-    long long rest;                         // set from outside: park without waiting
-};
-
-inline long long load(Mailbox& box) { return __atomic_load_n(&box.state, __ATOMIC_ACQUIRE); }
-inline bool swap(Mailbox& box, long long from, long long to) {
-    return __atomic_compare_exchange_n(&box.state, &from, to, false, __ATOMIC_ACQ_REL, __ATOMIC_ACQUIRE);
+inline long long load(const long long* box) { return __atomic_load_n(box + MAIL_STATE, __ATOMIC_ACQUIRE); }
+inline bool swap(long long* box, long long from, long long to) {
+    return __atomic_compare_exchange_n(box + MAIL_STATE, &from, to, false, __ATOMIC_ACQ_REL, __ATOMIC_ACQUIRE);
 }
 
 inline void pause() {
@@ -30,39 +23,39 @@ inline void pause() {
 }
 
 // A helper's loop: runs what is posted, and parks when nothing has come for some time.
-inline void serve(Mailbox& box, long long patience_us) {
+inline void serve(long long* box, long long patience_us) {
     const long long patience = patience_us * ticks::per_microsecond();
     while (true) {
         const long long since = ticks::now();
         for (int turn = 0; load(box) != POSTED; ++turn) {
             // `IDLE` to `PARKED` fails where work has come meanwhile; then it is done first.
-            const bool waits = ticks::now() - since <= patience && !__atomic_load_n(&box.rest, __ATOMIC_RELAXED);
+            const bool waits = ticks::now() - since <= patience && !__atomic_load_n(box + MAIL_REST, __ATOMIC_RELAXED);
             if (!waits && swap(box, IDLE, PARKED)) return;
             pause();
             if (turn % 64 == 63) sched_yield();  // somebody else may need this core
         }
         if (!swap(box, POSTED, RUNNING)) continue;  // it has been taken back
-        ((void (*)(void*, void*))box.function)((void*)box.bounds, (void*)box.arguments);
-        __atomic_store_n(&box.state, (long long)IDLE, __ATOMIC_RELEASE);
+        ((void (*)(void*, void*))box[MAIL_FUNCTION])((void*)box[MAIL_BOUNDS], (void*)box[MAIL_ARGUMENTS]);
+        __atomic_store_n(box + MAIL_STATE, (long long)IDLE, __ATOMIC_RELEASE);
     }
 }
 
 // Hands a launch over. The answer is 1 where the helper is parked and must be woken.
-inline void post(Mailbox& box, long long function, long long bounds, long long arguments) {
-    box.function = function, box.bounds = bounds, box.arguments = arguments;
-    box.answer = __atomic_exchange_n(&box.state, (long long)POSTED, __ATOMIC_ACQ_REL) == PARKED;
+inline void post(long long* box, long long function, long long bounds, long long arguments) {
+    box[MAIL_FUNCTION] = function, box[MAIL_BOUNDS] = bounds, box[MAIL_ARGUMENTS] = arguments;
+    box[MAIL_ANSWER] = __atomic_exchange_n(box + MAIL_STATE, (long long)POSTED, __ATOMIC_ACQ_REL) == PARKED;
 }
 
 // Waits for the launch. The answer is 1 where the helper has not begun: it will not, and the work is the caller's.
-inline void join(Mailbox& box) {
+inline void join(long long* box) {
     while (true) {
         const long long state = load(box);
         if (state == POSTED && swap(box, POSTED, IDLE)) {
-            box.answer = 1;
+            box[MAIL_ANSWER] = 1;
             return;
         }
         if (state == IDLE || state == PARKED) {
-            box.answer = 0;
+            box[MAIL_ANSWER] = 0;
             return;
         }
         pause();

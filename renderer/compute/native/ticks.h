@@ -15,7 +15,7 @@ inline long long now() {
 #endif
 }
 
-// Nearly: x86 does not say, and counts 2 to 4 thousand million a second.
+// An estimate on x86, which does not say: it counts 2 to 4 billion ticks a second.
 inline long long per_microsecond() {
 #if defined(__aarch64__)
     long long hertz;

@@ -38,8 +38,8 @@ struct Packet {
         // What is not finite would spoil the bounds of the others.
         const f16 sum = from.x + from.y + from.z + along.x + along.y + along.z;
         scattered = !(spread <= SCATTERED * longest);
-        together = agree == ALL && bits(sum - sum == 0.0f) == ALL && spread <= SPREAD_MAX * longest &&
-                   longest > 2.0f * TINY;
+        together =
+            agree == ALL && bits(sum - sum == 0.0f) == ALL && spread <= SPREAD_MAX * longest && longest > 2.0f * TINY;
         if (!together) return;
         inverse = {reciprocal(along.x), reciprocal(along.y), reciprocal(along.z)};
         const f16& fast = inverse[kz];
@@ -48,7 +48,7 @@ struct Packet {
         low_origin = {from.x + pad, from.y + pad, from.z + pad};
         high_origin = {from.x - pad, from.y - pad, from.z - pad};
         const f16 origins[8] = {-low_origin.x, -low_origin.y, -low_origin.z, high_origin.x,
-                                high_origin.y, high_origin.z,  -pad};
+                                high_origin.y, high_origin.z, -pad};
         const f8 outermost = least_of_each(origins);
         same_signs = true;
         for (int axis = 0; axis < 3; ++axis) {

@@ -17,7 +17,7 @@ template <bool any, class Queries> inline void trace_packet(const Queries& list,
         from.x[lane] = origin[0], from.y[lane] = origin[1], from.z[lane] = origin[2];
         along.x[lane] = direction[0], along.y[lane] = direction[1], along.z[lane] = direction[2];
         const float reach = list.reach.data[i];
-        hit.t[lane] = lane < used && reach >= 0.0f ? reach : -1.0f;  // what is no number reaches nowhere
+        hit.t[lane] = lane < used && reach >= 0.0f ? reach : -1.0f;  // NaN reaches nowhere
     }
     hit.u = hit.v = 0.0f;
     hit.face = -1;

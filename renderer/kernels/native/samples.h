@@ -1,8 +1,19 @@
 // Samples from the camera to their colours, sixteen at a time: the lanes of `camera.py` and `kernels.py`.
 #pragma once
+#include "quadtree.h"
 #include "shading.h"
 
 namespace packets {
+
+using quadtree::column_of;
+using quadtree::row_of;
+
+constexpr int PACKET_PX = 4;  // side of the square of pixels whose samples make packets
+static_assert(PACKET_PX * PACKET_PX == LANES);
+constexpr int PACKETS_A_BLOCK = BLOCK_PX * BLOCK_PX / LANES;
+constexpr int AT_ONCE = 16;  // packets that a thread takes
+
+inline int blocks_across(int pixels) { return (pixels + BLOCK_PX - 1) / BLOCK_PX; }
 
 template <class Scene, class View>
 inline void camera_rays(const Stage<Scene, View>& stage, f16 x, f16 y, Vec16& origin, Vec16& direction) {
@@ -39,14 +50,14 @@ inline void render_pixel(const Stage<Scene, View>& stage, int column, int row, i
     color[0] = added(total.x) * share, color[1] = added(total.y) * share, color[2] = added(total.z) * share;
 }
 
-// Renders a block of 4 x 4 pixels, `samples` squared samples each; blocks go along the Morton curve within 16 x 16
-// pixels, those by rows. Consecutive samples share a pixel as far as they can.
+// Renders a block of 4 x 4 pixels, `samples` squared samples each; blocks go along the Morton curve within
+// `BLOCK_PX` squared pixels, those by rows. Consecutive samples share a pixel as far as they can.
 template <class Scene, class View, class Pixel>
 inline void render_block(const Scene& scene, const View& view, int block, int width, int height, int samples,
                          double time_s, Pixel* image) {
-    const int columns = (width + 15) / 16, place = block / 16, inner = block % 16;
-    const int left = place % columns * 16 + (inner & 1) * 4 + (inner >> 2 & 1) * 8;
-    const int top = place / columns * 16 + (inner >> 1 & 1) * 4 + (inner >> 3) * 8;
+    const int columns = blocks_across(width), place = block / PACKETS_A_BLOCK, inner = block % PACKETS_A_BLOCK;
+    const int left = place % columns * BLOCK_PX + column_of(inner) * PACKET_PX;
+    const int top = place / columns * BLOCK_PX + row_of(inner) * PACKET_PX;
     if (left >= width || top >= height) return;
     Stage<Scene, View> stage = {scene, view, {}};
     for (int lane = 0; lane < LANES; ++lane) stage.time_s[lane] = time_s;
@@ -54,7 +65,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     const float across = (float)(width * samples), down = (float)(height * samples);
     if (per_pixel % LANES == 0) {
         for (int at = 0; at < LANES; ++at) {
-            const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+            const int column = left + column_of(at), row = top + row_of(at);
             float color[3];
             if (column >= width || row >= height) continue;
             render_pixel(stage, column, row, samples, across, down, color);
@@ -69,7 +80,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
         f16 x, y;
         unsigned busy = 0;
         for (int lane = 0; lane < LANES; ++lane) {
-            const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+            const int column = left + column_of(at), row = top + row_of(at);
             pixel[lane] = at;
             busy |= (unsigned)(column < width && row < height) << lane;
             x[lane] = (float)(column * samples + within_x), y[lane] = (float)(row * samples + within_y);
@@ -90,9 +101,10 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     }
     const float share = 1.0f / (float)per_pixel;
     for (at = 0; at < LANES; ++at) {
-        const int column = left + (at & 1) + (at >> 2 & 1) * 2, row = top + (at >> 1 & 1) + (at >> 3) * 2;
+        const int column = left + column_of(at), row = top + row_of(at);
         if (column < width && row < height)
-            image[(long long)row * width + column] = Pixel(sums[at][0] * share, sums[at][1] * share, sums[at][2] * share);
+            image[(long long)row * width + column] =
+                Pixel(sums[at][0] * share, sums[at][1] * share, sums[at][2] * share);
     }
 }
 
@@ -130,9 +142,8 @@ template <class Scene, class View>
 inline void shade_samples(const Scene& scene, const View& view, int* taken, int count, const float* position,
                           const double* time_s, float* color, long long* rays) {
     long long mine[2] = {};
-    share(taken, (count + LANES - 1) / LANES, 16, [&](int packet) {
-        shade_packet(scene, view, packet * LANES, count, position, time_s, color, mine);
-    });
+    share(taken, (count + LANES - 1) / LANES, AT_ONCE,
+          [&](int packet) { shade_packet(scene, view, packet * LANES, count, position, time_s, color, mine); });
     for (int kind = 0; kind < 2; ++kind) __atomic_fetch_add(rays + kind, mine[kind], __ATOMIC_RELAXED);
 }
 
@@ -140,9 +151,8 @@ template <class Scene, class View, class Image>
 inline void render_pixels(const Scene& scene, const View& view, int* taken, int samples, double time_s,
                           const Image& image) {
     const int width = image.shape[1], height = image.shape[0];
-    share(taken, (width + 15) / 16 * ((height + 15) / 16) * 16, 16, [&](int block) {
-        render_block(scene, view, block, width, height, samples, time_s, image.data);
-    });
+    share(taken, blocks_across(width) * blocks_across(height) * PACKETS_A_BLOCK, AT_ONCE,
+          [&](int block) { render_block(scene, view, block, width, height, samples, time_s, image.data); });
 }
 
 }  // namespace packets

@@ -7,9 +7,6 @@
 
 namespace packets {
 
-// As the SHAPE_ constants of structs.py.
-enum { SHAPE_MESH, SHAPE_SPHERE, SHAPE_DISK, SHAPE_RECTANGLE, SHAPE_CUBE };
-
 // Calls `work(value, mask)` for every distinct value among the lanes of a mask: what belongs to one instance or one
 // material is read once for all lanes that share it.
 template <class Work> inline void each_distinct(i16 values, unsigned mask, Work work) {
@@ -79,7 +76,7 @@ template <class Scene, class View> struct Stage {
         const auto& record = scene.tracks.data[track];
         const int last = record.key_count - 1;
         double at = (time_s[lane] - record.start_s) / record.interval_s;
-        at = at < 0.0 ? 0.0 : at > (double)last ? (double)last : at;
+        at = at < 0.0 ? 0.0 : at > last ? last : at;
         int index = (int)at;
         index = index < last - 1 ? index : last > 1 ? last - 1 : 0;
         const int first = record.first_key + index;
@@ -91,7 +88,7 @@ template <class Scene, class View> struct Stage {
         pose.translation.z[lane] = (float)(from[2] + (to[2] - from[2]) * fraction);
         const float angle = scene.key_angle.data[first];
         float weight_b = (float)fraction, weight_a = 1.0f - weight_b;
-        if (angle > 1.0e-3f) {
+        if (angle > SLERP_ANGLE_LEAST) {
             const float inverse = 1.0f / sinf(angle);
             weight_b = sinf(weight_b * angle) * inverse;
             weight_a = sinf(weight_a * angle) * inverse;
@@ -187,7 +184,7 @@ inline unsigned missing_sphere(const Vec16& from, const Vec16& direction, float 
     const Vec16 nearest = from - direction * b;
     const float limit = radius * radius;
     // The slack covers what rounding takes from a far start.
-    const i16 past = (b > 0.0f) | (-b - radius > reach) | (dot(nearest, nearest) > limit + 4.0e-6f * squared);
+    const i16 past = (b > 0.0f) | (-b - radius > reach) | (dot(nearest, nearest) > limit + SPHERE_SLACK * squared);
     return bits((squared > limit) & past);
 }
 
@@ -228,9 +225,8 @@ inline unsigned meet_scene(const Stage<Scene, View>& stage, const Vec16& origin,
             index = meeting ? index + 1 : node.skip;
             if (!meeting || node.instance < 0) continue;
             const auto& record = scene.instances.data[node.instance];
-            const unsigned better =
-                meet_instance<any>(scene, record, without_idle(start, meeting), without_idle(towards, meeting), meeting,
-                                   hit.at);
+            const unsigned better = meet_instance<any>(scene, record, without_idle(start, meeting),
+                                                       without_idle(towards, meeting), meeting, hit.at);
             hit.instance = lanes_of(better) ? (i16)node.instance : hit.instance;
             found |= better;
             if (any) {

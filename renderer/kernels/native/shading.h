@@ -5,8 +5,6 @@
 
 namespace packets {
 
-constexpr int LIGHT_POINT = 0;
-
 // What the lights meet at each lane.
 struct Reflection {
     Vec16 emission, albedo, specular, mirror;  // `mirror` is what the mirrored ray is weighed with
@@ -61,11 +59,10 @@ inline Vec16 direct_light(const Stage<Scene, View>& stage, const Surface& surfac
             const f16 distance = length(towards);
             towards = towards * (1.0f / distance);
             irradiance = irradiance * (1.0f / (distance * distance));
-            shadow.at.t = distance * 0.9999f;  // as lights.py
+            shadow.at.t = distance * SHORT;
         }
         const f16 cosine = dot(surface.normal, towards);
-        const unsigned facing =
-            material.lit & bits((cosine > 0.0f) & (dot(surface.geometric_normal, towards) > 0.0f));
+        const unsigned facing = material.lit & bits((cosine > 0.0f) & (dot(surface.geometric_normal, towards) > 0.0f));
         if (!facing) continue;
         shadow_rays -= lanes_of(facing);
         const unsigned blocked = meet_scene<true>(stage, start, towards, facing, shadow);
@@ -85,7 +82,7 @@ inline Vec16 direct_light(const Stage<Scene, View>& stage, const Surface& surfac
 inline Vec16 mirror_direction(const Surface& surface, const Vec16& direction) {
     Vec16 mirrored = direction - surface.normal * (2.0f * dot(direction, surface.normal));
     const f16 height = dot(mirrored, surface.geometric_normal);
-    mirrored = pick(height < 1.0e-4f, mirrored + surface.geometric_normal * (1.0e-4f - height), mirrored);
+    mirrored = pick(height < ABOVE_LEAST, mirrored + surface.geometric_normal * (ABOVE_LEAST - height), mirrored);
     return unit(mirrored);
 }
 
@@ -113,7 +110,7 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
         const i16 on_surface = lanes_of(met);
         travelled += on_surface ? hit.at.t : (f16)0.0f;
         const f16 cosine = -dot(surface.normal, towards);
-        const f16 slant = vmax(vabs(dot(surface.geometric_normal, towards)), (f16)1.0e-4f);
+        const f16 slant = vmax(vabs(dot(surface.geometric_normal, towards)), (f16)SLANT_LEAST);
         const f16 footprint = stage.view.spread * travelled / slant * surface.uv_density;
         const Reflection material = reflection_of(scene, surface, met, cosine, footprint);
         Vec16 leaving = material.emission;

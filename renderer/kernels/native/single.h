@@ -20,7 +20,7 @@ struct Tree {
 // One ray, ready to be walked.
 struct Single {
     float origin[3], inverse[3];
-    float inverse_far[3];  // for sides that are left, rounded up
+    float inverse_far[3];                 // for sides that are left, rounded up
     float near_origin[3], far_origin[3];  // moved by the padding, outwards
     float shear[3];
     int kx, ky, kz;
@@ -43,7 +43,8 @@ struct Single {
             const bool backwards = inverse[axis] < 0.0f;
             near_origin[axis] = backwards ? from[axis] - pad : from[axis] + pad;
             far_origin[axis] = backwards ? from[axis] + pad : from[axis] - pad;
-            near_side[axis] = (backwards ? 3 + axis : axis) * WIDTH, far_side[axis] = (backwards ? axis : 3 + axis) * WIDTH;
+            near_side[axis] = (backwards ? 3 + axis : axis) * WIDTH,
+            far_side[axis] = (backwards ? axis : 3 + axis) * WIDTH;
         }
     }
 };
@@ -66,10 +67,12 @@ inline void prefetch(const Tree& tree, int child) {
 template <class F>
 inline bool meet_blocks(const Block* block, const Vec<f4>& from, const Vec<f4>& along, int kx, int ky, int kz,
                         RayHit& hit) {
-    const Vec<F> origin = {(F)from.x[0], (F)from.y[0], (F)from.z[0]}, shear = {(F)along.x[0], (F)along.y[0], (F)along.z[0]};
+    const Vec<F> origin = {(F)from.x[0], (F)from.y[0], (F)from.z[0]},
+                 shear = {(F)along.x[0], (F)along.y[0], (F)along.z[0]};
     Vec<F> corner[3];
     for (int i = 0; i < 3; ++i)
-        corner[i] = Vec<F>{corners_of<F>(block, i, kx), corners_of<F>(block, i, ky), corners_of<F>(block, i, kz)} - origin;
+        corner[i] =
+            Vec<F>{corners_of<F>(block, i, kx), corners_of<F>(block, i, ky), corners_of<F>(block, i, kz)} - origin;
     F t, u, v;
     const auto inside = meets_triangle(corner[0], corner[1], corner[2], shear, t, u, v);
     if (!bits(inside)) return false;

@@ -8,9 +8,6 @@
 
 namespace packets {
 
-constexpr int STRUCTURE_BVH = 0, STRUCTURE_KDTREE = 1;
-constexpr int KD_STACK = 64;  // deeper than any such tree
-
 struct Counted {
     long long visits = 0, tests = 0;
     void visit() { ++visits; }
@@ -20,10 +17,12 @@ struct Counted {
 // Of a kd-tree: a plane and where the two sides begin, or a leaf's blocks.
 struct KdNode {
     float split;
-    int axis;    // 0, 1, 2, or 3 for a leaf
-    int first;   // the lower side, the upper one follows; the first block of a leaf
-    int count;   // triangles of a leaf
+    int axis;   // or `KD_LEAF`
+    int first;  // the lower side, the upper one follows; the first block of a leaf
+    int count;  // triangles of a leaf
 };
+
+static_assert(sizeof(KdNode) == KD_FLOATS * sizeof(float));
 
 struct KdTree {
     const KdNode* nodes;
@@ -32,12 +31,11 @@ struct KdTree {
 
 // Walks the sides of each plane in the order in which the ray meets them. A plane's own thickness is that of the
 // padding: what lies within it is looked for on both sides, as boxes of a BVH overlap by as much.
-template <bool any, class Count>
-inline bool walk(const KdTree& tree, const Single& ray, RayHit& hit, Count& count) {
+template <bool any, class Count> inline bool walk(const KdTree& tree, const Single& ray, RayHit& hit, Count& count) {
     struct Entry {
         int node;
         float near, far;
-    } stack[KD_STACK];
+    } stack[KD_DEPTH_MAX];
     const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
     const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
     Entry at = {0, 0.0f, hit.t};
@@ -46,14 +44,15 @@ inline bool walk(const KdTree& tree, const Single& ray, RayHit& hit, Count& coun
     while (true) {
         const KdNode& node = tree.nodes[at.node];
         count.visit();
-        if (node.axis < 3) {
+        if (node.axis != KD_LEAF) {
             const int axis = node.axis;
             // Where the ray enters and leaves the thickness of the plane. A ray along the plane may have either sign.
             const float a = (node.split - ray.near_origin[axis]) * ray.inverse[axis];
             const float b = (node.split - ray.far_origin[axis]) * ray.inverse[axis];
             const float enter = a < b ? a : b, leave = a < b ? b : a;
             const bool upwards = ray.inverse[axis] > 0.0f;
-            const int near_side = upwards ? node.first : node.first + 1, far_side = upwards ? node.first + 1 : node.first;
+            const int near_side = upwards ? node.first : node.first + 1,
+                      far_side = upwards ? node.first + 1 : node.first;
             if (at.near * (1.0f / ROUNDING_UP) > leave) {
                 at.node = far_side;
             } else if (enter > at.far * ROUNDING_UP) {
@@ -77,7 +76,8 @@ inline bool walk(const KdTree& tree, const Single& ray, RayHit& hit, Count& coun
 }
 
 // Every triangle.
-template <class Count> inline bool meet_all(const Block* blocks, int triangles, const Single& ray, RayHit& hit, Count& count) {
+template <class Count>
+inline bool meet_all(const Block* blocks, int triangles, const Single& ray, RayHit& hit, Count& count) {
     const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
     const Vec<f4> shear = {(f4)ray.shear[0], (f4)ray.shear[1], (f4)ray.shear[2]};
     count.test(triangles);

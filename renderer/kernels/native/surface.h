@@ -5,8 +5,6 @@
 
 namespace packets {
 
-constexpr float OFFSET = 1.0e-6f;
-
 inline f16 greatest_component(const Vec16& v) { return vmax(vmax(vabs(v.x), vabs(v.y)), vabs(v.z)); }
 
 // A hit in the unit space of its shape.
@@ -47,9 +45,11 @@ inline LocalSurface mesh_surface(const Scene& scene, const Mesh& mesh, const Pac
         const auto& face = scene.faces.data[mesh.first_face + number];
         const int first = face[0], second = face[1], third = face[2];
         const i16 lanes = lanes_of(same);
-        put(place.a, vertices[first], lanes), put(place.b, vertices[second], lanes), put(place.c, vertices[third], lanes);
+        put(place.a, vertices[first], lanes), put(place.b, vertices[second], lanes),
+            put(place.c, vertices[third], lanes);
         if (smooth)
-            put(normal.a, normals[first], lanes), put(normal.b, normals[second], lanes), put(normal.c, normals[third], lanes);
+            put(normal.a, normals[first], lanes), put(normal.b, normals[second], lanes),
+                put(normal.c, normals[third], lanes);
         if (!mapped) return;
         ua = lanes ? (f16)uvs[first][0] : ua, va = lanes ? (f16)uvs[first][1] : va;
         ub = lanes ? (f16)uvs[second][0] : ub, vb = lanes ? (f16)uvs[second][1] : vb;
@@ -61,7 +61,7 @@ inline LocalSurface mesh_surface(const Scene& scene, const Mesh& mesh, const Pac
     local.tangent_u = place.b - place.a, local.tangent_v = place.c - place.a;
     local.geometric_normal = unit(cross(local.tangent_u, local.tangent_v));
     const Vec16 between = normal.weighted(hit.u, hit.v, w);  // zero where the mesh has no normals
-    local.normal = pick(dot(between, between) > 1.0e-12f, between, local.geometric_normal);
+    local.normal = pick(dot(between, between) > SMOOTH_LEAST, between, local.geometric_normal);
     local.u = ua * hit.u + ub * hit.v + uc * w, local.v = va * hit.u + vb * hit.v + vc * w;
     local.uv_area = vabs((ub - ua) * (vc - va) - (vb - va) * (uc - ua));
     return local;
@@ -73,7 +73,7 @@ inline LocalSurface sphere_surface(const Vec16& point) {
     local.position = local.geometric_normal = local.normal = p;
     const f16 turn = vatan2(p.y, p.x) * (0.5f / PI);
     local.u = turn - vfloor(turn), local.v = 1.0f - vacos(p.z) * (1.0f / PI);
-    const f16 ring = vmax(vsqrt(p.x * p.x + p.y * p.y), (f16)1.0e-3f);
+    const f16 ring = vmax(vsqrt(p.x * p.x + p.y * p.y), (f16)RING_LEAST);
     local.tangent_u = {-p.y / ring, p.x / ring, (f16)0.0f};
     local.tangent_v = cross(p, local.tangent_u);
     local.uv_area = 1.0f / (2.0f * PI * PI * ring);
@@ -96,7 +96,8 @@ inline LocalSurface flat_surface(const Vec16& point, i16 axis, f16 side) {
 }
 
 template <class Scene, class Record>
-inline LocalSurface local_surface(const Scene& scene, const Record& record, const PacketHit& hit, unsigned mask, Vec16 point) {
+inline LocalSurface local_surface(const Scene& scene, const Record& record, const PacketHit& hit, unsigned mask,
+                                  Vec16 point) {
     if (record.shape == SHAPE_MESH) return mesh_surface(scene, scene.meshes.data[record.mesh], hit, mask);
     if (record.shape == SHAPE_SPHERE) return sphere_surface(point);
     if (record.shape == SHAPE_CUBE) {
@@ -140,14 +141,14 @@ inline Surface surface_of(const Stage<Scene, View>& stage, int instance, unsigne
     const f16 away = dot(normal, direction);
     surface.geometric_normal = geometric;
     surface.normal = normal;
-    if (bits(away > -1.0e-3f))
-        surface.normal = pick(away > -1.0e-3f, unit(normal - direction * (away + 1.0e-3f)), normal);
+    if (bits(away > -EDGE_ON))
+        surface.normal = pick(away > -EDGE_ON, unit(normal - direction * (away + EDGE_ON)), normal);
     surface.u = local.u, surface.v = local.v;
     surface.uv_density = 0.0f;
     if (bits(local.uv_area > 0.0f)) {
         const f16 patch = length(
             cross(transformed(record.from_local, local.tangent_u), transformed(record.from_local, local.tangent_v)));
-        surface.uv_density = vsqrt(local.uv_area / vmax(patch, (f16)1.0e-30f));
+        surface.uv_density = vsqrt(local.uv_area / vmax(patch, (f16)PATCH_LEAST));
     }
     surface.offset = (magnitude + greatest_component(surface.position)) * OFFSET;
     surface.material = record.material;

@@ -5,11 +5,6 @@
 
 namespace packets {
 
-// As the constants of structs.py.
-enum { TEXTURE_CONSTANT, TEXTURE_IMAGE, TEXTURE_CHECKERBOARD };
-enum { WRAP_REPEAT, WRAP_CLAMP, WRAP_BLACK };
-enum { FILTER_NEAREST, FILTER_BILINEAR, FILTER_MIPMAP };
-
 // Texel indices inside 0 .. count - 1, or -1 where the texture is black.
 inline i16 wrapped(i16 index, i16 count, int wrap) {
     const i16 outside = (index < 0) | (index >= count);
@@ -73,7 +68,7 @@ inline Vec16 image_lookup(const Scene& scene, const Record& record, f16 u, f16 v
     if (record.wrap == WRAP_REPEAT)
         u = u - vfloor(u), v = v - vfloor(v);
     else
-        u = clamped(u, -8.0f, 9.0f), v = clamped(v, -8.0f, 9.0f);
+        u = clamped(u, UV_LEAST, UV_MOST), v = clamped(v, UV_LEAST, UV_MOST);
     if (record.filter == FILTER_NEAREST) {
         const Level level = level_of(scene, record.first_level);
         const i16 column = wrapped(to_int(vfloor(u * to_float(level.width))), level.width, record.wrap);
@@ -82,7 +77,8 @@ inline Vec16 image_lookup(const Scene& scene, const Record& record, f16 u, f16 v
     }
     f16 detail = 0.0f;
     if (record.filter == FILTER_MIPMAP)
-        detail = vmin(vlog2(clamped(footprint_uv * record.texel_scale, 1.0f, 1.0e9f)), (f16)(record.level_count - 1.0f));
+        detail = vmin(vlog2(clamped(footprint_uv * record.texel_scale, 1.0f, TEXELS_MOST)),
+                      (f16)(record.level_count - 1.0f));
     const i16 first = to_int(detail);
     const f16 blend = detail - to_float(first);
     Vec16 color = level_lookup(scene, record, first, u, v);
@@ -102,7 +98,7 @@ inline Vec16 texture_color(const Scene& scene, int texture, f16 u, f16 v, f16 fo
     const Vec16 tint = spread(record.value);
     if (record.kind == TEXTURE_CONSTANT) return tint;
     if (record.kind == TEXTURE_IMAGE) {
-        // Lanes outside the mask may hold what is no number, and texel indices are made of it.
+        // Lanes outside the mask may hold NaN, and texel indices are made of it.
         const i16 valid = lanes_of(mask);
         return tint * image_lookup(scene, record, valid ? u : (f16)0.0f, valid ? v : (f16)0.0f,
                                    valid ? footprint_uv : (f16)0.0f);

@@ -7,9 +7,7 @@
 
 namespace packets {
 
-constexpr int WIDTH = 8;        // children of a node
-constexpr int BLOCK_WIDTH = 4;  // triangles of a block
-constexpr int LEAF = 8;         // triangles of a leaf at most
+constexpr int LEAF = 8;  // triangles of a leaf at most
 constexpr int EMPTY_CHILD = -2147483647 - 1;
 constexpr float NOTHING = __builtin_inff();  // an empty box reaches from here to its negative: no ray meets it
 
@@ -33,6 +31,8 @@ struct Block {
     float corner[3][3][BLOCK_WIDTH];
     int face[BLOCK_WIDTH];
 };
+
+static_assert(sizeof(Node) == NODE_FLOATS * sizeof(float) && sizeof(Block) == BLOCK_FLOATS * sizeof(float));
 
 struct Bounds {
     float lower[3], upper[3];
@@ -209,8 +209,7 @@ class TreeBuilder {
         }
         Cut best = {FAR, 0.0f, 0.0f, -1, 0};
         if (from.depth < DEPTH_OF_HALVES)
-            for (int axis = 0; axis < 3; ++axis)
-                try_axis(from, axis, centers.lower[axis], centers.upper[axis], best);
+            for (int axis = 0; axis < 3; ++axis) try_axis(from, axis, centers.lower[axis], centers.upper[axis], best);
         int middle = from.first + from.count() / 2;
         if (best.axis >= 0) {
             int low = from.first, high = from.end - 1;

@@ -5,7 +5,6 @@
 
 namespace packets {
 
-constexpr float TINY = 1.0e-20f;
 // How far a box test may be out after rounding, from above: Ize 2013, "Robust BVH Ray Traversal".
 constexpr float ROUNDING_UP = 1.0000005f;
 // A triangle's corners are rounded when they are moved to the ray's origin. Boxes are wider by as much, so that a ray

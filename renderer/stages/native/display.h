@@ -42,7 +42,8 @@ inline void unpack_squares(const float* color, const int* order, int side, int f
 
 // The same sample by sample, for tiles of any size. A pixel of a finer tile is the mean of a square of samples, which is
 // a run on the Morton curve.
-inline void unpack_samples(const float* color, const int* order, int side, int samples, int first, int last, float* rows) {
+inline void unpack_samples(const float* color, const int* order, int side, int samples, int first, int last,
+                           float* rows) {
     const int stride = side / samples, each = stride * stride;
     for (int j = first; j <= last; ++j) {
         float* to = rows + 3ll * j * samples;
@@ -79,7 +80,8 @@ template <class Plan>
 inline void expand_rows(const Plan& plan, int slot, int level, int y, int top, int bottom, const float* color,
                         float* samples, float* rows) {
     const Axis axis(plan, level);
-    const int side = plan.side, begin = y - axis.margin, last_pixel = bottom - begin < axis.reach ? bottom - begin : axis.reach;
+    const int side = plan.side, begin = y - axis.margin,
+              last_pixel = bottom - begin < axis.reach ? bottom - begin : axis.reach;
     const int first = axis.left[top > begin ? top - begin : 0], last = axis.right[last_pixel - 1];
     const int count = axis.width < side ? axis.width : side, spacing = axis.width / count;
     const int* order = (const int*)plan.order;
@@ -94,7 +96,7 @@ inline void expand_rows(const Plan& plan, int slot, int level, int y, int top, i
         interpolate(samples + (long long)line * side, side, spacing, axis, rows + (long long)line * axis.reach);
 }
 
-// Adds a framelet to the band's sums: cycles by which it is newer than the threshold, and half a cycle more.
+// Adds a framelet to the band's sums: cycles by which it is newer than the threshold, and `SHIFT_CYCLES` more.
 //
 // Sixteen pixels at a time; those past the tile or the image get no weight, but they are read and written: there must be
 // room for them behind all arrays, and numbers in the rows.
@@ -105,7 +107,8 @@ inline void blend_rows(const Plan& plan, int level, int x, int y, float age, int
     const int n = plan.resolution, begin_x = x - axis.margin, begin_y = y - axis.margin;
     const int left = begin_x > 0 ? begin_x : 0, right = begin_x + axis.reach < n ? begin_x + axis.reach : n;
     const int count = right - left, skipped = left - begin_x;
-    const int first = begin_y > top ? begin_y : top, end = begin_y + axis.reach < bottom ? begin_y + axis.reach : bottom;
+    const int first = begin_y > top ? begin_y : top,
+              end = begin_y + axis.reach < bottom ? begin_y + axis.reach : bottom;
     const long long plane = (long long)plan.band * n, next = axis.reach;
     i16 number;
     for (int lane = 0; lane < LANES; ++lane) number[lane] = lane;
@@ -118,7 +121,7 @@ inline void blend_rows(const Plan& plan, int level, int x, int y, float age, int
         for (int i = 0; i < count; i += LANES, at += LANES, upper += LANES, lower += LANES) {
             const f16 newer = age - load<f16>(at);
             const i16 counts = (newer >= 0.0f) & (number < count - i);
-            const f16 w = counts ? (newer + 0.5f) * (down * load<f16>(axis.weight + skipped + i)) : (f16)0.0f;
+            const f16 w = counts ? (newer + SHIFT_CYCLES) * (down * load<f16>(axis.weight + skipped + i)) : (f16)0.0f;
             float* to = at + plane;
             store(to, load<f16>(to) + w);
             for (int channel = 0; channel < 3; ++channel) {

@@ -1,17 +1,20 @@
-// Framelets: where their samples lie, and from their colours to signed errors, sixteen samples side by side: compressed luminance, streaming Haar
-// transform, levelwise norms, signed errors on the field. Definitions in `tsar/error.py` and `tsar/haar.py`.
+// Framelets: where their samples lie, and from their colours to signed errors, sixteen samples side by side: compressed
+// luminance, streaming Haar transform, levelwise norms, signed errors on the field. Definitions in `tsar/error.py` and
+// `tsar/haar.py`.
 //
 // The first-level cache holds all that lies between; colours and wavelet state go straight into the framelet cache.
 // A framelet has 4^k samples on the Morton curve, so four neighbours of any octave follow one another.
 #pragma once
 #include "functions.h"
 #include "lanes.h"
+#include "quadtree.h"
 
 namespace framelets {
 
 using namespace packets;
 
-constexpr int MOST_SAMPLES = 1024, MOST_POSITIONS = MOST_SAMPLES / 4, MOST_OCTAVE_POSITIONS = 341;
+constexpr int POSITIONS_MAX = SAMPLES_MAX / 4;
+constexpr int OCTAVE_POSITIONS_MAX = (SAMPLES_MAX - 1) / 3;  // of all octaves together
 
 // sqrt(y / (1 + y)) as y / sqrt(y (1 + y)): the root's reciprocal by Newton's method, from a first guess good to 3.5 %
 // that halves the exponent; three steps reach the last digit. From 1e18 on the answer is 1.
@@ -23,13 +26,13 @@ inline f16 compressed(f16 y) {
     return y * root;
 }
 
-// Luminance of sixteen samples, which are copied too; lanes of `good` go out where a sample is not a number that counts.
+// Luminance of sixteen samples, which are copied too; lanes of `good` go out where a sample is not finite or too great.
 inline f16 luminance_of(const float* rgb, float* copy, float most, i16& good) {
     const f16 p = load<f16>(rgb), q = load<f16>(rgb + 16), w = load<f16>(rgb + 32);
     store(copy, p), store(copy + 16, q), store(copy + 32, w);
     good &= (vabs(p) <= most) & (vabs(q) <= most) & (vabs(w) <= most);
     const Vec16 color = separated(rgb);
-    return 0.2126f * color.x + 0.7152f * color.y + 0.0722f * color.z;
+    return LUMINANCE_RED * color.x + LUMINANCE_GREEN * color.y + LUMINANCE_BLUE * color.z;
 }
 
 // The four below each of several positions.
@@ -70,7 +73,8 @@ template <class Body> inline void by_lanes(int count, Body body) {
 template <class F, class Plan>
 inline void transform_some(const Plan& plan, const Four<F>& in, const float* past, float* kept, int count, float* field,
                            float* power_s, float* power_t) {
-    const F h_upper = (in.a + in.b) * 0.5f, h_lower = (in.c + in.d) * 0.5f, g_upper = in.a - in.b, g_lower = in.c - in.d;
+    const F h_upper = (in.a + in.b) * 0.5f, h_lower = (in.c + in.d) * 0.5f, g_upper = in.a - in.b,
+            g_lower = in.c - in.d;
     const F hh = (h_upper + h_lower) * 0.5f, hg = h_upper - h_lower, gh = (g_upper + g_lower) * 0.5f;
     const F gg = g_upper - g_lower;
     const F hh_past = past ? load<F>(past) : hh, hg_past = past ? load<F>(past + count) : hg;
@@ -101,7 +105,7 @@ template <class Plan>
 inline void transform(const Plan& plan, const float* luminance, const float* past, float* kept, float* power_s,
                       float* power_t) {
     const int positions = plan.samples / 4;
-    float fields[2][MOST_POSITIONS];
+    float fields[2][POSITIONS_MAX];
     const float* in = luminance;
     for (int octave = 0, begin = 0; octave < plan.octaves; ++octave) {
         const int count = positions >> (2 * octave);
@@ -124,15 +128,16 @@ inline void transform(const Plan& plan, const float* luminance, const float* pas
 
 // Signed errors from powers, into the elements that the tile covers: a mean over positions, or a position's value in
 // each of its elements.
-template <class Plan> inline void scatter(const Plan& plan, const float* power, float tolerated, float* out, int elements) {
-    constexpr float LEAST = 1.17549435e-38f;
-    float phi[MOST_POSITIONS];
+template <class Plan>
+inline void scatter(const Plan& plan, const float* power, float tolerated, float* out, int elements) {
+    constexpr float LEAST = __FLT_MIN__;
+    float phi[POSITIONS_MAX];
     int count = plan.samples / 4;
     if (plan.difference) {
         const f16 octaves_tolerated = vlog2((f16)(tolerated > LEAST ? tolerated : LEAST));
         for (int i = 0; i < count; i += 16) {
             const f16 octaves = vlog2(vmax(load<f16>(power + i), (f16)LEAST)) - octaves_tolerated;
-            store(phi + i, clamped(octaves * 0.125f, -1.0f, 1.0f));
+            store(phi + i, clamped(octaves * (1.0f / OCTAVES_OF_FULL_ERROR), -1.0f, 1.0f));
         }
     } else
         for (int i = 0; i < count; i += 16) {
@@ -155,11 +160,11 @@ template <class Plan> inline void scatter(const Plan& plan, const float* power, 
 
 // One framelet. Its past state must not be where the new one goes.
 //
-// Returns whether all samples are numbers that count; otherwise nothing but the colours has been written.
+// Returns whether all samples are finite and in range; otherwise nothing but the colours has been written.
 template <class Plan>
 inline bool observe(const Plan& plan, const float* color, const float* past, float* kept_color, float* kept_state,
                     float* errors_s, float* errors_t, int elements) {
-    float luminance[MOST_SAMPLES], power_s[MOST_OCTAVE_POSITIONS + 15], power_t[MOST_OCTAVE_POSITIONS + 15];
+    float luminance[SAMPLES_MAX], power_s[OCTAVE_POSITIONS_MAX + 15], power_t[OCTAVE_POSITIONS_MAX + 15];
     i16 good = ~(i16)0;
     for (int i = 0; i < plan.samples; i += 16)
         store(luminance + i, compressed(luminance_of(color + 3 * i, kept_color + 3 * i, plan.radiance_max, good)));
@@ -172,12 +177,8 @@ inline bool observe(const Plan& plan, const float* color, const float* past, flo
 
 // Positions of the samples of a tile: its corner and the offsets `centre`, in tile widths, turned into image widths.
 inline void place(long long level, long long index, int samples, const float* centre, float* position) {
-    long long x = 0, y = 0;
-    for (int bit = 0; bit < level; ++bit) {
-        x |= ((index >> (2 * bit)) & 1) << bit;
-        y |= ((index >> (2 * bit + 1)) & 1) << bit;
-    }
-    const f4 corner = {(float)x, (float)y, (float)x, (float)y};
+    const float x = (float)quadtree::column_of(index), y = (float)quadtree::row_of(index);
+    const f4 corner = {x, y, x, y};
     const f16 corners = __builtin_shufflevector(corner, corner, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
     const float width = 1.0f / (float)(1ll << level);
     for (int i = 0; i < 2 * samples; i += 16) store(position + i, (corners + load<f16>(centre + i)) * width);
@@ -188,20 +189,29 @@ template <bool WRITTEN = false> inline void fetch_ahead(const void* from, long l
     for (long long at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)from + at, WRITTEN);
 }
 
+// Fields of zeros, and all framelets pending.
+template <class Plan>
+inline void start(const Plan& plan, int count, unsigned char* pending, float* errors_s, float* errors_t) {
+    const long long bytes = sizeof(float) << (2 * plan.field_level);
+    __builtin_memset(errors_s, 0, bytes);
+    __builtin_memset(errors_t, 0, bytes);
+    __builtin_memset(pending, 1, count);
+}
+
 // What threads that share a batch have in common: how many rows are taken, and how many were left as they are.
 struct Progress {
     int taken, left;
 };
 constexpr int ROWS_AT_ONCE = 8;
 
-// Rows of a batch that no other thread has taken. Those marked in `pending` are done, unless a sample is not a number
-// that counts: these stay marked and are counted.
+// Rows of a batch that no other thread has taken. Those marked in `pending` are done, unless a sample is not finite
+// or out of range: these stay marked and are counted.
 //
 // The cache is larger than the processor's: a row's past and its slot are asked for while the row before is computed.
 template <class Plan, class Cache>
-inline void observe_rows(const Plan& plan, const Cache& cache, int count, const long long* level, const long long* index,
-                         const float* color, const long long* slot, const float* const* past, unsigned char* pending,
-                         Progress* progress, float* errors_s, float* errors_t) {
+inline void observe_rows(const Plan& plan, const Cache& cache, int count, const long long* level,
+                         const long long* index, const float* color, const long long* slot, const float* const* past,
+                         unsigned char* pending, Progress* progress, float* errors_s, float* errors_t) {
     const long long samples = plan.samples, state = plan.state;
     float *cached_color = (float*)cache.color, *cached_state = (float*)cache.coefficients;
     int row, end = 0, left = 0;
@@ -215,8 +225,9 @@ inline void observe_rows(const Plan& plan, const Cache& cache, int count, const 
             if (!pending[row]) continue;
             const int shift = 2 * (plan.field_level - (int)level[row]);
             const long long first = index[row] << shift;
-            const bool done = observe(plan, color + 3 * samples * row, past[row], cached_color + 3 * samples * slot[row],
-                                      cached_state + state * slot[row], errors_s + first, errors_t + first, 1 << shift);
+            const bool done =
+                observe(plan, color + 3 * samples * row, past[row], cached_color + 3 * samples * slot[row],
+                        cached_state + state * slot[row], errors_s + first, errors_t + first, 1 << shift);
             pending[row] = !done;
             left += !done;
         }

@@ -12,8 +12,8 @@ using packets::vmax;
 using packets::vmin;
 using packets::vsqrt;
 
-typedef double d8 __attribute__((ext_vector_type(8)));
-typedef decltype(d8() < d8()) l8;
+using packets::d8;
+using packets::l8;
 typedef packets::b8 b8;
 
 inline d8 load(const double* from) {
@@ -35,7 +35,8 @@ struct Columns {
 
     Columns(double* memory, int* elements, int n) {
         double** const all[] = {&a_s, &a_t, &m_s, &m_t, &k_min, &k_max, &want, &most};
-        for (int i = 0; i < 8; ++i) *all[i] = memory + (long long)i * n;
+        static_assert(sizeof(all) / sizeof(*all) == given::COLUMNS);
+        for (int i = 0; i < given::COLUMNS; ++i) *all[i] = memory + (long long)i * n;
         element = elements;
     }
 };
@@ -151,7 +152,7 @@ template <class Plan> inline Levels water_levels(const Plan& plan, int count, co
 }
 
 // New densities, over the normalised old ones in the columns (sec. 6.4). Where one of two is to be taken both are
-// computed; what is no root, 0 / 0 and a / 0, is not taken.
+// computed; NaN and infinity, from 0 / 0 and a / 0, are not taken.
 template <bool BIASED, class Plan> inline void mix(const Plan& plan, int count, const Columns& c, Levels level) {
     const double low_s = plan.spatial_min, low_t = plan.temporal_min;
     for (int i = 0; i < count; i += 8) {

@@ -1,51 +1,18 @@
-// Passes over the field for the selection and the tiling; definitions in `tsar/selection.py` and `tsar/tiling.py`.
+// Passes over the field and over the tiles for the selection; definition in `tsar/selection.py`.
 #pragma once
-#include "lanes.h"
+#include "framelets.h"
+#include "ranking.h"
 
 namespace selection {
 
 typedef double d2 __attribute__((ext_vector_type(2)));
 typedef double d4 __attribute__((ext_vector_type(4)));
-typedef double d8 __attribute__((ext_vector_type(8)));
+typedef packets::d8 d8;
 
 // Sums of the four first and the four last: neighbours first, as everywhere up the quadtree.
 inline d2 sums_of_four(d8 v) {
     const d4 pairs = v.even + v.odd;
     return pairs.even + pairs.odd;
-}
-
-// Sums of the four children of each of `count` nodes; children lie one after the other.
-inline void sum_children(const double* below, double* sums, int count) {
-    int i = 0;
-    for (; i + 8 <= count; i += 8) {
-        d8 v[4];
-        __builtin_memcpy(v, below + 4 * i, sizeof(v));
-        const d8 ab = __builtin_shufflevector(v[0], v[1], 0, 4, 8, 12, 1, 5, 9, 13);
-        const d8 cd = __builtin_shufflevector(v[0], v[1], 2, 6, 10, 14, 3, 7, 11, 15);
-        const d8 ab_next = __builtin_shufflevector(v[2], v[3], 0, 4, 8, 12, 1, 5, 9, 13);
-        const d8 cd_next = __builtin_shufflevector(v[2], v[3], 2, 6, 10, 14, 3, 7, 11, 15);
-        const d8 a = __builtin_shufflevector(ab, ab_next, 0, 1, 2, 3, 8, 9, 10, 11);
-        const d8 b = __builtin_shufflevector(ab, ab_next, 4, 5, 6, 7, 12, 13, 14, 15);
-        const d8 c = __builtin_shufflevector(cd, cd_next, 0, 1, 2, 3, 8, 9, 10, 11);
-        const d8 d = __builtin_shufflevector(cd, cd_next, 4, 5, 6, 7, 12, 13, 14, 15);
-        const d8 sum = ((a + b) + c) + d;
-        __builtin_memcpy(sums + i, &sum, sizeof(sum));
-    }
-    for (; i < count; ++i) sums[i] = ((below[4 * i] + below[4 * i + 1]) + below[4 * i + 2]) + below[4 * i + 3];
-}
-
-// Whether all values of a field are densities, neither negative nor infinite nor no number. A field has a multiple of
-// eight elements.
-inline bool all_densities(const double* value, int count) {
-    decltype(d8() < d8()) bad = 0;
-    for (int i = 0; i < count; i += 8) {
-        d8 v;
-        __builtin_memcpy(&v, value + i, sizeof(v));
-        bad |= ~((v >= 0.0) & (v <= 1.7976931348623157e308));
-    }
-    long long any = 0;
-    for (int lane = 0; lane < 8; ++lane) any |= bad[lane];
-    return !any;
 }
 
 // Adds up sums of equal nodes that come one after the other, by fours: the sum of a node is made when its last child
@@ -58,8 +25,7 @@ struct Pyramid {
     double add(double sum) {
         double* children = waiting[0];
         int place = arrived++;
-        for (; (place & 3) == 3; place >>= 2, children += 4)
-            sum = (children[0] + children[1]) + (children[2] + sum);
+        for (; (place & 3) == 3; place >>= 2, children += 4) sum = (children[0] + children[1]) + (children[2] + sum);
         children[place & 3] = sum;
         return sum;
     }
@@ -86,6 +52,45 @@ inline double gather_tile(int count, const double* past, const double* rate, dou
         sum = pyramid.add((first.x + first.y) + (second.x + second.y));
     }
     return sum / count;
+}
+
+// Credit of every element, and its mean over every tile.
+inline void gather_credit(int tiles, int field_level, const long long* level, const long long* index,
+                          const double* temporal, const double* history, double* overdue, double* credit) {
+    for (int tile = 0; tile < tiles; ++tile) {
+        const int shift = 2 * (field_level - (int)level[tile]);
+        const long long first = index[tile] << shift;
+        overdue[tile] = gather_tile(1 << shift, history + first, temporal + first, credit + first);
+    }
+}
+
+// Tiles above the threshold, and the `ties` first of those at it; a refresh is taken off their credit.
+template <class Due>
+inline void refresh_due(int tiles, int field_level, const long long* level, const long long* index,
+                        const double* overdue, const ranking::Key* key, ranking::Key threshold, int ties,
+                        const Due& due) {
+    long long* chosen = (long long*)due.selected;
+    double* credit = (double*)due.history;
+    for (int tile = 0, out = 0; tile < tiles; ++tile) {
+        if (!ranking::is_taken(key[tile], threshold, ties)) continue;
+        chosen[out++] = tile;
+        const double left = wp::min(wp::max(overdue[tile] - 1.0, -1.0), 1.0);
+        const int shift = 2 * (field_level - (int)level[tile]);
+        for (long long i = index[tile] << shift; i < (index[tile] + 1) << shift; ++i) credit[i] = left;
+    }
+}
+
+// The tiles of a batch, and the positions of its samples.
+template <class Plan, class Due>
+inline void place_framelets(const Plan& plan, const long long* level, const long long* index, const Due& due) {
+    const long long* chosen = (const long long*)due.selected;
+    long long *due_level = (long long*)due.level, *due_index = (long long*)due.index;
+    for (int row = 0; row < plan.batch; ++row) {
+        due_level[row] = level[chosen[row]];
+        due_index[row] = index[chosen[row]];
+        framelets::place(due_level[row], due_index[row], plan.samples, (const float*)plan.centre,
+                         (float*)due.position + 2ll * plan.samples * row);
+    }
 }
 
 }  // namespace selection

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from renderer.frames import render_tiles
+from renderer.layout.sizes import KD_DEPTH_MAX
 from renderer.rays.single_rays import SingleRays
 from renderer.sampling.plan import SamplePlan
-from renderer.tables.accelerators import DEPTH_MAX, LEAF_TRIANGLES, STRUCTURES, build_kdtree
+from renderer.tables.accelerators import LEAF_TRIANGLES, STRUCTURES, build_kdtree
 from renderer.trace import Renderer
 from scenes import catalog
 from scenes.effects import scenes as effects
@@ -139,7 +140,7 @@ def test_the_kd_trees_counts_are_those_of_a_slow_walk() -> None:
         work = fast.counted(*one)[1]
         t_hit = float(hits.t[number]) if hits.face[number] >= 0 else 1e4
         visits, tests = walked_slowly(tree, *(part[0].astype(np.float64) for part in one), t_hit)
-        assert visits <= work.node_visits <= visits + 2 * DEPTH_MAX, number
+        assert visits <= work.node_visits <= visits + 2 * KD_DEPTH_MAX, number
         if hits.face[number] < 0:
             assert (work.node_visits, work.triangle_tests) == (visits, tests), number
 
@@ -149,7 +150,7 @@ def test_limits_of_the_kd_tree(count: int) -> None:
     mesh = sphere_mesh(count)
     tree, count = build_kdtree(mesh.vertices, mesh.faces), len(mesh.faces)
     leaves = tree.nodes[tree.nodes["axis"] == 3]
-    assert tree.depth <= DEPTH_MAX
+    assert tree.depth <= KD_DEPTH_MAX
     held = tree.blocks[:, 36:].view(np.int32)
     assert set(np.unique(held)) - {-1} == set(range(count))  # none is lost
     # others are at the greatest depth, or fans that no plane parts at a gain

@@ -1,0 +1,26 @@
+"""Numbers that the compiled stages, their C++ and the reference share; no header repeats one of them."""
+
+from __future__ import annotations
+
+from tsar.error import OCTAVES_OF_FULL_ERROR
+from tsar.reconstruction import AGE_MOST, AGE_STEPS, SHIFT_CYCLES
+from tsar.types import LUMINANCE
+
+SAMPLES_MAX = 1024
+"""Samples of a framelet that the estimate of errors has room for."""
+COLUMNS = 8
+"""Quantities of an element that the passes of the response hand on."""
+PLANES = 5
+"""Of a band of the image: the threshold of ages, and sums of weight, red, green and blue."""
+
+GIVEN: dict[str, float] = {
+    "SAMPLES_MAX": SAMPLES_MAX,
+    "COLUMNS": COLUMNS,
+    "PLANES": PLANES,
+    "OCTAVES_OF_FULL_ERROR": OCTAVES_OF_FULL_ERROR,
+    "AGE_MOST": AGE_MOST,
+    "AGE_STEPS": AGE_STEPS,
+    "SHIFT_CYCLES": SHIFT_CYCLES,
+    **dict(zip(("LUMINANCE_RED", "LUMINANCE_GREEN", "LUMINANCE_BLUE"), LUMINANCE, strict=True)),
+}
+"""As in :mod:`renderer.compute.sizes`."""
