@@ -34,7 +34,7 @@ def {name}(out: wp.array(dtype=float)):
 COLD = """
 import sys
 sys.path[:0] = [{root!r}, {folder!r}]
-from renderer import device
+from renderer.compute import device
 import warp as wp, first, second
 device._SLOW_LOAD_S = 0.0
 device.load_kernels((first, second), "cpu")
