@@ -29,7 +29,7 @@ from tsar.policy import Setting, run
 from tsar.response.local import Box, constrain
 from tsar.response.mixture import mix
 from tsar.selection import cell_centres
-from tsar.types import Display, Errors, FrameletBatch, SampleBatch, StepRecord, Tiling
+from tsar.types import Errors, FrameletBatch, SampleBatch, ShownImage, StepRecord, Tiling
 
 CYCLE_S = 1 / 50
 CYCLES = 40
@@ -54,7 +54,7 @@ def trace(batch: FrameletBatch) -> SampleBatch:
     return SampleBatch(wheel(x, y, batch.times.to(torch.float32)).to(torch.float32), {"primary_rays": x.numel()})
 
 
-def played(config: TsarConfig) -> list[tuple[StepRecord, Display]]:
+def played(config: TsarConfig) -> list[tuple[StepRecord, ShownImage]]:
     """The cycles of a run."""
     return list(run(Adaptive(Setting(config)), trace, fixed_clock(CYCLE_S), 0.4, 0.4 + CYCLES * CYCLE_S))
 
@@ -116,7 +116,7 @@ def tiles(axis, tiling: Tiling, values: np.ndarray, cmap: str) -> PatchCollectio
     return drawn
 
 
-def densities(record: StepRecord, display: Display) -> Figure:
+def densities(record: StepRecord, display: ShownImage) -> Figure:
     """What is shown, both densities and the tiling of one cycle."""
     figure, axes = panels(2, 8.0, 2)
     axes[0].imshow(encoded(display.image))
@@ -150,15 +150,15 @@ def errors(records: list[StepRecord]) -> Figure:
     return figure
 
 
-def ages(display: Display) -> Figure:
+def ages(display: ShownImage) -> Figure:
     """The picture on the display, the age of its samples, and its difference from the truth of that time."""
-    assert display.samples is not None
+    assert display.sample_map is not None
     figure, axes = panels(3, 9.0)
     side = display.image.shape[0]
     grid = (torch.arange(side) + 0.5) / side
     y, x = torch.meshgrid(grid, grid, indexing="ij")
     truth = wheel(x, y, torch.full_like(x, display.display_time_s))
-    age = (display.display_time_s - display.samples.newest_s) / CYCLE_S
+    age = (display.display_time_s - display.sample_map.newest_s) / CYCLE_S
     axes[0].imshow(encoded(display.image))
     axes[0].set_title("reconstruction")
     drawn = axes[1].imshow(age.numpy(), cmap="cividis_r")

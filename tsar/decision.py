@@ -25,17 +25,17 @@ class Decision:
 
 
 def decide(
-    densities: Densities, errors: Errors, history: Float64[Tensor, " e"], config: TsarConfig, stage: StageTimer
+    densities: Densities, errors: Errors, history: Float64[Tensor, " e"], config: TsarConfig, timer: StageTimer
 ) -> Decision:
     """The response to the errors, the tiling and the selection, one after the other.
 
     Args:
         stage: takes the times of ``response``, ``tiling`` and ``selection``.
     """
-    with stage("response"):
+    with timer("response"):
         densities = respond(densities, errors, config)
-    with stage("tiling"):
+    with timer("tiling"):
         tiling = build(densities.spatial, config)
-    with stage("selection"):
+    with timer("selection"):
         due = request(tiling, densities.temporal, history, config)
     return Decision(densities, tiling, due)

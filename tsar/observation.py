@@ -27,15 +27,15 @@ def observe(
     color: Float[Tensor, "n samples 3"],
     cache: FrameletCache,
     config: TsarConfig,
-    stage: StageTimer,
+    timer: StageTimer,
 ) -> Observation:
     """Errors of a batch by :func:`tsar.error.estimate`, and the batch into the cache, in place.
 
     Args:
         stage: takes the times of ``error`` and ``cache``.
     """
-    with stage("error"):
+    with timer("error"):
         found = estimate(batch, color, cache, config)
-    with stage("cache"):
+    with timer("cache"):
         cache.insert(batch, found.color, found.coefficients)
     return Observation(found.errors, found.nonfinite)

@@ -17,7 +17,7 @@ from torch import Tensor
 from tsar.clock import CycleSeconds, StageTimer, checked
 from tsar.config import TsarConfig
 from tsar.stages import REFERENCE, Stages
-from tsar.types import Display, FrameletBatch, SampleBatch, SampleMap, StepRecord, Trace
+from tsar.types import FrameletBatch, SampleBatch, SampleMap, ShownImage, StepRecord, Trace
 
 State = TypeVar("State")
 
@@ -170,7 +170,7 @@ class Policy(ABC, Generic[State]):
 
 def run(
     policy: Policy[State], trace: Trace, cycle_seconds: CycleSeconds, start_s: float, end_s: float
-) -> Iterator[tuple[StepRecord | None, Display]]:
+) -> Iterator[tuple[StepRecord | None, ShownImage]]:
     """Cycles from a warm start until the animation time passes ``end_s``.
 
     Warm-up cycles before ``start_s`` have negative numbers and are yielded too: the first images on the display come
@@ -194,7 +194,7 @@ def run(
         cycle_s = checked(cycle_seconds, done.samples.counters, done.timer.total)
         record = policy.record(done, moment, cycle_s)
         shown = done.shown
-        yield record, Display(time_s + policy.latency_cycles * cycle_s, time_s, shown.image, shown.sample_map)
+        yield record, ShownImage(time_s + policy.latency_cycles * cycle_s, time_s, shown.image, shown.sample_map)
         state, cycle, time_s = done.after, cycle + 1, time_s + cycle_s
 
 

@@ -37,12 +37,12 @@ class Reconstruction:
 
     Attributes:
         image: ``(resolution, resolution, 3)`` float32 linear RGB, finite everywhere.
-        samples: age and density of the newest samples over each tile of the finest level.
+        sample_map: age and density of the newest samples over each tile of the finest level.
         overdraw: framelets that were accumulated, in units of the image area.
     """
 
     image: Float[Tensor, "h w 3"]
-    samples: SampleMap
+    sample_map: SampleMap
     overdraw: float
 
 
@@ -64,8 +64,8 @@ def blend(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstru
     Returns:
         The image. The same cache gives the same bits.
     """
-    samples = newest_samples(cache, config)
-    newest = samples.newest_s
+    sample_map = newest_samples(cache, config)
+    newest = sample_map.newest_s
     reference = newest[torch.isfinite(newest)].max() if bool(torch.isfinite(newest).any()) else newest.new_zeros(())
     # Relative to the newest sample, in cycles: small numbers that float32 holds well.
     age = ((newest - reference) / cycle_s).clamp(min=-AGE_MOST).to(torch.float32)
@@ -74,7 +74,7 @@ def blend(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstru
     for level in range(config.level_min, config.level_max + 1):
         total.add_level(level)
     image = total.normalised()
-    return Reconstruction(image, samples, total.pairs / config.resolution_px**2)
+    return Reconstruction(image, sample_map, total.pairs / config.resolution_px**2)
 
 
 def newest_samples(cache: FrameletCache, config: TsarConfig) -> SampleMap:

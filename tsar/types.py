@@ -123,20 +123,20 @@ class SampleMap:
 
 
 @dataclass(frozen=True)
-class Display:
+class ShownImage:
     """An image as it goes onto the display.
 
     Attributes:
         display_time_s: when it appears.
         sample_time_s: animation time of its newest samples.
         image: ``(height, width, 3)`` float32 linear RGB.
-        samples: of what age and density its samples are.
+        sample_map: of what age and density its samples are.
     """
 
     display_time_s: float
     sample_time_s: float
     image: Float[Tensor, "h w 3"]
-    samples: SampleMap | None = None
+    sample_map: SampleMap | None = None
 
 
 @dataclass(frozen=True)

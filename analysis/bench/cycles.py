@@ -82,10 +82,10 @@ class Tilings:
         self._errors = Errors(*torch.zeros(2, field.numel()).unbind(0))
 
     def __call__(self) -> None:
-        stage = StageTimer()
+        timer = StageTimer()
         for _ in range(_TILINGS_PER_CALL):
-            self._decide(self._densities, self._errors, self._densities.temporal, self._config, stage)
-        self.seconds.append(stage.seconds["tiling"] / _TILINGS_PER_CALL)
+            self._decide(self._densities, self._errors, self._densities.temporal, self._config, timer)
+        self.seconds.append(timer.seconds["tiling"] / _TILINGS_PER_CALL)
 
 
 def synthetic_trace(batch: FrameletBatch) -> SampleBatch:

@@ -142,15 +142,15 @@ class _Framed:
         from tsar.policies.framed import Framed
         from tsar.policy import Moment, Setting
 
-        number, stage, policy = len(self.image_s), StageTimer(), Framed(Setting(self.config))
+        number, timer, policy = len(self.image_s), StageTimer(), Framed(Setting(self.config))
         moment = Moment(number * self.options.cycles_per_turn * self.options.cycle_s, number, self.options.cycle_s)
-        with stage("batch"):
+        with timer("batch"):
             state, batch = policy.request(policy.start(), moment)
-        with stage("tracing"):
+        with timer("tracing"):
             samples = self.renderer.trace(batch)
-        policy.observe(state, batch, samples, moment, stage)
-        self.image_s.append(stage.total)
-        self.trace_s.append(stage.seconds["tracing"])
+        policy.observe(state, batch, samples, moment, timer)
+        self.image_s.append(timer.total)
+        self.trace_s.append(timer.seconds["tracing"])
         self.counters.append(samples.counters)
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.command.cli import InputError
-from tsar.types import Display, StepRecord
+from tsar.types import ShownImage, StepRecord
 
 WHISKERS = 1.5
 """Interquartile ranges beyond the box at which whiskers end at the latest, in tables and figures."""
@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 Payload = TypeVar("Payload")
 
 
-Shown = tuple[StepRecord | None, Display]
+Shown = tuple[StepRecord | None, ShownImage]
 """A record, where the policy makes any, and its image."""
 
 
@@ -77,13 +77,13 @@ class Hold(Generic[Payload]):
         refresh_s: display times of the images that have been shown so far.
     """
 
-    def __init__(self, displays: Iterable[tuple[Payload, Display]]) -> None:
-        self._stream: Iterator[tuple[Payload, Display]] = iter(displays)
-        self._current: tuple[Payload, Display] | None = None
+    def __init__(self, displays: Iterable[tuple[Payload, ShownImage]]) -> None:
+        self._stream: Iterator[tuple[Payload, ShownImage]] = iter(displays)
+        self._current: tuple[Payload, ShownImage] | None = None
         self._next = next(self._stream, None)
         self.refresh_s: list[float] = []
 
-    def at(self, time_s: float) -> tuple[Payload, Display]:
+    def at(self, time_s: float) -> tuple[Payload, ShownImage]:
         """The image on the display at ``time_s``; times must not decrease.
 
         Raises:

@@ -77,8 +77,8 @@ def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels
         spatial = with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP)
         temporal = density_image(rates, scales.temporal, side_px, RATE_MAP)
         temporal = with_scale(temporal, scales.temporal, "refreshes per cycle", RATE_MAP)
-    if display.samples is not None:
-        age = age_image(display.samples.newest_s, view.time_s, scales.age_s, side_px)
+    if display.sample_map is not None:
+        age = age_image(display.sample_map.newest_s, view.time_s, scales.age_s, side_px)
         age = with_scale(age, (1e3 * scales.age_s[0], 1e3 * scales.age_s[1]), "ms", AGE_MAP)
     return {
         "tiling by refresh rate": tiling,

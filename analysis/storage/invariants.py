@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from analysis.command.cli import BrokenInvariants
 from analysis.storage.records import RecordLimits, checked_fields, read_limits
-from tsar.types import Display, StepRecord
+from tsar.types import ShownImage, StepRecord
 
 _CONSERVATION = 1e-5
 _ROUNDING = 1e-6  # densities are stored as float32
@@ -75,7 +75,7 @@ class InvariantCheck:
         return {**self._found, "ok": bool(ok)}
 
 
-def unbroken(cycles: Iterable[tuple[StepRecord | None, Display]]) -> Iterator[StepRecord]:
+def unbroken(cycles: Iterable[tuple[StepRecord | None, ShownImage]]) -> Iterator[StepRecord]:
     """Records of cycles as they come, checked by what the pipeline itself counted: measurements of time go on
     undisturbed.
 

@@ -18,7 +18,7 @@ from analysis.metrics import METRICS
 from analysis.metrics.causes import CAUSES, REGIONS, Split, Truths, flicker, split
 from analysis.metrics.quality import Floats, Hold, Shown, View, encode, pixel_errors
 from analysis.page.pictures import Pixels
-from tsar.types import Display
+from tsar.types import ShownImage
 
 _MOTION_S = 0.1  # motion is judged over this long
 
@@ -128,11 +128,11 @@ class _Watcher:
         self.seen = Seen(refresh_s=hold.refresh_s)
         self._truths, self._times_s, self._measuring = truths, times_s, measuring
         self._before: tuple[Tensor, Tensor] | None = None
-        self._last: Display | None = None
+        self._last: ShownImage | None = None
         rate_hz = 1.0 / (times_s[1] - times_s[0]) if len(times_s) > 1 else 0.0
         self._step = max(1, round(_MOTION_S * rate_hz))
 
-    def measure(self, number: int, display: Display, truth: Tensor, wanted: Tensor) -> float:
+    def measure(self, number: int, display: ShownImage, truth: Tensor, wanted: Tensor) -> float:
         """One reference time: the image shown, its linear and its encoded truth. Returns the mean squared error."""
         seen, asked = self.seen, self._measuring
         errors, shown = pixel_errors(display.image, truth, wanted)
@@ -144,7 +144,7 @@ class _Watcher:
             self._before = shown - wanted, wanted
         if number % asked.stride == 0:
             row |= {name: METRICS[name].of_image(shown, wanted) for name in asked.metrics}
-            if asked.causes and display.samples is not None:
+            if asked.causes and display.sample_map is not None:
                 row |= self._causes(number, display)
         if asked.kept[0] <= number < asked.kept[1]:
             for kept, one in zip(seen.frames, (shown, wanted), strict=True):
@@ -154,10 +154,10 @@ class _Watcher:
         seen.rows.append(row)
         return errors.mse
 
-    def _causes(self, number: int, display: Display) -> dict[str, float]:
-        assert display.samples is not None
+    def _causes(self, number: int, display: ShownImage) -> dict[str, float]:
+        assert display.sample_map is not None
         image = display.image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0)
-        found = split(image, display.samples, number, self._truths, self._measuring.framelet_side, self._step)
+        found = split(image, display.sample_map, number, self._truths, self._measuring.framelet_side, self._step)
         self.seen.splits.append(found)
         known = {**found.causes, "causes_mse": found.mse} if found.known else {}
         return {**known, "causes_known": found.known}

@@ -17,10 +17,9 @@ from renderer.compute import device as devices
 from renderer.compute.launching import Command, address, require_same
 from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
-from renderer.stages import kernels, plans
-from renderer.stages import reconstruction_kernels as display_kernels
+from renderer.stages import kernels, plans, reconstruction_kernels
 from renderer.stages.coverage import StageName, covers
-from renderer.stages.reconstruction import Display
+from renderer.stages.reconstruction import Reconstructor
 from renderer.stages.views import PerCache
 from tsar.accounting import FAST_REFRESH, Account
 from tsar.cache import FrameletCache
@@ -51,12 +50,12 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
 
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
     """Kernels throughout, but for what they do not cover of a configuration (:mod:`renderer.stages.coverage`)."""
-    devices.load_kernels((kernels, display_kernels), "cpu")
-    control, display = Control(config, threads), Display(config, threads)
+    devices.load_kernels((kernels, reconstruction_kernels), "cpu")
+    control, reconstructor = Control(config, threads), Reconstructor(config, threads)
     return Stages(
         observe=control.observe,
         decide=control.decide,
-        reconstruct=display.reconstruct,
+        reconstruct=reconstructor.reconstruct,
         account=control.account,
     )
 
@@ -84,7 +83,7 @@ class Control:
         self._account = Command(kernels.take_account, *fixed)
 
     def observe(
-        self, batch: FrameletBatch, color: Tensor, cache: FrameletCache, config: TsarConfig, stage: StageTimer
+        self, batch: FrameletBatch, color: Tensor, cache: FrameletCache, config: TsarConfig, timer: StageTimer
     ) -> Observation:
         """As :func:`tsar.observation.observe`; framelets with samples that are not finite are repaired and observed
         after the others.
@@ -96,11 +95,11 @@ class Control:
         """
         require_same(config, self.config)
         if not self._covered["observe"]:
-            return REFERENCE.observe(batch, color, cache, config, stage)
+            return REFERENCE.observe(batch, color, cache, config, timer)
         count, nonfinite = batch.level.shape[0], 0
         if count > config.batch_size:
             raise ValueError(f"batch: expected at most {config.batch_size} framelets, got {count}")
-        with stage("cache"):
+        with timer("cache"):
             claim, observe = self._per_cache(cache)
             color = _single(color).contiguous()
             spatial, temporal = torch.empty(self._elements), torch.empty(self._elements)
@@ -109,7 +108,7 @@ class Control:
             tiles = count, level, address("batch.index", batch.index, _I64, count)
             colors = address("color", color, _F32, count * 3 * config.samples)
             claim(*tiles, self._times_of(batch), *fields)
-        with stage("error"):
+        with timer("error"):
             self._run(observe, *tiles, colors, *fields)
             if self._progress[1]:
                 color, nonfinite = replace_nonfinite(color, config.framelet_side)
@@ -117,7 +116,7 @@ class Control:
         return Observation(Errors(spatial, temporal), nonfinite)
 
     def decide(
-        self, densities: Densities, errors: Errors, history: Tensor, config: TsarConfig, stage: StageTimer
+        self, densities: Densities, errors: Errors, history: Tensor, config: TsarConfig, timer: StageTimer
     ) -> Decision:
         """As :func:`tsar.decision.decide`; responses that are not compiled are the reference's.
 
@@ -126,10 +125,10 @@ class Control:
         """
         require_same(config, self.config)
         if not self._covered["decide"]:
-            return REFERENCE.decide(densities, errors, history, config, stage)
+            return REFERENCE.decide(densities, errors, history, config, timer)
         compiled = self._covered["respond"]
         if not compiled:
-            with stage("response"):
+            with timer("response"):
                 densities = respond(densities, errors, config)
         start = time.perf_counter()
         count, samples = config.batch_size, config.samples
@@ -173,7 +172,7 @@ class Control:
         request = Request(selected, credit, due_level, due_index, position)
         begun, responded, tiled, done = self._decided.tolist()
         shares = {"response": responded - begun, "tiling": tiled - responded, "selection": done - tiled}
-        stage.divide(time.perf_counter() - start, shares)
+        timer.divide(time.perf_counter() - start, shares)
         return Decision(Densities(spatial, temporal, surplus), tiling, request)
 
     def account(self, densities: Densities, errors: Errors, newest_s: Tensor, config: TsarConfig) -> Account:

@@ -42,7 +42,7 @@ class _Launches:
     bury: Command
 
 
-class Display:
+class Reconstructor:
     """Reconstruction for one configuration. Holds constants, recorded launches and working memory, nothing of a run."""
 
     def __init__(self, config: TsarConfig, threads: int = 1) -> None:

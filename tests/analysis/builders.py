@@ -10,7 +10,7 @@ import torch
 from analysis.metrics.quality import View
 from analysis.page.video import Scales
 from analysis.storage.records import RecordLimits
-from tsar.types import Densities, Display, Errors, SampleMap, StepRecord, Tiling
+from tsar.types import Densities, Errors, SampleMap, ShownImage, StepRecord, Tiling
 
 SPATIAL, TEMPORAL = (0.25, 64.0), (1 / 64, 1.0)
 SCALES = Scales(SPATIAL, TEMPORAL)
@@ -73,7 +73,7 @@ def view(time_s: float = 0.0, reference: float = 0.0, own: float = 1.0, framed: 
     record = good_record(densities=densities, tiling=tiling(*((1, i) for i in range(4))))
     newest_s = torch.full((2, 2), time_s - 0.125, dtype=torch.float64)
     ages = SampleMap(newest_s, torch.zeros(2, 2, dtype=torch.int64))
-    displays = Display(time_s, time_s, grey(own), ages), Display(time_s, 0.0, grey(framed))
+    displays = ShownImage(time_s, time_s, grey(own), ages), ShownImage(time_s, 0.0, grey(framed))
     shown = {"own": (record, displays[0]), "framed": (None, displays[1])}
     return View(number, time_s, grey(reference), shown, {"own": 0.1, "framed": 0.2})
 

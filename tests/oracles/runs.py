@@ -9,7 +9,7 @@ from tsar.config import TsarConfig
 from tsar.policies import POLICIES
 from tsar.policy import Policy, Setting, Truth, run
 from tsar.stages import REFERENCE, Stages
-from tsar.types import Display, StepRecord, Trace
+from tsar.types import ShownImage, StepRecord, Trace
 
 
 def made(
@@ -27,10 +27,10 @@ def play(
     end_s: float,
     stages: Stages = REFERENCE,
     truth: Truth | None = None,
-) -> Iterator[tuple[StepRecord | None, Display]]:
+) -> Iterator[tuple[StepRecord | None, ShownImage]]:
     return run(made(name, config, stages, truth, trace), trace, clock, start_s, end_s)
 
 
-def images(*arguments, **more) -> Iterator[Display]:
+def images(*arguments, **more) -> Iterator[ShownImage]:
     """As :func:`play`, without the records."""
     return (display for _, display in play(*arguments, **more))

@@ -77,7 +77,7 @@ def test_a_run_far_from_time_zero_is_the_run_at_time_zero(renderers, policy: str
             assert shown.display_time_s - later == image.display_time_s
             assert shown.sample_time_s - later == image.sample_time_s
             assert torch.equal(shown.image, image.image)
-            assert torch.equal(shown.samples.newest_s - later, image.samples.newest_s)
+            assert torch.equal(shown.sample_map.newest_s - later, image.sample_map.newest_s)
             if record is not None:
                 assert record.sim_time_s - later == expected.sim_time_s
                 assert record.age_spread_s == expected.age_spread_s

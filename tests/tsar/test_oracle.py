@@ -19,7 +19,7 @@ from tsar.policies import oracle
 from tsar.policies.oracle import Oracle
 from tsar.reconstruction import reconstruct
 from tsar.tiling import uniform
-from tsar.types import Display, SampleBatch
+from tsar.types import SampleBatch, ShownImage
 
 CYCLE, WARMUP = 0.02, 4
 CONFIG = TsarConfig(
@@ -164,8 +164,8 @@ def play(picture=EDGE, cycles=10, config=CONFIG, clock=None, truth=None, trace=N
 
 
 def newest_of(shown):
-    assert shown.samples is not None
-    return shown.samples.newest_s
+    assert shown.sample_map is not None
+    return shown.sample_map.newest_s
 
 
 def play_uniform(picture, cycles):
@@ -178,7 +178,7 @@ def play_uniform(picture, cycles):
         cache.insert(batch, color, torch.zeros(tiling.tile_count, state_size(side**2)))
         shown = reconstruct(cache, CONFIG, CYCLE)
         display_s = (cycle + Oracle.latency_cycles) * CYCLE
-        yield Display(display_s, cycle * CYCLE, shown.image, shown.samples)
+        yield ShownImage(display_s, cycle * CYCLE, shown.image, shown.sample_map)
 
 
 def error(displays, picture):

@@ -88,8 +88,8 @@ def test_double_width_is_bilinear_interpolation(shape):
 
 
 def map_of(shown):
-    assert shown.samples is not None
-    return shown.samples.newest_s, shown.samples.level
+    assert shown.sample_map is not None
+    return shown.sample_map.newest_s, shown.sample_map.level
 
 
 def pixel_truth(picture, time_s):

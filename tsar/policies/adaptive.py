@@ -66,7 +66,7 @@ class Adaptive(Policy[State]):
 
     def image(self, state: State, moment: Moment) -> Picture:
         made = self._stages.reconstruct(state.cache, self.config, moment.cycle_s)
-        return Picture(made.image, made.samples)
+        return Picture(made.image, made.sample_map)
 
     def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord:
         before, after, config = cycle.before, cycle.after, self.config

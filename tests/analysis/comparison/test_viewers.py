@@ -43,7 +43,7 @@ def test_steps_hold_what_is_shown_then() -> None:
     """Maps to the last bit, images nearly; what a run does not say is missing."""
     found = Steps("own", SCALES, 5)
     views = [view(number / 10, reference=0.1 * number, framed=0.2 * number, number=number) for number in range(5)]
-    silent = {**views[4].shown, "own": (None, replace(views[4].shown["own"][1], samples=None))}
+    silent = {**views[4].shown, "own": (None, replace(views[4].shown["own"][1], sample_map=None))}
     views[4] = replace(views[4], shown=silent)
     for one in views:
         found(one)

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from analysis.command.cli import InputError
 from analysis.metrics import quality
-from tsar.types import Display
+from tsar.types import ShownImage
 
 
-def shown(*times: float) -> list[tuple[int, Display]]:
-    return [(i, Display(t, t - 0.1, torch.full((2, 2, 3), float(i)))) for i, t in enumerate(times)]
+def shown(*times: float) -> list[tuple[int, ShownImage]]:
+    return [(i, ShownImage(t, t - 0.1, torch.full((2, 2, 3), float(i)))) for i, t in enumerate(times)]
 
 
 def test_reference_times() -> None:

@@ -38,7 +38,7 @@ def of_age(view: View, newest_s: torch.Tensor | None) -> View:
     """The same with other ages of the samples of the first run."""
     record, display = view.shown["own"]
     ages = None if newest_s is None else SampleMap(newest_s, torch.zeros(2, 2, dtype=torch.int64))
-    return replace(view, shown={**view.shown, "own": (record, replace(display, samples=ages))})
+    return replace(view, shown={**view.shown, "own": (record, replace(display, sample_map=ages))})
 
 
 def panel(frame: np.ndarray, slot: int, strip: int) -> np.ndarray:

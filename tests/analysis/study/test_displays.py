@@ -15,7 +15,7 @@ from analysis.metrics.causes import Truths
 from analysis.metrics.quality import Shown, View
 from analysis.study.displays import Measuring, Seen, watch
 from tests.analysis.builders import good_record
-from tsar.types import Display, SampleMap
+from tsar.types import SampleMap, ShownImage
 
 SIDE = 4
 
@@ -27,7 +27,7 @@ def image(white: int) -> torch.Tensor:
 
 
 def stream(display_s: Sequence[float], first: int = 0, latency_s: float = 0.2) -> list[Shown]:
-    return [(None, Display(t, t - latency_s, image(first + i))) for i, t in enumerate(display_s)]
+    return [(None, ShownImage(t, t - latency_s, image(first + i))) for i, t in enumerate(display_s)]
 
 
 def recorded(display_s: Sequence[float]) -> list[Shown]:
@@ -61,7 +61,7 @@ def test_errors_are_of_what_stands_on_the_display() -> None:
 
 
 def test_every_time_has_its_own_reference() -> None:
-    runs = {"a": [(good_record(), Display(0.0, 0.0, image(3)))], "b": stream([0.0])}
+    runs = {"a": [(good_record(), ShownImage(0.0, 0.0, image(3)))], "b": stream([0.0])}
     found = look([0.0, 1.0, 2.0], runs, [image(i) for i in (3, 5, 1)])
     assert white(found["a"]) == [0, 2, 2] and white(found["b"]) == [3, 5, 1]
 
@@ -100,7 +100,7 @@ def test_nothing_shown_at_the_start_is_an_error() -> None:
 def test_nonfinite_values_count_once_an_image_however_long_it_is_shown() -> None:
     bad = image(2)
     bad[3, 3] = torch.tensor([math.nan, math.inf, 0.0])
-    shown = [(None, Display(0.0, 0.0, bad)), (None, Display(0.9, 0.9, image(2)))]
+    shown = [(None, ShownImage(0.0, 0.0, bad)), (None, ShownImage(0.9, 0.9, image(2)))]
     found = look((np.arange(10) / 10).tolist(), {"a": recorded([0.0]), "b": shown})
     assert {name: seen.nonfinite for name, seen in found.items()} == {"a": 0, "b": 2}
     assert white(found["b"]) == [2] * 10
@@ -129,10 +129,10 @@ def test_images_of_a_span_are_kept_encoded() -> None:
 
 def test_ages_are_of_the_image_on_the_display() -> None:
     maps = [SampleMap(torch.full((2, 2), t, dtype=torch.float64), torch.zeros(2, 2, dtype=torch.int64)) for t in (3, 4)]
-    shown = [(good_record(i), Display(i * 0.2, 0.0, image(i), maps[i])) for i in range(2)]
+    shown = [(good_record(i), ShownImage(i * 0.2, 0.0, image(i), maps[i])) for i in range(2)]
     views: list[View] = []
     look([0.1, 0.3], {"a": shown, "b": stream([0.0])}, viewers=[views.append])
-    assert [view.shown["a"][1].samples is maps[i] for i, view in enumerate(views)] == [True, True]
+    assert [view.shown["a"][1].sample_map is maps[i] for i, view in enumerate(views)] == [True, True]
 
 
 def test_all_streams_are_read_side_by_side() -> None:

@@ -14,7 +14,7 @@ import tsar.decision
 import tsar.error
 from renderer.stages.control import Control, compiled_stages
 from renderer.stages.coverage import _KNOWN, StageName, covers
-from renderer.stages.reconstruction import Display
+from renderer.stages.reconstruction import Reconstructor
 from tests.oracles import pictures, runs
 from tests.renderer.stages.builders import CONFIGS, CYCLE_S, small
 from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
@@ -126,14 +126,14 @@ def test_a_field_that_no_stage_knows_goes_to_the_reference_throughout(config: Ts
         return lambda *arguments: called.append(name)
 
     original = {field.name: getattr(REFERENCE, field.name) for field in fields(REFERENCE)}
-    control, display = Control(config), Display(config)
+    control, reconstructor = Control(config), Reconstructor(config)
     try:
         for name in original:
             object.__setattr__(REFERENCE, name, heard(name))
         control.observe(None, None, None, config, None)
         control.decide(None, None, None, config, None)
         control.account(None, None, None, config)
-        display.reconstruct(None, config, 1.0)
+        reconstructor.reconstruct(None, config, 1.0)
     finally:
         for name, stage in original.items():
             object.__setattr__(REFERENCE, name, stage)

@@ -62,9 +62,9 @@ def differences(config: TsarConfig, number: int, cycles: int) -> Iterator[str]:
         theirs = copy.deepcopy(state.cache)
         image, plain = stages.reconstruct(state.cache, config, CYCLE_S), REFERENCE.reconstruct(theirs, config, CYCLE_S)
         yield from _near("image", image.image, plain.image, 1e-5, 1e-6)
-        yield from _same("ages", image.samples.newest_s, plain.samples.newest_s)
+        yield from _same("ages", image.sample_map.newest_s, plain.sample_map.newest_s)
         yield from _same("dead", state.cache.dead, theirs.dead)
-        sums = [s.account(ours.densities, found.errors, image.samples.newest_s, config) for s in (stages, REFERENCE)]
+        sums = [s.account(ours.densities, found.errors, image.sample_map.newest_s, config) for s in (stages, REFERENCE)]
         yield from _same("non-finite fields", sums[0].nonfinite + sums[1].nonfinite, 0)
         yield from _same("spread of ages", sums[0].age_spread_s, sums[1].age_spread_s)
         state = State(ours.densities, ours.tiling, ours.due, state.cache)
