@@ -16,7 +16,7 @@ from renderer.compute import device as devices
 from renderer.compute.launching import shared
 from renderer.kernels import entry as kernels
 from renderer.kernels import packets as packet_kernels
-from renderer.kernels.shading import stack_size
+from renderer.kernels.bundles import stack_size
 from renderer.layout.features import ALL, PACKETS, Feature
 from renderer.layout.sizes import BLOCK_PX
 from renderer.layout.structs import Ray, ViewData
