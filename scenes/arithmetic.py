@@ -1,14 +1,15 @@
-"""Functions whose last bit is not up to the processor.
+"""Functions that give the same bits on every x86-64 processor.
 
-NumPy, PyTorch, BLAS and the system's library choose code by the instructions that a processor has, and each rounds in
-its own way. What is here adds, multiplies, divides and takes roots one after the other, as IEEE 754 rounds them; other
-functions are evaluated with 64 bits of precision, which no vector unit has, and rounded to the 53 of float64. That is
-so on x86-64; where ``long double`` is another type, results agree up to rounding.
+NumPy, PyTorch, BLAS and the C library choose code by the instructions that a processor has, and each rounds in its own
+way. The functions here add, multiply, divide and take roots one after the other, as IEEE 754 rounds them. Other
+functions are evaluated with the 64 bits of precision of ``long double``, which no vector unit has, and rounded to the
+53 bits of float64. Where ``long double`` is another type, results agree up to rounding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,69 +23,44 @@ def _rounded(function: Callable[..., Any], *values: ArrayLike) -> Any:
     return function(*(np.asarray(value, np.longdouble) for value in values)).astype(np.float64)
 
 
-def sin(x: ArrayLike) -> Any:
-    """Sine, of numbers or arrays in radians; as all that follow, float64."""
-    return _rounded(np.sin, x)
+sin = partial(_rounded, np.sin)
+"""Sine of an angle, radians. This and what follows takes numbers or arrays and gives float64."""
 
+cos = partial(_rounded, np.cos)
+"""Cosine of an angle, radians."""
 
-def cos(x: ArrayLike) -> Any:
-    """Cosine."""
-    return _rounded(np.cos, x)
+tan = partial(_rounded, np.tan)
+"""Tangent of an angle, radians."""
 
+arcsin = partial(_rounded, np.arcsin)
+"""Angle of a sine, radians."""
 
-def tan(x: ArrayLike) -> Any:
-    """Tangent."""
-    return _rounded(np.tan, x)
+arccos = partial(_rounded, np.arccos)
+"""Angle of a cosine, radians."""
 
+arctan = partial(_rounded, np.arctan)
+"""Angle of a tangent, radians."""
 
-def arcsin(x: ArrayLike) -> Any:
-    """Angle of a sine, radians."""
-    return _rounded(np.arcsin, x)
+arctan2 = partial(_rounded, np.arctan2)
+"""Angle of a point, radians; takes ``y``, then ``x``."""
 
+exp = partial(_rounded, np.exp)
+"""Exponential function."""
 
-def arccos(x: ArrayLike) -> Any:
-    """Angle of a cosine, radians."""
-    return _rounded(np.arccos, x)
+expm1 = partial(_rounded, np.expm1)
+"""Exponential function, less one."""
 
+log = partial(_rounded, np.log)
+"""Natural logarithm."""
 
-def arctan(x: ArrayLike) -> Any:
-    """Angle of a tangent, radians."""
-    return _rounded(np.arctan, x)
+log1p = partial(_rounded, np.log1p)
+"""Natural logarithm of one more than the number."""
 
+power = partial(_rounded, np.power)
+"""A base to the power of an exponent."""
 
-def arctan2(y: ArrayLike, x: ArrayLike) -> Any:
-    """Angle of the point ``(x, y)``, radians."""
-    return _rounded(np.arctan2, y, x)
-
-
-def exp(x: ArrayLike) -> Any:
-    """Exponential function."""
-    return _rounded(np.exp, x)
-
-
-def log(x: ArrayLike) -> Any:
-    """Natural logarithm."""
-    return _rounded(np.log, x)
-
-
-def log1p(x: ArrayLike) -> Any:
-    """Natural logarithm of ``1 + x``."""
-    return _rounded(np.log1p, x)
-
-
-def expm1(x: ArrayLike) -> Any:
-    """Exponential function, less one."""
-    return _rounded(np.expm1, x)
-
-
-def power(base: ArrayLike, exponent: ArrayLike) -> Any:
-    """``base`` to the power of ``exponent``."""
-    return _rounded(np.power, base, exponent)
-
-
-def hypot(x: ArrayLike, y: ArrayLike) -> Any:
-    """Distance of ``(x, y)`` from the origin."""
-    return _rounded(np.hypot, x, y)
+hypot = partial(_rounded, np.hypot)
+"""Distance of a point ``x``, ``y`` from the origin."""
 
 
 def norm(vector: ArrayLike) -> float:

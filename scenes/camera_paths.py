@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from scenes.animation import continuous_quaternions
 from scenes.arithmetic import cos, norm, product, rotation_about
 from scenes.canonical import Mesh, PerspectiveCamera, Scene, SceneError
 from scenes.canonical.values import RigidTrack
@@ -45,8 +46,7 @@ def on_a_path(scene: Scene, path: CameraPath) -> Scene:
         axis[int(np.abs(up).argmax())] = np.sign(up[int(np.abs(up).argmax())])
         center = eye + way * forward
         turns = rotation_about(axis, np.linspace(0.0, 2.0 * np.pi, _KEYS))
-        rotation = turns.as_quat()
-        rotation[1:] *= np.cumprod(np.where((rotation[1:] * rotation[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))[:, None]
+        rotation = continuous_quaternions(turns.as_quat())
         translation = center - turns.apply(center)
         track = RigidTrack(0.0, TURN_S / (_KEYS - 1), translation, rotation)
         return dataclasses.replace(scene, camera=dataclasses.replace(camera, track=track), duration_s=TURN_S)

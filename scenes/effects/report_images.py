@@ -30,6 +30,7 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.driving import sky
+from scenes.effects.stage import facing_down, placed
 
 IMAGES = ("report-one", "report-two")
 """Names of the scenes."""
@@ -79,18 +80,13 @@ def knotted_tube(around: int, along: int) -> Mesh:
 
 
 def _scene(name: str, model: Mesh, material: Material, size_px: tuple[int, int], refraction_rays: int) -> Scene:
-    def placed(at: tuple[float, float, float], size: tuple[float, float, float]) -> np.ndarray:
-        matrix = np.diag([*size, 1.0])
-        matrix[:3, 3] = at
-        return matrix
-
     squares = CheckerboardTexture(ConstantTexture((0.7, 0.66, 0.6)), ConstantTexture((0.32, 0.36, 0.42)), (20.0, 20.0))
     box = Phong(
         ConstantTexture((0.45, 0.36, 0.26)), fresnel_min=0.25, fresnel_max=0.7, ambient=0.6, mirror_spread_deg=14.0
     )
     heights = np.linspace(1.0, -1.0, 64)[:, None, None]
     haze = np.array([0.62, 0.68, 0.75]) + np.clip(heights, 0.0, 1.0) * np.array([-0.45, -0.4, -0.25])
-    lamp = placed((-4.0, -5.0, 9.0), (1.6, -1.6, -1.0))
+    lamp = facing_down((-4.0, -5.0, 9.0), 1.6, 1.6)
     eye, target = np.array((2.4, -10.5, 4.6)), np.array((0.0, 0.0, 1.7))
     return Scene(
         PerspectiveCamera(camera_to_world(eye, target), 38.0, lens_radius=0.06, focal_distance=10.0),

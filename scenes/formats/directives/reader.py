@@ -15,7 +15,15 @@ import numpy as np
 from scenes.canonical import Material, SceneError, Texture
 from scenes.canonical.values import Matrix
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of, parse_directives
-from scenes.formats.geometry.transform_stack import TransformStack, look_at, rotation, scaling, translation
+from scenes.formats.geometry.transform_stack import (
+    TransformStack,
+    inverse,
+    invertible,
+    looking,
+    rotation,
+    scaling,
+    translation,
+)
 from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
@@ -117,10 +125,10 @@ class DirectiveReader:
 
     def _look_at(self, directive: Directive) -> None:
         eye, target, up = np.array(numbers(directive, 9)).reshape(3, 3)
-        found = look_at(eye, target, up, self.left_handed)
+        found = looking(eye, target, up, self.left_handed)
         if found is None:
             raise SceneError(f"{directive.place}: LookAt: expected an upward direction across the line of sight")
-        self.transforms.apply(found)
+        self.transforms.apply(inverse(found))
 
     def _name_system(self, directive: Directive) -> None:
         self.transforms.named[word(directive)] = [part.copy() for part in self.transforms.current]
@@ -184,9 +192,7 @@ def matrix(directive: Directive) -> Matrix:
 
 def checked(directive: Directive, found: Matrix) -> Matrix:
     """A transform that can be inverted; raises SceneError for another."""
-    part = found[:3, :3]
-    size = np.abs(part).max(initial=0.0)
-    if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0:
+    if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not invertible(found):
         raise SceneError(
             f"{directive.place}: {directive.name}: expected a matrix that can be inverted, last row 0 0 0 1"
         )

@@ -10,6 +10,7 @@ import numpy as np
 from scenes.canonical import Cube, Mesh
 from scenes.canonical.values import Matrix
 from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.orientation import area_normals
 
 _CLOSE = 1e-4  # of a side; files print six digits
 
@@ -82,7 +83,7 @@ def _sides(mesh: Mesh, signs: np.ndarray) -> np.ndarray | None:
     if (even.sum(axis=1) != 1).any():
         return None
     sides = np.where(even, corners[:, 0], 0)
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward = area_normals(corners)
     if ((outward * sides).sum(axis=1) <= 0).any():
         return None
     # what two triangles of a side lack are opposite corners: a triangle's sum is its middle corner and the side twice
@@ -93,9 +94,9 @@ def _sides(mesh: Mesh, signs: np.ndarray) -> np.ndarray | None:
             return None
     if mesh.normals is not None:
         world = mesh.vertices[mesh.faces].astype(np.float64)
-        across = np.cross(world[:, 1] - world[:, 0], world[:, 2] - world[:, 0])
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        if (np.einsum("fcx,fx->fc", mesh.normals[mesh.faces], across) < 1.0 - 1e-3).any():
+        normals = area_normals(world)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if (np.einsum("fcx,fx->fc", mesh.normals[mesh.faces], normals) < 1.0 - 1e-3).any():
             return None
     return sides
 

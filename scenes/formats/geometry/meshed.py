@@ -25,6 +25,7 @@ from scenes.canonical import (
     Sphere,
     Texture,
 )
+from scenes.formats.geometry.orientation import area_normals
 from scenes.formats.geometry.revolution import partial_sphere, ring
 
 SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
@@ -59,8 +60,7 @@ def mitsuba_cube() -> Mesh:
     uvs = np.tile(np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32), (6, 1))
     first = 4 * np.arange(6)[:, None]
     faces = (first + np.array([0, 1, 2, 3, 0, 2])).reshape(-1, 3).astype(np.int32)
-    across = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
-    inward = (across * normals[faces[:, 0]]).sum(axis=1) < 0.0
+    inward = (area_normals(points[faces]) * normals[faces[:, 0]]).sum(axis=1) < 0.0
     return Mesh(points, np.where(inward[:, None], faces[:, ::-1], faces), normals, uvs, "cube")
 
 
@@ -110,5 +110,5 @@ def _cube() -> Mesh:
             uvs.extend(SQUARE_UV)
             faces += [[start, start + 1, start + 2], [start, start + 2, start + 3]]
     arrays = (np.array(part, np.float32) for part in (vertices, normals, uvs))
-    points, across, texture = arrays
-    return Mesh(points, np.array(faces, np.int32), across, texture, "cube")
+    points, outward, texture = arrays
+    return Mesh(points, np.array(faces, np.int32), outward, texture, "cube")

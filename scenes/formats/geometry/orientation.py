@@ -11,6 +11,11 @@ FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
 """Mirrors z; a sphere stays, and its texture coordinate ``v`` is reversed."""
 
 
+def area_normals(corners: np.ndarray) -> np.ndarray:
+    """Vectors along the outward normals of triangles ``(n, 3, 3)``, as long as twice their areas, ``(n, 3)``."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def turned(mesh: Mesh) -> Mesh:
     """The mesh with its inside out."""
     normals = None if mesh.normals is None else -mesh.normals
@@ -22,8 +27,7 @@ def facing_normals(mesh: Mesh) -> Mesh:
     if mesh.normals is None:
         return mesh
     corners = mesh.vertices[mesh.faces].astype(np.float64)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    wrong = (across * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
+    wrong = (area_normals(corners) * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
     if not wrong.any():
         return mesh
     faces = np.where(wrong[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces).astype(np.int32)

@@ -8,8 +8,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.arithmetic import arccos, cos, hypot, sin
+from scenes.arithmetic import arccos, cos, hypot, product, sin
 from scenes.canonical import Mesh
+from scenes.formats.geometry.orientation import area_normals
 
 AROUND, ALONG = 64, 16
 """Quadrilaterals of a full turn, and along the profile where it is curved."""
@@ -42,10 +43,10 @@ def revolved(profile: Profile, along: int, turn_deg: float = 360.0, source: str 
     a, b, c, d = (part.ravel() for part in (row, row + 1, row + around + 2, row + around + 1))
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     corners = points.reshape(-1, 3)[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    size = np.linalg.norm(area_normals(corners), axis=1)
     return Mesh(
         points.reshape(-1, 3).astype(np.float32),
-        faces[area > 1e-12 * area.max()].astype(np.int32),
+        faces[size > 1e-12 * size.max()].astype(np.int32),
         normal.reshape(-1, 3).astype(np.float32),
         np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float32),
         source,
@@ -104,12 +105,11 @@ def lamp_sphere(radius: float) -> Mesh:
     return Mesh((unit.vertices * np.float32(scale)), unit.faces, unit.normals, unit.uvs, unit.source)
 
 
-def area(mesh: Mesh) -> float:
-    """Of all triangles."""
+def area(mesh: Mesh, axes: NDArray[np.float64] | None = None) -> float:
+    """Area of all triangles; of the mesh under a linear map ``(3, 3)`` where one is given."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
-    return 0.5 * float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    )
+    placed = corners if axes is None else product(corners, axes.T)
+    return 0.5 * float(np.linalg.norm(area_normals(placed), axis=1).sum())
 
 
 def ring(radius: float, inner: float, height: float, turn_deg: float = 360.0) -> Mesh:

@@ -6,6 +6,7 @@ import numpy as np
 
 from scenes.canonical import Mesh
 from scenes.canonical.values import Matrix
+from scenes.formats.geometry.orientation import area_normals
 
 _ROUND_OFF = 1e-4  # of the size: how far off a round shape vertices may be
 _AREA_OFF = 0.02  # of the area, which triangles cut off
@@ -29,7 +30,7 @@ def recognised_disk(mesh: Mesh) -> Matrix | None:
     if size <= 0.0:
         return None
     corners = points[mesh.faces]
-    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ (normal / size)
+    areas = 0.5 * area_normals(corners) @ (normal / size)
     if (areas < 0.0).any() or abs(areas.sum() / (np.pi * size) - 1.0) > _AREA_OFF:
         return None
     if mesh.normals is not None and (mesh.normals @ (normal / size) < 1.0 - 1e-3).any():
@@ -57,8 +58,9 @@ def recognised_sphere(mesh: Mesh) -> Matrix | None:
     outward = unit @ root
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     corners = unit[mesh.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    if ((mesh.normals * outward).sum(axis=1) < 0.99).any() or ((across * corners[:, 0]).sum(axis=1) <= 0.0).any():
+    if ((mesh.normals * outward).sum(axis=1) < 0.99).any() or (
+        (area_normals(corners) * corners[:, 0]).sum(axis=1) <= 0.0
+    ).any():
         return None
     turn = np.eye(3)
     if mesh.uvs is not None:
@@ -103,7 +105,7 @@ def _ellipsoid(points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 def _closed(mesh: Mesh, unit: np.ndarray) -> bool:
     """Whether the triangles cover the unit sphere, but for what they cut off."""
     corners = unit[mesh.faces]
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = 0.5 * np.linalg.norm(area_normals(corners), axis=1)
     volume = np.einsum("fx,fx->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
     return bool(areas.sum() > (1.0 - _AREA_OFF) * 4.0 * np.pi and volume > (1.0 - _AREA_OFF) * 4.0 / 3.0 * np.pi)
 

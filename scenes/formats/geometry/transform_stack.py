@@ -41,21 +41,30 @@ def rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
     return matrix
 
 
-def look_at(
+def invertible(matrix: Matrix) -> bool:
+    """Whether a transform is finite and keeps a volume."""
+    part = matrix[:3, :3]
+    size = np.abs(part).max(initial=0.0)
+    return bool(np.isfinite(matrix).all() and abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0)
+
+
+def looking(
     eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64], left_handed: bool
 ) -> Matrix | None:
-    """World to camera, which looks along +z with y up; x is to the right of the picture in PBRT's left-handed sense, or
-    of a right-handed world (LuxRender). None where the three points are on one line.
+    """Camera to world of a camera that looks along +z with y up; None where the three points are on one line.
+
+    Its x axis lies to the right in a left-handed world (PBRT, where Mitsuba says that it lies to the left of a
+    right-handed one), or to the right in a right-handed world (LuxRender).
     """
     forward = target - eye
-    right = np.cross(up, forward) if left_handed else np.cross(forward, up)
-    if min(norm(forward), norm(right)) < 1e-12:
+    side = np.cross(up, forward) if left_handed else np.cross(forward, up)
+    if min(norm(forward), norm(side)) < 1e-12:
         return None
-    forward, right = forward / norm(forward), right / norm(right)
-    above = np.cross(forward, right) if left_handed else np.cross(right, forward)
+    forward, side = forward / norm(forward), side / norm(side)
+    above = np.cross(forward, side) if left_handed else np.cross(side, forward)
     matrix = np.eye(4)
-    matrix[:3] = np.stack([right, above, forward, eye], axis=1)
-    return inverse(matrix)
+    matrix[:3] = np.stack([side, above, forward, eye], axis=1)
+    return matrix
 
 
 def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack | None:

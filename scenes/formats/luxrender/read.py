@@ -35,6 +35,7 @@ from scenes.formats.directives.reader import typed, word
 from scenes.formats.directives.scene_reader import SceneReader, scene_of
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
 from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.revolution import area
 from scenes.formats.geometry.transform_stack import KEYS_MAX
 from scenes.formats.losses import LossReport
 from scenes.formats.luxrender.read_materials import LuxSurfaces, lux_image
@@ -260,14 +261,9 @@ class LuxReader(SceneReader):
             return
         luminance = float(product(_LUMINANCE, emission))
         lamp = self.instances[-1]
-        corners = product(
-            as_mesh(lamp.shape).vertices[as_mesh(lamp.shape).faces].astype(np.float64), lamp.to_world[:3, :3].T
-        )
-        area = (
-            0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-        )
-        if luminance > 0.0 and area > 0.0:
-            radiance = rgb(np.array(emission) * power / (math.pi * area * luminance))
+        size = area(as_mesh(lamp.shape), lamp.to_world[:3, :3])
+        if luminance > 0.0 and size > 0.0:
+            radiance = rgb(np.array(emission) * power / (math.pi * size * luminance))
             self.instances[-1] = dataclasses.replace(lamp, emission=radiance)
 
 

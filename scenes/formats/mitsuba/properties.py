@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenes.arithmetic import norm, power, product
+from scenes.arithmetic import power, product
 from scenes.canonical import Rgb, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, rgb, sampled_rgb, xyz_to_rgb
-from scenes.formats.geometry.transform_stack import KEYS_MAX, rotation, scaling, translation
+from scenes.formats.geometry.transform_stack import KEYS_MAX, invertible, looking, rotation, scaling, translation
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import NUMBER_MAX
 from scenes.formats.text.xml_tree import Node
@@ -185,32 +185,26 @@ def transform_of(node: Node) -> Matrix:
         elif step.tag == "matrix":
             made = np.array(numbers(step, step.get("value"), 16)).reshape(4, 4)
         elif step.tag in ("lookat", "lookAt"):
-            made = looking(step)
+            made = _looked_along(step)
         else:
             raise SceneError(f"{step.place}: expected a step of a transform, got {step.tag!r}")
         matrix = product(made, matrix)
-    part = matrix[:3, :3]
-    size = np.abs(part).max(initial=0.0)
-    if not np.isfinite(matrix).all() or not abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0:
+    if not invertible(matrix):
         raise SceneError(f"{node.place}: transform: expected one that can be inverted")
     return matrix
 
 
-def looking(step: Node) -> Matrix:
-    """Camera to world: looks along +z, y up, x to the left."""
-    points = {name: np.array(numbers(step, step.get(name), 3)) for name in ("origin", "target")}
-    forward = points["target"] - points["origin"]
+def _looked_along(step: Node) -> Matrix:
+    """Camera to world by two points and an upward direction."""
+    origin, target = (np.array(numbers(step, step.get(name), 3)) for name in ("origin", "target"))
     if "up" in step.attributes:
         up = np.array(numbers(step, step.get("up"), 3))
     else:
-        up = np.eye(3)[int(np.abs(forward).argmin())]
-    left = np.cross(up, forward)
-    if min(norm(forward), norm(left)) < 1e-12:
+        up = np.eye(3)[int(np.abs(target - origin).argmin())]
+    found = looking(origin, target, up, left_handed=True)
+    if found is None:
         raise SceneError(f"{step.place}: lookat: expected an upward direction across the line of sight")
-    forward, left = forward / norm(forward), left / norm(left)
-    matrix = np.eye(4)
-    matrix[:3] = np.stack([left, np.cross(forward, left), forward, points["origin"]], axis=1)
-    return matrix
+    return found
 
 
 IORS = {
