@@ -112,8 +112,7 @@ def test_where_things_are_at_a_frame(tmp_path: Path) -> None:
     assert np.linalg.norm(error) < 1e-5
 
 
-def test_lights_and_other_materials(tmp_path: Path) -> None:
-    more = """
+MORE = """
 material
   materialname pane
   type glass
@@ -156,7 +155,10 @@ light
   color 3 3 3
 end
 """
-    scene, _ = loaded(tmp_path, SMALL + more)
+
+
+def test_lights_and_other_materials(tmp_path: Path) -> None:
+    scene, _ = loaded(tmp_path, SMALL + MORE)
     materials = [type(instance.material) for instance in scene.instances]
     assert materials == [Phong, Phong, Glass, Mirror, Phong]
     assert [type(light).__name__ for light in scene.lights] == ["PointLight", "DirectionalLight", "SpotLight"]

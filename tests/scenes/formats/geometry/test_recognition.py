@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from scenes.canonical import ConstantTexture, Cube, Disk, Matte, Mesh, Rectangle, Shape, Sphere
 from scenes.formats.geometry.meshed import as_mesh
-from scenes.formats.geometry.recognition import recognised, shape_of
+from scenes.formats.geometry.recognition import recognised, recognised_rectangle, shape_of
 from scenes.formats.losses import LossReport
 
 SHAPES: tuple[Shape, ...] = (Rectangle(), Cube(), Disk(), Sphere())
@@ -149,3 +149,23 @@ def test_round_shapes_in_the_place_of_triangles_are_reported() -> None:
         report = LossReport()
         found, _ = shape_of(as_mesh(shape), Matte(ConstantTexture((0.5, 0.5, 0.5))), "here", report)
         assert type(found) is type(shape) and len(report.losses) == losses
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30, deadline=None)
+def test_rectangles_are_recognised_under_any_transform(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    matrix = np.eye(4)
+    matrix[:3, :2], matrix[:3, 3] = rng.normal(size=(3, 2)), rng.normal(size=3)
+    normal = np.cross(matrix[:3, 0], matrix[:3, 1])
+    matrix[:3, 2] = normal / np.linalg.norm(normal)
+    plain = as_mesh(Rectangle())
+    points = (plain.vertices @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    normals = np.tile(matrix[:3, 2], (4, 1)).astype(np.float32)
+    found = recognised_rectangle(Mesh(points, plain.faces, normals, plain.uvs))
+    assert found is not None
+    np.testing.assert_allclose(found, matrix, atol=1e-4 * np.abs(matrix).max() + 1e-5)
+    bent = points.copy()
+    bent[2] += 0.1 * np.abs(points).max()
+    assert recognised_rectangle(Mesh(bent, plain.faces, normals, plain.uvs)) is None
+    assert recognised_rectangle(Mesh(points, plain.faces, -normals, plain.uvs)) is None

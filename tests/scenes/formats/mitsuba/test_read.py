@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -20,20 +18,17 @@ from scenes.canonical import (
     ImageTexture,
     Masked,
     Matte,
-    Mesh,
     Metal,
     MixMaterial,
     PerspectiveCamera,
     Phong,
     Plastic,
-    SceneError,
     Sphere,
     SpotLight,
     SunSky,
 )
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
-from scenes.formats.geometry.mesh_files import read_serialized
 from scenes.formats.losses import LossReport
 from tests.scenes.formats.files import DATA, MITSUBA, REAL, SENSOR, mitsuba, needs_data
 
@@ -190,92 +185,6 @@ def test_images_have_their_first_row_at_the_top_of_v(tmp_path: Path) -> None:
     assert isinstance(texture, ImageTexture) and (texture.uv_scale, texture.uv_offset) == ((1.0, -3.0), (0.0, 1.0))
 
 
-def serialized(meshes: list[Mesh], version: int = 4) -> bytes:
-    """A file as Mitsuba writes it."""
-    content, starts = b"", []
-    for mesh in meshes:
-        starts.append(len(content))
-        flags = 0x1000 | (mesh.normals is not None) | 0x2 * (mesh.uvs is not None)
-        body = struct.pack("<I", flags) + (b"name\0" if version == 4 else b"")
-        body += struct.pack("<QQ", len(mesh.vertices), len(mesh.faces)) + mesh.vertices.tobytes()
-        body += b"" if mesh.normals is None else mesh.normals.tobytes()
-        body += b"" if mesh.uvs is None else mesh.uvs.tobytes()
-        content += struct.pack("<HH", 0x041C, version) + zlib.compress(body + mesh.faces.astype("<u4").tobytes())
-    return (
-        content
-        + b"".join(struct.pack("<Q" if version == 4 else "<I", at) for at in starts)
-        + struct.pack("<I", len(starts))
-    )
-
-
-@pytest.mark.parametrize("version", [3, 4])
-def test_serialized_meshes(version: int) -> None:
-    rng = np.random.default_rng(0)
-    points, uvs = rng.random((5, 3)).astype(np.float32), rng.random((5, 2)).astype(np.float32)
-    faces = np.array([[0, 1, 2], [2, 3, 4]], np.int32)
-    content = serialized([Mesh(points, faces), Mesh(points[::-1].copy(), faces, None, uvs)], version)
-    second = read_serialized(content, 1, "a")
-    np.testing.assert_array_equal(second.vertices, points[::-1])
-    np.testing.assert_array_equal(second.uvs, uvs)
-    np.testing.assert_array_equal(second.faces, faces)
-    assert read_serialized(content, 0, "a").uvs is None
-    with pytest.raises(SceneError, match="expected a shape index below 2, got 2"):
-        read_serialized(content, 2, "a")
-    rng = np.random.default_rng(1)
-    for _ in range(300):
-        broken = bytearray(content)
-        for at in rng.integers(0, len(broken), 3):
-            broken[at] = rng.integers(0, 256)
-        try:
-            read_serialized(bytes(broken), 1, "a")
-        except SceneError:
-            pass
-    with pytest.raises(SceneError, match="expected a serialized mesh"):
-        read_serialized(b"nothing", 0, "a")
-
-
-BOX = "luxrender/cornell-box/cornell-box.lxs"
-BOMB = """<?xml version="1.0"?><!DOCTYPE scene [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
-<!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]><scene version="0.5.0">&c;</scene>"""
-OUTSIDE = """<?xml version="1.0"?><!DOCTYPE scene [<!ENTITY x SYSTEM "file:///etc/passwd">]><scene>&x;</scene>"""
-
-
-@pytest.mark.parametrize("text", [BOMB, OUTSIDE])
-def test_bombs_and_outside_entities_are_refused(text: str, tmp_path: Path) -> None:
-    (tmp_path / "a.xml").write_text(text)
-    with pytest.raises(SceneError, match="expected no document type and no entities"):
-        load_scene_file(tmp_path / "a.xml")
-
-
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        ("<shape", r"a.xml:3:\d+: expected well-formed XML"),
-        ('<shape type="sphere"><float name="radius" value="nan"/></shape>', "radius: expected 1 numbers up to 1e"),
-        ('<shape type="sphere"><float name="radius" value="1e308"/></shape>', "radius: expected 1 numbers up to 1e"),
-        ('<shape type="sphere"><ref id="x"/></shape>', r"a.xml:3:22: expected a name of something before it, got 'x'"),
-        ('<shape type="obj"><string name="filename" value="../x.obj"/></shape>', "expected a file inside"),
-        ('<shape type="obj"><string name="filename" value="/etc/passwd"/></shape>', "expected a relative file name"),
-        ('<include filename="a.xml"/>', "do not include themselves"),
-        ('<bsdf type="twosided"/>', "expected a bsdf inside, got 0"),
-        ('<bsdf type="twosided" id="t"><ref id="t"/></bsdf>', "expected at most 32 materials inside each other"),
-        (
-            '<integrator type="path"><integer name="maxDepth" value="$d"/></integrator>',
-            "expected a parameter with a default",
-        ),
-        ("<nonsense/>", r"a.xml:3:1: expected an element of a scene, got 'nonsense'"),
-        ("<shape>" * 80 + "</shape>" * 80, "expected at most 64 elements inside each other"),
-        (
-            '<shape type="cube"><transform name="toWorld"><scale value="0"/></transform></shape>',
-            "expected one that can be inverted",
-        ),
-    ],
-)
-def test_faults_of_scenes(body: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=message):
-        mitsuba(tmp_path, body)
-
-
 @needs_data
 def test_mitsuba_renders_what_is_written_for_it_as_the_source_was_meant(tmp_path: Path) -> None:
     """The Cornell box of three formats, path-traced: the mean of the converged reference, within noise."""
@@ -294,22 +203,3 @@ def test_mitsuba_renders_what_is_written_for_it_as_the_source_was_meant(tmp_path
         parameters.update()
         mean = np.array(mi.render(scene, spp=64))[..., :3].mean(axis=(0, 1))
         np.testing.assert_allclose(mean, [0.1963, 0.1276, 0.0360], rtol=0.05)
-
-
-@pytest.mark.parametrize(
-    ("body", "loss"),
-    [
-        ('<shape type="blob"><float name="size" value="2"/></shape>', "shape 'blob', which is not known: left out"),
-        ('<shape type="hair"/>', "hair: left out"),
-        ('<bsdf type="plaster"/>', "material 'plaster', which is not known: grey, matte"),
-        (
-            '<emitter type="bulb"><float name="w" value="6"/></emitter>',
-            "emitter 'bulb', which is not known: left out",
-        ),
-        ('<medium type="homogeneous" id="fog"/>', "medium 'fog' (participating medium): left out"),
-        ('<integrator type="guess"/>', "integrator 'guess', which is not known: path"),
-    ],
-)
-def test_what_is_not_known_is_reported_once_and_the_rest_is_read(body: str, loss: str, tmp_path: Path) -> None:
-    scene, lost = mitsuba(tmp_path, f'{body}<shape type="sphere"/>')
-    assert lost == [f"a.xml:3:1: {loss}"] and len(scene.instances) == 1
