@@ -40,7 +40,7 @@ _METAL_NAMES = {"Ag": "silver", "Al": "aluminium", "Au": "gold", "Cu": "copper"}
 class LuxSurfaceWriter(SurfaceWriter):
     """Lines of textures and materials."""
 
-    color_texture = "spectrum"
+    color_texture = "color"
     color = "color"
     checkerboard_end = ' "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
     _null: Matte | None = None
