@@ -30,7 +30,7 @@ def on_a_path(scene: Scene, path: CameraPath) -> Scene:
     of the world nearest to the camera's own. ``fly-through`` goes straight ahead, and back.
 
     Raises:
-        SceneError: the camera has a path already, or is none with a place.
+        SceneError: the camera moves already, or is not a perspective one.
     """
     camera = scene.camera
     if not isinstance(camera, PerspectiveCamera):

@@ -49,13 +49,17 @@ def _between(table: NDArray[np.float64], at: float) -> NDArray[np.float64]:
 
 
 def _elevation_rad(light: SunSky) -> float:
-    """Of the sun, at least zero."""
+    """Height of the sun above the horizon, radians, at least zero."""
     sun, up = (np.array(part) / norm(part) for part in (light.sun_direction, light.up))
     return max(arcsin(float(np.clip(product(sun, up), -1.0, 1.0))), 0.0)
 
 
 def sky_radiance(light: SunSky, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Radiance of the sky without the sun (Hošek and Wilkie 2012, eq. 8); black below the horizon.
+    """Radiance of the sky without the sun; black below the horizon.
+
+    With ``θ`` the angle from the zenith and ``γ`` that from the sun, the radiance is the mean radiance times
+    ``(1 + A e^(B / (cos θ + 0.01))) (C + D e^(E γ) + F cos² γ + G χ + I √(cos θ))`` where
+    ``χ = (1 + cos² γ) / (1 + H² - 2 H cos γ)^1.5`` (Hošek and Wilkie 2012, eq. 8).
 
     Args:
         light: turbidity from 1 to 10 and a sun above the horizon; others are held at the nearest.

@@ -22,8 +22,8 @@ ASSETS = Path(__file__).parent / "assets"
 Picture = NDArray[np.float32]
 
 PIXELS_MOST = 1 << 27
-"""Of a picture, such as 16384 x 8192; a few kilobytes of file can hold more than memory does. One takes about 36 bytes
-while its scene is loaded."""
+"""Most pixels of a picture, such as 16384 x 8192. A file of some kilobytes can hold more pixels than memory does; one
+pixel takes about 36 bytes while its scene is loaded."""
 
 
 def one_line(error: BaseException) -> str:
@@ -35,7 +35,7 @@ def asset(name: str) -> Path:
     """Path of a file delivered with the project.
 
     Raises:
-        SceneError: if there is none of that name.
+        SceneError: no asset has this name.
     """
     path = ASSETS / name
     if not path.is_file():
@@ -47,9 +47,9 @@ FileState = tuple[int, int, int, int]
 
 
 def state_of(path: Path) -> FileState | None:
-    """What differs between a file and itself once it was written to or replaced; None where there is none.
+    """Times, size and number of a file, which change when it is written to or replaced; None where there is no file.
 
-    What is read from a file is kept for as long as this stays.
+    What is read from a file is kept for as long as its state stays the same.
     """
     try:
         found = path.stat()
@@ -70,7 +70,7 @@ def read_image(path: Path) -> Picture:
         ``(height, width, 3)`` float32, row 0 at the top; shared between callers, so read-only.
 
     Raises:
-        SceneError: if the file is missing, cannot be read, or holds more than :data:`PIXELS_MOST` pixels.
+        SceneError: the file is missing, cannot be read, or holds more than :data:`PIXELS_MOST` pixels.
     """
     path = Path(path)
     if not path.is_file():

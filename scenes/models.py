@@ -197,7 +197,7 @@ def _mtl(material: Any, path: Path) -> Phong:
         diffuse = texture.image.mean(axis=(0, 1))
     exponent = float(np.asarray(given.get("ns", 0.0)).reshape(-1)[0])
     specular = np.minimum(np.clip(_rgb(given.get("ks", (0.0, 0.0, 0.0))), 0.0, 1.0), 1.0 - diffuse)
-    if exponent < 1.0:  # a highlight as wide as this is none
+    if exponent < 1.0:  # a highlight this wide is not visible as one
         return Phong(texture)
     return Phong(texture, _rgb(specular), min(exponent, _EXPONENT_MAX))
 

@@ -108,7 +108,7 @@ def load(name: str) -> Scene:
     """One of the two scenes; its film has the size of the report's image.
 
     Raises:
-        SceneError: there is none of that name.
+        SceneError: no image has this name.
     """
     if name == "report-one":  # about 10,100 polygons; soft shadows, diffuse reflections, depth of field
         paint = Phong(

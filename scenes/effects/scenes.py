@@ -271,7 +271,7 @@ def load(name: str) -> Scene:
     """The scene of an effect.
 
     Raises:
-        SceneError: there is none of that name.
+        SceneError: no effect has this name.
     """
     if name not in EFFECTS:
         raise SceneError(f"effect: expected one of {', '.join(EFFECTS)}, got {name!r}")

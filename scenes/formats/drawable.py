@@ -1,4 +1,4 @@
-"""A canonical scene as this project's renderer can draw it: what it does not have becomes what it has, and is reported.
+"""A canonical scene as this project's renderer can draw it: what the renderer lacks is replaced and reported.
 
 Facets of alpha ``α`` spread mirrored rays about evenly over a cone of half angle ``2 atan α``: that of a facet whose
 slope is ``α`` turns the ray by twice its angle.
@@ -54,7 +54,7 @@ from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.losses import LossReport
 
 DEPTH_MAX = 8
-"""Bounces that mirrored and refracted rays are followed for."""
+"""Most bounces of mirrored and refracted rays."""
 
 _SMOOTH = 0.02  # alpha below which a mirror is drawn sharp
 _EXPONENT_MAX = 1.0e4
@@ -102,7 +102,7 @@ class Approximation:
         return made
 
     def instance(self, instance: Instance, number: int) -> list[Instance]:
-        """A shape; lamps are rectangles and spheres, a cube is six, others are seen and give no light."""
+        """Instances for a shape: lamps are rectangles and spheres, a cube is six of them, and others give no light."""
         name = instance.name or f"shape {number}"
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
         if instance.emission is None:
@@ -123,7 +123,7 @@ class Approximation:
         return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
 
     def texture(self, texture: Texture, where: str) -> Texture:
-        """A texture; products and mixtures that are none of the plain ones become their mean."""
+        """A plain texture; products and mixtures that are not plain become their means."""
         texture = folded(texture)
         if isinstance(texture, ConstantTexture | ImageTexture):
             return texture

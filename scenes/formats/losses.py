@@ -1,4 +1,4 @@
-"""What a conversion could not carry over: every loss is written down, once each, with what became of it."""
+"""Losses of a conversion: what could not be carried over, and what became of it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenes.canonical import SceneError
 
 @dataclass(frozen=True)
 class Loss:
-    """Something that a format has and the next does not.
+    """Something that a format has and the target does not have.
 
     Attributes:
         where: file and line, or the name of the part of the scene.
@@ -27,19 +27,20 @@ class Loss:
 
 
 class LossReport:
-    """Collects losses; the same one at the same place counts once."""
+    """Collects losses; equal losses at one place count once."""
 
     def __init__(self) -> None:
         self._losses: dict[Loss, None] = {}
 
     def add(self, where: str, what: str, became: str = "left out") -> None:
-        """Writes a loss down."""
+        """Adds a loss."""
         self._losses.setdefault(Loss(where, what, became))
 
     def kind(self, table: Mapping[str, str], wanted: str, what: str, where: object) -> str:
-        """The canonical kind of a file's; of several that become the same one, all but the first are written down.
+        """The canonical kind for the kind of a file.
 
-        One that the table does not have becomes its first.
+        Several kinds of files may become one canonical kind; all but the first of them are reported. A kind that the
+        table lacks becomes the first canonical kind and is reported.
         """
         if wanted not in table:
             found = next(iter(table.values()))
@@ -51,20 +52,20 @@ class LossReport:
         return found
 
     def unknown(self, where: object, what: str, wanted: str, became: str = "left out") -> None:
-        """Writes down a kind of something that is not known, and what stands in its place."""
+        """Reports a kind that is not known, and what stands in its place."""
         self.add(str(where), f"{what} {wanted!r}, which is not known", became)
 
     @property
     def losses(self) -> tuple[Loss, ...]:
-        """All of them, in the order that they were met."""
+        """All losses, in the order in which they were added."""
         return tuple(self._losses)
 
     def rows(self) -> list[dict[str, str]]:
-        """For JSON."""
+        """The losses as JSON objects."""
         return [asdict(loss) for loss in self._losses]
 
     def text(self) -> str:
-        """A line each."""
+        """The losses, one a line."""
         return "\n".join(map(str, self._losses))
 
     def refuse_any(self) -> None:
@@ -75,5 +76,5 @@ class LossReport:
 
 
 def first_of(table: Mapping[str, str]) -> dict[str, str]:
-    """A file's kind for each canonical one: the first that becomes it."""
+    """For each canonical kind the first kind of files that becomes it."""
     return {ours: theirs for theirs, ours in reversed(list(table.items()))}

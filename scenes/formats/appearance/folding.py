@@ -21,7 +21,7 @@ Change = Callable[[np.ndarray], np.ndarray]
 
 
 def folded(texture: Texture) -> Texture:
-    """The same texture without products and mixtures where one part is constant or both repeat alike."""
+    """The texture without its products and mixtures, where one part is constant or both parts repeat alike."""
     if isinstance(texture, CheckerboardTexture):
         parts = folded(texture.even), folded(texture.odd)
         same = parts[0] is texture.even and parts[1] is texture.odd
@@ -42,7 +42,7 @@ def _mixture(amount: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
 
 
 def _of_two(first: Texture, second: Texture, join: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Texture | None:
-    """Two textures joined point by point; None where the result is none of the plain ones."""
+    """Two textures joined point by point, or None where the result is not a plain texture."""
     if isinstance(first, ConstantTexture):
         value = np.array(first.value)
         return _changed(second, lambda other: join(value, other))
@@ -64,7 +64,7 @@ def _of_two(first: Texture, second: Texture, join: Callable[[np.ndarray, np.ndar
 
 
 def _changed(texture: Texture, change: Change) -> Texture | None:
-    """A texture with every colour changed; None for one that is not plain."""
+    """A texture with every colour changed, or None where it is not plain."""
     if isinstance(texture, ConstantTexture):
         value: Rgb = rgb(change(np.array(texture.value)))
         return ConstantTexture(value)

@@ -1,4 +1,4 @@
-"""Colours from the ways that scene files give them: RGB, XYZ, samples over wavelengths, black bodies, named metals."""
+"""Colours that scene files give as XYZ, as samples over wavelengths, as black bodies or as names of metals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scenes.canonical.values import Rgb
 XYZ_TO_RGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
-"""To linear Rec. 709 with white D65 (IEC 61966-2-1)."""
+"""From CIE XYZ to linear Rec. 709 with white D65 (IEC 61966-2-1)."""
 
 _Y_INTEGRAL = 106.856895  # of the colour matching function for luminance, CIE 1931
 
@@ -32,23 +32,23 @@ _LONG_NAMES = {"silver": "Ag", "aluminium": "Al", "aluminum": "Al", "gold": "Au"
 
 
 def metal(name: str) -> tuple[Rgb, Rgb] | None:
-    """Index of refraction of a metal by symbol or name, None for one that is not known."""
+    """Index of refraction of a metal by its symbol or name, or None where it is not known."""
     return METALS.get(name) or METALS.get(_LONG_NAMES.get(name.lower(), ""))
 
 
 def rgb(values: ArrayLike) -> Rgb:
-    """Three floats."""
+    """A colour of any three numbers."""
     red, green, blue = (float(value) for value in np.asarray(values, np.float64).reshape(3))
     return red, green, blue
 
 
 def grey(value: float) -> Rgb:
-    """The same in all three."""
+    """A colour of three equal channels."""
     return (value, value, value)
 
 
 def xyz_to_rgb(xyz: ArrayLike) -> Rgb:
-    """Linear Rec. 709 of a CIE XYZ colour; what lies outside becomes 0."""
+    """Linear Rec. 709 of a CIE XYZ colour; negative channels become 0."""
     return rgb(np.maximum(product(XYZ_TO_RGB, np.asarray(xyz, np.float64)), 0.0))
 
 
@@ -71,8 +71,11 @@ def matching(wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def sampled_rgb(wavelength_nm: NDArray[np.float64], values: NDArray[np.float64]) -> Rgb:
-    """Colour of a spectrum sampled at some wavelengths, linear between them and constant beyond; a constant 1 has
-    luminance 1.
+    """Colour of a sampled spectrum, linear between its samples and constant beyond; a constant 1 has luminance 1.
+
+    Args:
+        wavelength_nm: ``(n,)`` in any order.
+        values: ``(n,)`` of the spectrum there.
     """
     order = np.argsort(wavelength_nm)
     at = np.arange(360.0, 831.0)

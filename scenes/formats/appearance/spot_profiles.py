@@ -1,4 +1,4 @@
-"""How spot lights fall off towards their edge in each renderer, and one profile in the place of another.
+"""How spot lights fall off towards their edges in each renderer, and how one profile becomes another.
 
 Source: PBRT v3 (Pharr, Jakob and Humphreys 2016, sec. 12.3.1), which LuxRender shares; Mitsuba 0.5 documentation,
 section on spot lights; :mod:`renderer.kernels.lights` for this project's.
@@ -36,9 +36,9 @@ def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
 
 
 def reshaped(light: SpotLight, profile: str, report: LossReport) -> SpotLight:
-    """The spot with another profile, of the same edge and power; reported where it differs.
+    """The spot light with another profile, the same edge and the same power; a change is reported.
 
-    The inner angle changes so that the power stays; where it cannot, the intensity does.
+    The inner angle is changed so that the power stays. Where no angle does that, the intensity is changed.
     """
     if light.profile == profile or light.inner_deg == light.outer_deg:
         return dataclasses.replace(light, profile=profile)

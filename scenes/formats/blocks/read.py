@@ -4,7 +4,7 @@ A file's clock runs in time units of its own; what moves is at ``location + velo
 starts with the first frame and runs in seconds, such that frames follow each other at the file's frame rate.
 
 Source: motion-blur perception thesis, chapter 3, fig. 13. Attributes that the figure does not show (``rotation``,
-``spread``, ``aperture`` and others) are listed in ``block_text.ALLOWED``.
+``spread``, ``aperture`` and others) are listed in :data:`scenes.formats.blocks.text.ALLOWED`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from scenes.loading import clamp_radiance, read_image
 from scenes.models import place_model
 
 LEAD_S = 3.0
-"""Motion before the first and after the last frame, for what looks back and ahead."""
+"""Motion before the first and after the last frame, seconds: filters and caches look back and ahead."""
 
 _KEYS_PER_FRAME = 4  # of a camera that turns
 _SHAPES = {"sphere": Sphere, "disk": Disk, "rectangle": Rectangle, "cube": Cube}

@@ -28,16 +28,16 @@ from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
 SAVED_MAX = 1024
-"""Attribute blocks inside each other."""
+"""Greatest depth of attribute blocks."""
 
 
 @dataclass
 class Attributes:
-    """What ``AttributeBegin`` saves besides the transform."""
+    """What ``AttributeBegin`` saves beside the transform."""
 
     material: Material | None = None
     emission: tuple[float, float, float] | None = None
-    power: float = 0.0  # lumens that scale the emission, 0 for none
+    power: float = 0.0  # lumens that the emission is scaled to, 0 for none
     reversed: bool = False
 
 
@@ -166,7 +166,11 @@ class DirectiveReader:
 
 
 def word(directive: Directive, at: int = 0) -> str:
-    """A string value of a directive; raises SceneError where there is none."""
+    """A string value of a directive.
+
+    Raises:
+        SceneError: it has no string there.
+    """
     found = directive.values[at] if at < len(directive.values) else None
     if not isinstance(found, tuple) or len(found) != 1:
         raise SceneError(f"{directive.place}: {directive.name}: expected a string")
@@ -174,7 +178,11 @@ def word(directive: Directive, at: int = 0) -> str:
 
 
 def numbers(directive: Directive, count: int) -> list[float]:
-    """The numbers of a directive, bracketed or not; raises SceneError for another count."""
+    """The numbers of a directive, bracketed or not.
+
+    Raises:
+        SceneError: there are strings, or another count of numbers.
+    """
     found: list[float] = []
     for value in directive.values:
         if isinstance(value, tuple):
@@ -191,7 +199,11 @@ def matrix(directive: Directive) -> Matrix:
 
 
 def checked(directive: Directive, found: Matrix) -> Matrix:
-    """A transform that can be inverted; raises SceneError for another."""
+    """The transform itself, where it can be inverted.
+
+    Raises:
+        SceneError: it cannot.
+    """
     if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not invertible(found):
         raise SceneError(
             f"{directive.place}: {directive.name}: expected a matrix that can be inverted, last row 0 0 0 1"

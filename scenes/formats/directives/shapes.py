@@ -1,4 +1,4 @@
-"""Shapes of PBRT v3 and LuxRender files, into the canonical scene's.
+"""Shapes of files of directives, into those of the canonical scene.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on shapes.
 """
@@ -22,7 +22,7 @@ from scenes.formats.text.scene_files import SceneFiles
 
 @dataclass
 class ShapeReader:
-    """Makes shapes of parameters; files of meshes are read once.
+    """Makes shapes of parameters; each file of a mesh is read once.
 
     Attributes:
         files: for meshes.
@@ -34,7 +34,7 @@ class ShapeReader:
     _meshes: dict[Path, Mesh] = field(default_factory=dict)
 
     def made(self, kind: str, parameters: Parameters, turn_over: bool, beside: Path) -> tuple[Shape, Matrix] | None:
-        """A shape and where it lies in the current space; None for what cannot be had, reported."""
+        """A shape and its place in the current space, or None for a shape that is left out, which is reported."""
         where = str(parameters.place)
         if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
             mesh = self._ply(parameters, beside) if kind == "plymesh" else self._triangles(parameters)

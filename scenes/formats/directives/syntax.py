@@ -53,7 +53,7 @@ def _lexer() -> lark.Lark:
 
 @dataclass(frozen=True)
 class Directive:
-    """A directive: its name, and its strings and numbers in order."""
+    """A directive: its name, and its strings and numbers in their order."""
 
     name: str
     values: tuple[Values, ...]
@@ -62,7 +62,7 @@ class Directive:
 
 @dataclass
 class Parameters:
-    """Typed parameters of a directive; what is not asked for can be listed.
+    """Typed parameters of a directive. Those that nothing asked for can be listed.
 
     Attributes:
         place: of the directive.
@@ -79,10 +79,10 @@ class Parameters:
         return name in self.given
 
     def numbers(self, name: str, count: int | None = None) -> NDArray[np.float64] | None:
-        """Numbers of a parameter, None where it is not given; of so many, where a count is.
+        """Numbers of a parameter, or None where it is not given.
 
         Raises:
-            SceneError: it holds no numbers, or another count.
+            SceneError: it holds strings, or another count of numbers than the given one.
         """
         self.asked.add(name)
         if name not in self.given:
@@ -95,19 +95,31 @@ class Parameters:
         return found
 
     def number(self, name: str, default: float) -> float:
-        """A single number; raises SceneError for several."""
+        """A single number.
+
+        Raises:
+            SceneError: there are several.
+        """
         found = self.numbers(name, 1)
         return default if found is None else float(found[0])
 
     def whole(self, name: str, default: int, least: int, most: int) -> int:
-        """A whole number within bounds; raises SceneError for another."""
+        """A whole number from ``least`` to ``most``.
+
+        Raises:
+            SceneError: it is another number.
+        """
         value = self.number(name, default)
         if value != int(value) or not least <= value <= most:
             raise SceneError(f"{self.place}: {name}: expected a whole number from {least} to {most}, got {value:g}")
         return int(value)
 
     def text(self, name: str, default: str) -> str:
-        """A string; raises SceneError for numbers or several."""
+        """A string.
+
+        Raises:
+            SceneError: there are numbers, or several strings.
+        """
         self.asked.add(name)
         found = self.given.get(name)
         if found is None:
@@ -117,14 +129,18 @@ class Parameters:
         return found[0]
 
     def truth(self, name: str, default: bool) -> bool:
-        """A bool, quoted or not; raises SceneError for what is none."""
+        """True or false, quoted or not.
+
+        Raises:
+            SceneError: it is another word.
+        """
         value = self.text(name, str(default).lower())
         if value not in ("true", "false"):
             raise SceneError(f"{self.place}: {name}: expected true or false, got {value!r}")
         return value == "true"
 
     def unasked(self) -> list[str]:
-        """Names of what was given and not asked for."""
+        """Names of the parameters that nothing asked for."""
         return [name for name in self.given if name not in self.asked]
 
 
@@ -132,7 +148,7 @@ def parse_directives(text: str, file: str) -> Iterator[Directive]:
     """Directives of a text.
 
     Raises:
-        SceneError: it is no such text; file, line, column.
+        SceneError: the text is not one of directives; the message has file, line and column.
     """
     head, values = None, []
     for token in _tokens(text, file):
@@ -187,7 +203,7 @@ def _values(token: Any, file: str) -> Values:
 
 
 def _parsed(text: str, place: Place) -> NDArray[np.float64]:
-    """Numbers apart by blanks and commas."""
+    """Numbers separated by blanks and commas."""
     text = text.replace(",", " ")
     if not text or text.isspace():
         return np.zeros(0)
@@ -197,7 +213,7 @@ def _parsed(text: str, place: Place) -> NDArray[np.float64]:
             found = np.fromstring(text, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
             raise SceneError(f"{place}: expected numbers, got {text.strip()[:30]!r}") from None
-    if not (np.abs(found) <= NUMBER_MAX).all():  # also not a number
+    if not (np.abs(found) <= NUMBER_MAX).all():  # NaN fails as well
         raise SceneError(f"{place}: expected numbers up to {NUMBER_MAX:g}, got {text.strip()[:30]!r}")
     return found
 
@@ -215,7 +231,7 @@ def parameters_of(directive: Directive, skip: int) -> Parameters:
     """Parameters of a directive behind its first ``skip`` values: pairs of ``"type name"`` and values.
 
     Raises:
-        SceneError: a declaration is none, or has no value.
+        SceneError: a declaration is malformed, or has no value.
     """
     given: dict[str, Values] = {}
     types: dict[str, str] = {}

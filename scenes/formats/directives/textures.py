@@ -48,7 +48,11 @@ class TextureReader:
     materials: Mapping[str, Material]
 
     def color(self, parameters: Parameters, name: str, default: Rgb) -> Rgb:
-        """A colour, however it is given; raises SceneError where it cannot be read."""
+        """A colour, given in any of the ways of the format.
+
+        Raises:
+            SceneError: it cannot be read.
+        """
         if name not in parameters:
             parameters.asked.add(name)
             return default

@@ -33,8 +33,10 @@ SQUARE_UV = 0.5 * SQUARE[:, :2] + 0.5
 
 
 def depends_on_uv(part: Material | Texture) -> bool:
-    """Whether a material looks different with other texture coordinates: by a texture, or by which way facets spread
-    more."""
+    """Whether a material looks different with other texture coordinates.
+
+    A texture makes it so, and so does a roughness that differs between the two directions of the surface.
+    """
     if isinstance(part, ImageTexture | CheckerboardTexture | HeightField):
         return True
     roughness = getattr(part, "roughness", 0.0)
@@ -80,7 +82,7 @@ def as_mesh(shape: Shape) -> Mesh:
 
 @lru_cache(maxsize=256)
 def _meshed(shape: Rectangle | Cube | Disk | Sphere) -> Mesh:
-    """Once for all shapes of a size, so that it is written once."""
+    """One mesh for all shapes of a size, so that it is written once."""
     if isinstance(shape, Rectangle):
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
         normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))

@@ -1,4 +1,4 @@
-"""What exporters share: which shapes are written once and placed often, and the keys of motions."""
+"""Which shapes are written once and placed often, and the keys of motions: what all writers ask."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def shines(instance: Instance) -> bool:
 
 
 def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
-    """What a lamp gives off on its front, None for other shapes; one that shines on both sides is reported."""
+    """Radiance of the front of a lamp, or None for other shapes; a lamp that shines on both sides is reported."""
     if isinstance(instance.material, Emissive):
         report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
         return instance.material.radiance
@@ -39,7 +39,7 @@ def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
 
 
 def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix], list[float]]:
-    """Where something is at each key of its motion, and when, seconds; one at time zero where it rests."""
+    """Poses at the keys of a motion and their times, seconds; one pose at time zero where nothing moves."""
     if track is None or len(track.translation) == 1:
         return [placed(track, to_world)], [0.0]
     times_s = track_times(track)

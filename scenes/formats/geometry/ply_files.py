@@ -1,7 +1,7 @@
-"""PLY meshes, read with nothing taken on trust and written plainly.
+"""PLY meshes, read from files that are not trusted, and written.
 
-The mesh library reads PLY too, but allocates what a header claims and makes normals where a file has none; here counts
-are held against the length of the file first, and a mesh without normals stays without.
+The mesh library also reads PLY, but it allocates what a header claims and makes normals where a file has none. Here
+counts are first compared with the length of the file, and a mesh without normals stays without them.
 
 Source: G. Turk, "The PLY Polygon File Format" (1994).
 """

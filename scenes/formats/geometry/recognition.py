@@ -91,7 +91,7 @@ def recognised(mesh: Mesh) -> tuple[Shape, Matrix] | None:
 
 
 def shape_of(mesh: Mesh, material: Material, where: str, report: LossReport) -> tuple[Shape, Matrix]:
-    """A mesh as what it is, and where it lies; round shapes in the place of triangles are reported.
+    """The shape that a mesh is, and where it lies; the mesh itself where it is none. Round shapes are reported.
 
     Its texture coordinates count only where the material depends on them.
     """

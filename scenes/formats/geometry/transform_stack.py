@@ -14,7 +14,7 @@ from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.losses import LossReport
 
 KEYS_MAX = 1024
-"""Of a motion."""
+"""Most keys of a motion."""
 
 _RIGID = 1e-4
 
@@ -119,7 +119,7 @@ def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
 
 
 class TransformStack:
-    """The current transform at the keys of a motion, those saved, and those with names.
+    """The current transform at the keys of a motion, the saved transforms, and the named ones.
 
     Attributes:
         current: one matrix a key.
@@ -140,7 +140,7 @@ class TransformStack:
         self._saved.append(([matrix.copy() for matrix in self.current], self.active, self.times_s))
 
     def pop(self) -> bool:
-        """Restores it; False where none is saved."""
+        """Restores the state that was saved last; False where none is saved."""
         if not self._saved:
             return False
         self.current, self.active, self.times_s = self._saved.pop()
@@ -155,13 +155,13 @@ class TransformStack:
         self.current = [product(old, matrix) if on else old for on, old in zip(self.active, self.current, strict=True)]
 
     def take(self, name: str) -> None:
-        """Sets the transform to that of a name, at all keys; one with other keys is held at its first."""
+        """Sets the transform at all keys to a named one; one with another count of keys is held at its first."""
         found = self.named[name]
         same = len(found) == len(self.current)
         self.current = [part.copy() for part in (found if same else [found[0]] * len(self.current))]
 
     def retime(self, times_s: Sequence[float]) -> None:
-        """Other keys, all where the first is now."""
+        """Sets other keys, all with the transform of the first."""
         self.current = [self.current[0].copy() for _ in times_s]
         self.active, self.times_s = (True,) * len(times_s), tuple(times_s)
 

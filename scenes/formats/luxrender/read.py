@@ -1,7 +1,7 @@
 """LuxRender 1.x scenes into the canonical scene.
 
-The syntax is PBRT's, and so is much of the meaning; this module holds what differs: ``LookAt`` is right-handed, images
-have their first row at ``v = 0``, lights have a gain and may be given by power, materials and metals have other names.
+LuxRender shares its syntax and much of its meaning with PBRT. It differs in these: ``LookAt`` is right-handed, images
+have their first row at ``v = 0``, lights have a gain and may be given by their power, and materials have other names.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
 ch. 4.

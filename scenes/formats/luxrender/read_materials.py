@@ -1,4 +1,4 @@
-"""Textures and materials of LuxRender 1.x, into the canonical scene's; what differs from PBRT's.
+"""Textures and materials of LuxRender 1.x, into those of the canonical scene.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender), sections on materials and textures.
 """

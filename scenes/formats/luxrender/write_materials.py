@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene as lines of a LuxRender 1.x file; what differs from PBRT's.
+"""Textures and materials of the canonical scene as lines of a LuxRender 1.x file.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender); Hagemann 2018, ch. 4.
 """
@@ -95,7 +95,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         return super().plain_material(material, where)
 
     def _coated(self, material: Glossy | Plastic | Phong | Uber, where: str) -> tuple[str, list[str]]:
-        """What is a coat over a diffuse base, or becomes one."""
+        """A material that is a coat over a diffuse base, or becomes one."""
         if isinstance(material, Glossy):
             parts = material.diffuse, material.specular, material.roughness
         elif isinstance(material, Plastic):

@@ -1,4 +1,4 @@
-"""Properties of Mitsuba elements: numbers, vectors, colours, transforms, with the parameters of the file put in."""
+"""Properties of Mitsuba elements: numbers, vectors, colours and transforms."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PROPERTIES = ("integer", "float", "string", "boolean", "rgb", "srgb", "spectrum"
 
 @dataclass
 class Properties:
-    """An element's properties by name, and its other children; what is not asked for can be listed."""
+    """The properties of an element by name, and its other children."""
 
     node: Node
     report: LossReport
@@ -87,7 +87,7 @@ class Properties:
         return grey(self.number(name, 0.0)) if node.tag in ("float", "integer") else color_of(node)
 
     def transform(self, name: str = "toWorld") -> Matrix:
-        """A transform; of an animation its first, reported."""
+        """A transform; an animation becomes its first transform, which is reported."""
         keys, _ = self.motion(name)
         if len(keys) > 1:
             self.report.add(str(self.given[name].place), "an animated transform", "the first of its transforms")
@@ -117,7 +117,11 @@ class Properties:
 
 
 def numbers(node: Node, text: str, count: int | None) -> list[float]:
-    """Numbers of a text, apart by commas or blanks; raises SceneError for another count, or what is none."""
+    """Numbers of a text, separated by commas or blanks.
+
+    Raises:
+        SceneError: a word is not a number or too great a one, or there is another count than the given one.
+    """
     words = text.replace(",", " ").split()
     try:
         found = [float(word) for word in words]
@@ -141,7 +145,11 @@ def triple(node: Node, default: float, whole: str = "value") -> list[float]:
 
 
 def color_of(node: Node) -> Rgb:
-    """The colour of an element; raises SceneError where it cannot be read."""
+    """The colour of an element.
+
+    Raises:
+        SceneError: it cannot be read.
+    """
     text = node.get("value").strip()
     if node.tag == "blackbody":
         kelvin = numbers(node, node.get("temperature", "5000").rstrip("Kk"), 1)[0]

@@ -114,7 +114,11 @@ class MitsubaReader:
         return self.names[name]
 
     def find(self, reference: Node) -> Node:
-        """What a reference names; raises SceneError where nothing has the name."""
+        """The element that a reference names.
+
+        Raises:
+            SceneError: no element has the name.
+        """
         return self._named(reference, reference.get("id"))
 
     def _node(self, node: Node) -> None:

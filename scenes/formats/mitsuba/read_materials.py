@@ -1,4 +1,4 @@
-"""Textures and materials of Mitsuba 0.5, into the canonical scene's.
+"""Materials of Mitsuba 0.5, into those of the canonical scene.
 
 Source: Mitsuba 0.5 documentation, sections on scattering models and textures.
 """
@@ -81,7 +81,11 @@ class MitsubaSurfaces(MitsubaTextures):
         return found
 
     def one_inner(self, properties: Properties) -> Material:
-        """The one material inside; raises SceneError for another number."""
+        """The material inside; of two, the first.
+
+        Raises:
+            SceneError: there is none, or more than two.
+        """
         found = self.inner(properties)
         if len(found) not in (1, 2):
             raise SceneError(f"{properties.where}: expected a bsdf inside, got {len(found)}")

@@ -1,4 +1,4 @@
-"""Shapes of Mitsuba 0.5, into the canonical scene's instances.
+"""Shapes of Mitsuba 0.5, into instances of the canonical scene.
 
 Source: Mitsuba 0.5 documentation, section on shapes.
 """
@@ -45,7 +45,7 @@ _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
 
 class MitsubaShapes:
-    """Makes instances of elements; files of meshes are read once."""
+    """Makes instances of elements; each file of a mesh is read once."""
 
     def __init__(
         self, files: SceneFiles, report: LossReport, surfaces: MitsubaSurfaces, find: Callable[[Node], Node]
@@ -55,7 +55,7 @@ class MitsubaShapes:
         self._meshes: dict[tuple, Mesh] = {}
 
     def read(self, node: Node) -> list[Instance]:
-        """Instances of a shape: one, those of a group, or none, reported."""
+        """Instances of a shape: one, those of a group, or none where it is left out, which is reported."""
         kind, properties = node.get("type"), Properties(node, self.report)
         if kind == "shapegroup":
             parts = [child for child in properties.rest if child.tag == "shape"]

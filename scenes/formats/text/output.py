@@ -1,4 +1,4 @@
-"""Where a converted scene goes: its text, and the meshes and pictures beside it, all in place at once or not at all."""
+"""The files of a converted scene: its text, meshes and pictures, which are put in place together or not at all."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Output:
         self._pictures: dict[int, tuple[NDArray[np.float32], str]] = {}
 
     def _named(self, folder: str, stem: str, ending: str, parts: Iterable[bytes | memoryview]) -> str:
-        """Writes a file whose name tells its content, so that scenes in one folder do not take each other's."""
+        """Writes a file whose name holds a hash of its content, so that scenes in one folder keep their files apart."""
         (self._work / folder).mkdir(exist_ok=True)
         partial, digest = self._work / folder / "partial", hashlib.blake2b(digest_size=4)
         with partial.open("wb") as file:
@@ -50,7 +50,11 @@ class Output:
         return name
 
     def mesh(self, mesh: Mesh) -> str:
-        """Writes a mesh once, as PLY; its name from the scene's folder."""
+        """Writes a mesh once, as PLY.
+
+        Returns:
+            Its name, relative to the folder of the scene.
+        """
         if id(mesh) not in self._meshes:
             stem = Path(mesh.source).stem if mesh.source.endswith((".ply", ".obj", ".gz")) else "mesh"
             self._meshes[id(mesh)] = mesh, self._named("models", stem, ".ply", ply_parts(mesh))
@@ -59,11 +63,11 @@ class Output:
     def picture(
         self, image: NDArray[np.float32], source: str, endings: tuple[str, ...] = (".exr", ".png", ".jpg", ".jpeg")
     ) -> str:
-        """Copies the file that a picture came from, or writes it as EXR where it is another or has been changed.
+        """Copies the file of a picture, or writes an EXR file where its format does not fit or the picture has changed.
 
         Args:
             image: linear RGB.
-            source: file that it came from, or empty.
+            source: the file of the picture, or empty.
             endings: of the files that may be copied.
         """
         if id(image) not in self._pictures:

@@ -1,7 +1,7 @@
-"""Files that a scene file names. A scene file is not to be trusted: it reads what lies in its folder, and no more.
+"""Files that a scene file names.
 
-Names are taken as relative; ones that lead out of the allowed folder, also through links, are refused. How much is read
-and how deep files include each other is bounded.
+A scene file is not trusted. Its names are relative; names that lead out of the allowed folder, also through links, are
+refused. The bytes that are read and the depth of includes are bounded.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from pathlib import Path
 from scenes.canonical import SceneError
 
 DEPTH_MAX = 16
-"""Files that include each other."""
+"""Greatest depth of files that include each other."""
 
 BYTES_MAX = 2 << 30
-"""Of text and meshes, of all files together."""
+"""Most bytes of text and meshes that one scene reads."""
 
 
 class SceneFiles:
@@ -27,7 +27,7 @@ class SceneFiles:
         Args:
             main: the scene's first file.
             root: folder that no file may lie outside of; by default that of ``main``.
-            bytes_max: read at most.
+            bytes_max: bytes that are read at most.
         """
         self.main = Path(main)
         self.folder = self.main.resolve().parent
@@ -41,11 +41,11 @@ class SceneFiles:
 
         Args:
             name: as the scene gives it, relative.
-            where: the name stands, for the message.
-            beside: file whose folder the name is relative to where it is not found beside the first file.
+            where: place of the name, for the message.
+            beside: another file; the name is looked up in its folder where the folder of the first file lacks it.
 
         Raises:
-            SceneError: absolute, outside, or not there.
+            SceneError: the name is absolute, leads outside, or names no file.
         """
         text = name.replace("\\", "/")
         if not text or "\0" in text or Path(text).is_absolute() or text[1:2] == ":":

@@ -1,4 +1,4 @@
-"""XML of Mitsuba scenes as a plain tree with places; no entities, no document types, nothing from outside."""
+"""XML documents as plain trees with places; entities, document types and outside references are refused."""
 
 from __future__ import annotations
 
