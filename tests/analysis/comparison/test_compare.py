@@ -1,0 +1,142 @@
+"""Comparisons from Python: objects and names, what comes back, and what is refused."""
+
+from __future__ import annotations
+
+import gc
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from analysis import METRICS, Result, compare, load
+from analysis.storage.records import read_limits
+from renderer import render
+from scenes.catalog import load as load_scene
+from tsar import POLICIES, ConfigError
+from tsar.morton import raster_to_morton
+from tsar.policies.framed import Framed
+
+SMALL: dict[str, Any] = {"resolution_px": 64, "batch_size": 16, "warmup_cycles": 8, "reference_samples_per_axis": 1}
+
+
+class Late(Framed):
+    """The framed renderer, later."""
+
+    latency_cycles = 3
+
+
+def mean_difference(shown: torch.Tensor, reference: torch.Tensor) -> float:
+    return float((shown - reference).mean())
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    out = tmp_path_factory.mktemp("compared")
+    scene = load_scene("fly-by")
+    return compare(scene, ["tsar", Late], [mean_difference], 0.2, out=out, image_times_s=[0.0, 0.11], **SMALL)
+
+
+def test_a_result_has_a_row_a_run(result: Result) -> None:
+    table = result.table()
+    assert list(table.index) == ["tsar", "Late"] and np.isnan(table.loc["tsar", "ratio"])
+    expected = result.errors["mse"].median("time_s").sel(run="Late")
+    assert table.loc["Late", "mse"] == float(expected) > 0
+    ratio = result.errors["mse"].sel(run="tsar") / result.errors["mse"].sel(run="Late")
+    assert table.loc["Late", "ratio"] == pytest.approx(float(ratio.median()))
+    assert table.loc["Late", "mean_difference"] == pytest.approx(
+        float(result.errors["mean_difference"].sel(run="Late").mean())
+    )
+
+
+def test_images_are_those_of_the_times_asked_for(result: Result) -> None:
+    images = result.images
+    assert images.dims == ("run", "time_s", "row", "column", "channel") and images.shape == (3, 2, 64, 64, 3)
+    assert list(images["run"].values) == ["tsar", "Late", "reference"]
+    np.testing.assert_allclose(images["time_s"], [0.0, 0.1])
+    from analysis.metrics.quality import pixel_errors
+
+    for run in ("tsar", "Late"):
+        for time_s in images["time_s"].values:
+            shown, truth = (torch.from_numpy(images.sel(run=one, time_s=time_s).values) for one in (run, "reference"))
+            assert pixel_errors(shown, truth)[0].mse == pytest.approx(
+                float(result.errors["mse"].sel(run=run, time_s=time_s))
+            )
+
+
+def test_what_was_given_is_named_and_the_tables_are_as_before(result: Result) -> None:
+    added = {
+        one["name"]: one for one in json.loads((result.folder / "summary.json").read_text())["provenance"]["added"]
+    }
+    assert added.keys() == {"Late", "mean_difference"} and added["Late"]["module"] == __name__
+    assert added["Late"]["distribution"] is None and added["Late"]["kind"] == "policy"
+    assert "Late" not in POLICIES and "mean_difference" not in METRICS
+
+
+def test_the_report_is_one_file(result: Result, tmp_path: Path) -> None:
+    written = result.report(tmp_path / "deep" / "report.html")
+    assert "Late" in written.read_text() and written.stat().st_size > 10_000
+
+
+def test_a_finished_run_is_read_back(result: Result) -> None:
+    found = load(result.folder)
+    np.testing.assert_array_equal(found["mse"], result.errors["mse"])
+    assert found.attrs["policy"] == "tsar" and json.loads(found.attrs["config"])["seconds"] == 0.2
+    densities = found["density_spatial"]
+    assert densities.dims == ("cycle", "row", "column") and densities.shape[1:] == (128, 128)
+    assert (np.diff(found["cycle_time_s"]) > 0).all() and int(found["cycle"][0]) == -8
+    limits = read_limits(result.folder / "steps.parquet")
+    budget = (densities * found["density_temporal"]).sum(("row", "column")) + found["surplus"]
+    np.testing.assert_allclose(budget, limits.budget, rtol=1e-5)
+
+
+def test_fields_are_in_raster_order(result: Result) -> None:
+    import pyarrow.parquet as pq
+
+    stored = pq.read_table(result.folder / "steps.parquet", columns=["density_spatial"])["density_spatial"][-1]
+    flat = stored.values.to_numpy()
+    field = load(result.folder)["density_spatial"].values[-1]
+    np.testing.assert_array_equal(field, flat[raster_to_morton(128).numpy()].reshape(128, 128))
+    np.testing.assert_array_equal(field[:64, :64].mean(), flat[: 64 * 64].mean())  # the first quarter of the curve
+    assert (field != flat.reshape(128, 128)).any()
+
+
+def test_a_folder_of_its_own_goes_with_the_result() -> None:
+    found = compare("fly-by", ["framed"], seconds=0.05, **SMALL)
+    folder = found.folder
+    assert (folder / "summary.json").is_file() and found.images.sizes["time_s"] == 3
+    assert list(found.table().index) == ["framed"] and found.errors["mse"].shape == (1, 3)
+    assert "density_spatial" not in load(folder)
+    del found
+    gc.collect()
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"resolution": 64}, "^resolution: expected an option of a run, such as resolution_px$"),
+        ({"policies": ["tsr"]}, "expected one of tsar, framed, .*, got 'tsr' \\(nearest: tsar\\)"),
+        ({"policies": []}, "policies: expected at least one"),
+        ({"metrics": ["flp"]}, "metrics: expected one of flip, .*'flp'"),
+        ({"scene": "flyby"}, "nearest: fly-by"),
+        ({"image_times_s": [-1.0]}, "image_times_s: expected times from 0 s, got -1"),
+        ({"batch_size": 0}, "batch_size"),
+    ],
+)
+def test_what_is_wrong_is_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        compare(**{"scene": "fly-by", **arguments})
+
+
+def test_a_picture_is_one_call() -> None:
+    found = render("moving-object", (48, 32), samples_per_pixel=4)
+    assert found.shape == (32, 48, 3) and found.dtype == np.float32 and 0.01 < found.mean() < 10.0
+    np.testing.assert_array_equal(found, render(load_scene("moving-object"), (48, 32), samples_per_pixel=4, threads=1))
+    assert (found != render("moving-object", (48, 32), samples_per_pixel=4, point_set="sobol")).any()
+    with pytest.raises(ConfigError, match="point set: expected one of"):
+        render("glass", 32, point_set="soboll")
+    with pytest.raises(ConfigError, match="size: expected at least one pixel, got 0"):
+        render("glass", 0)
