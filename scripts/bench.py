@@ -1,39 +1,12 @@
-"""Measure how fast the simulator is beside Embree, Mitsuba 3 and PyWavelets, and how little its machinery costs.
-
-Examples: python scripts/bench.py --out out/bench
-          python scripts/bench.py --only coherent,incoherent --out out/rays
-          python scripts/bench.py --compare out/before/bench.json out/after/bench.json
-"""
-
-from __future__ import annotations
+"""Measure how fast the simulator is beside Embree, Mitsuba 3 and PyWavelets, and how little its machinery costs."""
 
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.bench.turns import BenchOptions
-from analysis.command.cli import bad_input, parse, run_cli
-
-
-def main() -> None:
-    """Parses, measures or compares, and prints one table."""
-    options = parse(BenchOptions, __doc__ or "")
-    from analysis.bench.table import comparison_table, console, rows_table
-
-    if options.compare is not None:
-        with bad_input():
-            table = comparison_table(*options.compare)
-        console().print(table)
-        return
-    from analysis.bench.run import run_bench
-
-    found = run_bench(options)
-    shown = console()
-    shown.print(rows_table(found))
-    ending = options.file_ending
-    shown.print(f"written to {options.out}: bench{ending}.json, summary{ending}.json")
-
+from analysis.bench.command import main
+from analysis.command.cli import run_cli
 
 if __name__ == "__main__":
     run_cli(main)

@@ -1,48 +1,12 @@
-"""Report what an adaptive cycle and a framed image cost: the model of table 7.1 under every ledger, and this machine.
-
-Examples: python scripts/cost_report.py --out out/cost
-          python scripts/cost_report.py --no-measure --ledger summed --batch-size 256 --out out/summed
-"""
-
-from __future__ import annotations
+"""Report what an adaptive cycle and a framed image cost, by the model of table 7.1 and on this machine."""
 
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.command.cli import parse, run_cli
-from analysis.cost_report.options import CostReportOptions
-
-
-def main() -> None:
-    """Parses, evaluates, measures, prints tables and where the files are."""
-    options = parse(CostReportOptions, __doc__ or "")
-    from analysis.cost_report.run import write_report
-
-    summary = write_report(options)
-
-    from rich.table import Table
-
-    from analysis.command.console import console
-    from analysis.cost_report.tables import tables
-
-    shown = console()
-    for found in tables(summary):
-        table = Table(title=found.title, title_justify="left", caption=found.note or None, caption_justify="left")
-        for number, name in enumerate(found.header):
-            table.add_column(name, justify="right" if number else "left")
-        for row in found.rows:
-            table.add_row(*row)
-        shown.print(table)
-    rows = ", ".join(f"{batch} at {side}²" for batch, side in summary["admitted"])
-    segments = f"{options.admitted_segments:g} segments"
-    shown.print(f"admitted at {segments}, ledger {options.ledger}: {len(summary['admitted'])} rows: {rows or 'none'}")
-    crossing = summary["crossing_batch"]
-    shown.print(f"equal cost at batch {'none' if crossing is None else f'{crossing:,.1f}'}")
-    names = ", ".join(sorted(path.name for path in options.out.iterdir() if path.is_file()))
-    shown.print(f"written to {options.out}: {names}")
-
+from analysis.command.cli import run_cli
+from analysis.cost_report.command import main
 
 if __name__ == "__main__":
     run_cli(main)

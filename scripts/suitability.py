@@ -1,44 +1,12 @@
-"""Run the suitability study: five inputs at sixteen settings, over seeds and phases, beside the thesis' results.
-
-Examples: python scripts/suitability.py --scale quick --out out/study-quick
-          python scripts/suitability.py --inputs fly-by --rows 6 7 8 --scale half --out out/fly-by
-          python scripts/suitability.py --scale thesis --scheduler tcp://host:8786 --out /shared/study
-"""
-
-from __future__ import annotations
+"""Run the suitability study: five inputs at sixteen settings, over seeds and phases, beside the thesis' results."""
 
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.command.cli import parse, require_unbroken, run_cli
-from analysis.command.extras import require_extra
-from analysis.suitability.options import SuitabilityOptions
-
-
-def main() -> None:
-    """Runs what is missing; prints the tables."""
-    options = parse(SuitabilityOptions, __doc__ or "")
-    require_extra("study", "perception")
-    from analysis.suitability.run import study
-
-    summary, tables = study(options)
-
-    from analysis.command.console import console
-    from analysis.suitability.run import console_tables
-
-    shown = console(max(110, console().width))
-    for table in console_tables(tables):
-        shown.print(table)
-    done = summary["runs_done"]
-    shown.print(
-        f"{done} of {summary['runs']} runs; written to {options.out}: summary.json, tables/, figures/, report.html"
-    )
-    require_unbroken(summary["broken_invariants"])
-    if summary["failures"]:
-        sys.exit(1)
-
+from analysis.command.cli import run_cli
+from analysis.suitability.command import main
 
 if __name__ == "__main__":
     run_cli(main)

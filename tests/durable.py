@@ -144,15 +144,15 @@ _TINY = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", "16", "--w
 
 
 def _inputs(folder: Path) -> int:
-    from analysis.storage import records
+    from analysis.storage import provenance as module
 
-    provenance = records.provenance
+    provenance = module.provenance
 
     def committed(*arguments: Any, **extra: Any) -> dict[str, Any]:
         return {**provenance(*arguments, **extra), "uncommitted_changes": False}
 
     with ExitStack() as stack:
-        stack.enter_context(patch.object(records, "provenance", committed))
+        stack.enter_context(patch.object(module, "provenance", committed))
         runs = _in_cache(folder)
         stack.enter_context(patch("analysis.comparison.repetitions.InputsOptions.runs", runs))
         return call("inputs", "fly-by", "--repetitions", "2", *_TINY, "--out", str(folder / "out"))
@@ -202,7 +202,7 @@ def _tiles(folder: Path) -> int:
         yield from ((number, render_chunk(picture, chunk)) for number, chunk in enumerate(chunks))
 
     size = ("--width-px", "48", "--height-px", "32", "--samples", "4", "--chunk-tiles", "1")
-    alone = patch("scripts.tiles.connected", lambda farm: nullcontext())
+    alone = patch("analysis.tracer.tiles_command.connected", lambda farm: nullcontext())
     with alone, patch("analysis.tracer.tiles.rendered", rendered):
         return call("tiles", "plain", *size, "--out", str(folder / "out"))
 

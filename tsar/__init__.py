@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from tsar.stages import REFERENCE as REFERENCE, Stages as Stages
     from tsar.types import (
         Densities as Densities,
-        Display as Display,
         Errors as Errors,
         FrameletBatch as FrameletBatch,
         SampleBatch as SampleBatch,
         SampleMap as SampleMap,
+        ShownImage as ShownImage,
         StepRecord as StepRecord,
         Tiling as Tiling,
     )
@@ -53,6 +53,6 @@ __getattr__, __dir__ = lazily(
         "tsar.policy": "Moment Picture Policy Price Setting run step",
         "tsar.reconstruction": "Reconstruction",
         "tsar.stages": "REFERENCE Stages",
-        "tsar.types": "Densities Display Errors FrameletBatch SampleBatch SampleMap StepRecord Tiling",
+        "tsar.types": "Densities Errors FrameletBatch SampleBatch SampleMap ShownImage StepRecord Tiling",
     },
 )

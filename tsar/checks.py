@@ -41,7 +41,7 @@ def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
             if own is not None:
                 own(self)
 
-        record.__post_init__ = __post_init__
+        record.__post_init__ = __post_init__  # type: ignore[attr-defined]
         return record
 
     return closed
@@ -55,6 +55,6 @@ def _choices(record: type) -> tuple[tuple[str, bool, tuple[Any, ...]], ...]:
         many = get_origin(kind) is tuple
         item = get_args(kind)[0] if many else kind
         parts = get_args(item) if get_origin(item) in (Union, UnionType) else (item,)
-        if Literal in map(get_origin, parts):  # beside it there is None at most
+        if any(get_origin(part) is Literal for part in parts):  # beside it there is None at most
             found.append((name, many, tuple(choice for part in parts for choice in get_args(part) or (None,))))
     return tuple(found)

@@ -6,7 +6,7 @@ The tables hold places, so that a name can be checked before anything large is i
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tsar.named import Named
 
@@ -40,3 +40,12 @@ NORMS: Named[Norm] = Named("norm", "tsar.norms", {"l2": "tsar.norms:total_power"
 RECONSTRUCTIONS: Named[Reconstruct] = Named(
     "reconstruction", "tsar.reconstructions", {"blend": "tsar.reconstruction:blend"}
 )
+
+
+def chosen(config: TsarConfig) -> tuple[tuple[Named[Any], str], ...]:
+    """The tables of this module, each with the name that a configuration chooses from it."""
+    return (
+        (SOLVERS, config.response.solver),
+        (NORMS, config.error.norm),
+        (RECONSTRUCTIONS, config.reconstruction.method),
+    )

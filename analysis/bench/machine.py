@@ -6,8 +6,9 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
-from pathlib import Path
 from typing import Any
+
+from analysis.storage.provenance import cpu_model
 
 PACKAGES = {
     "torch": "torch",
@@ -18,8 +19,6 @@ PACKAGES = {
     "PyWavelets": "PyWavelets",
 }
 """Ours and the peers: name in the report and name of the distribution."""
-
-_CPU_INFO = Path("/proc/cpuinfo")
 
 
 def machine(device: str = "cpu") -> dict[str, Any]:
@@ -35,18 +34,6 @@ def machine(device: str = "cpu") -> dict[str, Any]:
 
         found["gpu"] = torch.cuda.get_device_name(device)
     return found
-
-
-def cpu_model() -> str:
-    """Name of the processor as the system tells it."""
-    try:
-        with _CPU_INFO.open() as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def versions() -> dict[str, str | None]:

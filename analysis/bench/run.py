@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from analysis.bench.conversion import conversion
@@ -22,9 +21,7 @@ from analysis.command import progress
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.ownership import own_folder
 from analysis.storage.files import write_json
-from analysis.storage.records import provenance
-
-ROOT = Path(__file__).resolve().parents[2]
+from analysis.storage.provenance import provenance
 
 MEASURED_BY: Mapping[str, Group] = {
     "coherent": coherent,
@@ -80,5 +77,5 @@ def _summary(options: BenchOptions, rows: list[Row]) -> dict[str, Any]:
         "targets_met": sum(row.met is True for row in rows),
         "targets_missed": [f"{row.group}: {row.name}" for row in rows if row.met is False],
         "config": config,
-        "provenance": provenance(ROOT, config, device=options.device),
+        "provenance": provenance(config, device=options.device),
     }

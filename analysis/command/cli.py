@@ -98,11 +98,18 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     caught = io.StringIO()
     try:
         with contextlib.redirect_stderr(caught), bad_input():
-            return tyro.cli(options, description=description, args=arguments)
+            return tyro.cli(options, description=_as_called(description), args=arguments)
     except SystemExit as stop:
         if not stop.code:
             raise
         raise InputError(_one_line(caught.getvalue())) from None
+
+
+def _as_called(description: str) -> str:
+    """A description whose examples call the command as it was called: as a script, or by ``tsar``."""
+    if not sys.argv[0].startswith("tsar "):
+        return description
+    return re.sub(r"python scripts/(\w+)\.py", sys.argv[0], description)
 
 
 def require_memory(need_bytes: float, what: str) -> None:

@@ -73,9 +73,15 @@ def own_folder(path: Path, what: str) -> Path:
 
 def release_folders() -> None:
     """Gives back all folders that this process owns."""
-    while _owned_folders:
-        folder, file = _owned_folders.popitem()
-        with file, suppress(OSError):
+    for folder in list(_owned_folders):
+        release_folder(folder)
+
+
+def release_folder(path: Path) -> None:
+    """Gives back a folder, if this process owns it."""
+    folder = path.resolve()
+    if folder in _owned_folders:
+        with _owned_folders.pop(folder), suppress(OSError):
             (folder / _OWNER).unlink()
 
 

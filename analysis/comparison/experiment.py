@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import InputError, bad_input, full_disk, require_memory
 from analysis.command.ownership import own_folder, writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
-from analysis.storage.store import Store
+from analysis.comparison.stored import FILES, SUMMARY, added_by, content_of, write_summary
 
 if TYPE_CHECKING:
     from analysis.command.progress import Bars
@@ -32,9 +31,6 @@ if TYPE_CHECKING:
     from renderer.trace import Renderer
     from scenes.canonical import Scene
 
-ROOT = Path(__file__).resolve().parents[2]
-_SUMMARY = "summary.json"
-_FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
 _BYTES_PER_PIXEL = 260  # images, age fields and samples of a run in flight
 _BYTES_PER_CACHED_SAMPLE = 20  # colours and wavelet coefficients
 
@@ -49,8 +45,8 @@ class Setup:
     losses: tuple[str, ...] = ()
 
 
-def prepare(options: RunOptions) -> Setup:
-    """Checks the machine, loads the scene and builds the renderer of the adaptive run.
+def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
+    """Checks the machine, loads the scene unless one is given, and builds the renderer of the adaptive run.
 
     Raises:
         InputError: something asked for cannot be had.
@@ -66,7 +62,7 @@ def prepare(options: RunOptions) -> Setup:
         from scenes import catalog
 
     with bad_input():
-        scene, losses = catalog.load_any(options.input, options.phase, options.camera_path)
+        scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
         for loss in losses:
             print(loss)
         renderer_of = lru_cache(maxsize=4)(partial(_renderer, options, scene))
@@ -96,15 +92,32 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
     Raises:
         InputError: something asked for cannot be had.
     """
+    return measure(options, began_s)[0]
+
+
+def measure(
+    options: RunOptions,
+    began_s: float | None = None,
+    scene: Scene | None = None,
+    viewers: Sequence[Callable[[View], None]] = (),
+) -> tuple[dict[str, Any], Measured]:
+    """As :func:`run_experiment`, and everything that was measured.
+
+    Args:
+        options: what to run.
+        began_s: since when the first cycle is waited for.
+        scene: by default that of the options' input.
+        viewers: each is told what all displays show at every reference time.
+    """
     began_s = time.monotonic() if began_s is None else began_s
-    setup = prepare(options)
+    setup = prepare(options, scene)
     with first_imports():
         from analysis.command import progress
         from analysis.metrics.quality import reference_times
         from analysis.storage.records import StepWriter
         from renderer.film.files import FilmError
 
-    for name in (_SUMMARY, *_FILES):
+    for name in (SUMMARY, *FILES):
         (options.out / name).unlink(missing_ok=True)  # of an earlier run
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
     with progress.bars() as bars, full_disk(options.out, FilmError):
@@ -113,13 +126,13 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
             own, first_cycle_s = first_made(runs[options.policy].images, began_s, bars.say)
             runs[options.policy] = dataclasses.replace(runs[options.policy], images=own)
             reference = _reference(options, setup, len(times_s), bars)
-            measured = _compare(options, times_s, reference, runs, bars)
+            measured = _compare(options, times_s, reference, runs, bars, viewers)
     if measured.seen[options.policy].images == 0 or (measured.totals.recorded and measured.totals.cycles == 0):
         (options.out / "steps.parquet").unlink(missing_ok=True)
         (options.out / "comparison.mp4").unlink(missing_ok=True)
         raise InputError(f"seconds: expected time for a cycle before the last reference image, got {options.seconds:g}")
     with full_disk(options.out):
-        return _write(options, setup, measured, first_cycle_s)
+        return _write(options, setup, measured, first_cycle_s), measured
 
 
 def _limits(options: RunOptions) -> RecordLimits:
@@ -127,49 +140,6 @@ def _limits(options: RunOptions) -> RecordLimits:
 
     c = options.tsar
     return RecordLimits(c.batch_size, c.budget, c.spatial_bounds, c.temporal_bounds)
-
-
-def finished(options: RunOptions) -> dict[str, Any] | None:
-    """The summary of a run of these options, by this code and of this scene as they are now; or None.
-
-    It is complete where all of its files are as they were written; those that are damaged are named.
-
-    Raises:
-        InputError: the scene cannot be read.
-    """
-    with first_imports():
-        from scenes import catalog
-
-    with bad_input():
-        scene, _ = catalog.load_any(options.input, options.phase, options.camera_path)
-        store = Store(options.out, content_of(options, scene))
-        found = store.read_json(_SUMMARY, {"provenance": dict, "policy": str, "files": list[str]})
-    return found if found and all(store.find(name) is not None for name in found["files"]) else None
-
-
-def content_of(options: RunOptions, scene: Scene) -> str:
-    """Hash of all that decides what a run gives: options, the scene's content, and the code."""
-    from analysis.storage.files import plain
-    from analysis.storage.reference import content_hash
-    from analysis.storage.source import code_hash
-
-    kept = {name: value for name, value in plain(options).items() if name not in ("out", "cache")}
-    return content_hash((kept, scene, code_hash(run_experiment)))
-
-
-def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
-    """Lists the files of a run that has ended, and writes its summary last: from then on the run is complete.
-
-    Returns:
-        What is in the summary: what was given, and the files.
-    """
-    store = Store(options.out, summary["provenance"]["content"])
-    files = [name for name in _FILES if (options.out / name).exists()]
-    for name in files:
-        store.add(name)
-    summary = {**summary, "files": files}
-    store.write_json(_SUMMARY, summary)
-    return summary
 
 
 def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:
@@ -218,7 +188,12 @@ def _runs(options: RunOptions, setup: Setup, writer: StepWriter) -> dict[str, Po
 
 
 def _compare(
-    options: RunOptions, times_s: Floats, reference: Reference, runs: dict[str, PolicyRun], bars: Bars
+    options: RunOptions,
+    times_s: Floats,
+    reference: Reference,
+    runs: dict[str, PolicyRun],
+    bars: Bars,
+    further: Sequence[Callable[[View], None]],
 ) -> Measured:
     from contextlib import nullcontext
 
@@ -242,7 +217,7 @@ def _compare(
 
     place, fps = options.out / "comparison.mp4", options.reference_rate_hz / stride
     with Mp4Writer(place, fps, film.width_px, film.height_px) if options.film else nullcontext() as sink:
-        viewers = [on_view, steps, *([Filming(film, sink, stride)] if sink else [])]
+        viewers = [on_view, steps, *further, *([Filming(film, sink, stride)] if sink else [])]
         images = {name: run.images for name, run in runs.items()}
         of_images = tuple(name for name in options.metrics if METRICS[name].image)
         kept = (0, len(times_s)) if len(of_images) < len(options.metrics) else (0, 0)
@@ -281,12 +256,12 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
     """Figures, report and summary."""
     from analysis.comparison import results
     from analysis.comparison.summary import summarise
-    from analysis.storage.records import provenance
+    from analysis.storage.provenance import provenance
 
     config = dataclasses.asdict(options)
     source = provenance(
-        ROOT,
         config,
+        added_by(options),
         scene=setup.scene.name or options.input,
         phase=options.phase,
         seed=options.tsar.seed,

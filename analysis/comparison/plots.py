@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
@@ -31,8 +32,10 @@ def error_figure(
         title: above the figure.
     """
     rivals = [name for name in errors if name != own]
-    figure, (upper, lower) = new_figure(9.0, 5.6, 2, sharex=True, height_ratios=(3, 2))
-    for axis in (upper, lower):
+    rows = {"rows": 2, "height_ratios": (3, 2)} if rivals else {"rows": 1}
+    figure, axes = new_figure(9.0, 5.6 if rivals else 3.4, sharex=True, **rows)
+    upper = axes[0]
+    for axis in axes:
         axis.vlines(refresh_s, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
     for name, ink in inks(list(errors), own).items():
         values = errors[name]
@@ -43,22 +46,26 @@ def error_figure(
     upper.set_title(title, fontsize=10, loc="left", parse_math=False)
     upper.margins(y=0.15)
     upper.legend(frameon=False, fontsize=8, ncols=min(len(errors), 5), loc="upper left")
+    if rivals:
+        _draw_ratio(axes[-1], times_s, ratio, f"{own} / {rivals[0]}")
+    marked = f"   (dotted: the display of {rivals[0]} changes)" if rivals else ""
+    axes[-1].set_xlabel(f"simulated time, s{marked}")
+    axes[-1].set_xlim(times_s[0], times_s[-1])
+    return figure
+
+
+def _draw_ratio(axis: Axes, times_s: Floats, ratio: Floats, label: str) -> None:
+    """A ratio over time; infinite values are marked along the upper edge."""
     shown = np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan)
-    lower.plot(times_s, shown, color="0.2", linewidth=1.1)
+    axis.plot(times_s, shown, color="0.2", linewidth=1.1)
     infinite = np.isinf(ratio)
     if infinite.any():
-        transform = lower.get_xaxis_transform()
-        lower.plot(
-            times_s[infinite], np.full(infinite.sum(), 0.97), "^", color="0.2", markersize=4, transform=transform
-        )
-    lower.axhline(1.0, color="0.0", linewidth=0.8)
-    lower.set_yscale("log")
-    _widen(lower, shown)
-    lower.set_ylabel(f"{own} / {rivals[0]}" if rivals else own)
-    marked = f"   (dotted: the display of {rivals[0]} changes)" if rivals else ""
-    lower.set_xlabel(f"simulated time, s{marked}")
-    lower.set_xlim(times_s[0], times_s[-1])
-    return figure
+        edge = np.full(infinite.sum(), 0.97)
+        axis.plot(times_s[infinite], edge, "^", color="0.2", markersize=4, transform=axis.get_xaxis_transform())
+    axis.axhline(1.0, color="0.0", linewidth=0.8)
+    axis.set_yscale("log")
+    _widen(axis, shown)
+    axis.set_ylabel(label)
 
 
 def _widen(axis, values: Floats) -> None:

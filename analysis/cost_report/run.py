@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import bad_input, full_disk
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from analysis.cost_report.measurement import Measurement
     from analysis.cost_report.sweeps import Sweep
 
-ROOT = Path(__file__).resolve().parents[2]
 SURFACE_BATCHES = (16.0, 1536.0)
 SURFACE_SEGMENTS = (0.0, 8.0)
 SURFACE_SIDES_PX = (64.0, 1536.0)
@@ -219,13 +217,15 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
 
         with progress.bars() as bars:
             measured = measure(options.measurement, ready, bars)
-    from analysis.storage.records import provenance
+    from analysis.storage.provenance import provenance
 
     found = refitted(options.measurement, measured) if measured else None
     config = dataclasses.asdict(options)
-    machine = {name: getattr(measured, name) if measured else None for name in ("device", "threads", "torch_threads")}
+    machine: dict[str, Any] = {
+        name: getattr(measured, name) if measured else None for name in ("device", "threads", "torch_threads")
+    }
     scene = options.measurement.input if measured else None
-    source = provenance(ROOT, config, scene=scene, **machine)
+    source = provenance(config, scene=scene, **machine)
     summary = {**summarise(options, found), "config": config, "provenance": source}
     with full_disk(options.out):
         _draw(options, summary)

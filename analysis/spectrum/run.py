@@ -9,7 +9,6 @@ from typing import Any
 from analysis.command.cli import bad_input, full_disk, require_memory
 from analysis.command.ownership import own_folder
 from analysis.command.progress import Bars, bars
-from analysis.comparison.experiment import ROOT
 from analysis.page.figures import save
 from analysis.spectrum import plots
 from analysis.spectrum.estimate_check import check_estimate, measure_example, measure_input
@@ -24,7 +23,7 @@ from analysis.spectrum.spectra import (
     shown,
 )
 from analysis.storage.files import write_json
-from analysis.storage.records import provenance
+from analysis.storage.provenance import provenance
 
 _BYTES_PER_SAMPLE = 32  # of a tile's volume; 27 were measured, its transform and a windowed copy included
 _BYTES_PER_PIXEL = 400
@@ -59,7 +58,7 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
         if options.does("agreement"):
             found["agreement"] = _agreement(options, shown_bars)
         config = dataclasses.asdict(options)
-        source = provenance(ROOT, config, scene=", ".join(options.inputs), seed=options.tsar.seed, device="cpu")
+        source = provenance(config, scene=", ".join(options.inputs), seed=options.tsar.seed, device="cpu")
         derived = {"level_max": options.tsar.level_max, "cycle_s": options.cycle_s()}
         summary = {**found, "config": {**config, "resolved": derived}, "provenance": source}
         write_json(options.out / "summary.json", summary)

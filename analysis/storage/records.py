@@ -1,13 +1,9 @@
-"""Run records on disk: one Parquet row a pipeline cycle, and where the run came from."""
+"""Run records on disk: one Parquet row a pipeline cycle."""
 
 from __future__ import annotations
 
-import hashlib
-import importlib.metadata
 import json
 import os
-import platform
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +13,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from torch import Tensor
 
-from analysis.command.extras import DISTRIBUTION
 from analysis.storage.files import PARTIAL, plain
 from tsar.types import StepRecord
 
@@ -178,38 +173,3 @@ def density_quantiles(path: Path, percents: tuple[float, ...] = (5.0, 25.0, 50.0
             for row in part.column(name):
                 found[name].append(np.percentile(row.values.to_numpy(), percents))
     return {name: np.asarray(values) for name, values in found.items()}
-
-
-def provenance(root: Path, config: Any, **extra: Any) -> dict[str, Any]:
-    """Where a run comes from: commit, configuration hash, versions and machine.
-
-    Args:
-        root: folder of the project's checkout, if it is one.
-        config: resolved configuration; its hash identifies the run.
-        extra: further entries, such as scene, seed and device.
-    """
-    text = json.dumps(plain(config), sort_keys=True)
-    versions: dict[str, str | None] = {}
-    for package in (DISTRIBUTION, "torch", "warp-lang", "numpy"):
-        try:
-            versions[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            versions[package] = None
-    return {
-        "commit": _git(root, "rev-parse", "HEAD"),
-        "uncommitted_changes": bool(_git(root, "status", "--porcelain", "--untracked-files=no")),
-        "config_hash": hashlib.sha256(text.encode()).hexdigest()[:16],
-        "versions": {"python": platform.python_version(), **versions},
-        "platform": platform.platform(),
-        "cpu_count": os.cpu_count(),
-        **extra,
-    }
-
-
-def _git(root: Path, *arguments: str) -> str:
-    """Output of a git command, or nothing where there is no repository or no git."""
-    try:
-        done = subprocess.run(["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=10)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""

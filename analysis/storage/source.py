@@ -20,6 +20,8 @@ from typing import Any
 
 from tsar.named import Named
 
+_PACKAGES = ("tsar", "renderer", "scenes", "analysis")
+
 _NO_DATA = (".pyc", ".md", ".html", ".js")
 """Endings of files beside the code that decide no result: pages only show them."""
 
@@ -126,6 +128,8 @@ def version_of(library: str) -> str | None:
 def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
     """Modules that can be reached by imports, and names of libraries that they import."""
     modules, libraries, waiting = set[Path](), set[str](), list(starts)
+    # installed packages lie beside those of others
+    own = {*_PACKAGES, *(path.relative_to(root).with_suffix("").parts[0] for path in starts)}
     while waiting:
         path = waiting.pop()
         if path in modules:
@@ -133,11 +137,11 @@ def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
         modules.add(path)
         content = path.read_bytes()
         for place in _places(content):
-            waiting += _module(root, place)
+            waiting += _module(root, place) if place.partition(".")[0] in own else []
         for name in _imports(content, path.parent.relative_to(root).parts):
-            found = _module(root, name)
-            waiting += found
             top = name.partition(".")[0]
+            found = _module(root, name) if top in own else []
+            waiting += found
             if not found and top not in sys.stdlib_module_names:
                 libraries.add(top)
     return modules, libraries

@@ -19,7 +19,7 @@ from analysis.metrics.cost_model import (
 from analysis.metrics.display_model import DisplayModel
 from analysis.storage.files import plain
 from analysis.storage.source import brought
-from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
+from tsar.choices import chosen
 from tsar.config import TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
 from tsar.policies import POLICIES
 
@@ -166,13 +166,7 @@ class Case:
 
     def key(self, source: str) -> str:
         """Name of its files: for people first, then a hash of all that decides it and of the source code."""
-        c = self.tsar
         # the source does not cover what was added to a table
-        added = brought(
-            (POLICIES, self.policy),
-            (SOLVERS, c.response.solver),
-            (NORMS, c.error.norm),
-            (RECONSTRUCTIONS, c.reconstruction.method),
-        )
+        added = brought((POLICIES, self.policy), *chosen(self.tsar))
         text = json.dumps([plain(self), source, *plain(added)], sort_keys=True)
         return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"

@@ -39,8 +39,6 @@ from analysis.study.runs import Machine, PolicyRun, Totals, begin
 if TYPE_CHECKING:
     from renderer.trace import Renderer
 
-ROOT = Path(__file__).resolve().parents[2]
-
 
 @dataclass(frozen=True)
 class Place:

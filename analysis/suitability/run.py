@@ -15,9 +15,9 @@ from analysis.command.cli import bad_input, full_disk
 from analysis.command.ownership import own_folder, writable_folder
 from analysis.command.progress import bars
 from analysis.storage.files import atomic, write_json
-from analysis.storage.records import provenance
+from analysis.storage.provenance import provenance
 from analysis.study.cases import ROWS, SCALES, Case
-from analysis.study.evaluation import ROOT, Place, broken, finished, times_of
+from analysis.study.evaluation import Place, broken, finished, times_of
 from analysis.study.farm import describe_failures, run_cases
 from analysis.suitability import plots
 from analysis.suitability.options import SuitabilityOptions
@@ -146,7 +146,7 @@ def _summary(
         "seconds": seconds,
         "peak_memory_bytes": max(measured["peak_memory_bytes"].tolist(), default=0) if len(measured) else 0,
         "config": config,
-        "provenance": provenance(ROOT, config, device="cpu", seeds=sorted({run.repetition for run in planned})),
+        "provenance": provenance(config, device="cpu", seeds=sorted({run.repetition for run in planned})),
     }
 
 

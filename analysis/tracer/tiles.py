@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.storage.reference import content_hash
-from analysis.storage.source import code_hash
+from analysis.storage.source import brought, code_hash
 from analysis.storage.store import Store
 from analysis.tracer.options import TileOptions
 
@@ -50,15 +50,17 @@ class Picture:
 
 
 @lru_cache(maxsize=4)
-def source_of(scene: str) -> str:
-    """Hash of the content of a scene and the code that renders it.
+def source_of(scene: str, point_set: str) -> str:
+    """Hash of the content of a scene and of the code that renders it with a point set.
 
     It is taken once in a process, for the process goes on with what it has imported and read: a worker that is older
     than a change must not pass for one that knows it.
     """
+    from renderer.sampling import POINT_SETS
     from scenes import catalog
 
-    return content_hash((catalog.load(scene), code_hash(render_chunk)))
+    added = brought((POINT_SETS, point_set))
+    return content_hash((catalog.load(scene), code_hash(render_chunk), *added))
 
 
 def picture_of(options: TileOptions, threads: int) -> Picture:
@@ -77,7 +79,9 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
     size = options.width_px or film.width_px, options.height_px or film.height_px
     check_frame_size(*size, 1)
     kinds = options.samples, options.point_set, options.space_filter
-    return Picture(options.scene, size, *kinds, options.time_s, options.seed, threads, source_of(options.scene))
+    return Picture(
+        options.scene, size, *kinds, options.time_s, options.seed, threads, source_of(options.scene, options.point_set)
+    )
 
 
 def chunks_of(picture: Picture, chunk_tiles: int) -> list[range]:
@@ -106,7 +110,7 @@ def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.flo
     from renderer.frames import render_tiles
     from renderer.sampling.plan import SamplePlan
 
-    if picture.source != source_of(picture.scene):
+    if picture.source != source_of(picture.scene, picture.point_set):
         raise ValueError(f"{picture.scene}: expected source {picture.source[:16]}, this worker runs another one")
     renderer = _renderer(picture.scene, picture.seed, picture.threads)
     plan = SamplePlan(picture.samples, picture.point_set, picture.seed, picture.space_filter)  # type: ignore[arg-type]

@@ -46,7 +46,8 @@ def test_a_comparison(
 
 
 def test_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    script, names = importlib.import_module("scripts.inputs"), ("ratio_median", "share_suitable", "suitable_percentile")
+    script = importlib.import_module("analysis.comparison.inputs_command")
+    names = "ratio_median", "share_suitable", "suitable_percentile"
     whole = {
         **dict.fromkeys((*names, "cycles", "age_spread_s"), 1.0),
         "ratio_quartiles": [1.0, 1.0],

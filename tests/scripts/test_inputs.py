@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 import analysis.storage.source
-import scripts.inputs as script
-from analysis.comparison.experiment import RunOptions, content_of, finished, write_summary
+from analysis.comparison import inputs_command as script
+from analysis.comparison.options import RunOptions
 from analysis.comparison.repetitions import InputsOptions, row
+from analysis.comparison.stored import content_of, finished, write_summary
 from analysis.study.cases import INPUTS
 from scenes import catalog
 from tests.scripts.commands import assert_refused, call_script, nothing_in

@@ -1,21 +1,11 @@
 """Machine and versions."""
 
 import importlib.metadata
-from pathlib import Path
 
 import pytest
 
 from analysis.bench import machine as bench_machine
-from analysis.bench.machine import cpu_model, installed, machine, versions
-
-
-def test_the_processor_is_named_as_the_system_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    info = tmp_path / "cpuinfo"
-    info.write_text("processor\t: 0\nmodel name\t: Quick CPU @ 3 GHz\nflags: none\n")
-    monkeypatch.setattr(bench_machine, "_CPU_INFO", info)
-    assert cpu_model() == "Quick CPU @ 3 GHz"
-    monkeypatch.setattr(bench_machine, "_CPU_INFO", tmp_path / "missing")
-    assert cpu_model()
+from analysis.bench.machine import installed, machine, versions
 
 
 def test_cores_and_memory() -> None:

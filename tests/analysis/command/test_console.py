@@ -9,9 +9,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-import scripts.run
 from analysis.command.console import console, frame_table
 from analysis.command.progress import bars
+from analysis.comparison import run_command
 from tests.scripts.commands import call_script
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -40,7 +40,7 @@ def test_a_run_prints_its_folder_as_it_is(
     summary: dict[str, Any] = {"ratio_statistics": {"framed": statistics}, "policy": "tsar", "metrics": {}}
     summary |= {"files": [], "ledger": "thesis", "cycles": 1, "cycle_s": 0.1}
     summary |= {"samples_traced": 1, "invariants": {"ok": True}, "nonfinite": {"samples": 0}}
-    monkeypatch.setattr(scripts.run, "run_experiment", lambda options, began_s: summary)
+    monkeypatch.setattr(run_command, "run_experiment", lambda options, began_s: summary)
     monkeypatch.chdir(tmp_path)
     assert call_script("run.py", monkeypatch, "fly-by", "--out", ODD) == 0
     assert f"written to {ODD}" in capsys.readouterr().out

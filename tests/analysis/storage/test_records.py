@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.storage.invariants import InvariantCheck, check_invariants, covers_once
-from analysis.storage.records import StepWriter, density_quantiles, provenance, read_limits
+from analysis.storage.records import StepWriter, density_quantiles, read_limits
 from tests.analysis.builders import ELEMENTS, LIMITS, SPATIAL, TEMPORAL, good_record, random_tiling, tiling
 from tsar.morton import deinterleave
 from tsar.types import Errors, StepRecord
@@ -212,10 +212,3 @@ def test_density_quantiles(tmp_path: Path) -> None:
     assert np.allclose(found["sim_time_s"], 0.01 * np.arange(40))
     assert np.allclose(found["density_spatial"], np.array([1.0, 1.5, 2.0]) + np.arange(40)[:, None])
     assert np.allclose(found["density_temporal"], np.tile([0.25, 0.375, 0.5], (40, 1)))
-
-
-def test_provenance_names_configuration_and_versions(tmp_path: Path) -> None:
-    first, same, other = (provenance(tmp_path, {"a": a, "b": 2}, seed=3) for a in (1, 1, 5))
-    assert first["config_hash"] == same["config_hash"] != other["config_hash"]
-    assert first["versions"]["torch"] == torch.__version__ and first["versions"]["numpy"] == np.__version__
-    assert (first["commit"], first["uncommitted_changes"], first["seed"]) == ("", False, 3)

@@ -31,7 +31,7 @@ from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 from scenes import catalog
 
-PICTURE = Picture("quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light"))
+PICTURE = Picture("quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", "hammersley"))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,46 @@
+"""Compare a policy, by default temporally and spatially adaptive rendering, with its rivals at equal cost.
+
+Example: python scripts/run.py fly-by --seconds 2 --out out/fly-by
+"""
+
+from __future__ import annotations
+
+from analysis.command.cli import parse, require_unbroken
+from analysis.command.start import process_began_s
+from analysis.comparison.experiment import run_experiment
+from analysis.comparison.options import RunOptions
+
+
+def main() -> None:
+    """Parses, runs, prints what came out and where it is."""
+    options = parse(RunOptions, __doc__ or "")
+    summary = run_experiment(options, process_began_s())
+
+    from rich.table import Table
+
+    from analysis.command.console import console
+
+    title = f"{options.input}: {summary['policy']}, ledger {summary['ledger']}"
+    table = Table(title=title, show_header=False, title_justify="left")
+    rows = {}
+    for rival, statistics in summary.get("ratio_statistics", {}).items():
+        low, high = statistics.quartile_low, statistics.quartile_high
+        rows[f"MSE ratio to {rival}, median"] = f"{statistics.median:.3f} (quartiles {low:.3f} – {high:.3f})"
+        rows[f"at most that of {rival}"] = f"{100 * statistics.share_suitable:.0f} % of the time"
+        rows[f"greatest suitable percentile to {rival}"] = f"{statistics.suitable_percentile:.0f}"
+    for metric, values in summary["metrics"].items():
+        rows[metric] = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
+    checked = summary["invariants"]
+    holds = {True: "hold in every cycle", False: f"BROKEN: {checked}", None: "not recorded by these policies"}
+    rows |= {
+        "cycles": f"{summary['cycles']}, {1e3 * summary['cycle_s']:.2f} ms each",
+        "samples traced": f"{summary['samples_traced']:,}",
+        "invariants": holds[checked and checked["ok"]],
+        "non-finite values": str(sum(summary["nonfinite"].values())),
+    }
+    for name, value in rows.items():
+        table.add_row(name, value)
+    shown = console()
+    shown.print(table)
+    shown.print(f"written to {options.out}: {', '.join(['summary.json', *summary['files']])}")
+    require_unbroken([] if checked is None or checked["ok"] else [options.input])

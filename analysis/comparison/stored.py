@@ -1,0 +1,72 @@
+"""What a comparison leaves on disk: which files, whether they are whole, and what decides them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from analysis.command.cli import bad_input
+from analysis.command.start import first_imports
+from analysis.comparison.options import RunOptions
+from analysis.metrics import METRICS
+from analysis.storage.store import Store
+from tsar.choices import chosen
+from tsar.policies import POLICIES
+
+if TYPE_CHECKING:
+    from analysis.storage.source import Brought
+    from scenes.canonical import Scene
+
+SUMMARY = "summary.json"
+FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
+
+
+def finished(options: RunOptions) -> dict[str, Any] | None:
+    """The summary of a run of these options, by this code and of this scene as they are now; or None.
+
+    It is complete where all of its files are as they were written; those that are damaged are named.
+
+    Raises:
+        InputError: the scene cannot be read.
+    """
+    with first_imports():
+        from scenes import catalog
+
+    with bad_input():
+        scene, _ = catalog.load_any(options.input, options.phase, options.camera_path)
+        store = Store(options.out, content_of(options, scene))
+        found = store.read_json(SUMMARY, {"provenance": dict, "policy": str, "files": list[str]})
+    return found if found and all(store.find(name) is not None for name in found["files"]) else None
+
+
+def content_of(options: RunOptions, scene: Scene) -> str:
+    """Hash of all that decides what a run gives: options, the scene's content, and the code."""
+    from analysis.comparison.experiment import run_experiment
+    from analysis.storage.files import plain
+    from analysis.storage.reference import content_hash
+    from analysis.storage.source import code_hash
+
+    kept = {name: value for name, value in plain(options).items() if name not in ("out", "cache")}
+    return content_hash((kept, scene, code_hash(run_experiment), *added_by(options)))
+
+
+def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
+    """Lists the files of a run that has ended, and writes its summary last: from then on the run is complete.
+
+    Returns:
+        What is in the summary: what was given, and the files.
+    """
+    store = Store(options.out, summary["provenance"]["content"])
+    files = [name for name in FILES if (options.out / name).exists()]
+    for name in files:
+        store.add(name)
+    summary = {**summary, "files": files}
+    store.write_json(SUMMARY, summary)
+    return summary
+
+
+def added_by(options: RunOptions) -> list[Brought]:
+    """What a run uses that is not the project's own."""
+    from analysis.storage.source import brought
+
+    policies = ((POLICIES, name) for name in (options.policy, *options.rivals))
+    return brought(*policies, *((METRICS, name) for name in options.metrics), *chosen(options.tsar))

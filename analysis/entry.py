@@ -1,0 +1,86 @@
+"""The command ``tsar``: every script of the project as a subcommand, and what has a name.
+
+Usage: tsar COMMAND [OPTIONS]; tsar COMMAND --help; tsar list [TABLE]; tsar --version
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.metadata
+import sys
+
+from analysis.command.cli import InputError, run_cli
+from analysis.command.extras import DISTRIBUTION
+
+COMMANDS = {
+    "run": "analysis.comparison.run_command",
+    "inputs": "analysis.comparison.inputs_command",
+    "render": "analysis.tracer.render_command",
+    "study": "analysis.suitability.command",
+    "sensitivity": "analysis.sensitivity.command",
+    "spectrum": "analysis.spectrum.command",
+    "cost_report": "analysis.cost_report.command",
+    "gallery": "analysis.tracer.gallery_command",
+    "job": "analysis.tracer.job_command",
+    "tiles": "analysis.tracer.tiles_command",
+    "pointsets": "analysis.tracer.pointsets_command",
+    "accelerators": "analysis.tracer.accelerators_command",
+    "perception": "analysis.perception.command",
+    "convert": "analysis.conversion.convert_command",
+    "conversion_check": "analysis.conversion.check_command",
+    "bench": "analysis.bench.command",
+    "same": "analysis.storage.command",
+}
+"""Modules whose ``main`` runs a command; a script of the same name calls it too, but for study: suitability."""
+
+TABLES = {
+    "policies": "tsar.policies:POLICIES",
+    "metrics": "analysis.metrics:METRICS",
+    "scenes": "scenes.catalog:SCENES",
+    "formats": "scenes.formats:FORMATS",
+    "point-sets": "renderer.sampling:POINT_SETS",
+    "solvers": "tsar.choices:SOLVERS",
+    "norms": "tsar.choices:NORMS",
+    "reconstructions": "tsar.choices:RECONSTRUCTIONS",
+}
+"""What has a name, and where its table is."""
+
+
+def main() -> None:
+    """Runs the command that the command line names, and ends the process."""
+    run_cli(_dispatch)
+
+
+def _dispatch() -> None:
+    name, rest = (sys.argv[1:2] or ["--help"])[0], sys.argv[2:]
+    if name in ("-h", "--help"):
+        print(f"{__doc__}\nCommands: {', '.join([*COMMANDS, 'list'])}\nTables: {', '.join(TABLES)}")
+    elif name == "--version":
+        print(f"{DISTRIBUTION} {importlib.metadata.version(DISTRIBUTION)}")
+    elif name == "list":
+        for table in rest or TABLES:
+            _print_table(table)
+    else:
+        module = importlib.import_module(_known(name, {**COMMANDS, "list": ""}, "command"))
+        sys.argv = [f"tsar {name}", *rest]
+        module.main()
+
+
+def _print_table(name: str) -> None:
+    """What has a name, and where each comes from."""
+    module, _, attribute = _known(name, TABLES, "list").partition(":")
+    table = getattr(importlib.import_module(module), attribute)
+    print(f"{name} (entry points: {table.group})")
+    for entry in table:
+        origin = table.origin(entry)
+        added = "" if table.is_own(entry) else f" ({origin.distribution or 'no distribution'} {origin.version or ''})"
+        print(f"  {entry:20} {origin.module}{added}")
+
+
+def _known(name: str, known: dict[str, str], what: str) -> str:
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f" (nearest: {near[0]})" if near else ""
+    raise InputError(f"{what}: expected one of {', '.join(known)}, got {name!r}{hint}")
