@@ -110,7 +110,7 @@ def _traced(
 
 
 def place_tiles(image: Float[Tensor, "h w 3"], tiles: Sequence[int], colors: Float[Tensor, "tiles 256 3"]) -> None:
-    """Puts tiles into a picture; what hangs over is dropped."""
+    """Puts tiles into a picture; pixels outside of it are dropped."""
     height, width = image.shape[:2]
     columns, rows = (torch.as_tensor(part) for part in tile_pixels(tiles, width))
     inside = (columns < width) & (rows < height)

@@ -30,7 +30,7 @@ from scenes.canonical import Scene
 from tsar.types import FrameletBatch, SampleBatch
 
 _RANGE = 1024  # samples or pixels per launch without packets: few enough that threads end together
-_RANGE_CUDA = 1 << 18  # few enough that the rays waiting to be followed fit into memory
+_RANGE_CUDA = 1 << 18  # few enough that the rays that wait to be followed fit into memory
 _SECONDARY = "shadow_rays", "reflection_rays", "refraction_rays"
 
 

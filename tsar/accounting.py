@@ -1,5 +1,5 @@
-"""What a cycle's record says of the whole field: the density that is handed out, how the ages on show differ, and how
-many values are not finite."""
+"""Sums over the field for the record of a cycle: the density that is handed out, the spread of the ages that are shown,
+and the number of values that are not finite."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Account:
 def account(
     densities: Densities, errors: Errors, newest_s: Float64[Tensor, "side side"], config: TsarConfig
 ) -> Account:
-    """Takes stock of densities and errors, and of the newest samples on show, raster order."""
+    """Sums densities and errors, and the ages of the newest samples that are shown, in raster order."""
     fields = densities.spatial, densities.temporal, errors.spatial, errors.temporal
     nonfinite = sum(int((~torch.isfinite(field)).sum()) for field in fields)
     return Account(total(densities.combined()), _age_spread(newest_s, densities, config), nonfinite)

@@ -22,7 +22,7 @@ EMPTY = -1
 
 
 class FrameletCache:
-    """Fixed number of slots.
+    """A fixed number of slots for framelets.
 
     Attributes:
         color: ``(slots, samples, 3)`` float32, Morton order.

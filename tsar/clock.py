@@ -24,7 +24,7 @@ def fixed_clock(seconds: float) -> CycleSeconds:
 
 
 def checked(clock: CycleSeconds, counters: Mapping[str, int], wall_s: float) -> float:
-    """What the clock says, refusing what would stop time or send it back.
+    """What the clock says; it must be finite and positive, or time would stop or run backwards.
 
     Raises:
         ValueError: the clock returned a value that is not finite and positive.
@@ -36,7 +36,7 @@ def checked(clock: CycleSeconds, counters: Mapping[str, int], wall_s: float) -> 
 
 
 class Timed:
-    """A context that adds its length to an entry of a table, however it ends."""
+    """A context that adds its duration to an entry of a table, also where it ends with an error."""
 
     __slots__ = ("_seconds", "_stage", "_start")
 
@@ -57,11 +57,11 @@ class StageTimer:
         self.seconds: dict[str, float] = {}
 
     def __call__(self, stage: str) -> Timed:
-        """A context whose length counts for a stage."""
+        """A context whose duration counts for a stage."""
         return Timed(self.seconds, stage)
 
     def divide(self, seconds: float, shares: Mapping[str, float]) -> None:
-        """Adds a span that stages have in common, to each its share; the shares need not add up to one."""
+        """Divides a span among the stages that share it, in proportion to ``shares``; these need not add up to one."""
         whole = sum(shares.values()) or 1.0
         for stage, share in shares.items():
             self.seconds[stage] = self.seconds.get(stage, 0.0) + seconds * share / whole

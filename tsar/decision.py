@@ -1,4 +1,4 @@
-"""What follows from a batch's errors: new densities, their tiling, and which of its tiles are rendered next."""
+"""The stages from a batch's errors to the next batch: new densities, their tiling, and the tiles that are due in it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def decide(
     """The response to the errors, the tiling and the selection, one after the other.
 
     Args:
-        stage: takes the times of ``response``, ``tiling`` and ``selection``.
+        timer: takes the times of ``response``, ``tiling`` and ``selection``.
     """
     with timer("response"):
         densities = respond(densities, errors, config)

@@ -28,7 +28,7 @@ OCTAVES_OF_FULL_ERROR = 8.0
 _POWER_LEAST, _POWER_MOST = torch.finfo(torch.float32).tiny, 2.0**100
 
 RADIANCE_MAX = 1e30
-"""Greatest radiance that counts as a number: sums of many samples stay below what float32 can hold."""
+"""Radiance beyond which a sample counts as not finite, so that sums of many samples fit into float32."""
 
 
 @dataclass(frozen=True)
@@ -154,8 +154,11 @@ def _share_octaves(norm: str, repeat: int) -> float:
 
 
 def tolerated_power(octaves: int, offset: float, slope: float, config: ErrorConfig) -> float:
-    """:func:`template_power` summed over octaves, within what float32 holds: beyond either bound no signal, whose power
-    is 0 or lies between the two, has another error than at it."""
+    """:func:`template_power`, summed over octaves and kept within what float32 holds.
+
+    The power of a signal is 0 or lies between these bounds, so a template beyond a bound gives the same errors as one
+    at the bound.
+    """
     return min(max(float(template_power(octaves, offset, slope, config).sum()), _POWER_LEAST), _POWER_MOST)
 
 

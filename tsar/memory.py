@@ -1,4 +1,4 @@
-"""Memory that this process can still have: the least that the machine, a container and limits of the process leave."""
+"""Memory that this process can still allocate: the least of what the machine, containers and its own limits leave."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def free_memory_bytes(root: Path = Path("/")) -> int:
-    """Bytes that can be had; what the system keeps of files counts as free, for it gives that back.
+    """Bytes that can be allocated. The cache of files counts as free, for the system gives it back.
 
     Args:
         root: where ``proc`` and ``sys`` lie.
@@ -50,7 +50,7 @@ def _groups(root: Path) -> Iterator[int]:
 
 
 def _number(path: Path) -> int | None:
-    """The number in a file; None where there is no file, or no number but the word ``max``."""
+    """The number in a file; None where there is no such file, or where it holds the word ``max``."""
     text = "".join(_lines(path)).strip()
     return int(text) if text.isdecimal() else None
 

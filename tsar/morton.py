@@ -38,7 +38,10 @@ def deinterleave(index: Int64[Tensor, "*n"]) -> tuple[Int64[Tensor, "*n"], Int64
 
 
 def first_node(level):
-    """Nodes of all levels above one, a number or a tensor: nodes are numbered level after level from the coarsest."""
+    """Number of the first node of a level, ``(4^level - 1) / 3``: nodes are numbered level after level, coarsest first.
+
+    ``level`` is an int or an int64 tensor, and so is the result.
+    """
     return (4**level - 1) // 3
 
 
@@ -137,7 +140,7 @@ def tile_mean(
 
 
 def total(field: Float[Tensor, " e"]) -> float:
-    """Sum of a field, the same bits for any number of threads: a scan has one order, a parallel sum has not."""
+    """Sum of a field, the same bits for any number of threads: a scan adds in one order, a parallel sum does not."""
     return float(torch.cumsum(field, 0)[-1]) if field.numel() else 0.0
 
 

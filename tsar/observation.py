@@ -1,4 +1,4 @@
-"""What a rendered batch tells: its errors; its colours and wavelet states go into the cache."""
+"""The first stage after tracing: errors of a batch, and its colours and wavelet states into the cache."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def observe(
     config: TsarConfig,
     timer: StageTimer,
 ) -> Observation:
-    """Errors of a batch by :func:`tsar.error.estimate`, and the batch into the cache, in place.
+    """Estimates the errors of a batch (:func:`tsar.error.estimate`) and stores the batch in the cache, in place.
 
     Args:
-        stage: takes the times of ``error`` and ``cache``.
+        timer: takes the times of ``error`` and ``cache``.
     """
     with timer("error"):
         found = estimate(batch, color, cache, config)

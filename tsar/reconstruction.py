@@ -24,9 +24,9 @@ from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
 from tsar.types import SampleMap
 
 SHIFT_CYCLES = 0.5
-"""What the temporal weight of a framelet is greater by than the cycles by which it is newer than the age field."""
+"""Added to the cycles by which a framelet is newer than the age field; the sum is its temporal weight."""
 AGE_STEPS = 2.0**16
-"""Steps to a cycle that ages are rounded to before they are smoothed."""
+"""Ages are rounded to this fraction of a cycle, one in so many, before they are smoothed."""
 AGE_MOST = 1.0e6
 """Greatest age, cycles."""
 

@@ -11,8 +11,8 @@ from torch import Tensor
 def square_root(value: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
     """Square roots on the CPU, correctly rounded as IEEE 754 demands; NaN below zero.
 
-    Not ``torch.sqrt``: the library behind it misses the last bit of some roots (of one in five on an AMD EPYC), and of
-    which ones is up to the processor.
+    ``torch.sqrt`` does not serve: the library behind it misses the last bit of some roots (one in five on an AMD EPYC),
+    and which ones these are depends on the processor.
     """
     with np.errstate(invalid="ignore"):
         return torch.as_tensor(np.sqrt(value.numpy()))

@@ -54,9 +54,9 @@ def select(
 
     Each element gathers its temporal density every cycle, a tile is as overdue as the mean credit of the elements it
     covers, and rendering a tile takes one refresh off its credit. Credit lives on the field, so it survives re-tiling.
-    What is left after a refresh is kept within one refresh either way: then fractional rates come out right on average,
-    where more or less falls due than a batch holds all rates shrink or grow in proportion, and, every density being
-    positive, a tile's turn always comes.
+    The credit that is left after a refresh is kept in [-1, 1]. Fractional rates then come out right on average. Where
+    more or fewer tiles fall due than a batch holds, all rates shrink or grow in proportion. As every density is
+    positive, every tile is rendered at some time.
 
     Returns:
         Indices into the tiling in Morton order, and the history for the next cycle. Ties go to the earlier tile.

@@ -107,9 +107,11 @@ def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor],
 
 @lru_cache(maxsize=16)
 def tie_order(level_low: int, level_high: int) -> Int64[Tensor, " nodes"]:
-    """Order in which equal nodes split: coarse before fine, so that a parent comes before its child, and within a level
-    by bit-reversed index, so that where the bound on the tiles leaves only some of many equal nodes to split, they are
-    spread over the whole image instead of filling it from its first corner."""
+    """Order in which equal nodes split: by level, coarse before fine, and within a level by bit-reversed index.
+
+    A parent then comes before its child. Where the bound on the tiles lets only some of many equal nodes split, these
+    are spread over the whole image; in the order of their indices they would fill it from one corner.
+    """
     order, first = [], 0
     for level in range(level_low, level_high):
         index = torch.arange(4**level)

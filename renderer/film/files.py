@@ -59,7 +59,7 @@ def encode_srgb(image: Float[Tensor, "h w 3"]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=1)
 def _steps() -> NDArray[np.float32]:
-    """Least radiance of each of the codes 1 to 255: no processor then rounds a picture's values in its own way."""
+    """Least radiance of each of the codes 1 to 255. Comparing with these gives the same codes on every processor."""
     middle = (np.arange(255) + 0.5) / 255.0
     return np.where(middle > 0.04045, power((middle + 0.055) / 1.055, 2.4), middle / 12.92).astype(np.float32)
 
@@ -141,7 +141,7 @@ class _FilmWriter:
     """
 
     def __init__(self, path: Path, fps: float, width_px: int, height_px: int) -> None:
-        """Raises FilmError if the rate is none or the file cannot be written."""
+        """Raises FilmError if the rate is not positive or the file cannot be written."""
         if not fps > 0:
             raise FilmError(f"{path}: expected a positive frame rate, got {fps}")
         self.path, self.frames = path, 0
@@ -203,7 +203,7 @@ class Mp4Writer(_FilmWriter):
     """An H.264 film (MPEG-4 part 2 where there is no encoder for it), of even width and height."""
 
     def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:
-        """Raises FilmError if a size is odd, the rate is none or the file cannot be written."""
+        """Raises FilmError if a size is odd, the rate is not positive, or the file cannot be written."""
         if width_px % 2 or height_px % 2 or min(width_px, height_px) < 2:
             raise FilmError(f"{path}: MP4 needs an even width and height, got {width_px} x {height_px}")
         super().__init__(path, fps, width_px, height_px)

@@ -16,9 +16,7 @@ _NATIVE = """
 #if defined(__CUDACC__) || defined(__CUDA_ARCH__) || defined(__CUDACC_RTC__)
     return wp::vec4(-1.0f, 0.0f, 0.0f, 0.0f);
 #else
-    packets::RayHit hit;
-    const bool found = packets::single_ray<{any}>(scene, mesh, start, towards, reach, (long long*)work.data, hit);
-    return wp::vec4(found ? hit.t : -1.0f, hit.u, hit.v, __builtin_bit_cast(float, hit.face));
+    return packets::meet_mesh_alone<{any}>(scene, mesh, start, towards, reach, (long long*)work.data);
 #endif
 """
 

@@ -130,7 +130,7 @@ def shade_samples(
     color: Address,
     rays: Address,
 ):
-    """As the kernel of the same name in ``kernels.py``, for all samples that no other launch has taken.
+    """As the kernel of the same name in ``entry.py``, for all samples that no other launch has taken.
 
     Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero. ``rays``
     receives the totals. Arrays come as addresses, for a launch that is recorded once.
@@ -147,5 +147,5 @@ def render_pixels(
     time_s: wp.float64,
     image: wp.array2d(dtype=wp.vec3),
 ):
-    """As the kernel of the same name in ``kernels.py``, shared between launches like :func:`shade_samples`."""
+    """As the kernel of the same name in ``entry.py``, shared between launches like :func:`shade_samples`."""
     native_render_pixels(scene, view, taken, samples, time_s, image)

@@ -4,7 +4,7 @@ The mask is a ranking of the voxels of a torus (frame, row, column) by void and 
 evenly as can be, numbered down as the tightest cluster is taken away, then the rest, each in the largest void.
 
 Source: Ulichney 1993, "The void-and-cluster method for dither array generation"; Wolfe et al. 2022, "Spatiotemporal
-blue noise masks": two voxels repel in space if of one frame, in time if of one pixel, and not otherwise.
+blue noise masks": two voxels of one frame repel in space, two of one pixel repel in time, and others do not repel.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class _Field:
         self._voids, self._clusters = np.zeros(self.count), np.full(self.count, -np.inf)
 
     def copy(self) -> _Field:
-        """Another one in the same state."""
+        """A copy in the same state."""
         twin = _Field(self.frames, self.side)
         twin._energy, twin._set = self._energy.copy(), self._set.copy()
         twin._voids, twin._clusters = self._voids.copy(), self._clusters.copy()
@@ -94,7 +94,7 @@ class _Field:
         self._change(voxel, 1.0)
 
     def take(self, voxel: int) -> None:
-        """Sets a voxel no more."""
+        """Clears a voxel."""
         self._set[voxel] = False
         self._change(voxel, -1.0)
 

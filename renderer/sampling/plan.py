@@ -70,8 +70,8 @@ def gaussian_warp(
 ) -> tuple[Float[NDArray[np.float64], "*n"], Float[NDArray[np.float64], "*n"]]:
     """Offsets from the pixel's centre with a Gaussian density, pixels (Box and Muller 1958; thesis fig. 16).
 
-    Deviation: the radius is that of ``1 - u``, which never is 0 where ``u`` is in [0, 1); the thesis takes ``u``, whose
-    0 has no logarithm.
+    Deviation: the radius is that of ``1 - u``, which is never 0 for ``u`` in [0, 1). The thesis takes ``u``, which may
+    be 0 and then has no logarithm.
     """
     radius = sigma_px * np.sqrt(-2.0 * log1p(-np.asarray(u)))
     turn = 2.0 * np.pi * np.asarray(v)

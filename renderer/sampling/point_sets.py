@@ -18,7 +18,7 @@ from scenes.arithmetic import log, power
 
 Points = Float[NDArray[np.float64], "n 3"]
 COUNT_MAX = 1 << 16
-"""Points of a set at most."""
+"""Greatest number of points of a set."""
 
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 

@@ -1,4 +1,4 @@
-"""Reconstruction, first half, in C: how old the newest samples are, and which framelets may still be seen.
+"""Reconstruction, first half, in C++ (``native/ages.h``): ages of the newest samples, and framelets that may be seen.
 
 *Cells* are tiles of the finest level, raster order. Definitions in ``tsar/reconstruction.py``.
 """

@@ -1,9 +1,9 @@
-"""Reconstruction, second half, in C: bands of rows, each small enough for the second-level cache, from the threshold
-of ages to finished pixels. Definitions in ``tsar/reconstruction.py``.
+"""Reconstruction, second half, in C++ (``native/bands.h``): from the threshold of ages to finished pixels.
 
-A band's working memory holds five planes of its pixels: threshold, sums of weight, red, green, blue. A framelet is
-first expanded along rows to pixels (*rows*, one per row of samples), then every row of pixels is a blend of two of
-these: ``native/display.h``.
+Bands of rows are each small enough for the second-level cache. A band's working memory holds five planes of its pixels:
+threshold, sums of weight, red, green, blue. A framelet is first expanded along rows to pixels (*rows*, one per row of
+samples), then every row of pixels is a blend of two of these: ``native/display.h``. Definitions in
+``tsar/reconstruction.py``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The bookkeeping of the cache in C: which slots a batch takes, and what was in them. Definition: ``tsar/cache.py``."""
+"""The bookkeeping of the cache in C++ (``native/claims.h``): slots that a batch takes, and what was in them.
+
+Definition: ``tsar/cache.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Kernel entry points of the control stages: each the recipe of its stages in ``tsar``.
 
 They run on the CPU, where a launch is one call on one thread, and threads share what is large; the passes they call are
-in C and C++.
+in C++.
 """
 
 from __future__ import annotations

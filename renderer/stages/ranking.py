@@ -1,8 +1,8 @@
-"""The greatest of many, without sorting: what selection, cache and tiling have in common.
+"""The greatest of many values without sorting (``native/ranking.h``); selection, cache and tiling use it.
 
 Each ranks by a float64 and takes the ``k`` first. A float64 becomes an unsigned key of the same order, and the key of
-the ``k``-th is found bit by bit from the top: passes that count, each a handful of vector instructions for the some
-hundred values there are, until as many lie above as are wanted. All above it are taken, and of those equal to it as
+the ``k``-th is found bit by bit from the top: passes that count, each a few vector instructions for several hundred
+values, until as many lie above as are wanted. All above it are taken, and of those equal to it as
 many as are missing, in a stated order.
 
 Addresses are passed as numbers: a launch then costs less, for no array has to be described.

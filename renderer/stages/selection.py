@@ -1,5 +1,5 @@
-"""Selection in C: the passes over the field and over the tiles. The recipe is in ``control_kernels.py``, the definition
-in ``tsar/selection.py``."""
+"""Selection in C++ (``native/selection.h``): passes over the field and over the tiles. They are put together in
+``kernels.py``; the definition is in ``tsar/selection.py``."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Tiling and the record's sums in C; definitions in ``tsar/tiling.py`` and ``tsar/accounting.py``.
+"""Tiling and the sums of a cycle's record in C++ (``native/tiling.h``, ``native/account.h``).
 
-Nodes of the quadtree lie one level after the other, coarse first: level ``L`` begins at ``(4^L - 1) / 3``.
+Nodes of the quadtree lie one level after the other, coarse first: level ``L`` begins at ``(4^L - 1) / 3``. Definitions
+in ``tsar/tiling.py`` and ``tsar/accounting.py``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Structures over a mesh's triangles that can stand in for its tree of boxes: a kd-tree, or none at all.
 
-They exist to be compared: every structure holds the same triangles and is walked by kernels that test them alike
-(``native/structures.h``), so every one gives the same pictures. (A triangle no
-larger than float32 can tell its corners apart may be met or missed by chance, and a structure keeps rays from it that
-pass far away.)
+They exist to be compared. Every structure holds the same triangles, and the kernels that walk them test triangles alike
+(``native/structures.h``), so every structure gives the same pictures. There is one exception: whether a ray meets a
+triangle so small that float32 hardly tells its corners apart is a matter of rounding, and a structure may keep the ray
+away from it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STRUCTURES: tuple[Structure, ...] = get_args(Structure)
 CANDIDATES = 32
 """Planes tried along each axis of a node."""
 LEAF_TRIANGLES = 9
-"""A node of so many triangles is not split further: fewer than ten."""
+"""Greatest number of triangles of a node that is not split further."""
 TRAVERSAL_COST, TEST_COST = 1.0, 1.0
 """Of stepping into a node and of testing a triangle, in the surface area heuristic."""
 
@@ -154,7 +154,7 @@ def _cheapest(
         best = np.where(better, value, best)
         axis_of = np.where(better, axis, axis_of)
         plane_of = np.where(better, planes[np.arange(nodes), choice], plane_of)
-    axis_of[best >= TEST_COST * counts] = KD_LEAF  # testing all is no dearer
+    axis_of[best >= TEST_COST * counts] = KD_LEAF  # testing all costs no more
     return axis_of, plane_of.astype(np.float32).astype(np.float64)
 
 

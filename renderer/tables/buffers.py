@@ -44,7 +44,7 @@ from scenes.canonical import (
 )
 
 DEPTH_MAX = 64
-"""Bounces followed at most, also where the scene sets no limit: facing mirrors end here."""
+"""Greatest number of bounces, also where the scene sets no limit: rays between facing mirrors end here."""
 
 _UNIT_SHAPES = {Sphere: Shape.SPHERE, Disk: Shape.DISK, Rectangle: Shape.RECTANGLE, Cube: Shape.CUBE}
 

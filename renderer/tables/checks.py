@@ -1,4 +1,4 @@
-"""Values of a scene or a picture that no kernel can make sense of, refused in one line."""
+"""Checks of values of a scene or a picture that no kernel can use; the errors are one line."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class UnitMesh:
 
 
 class _Pool:
-    """Arrays one behind the other."""
+    """Arrays, concatenated."""
 
     def __init__(self, width: int, scalar: type, dtype: type) -> None:
         self.width, self.scalar, self.dtype = width, scalar, dtype

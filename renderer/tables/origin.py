@@ -1,4 +1,4 @@
-"""Where the kernels' space has its origin: single precision is fine only near it.
+"""Where the origin of the kernels' space lies: single precision is fine only near it.
 
 Kernels compute in float32, whose steps grow with the distance from the origin: of a room 1e5 of its sizes away they are
 a hundredth of it. A scene that lies far away is therefore moved here, in float64, before anything is rounded.

@@ -1,4 +1,4 @@
-// Samples from the camera to their colours, sixteen at a time: the lanes of `camera.py` and `kernels.py`.
+// Samples from the camera to their colours, sixteen at a time: the lanes of `camera.py` and `entry.py`.
 #pragma once
 #include "quadtree.h"
 #include "shading.h"

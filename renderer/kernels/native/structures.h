@@ -118,4 +118,13 @@ inline bool single_ray(const Scene& scene, int mesh, const V& start, const V& to
     return found;
 }
 
+// The same for a caller in Python: distance, negative for none, weights of the first two corners, and the face's bits.
+template <bool any, class Scene>
+inline wp::vec4 meet_mesh_alone(const Scene& scene, int mesh, const wp::vec3& start, const wp::vec3& towards,
+                                float reach, long long* totals) {
+    RayHit hit;
+    const bool found = single_ray<any>(scene, mesh, start, towards, reach, totals, hit);
+    return wp::vec4(found ? hit.t : -1.0f, hit.u, hit.v, __builtin_bit_cast(float, hit.face));
+}
+
 }  // namespace packets
