@@ -69,7 +69,7 @@ def norm(vector: ArrayLike) -> float:
 
 
 def product(first: ArrayLike, second: ArrayLike) -> Any:
-    """What ``first @ second`` means, summed from the first term to the last.
+    """The product ``first @ second``, summed from the first term to the last.
 
     Args:
         first: ``(..., m, k)`` or ``(k,)``.

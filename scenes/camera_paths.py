@@ -58,7 +58,7 @@ def on_a_path(scene: Scene, path: CameraPath) -> Scene:
 
 
 def looked_at_distance(scene: Scene, eye: np.ndarray, forward: np.ndarray) -> float:
-    """How far ahead the middle of what lies in front of the camera is: the median of the shapes' middles."""
+    """Median distance along the line of sight of the middles of the shapes in front of the camera."""
     middles = []
     for instance in scene.instances:
         shape = instance.shape

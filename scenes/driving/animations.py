@@ -87,7 +87,7 @@ ANIMATIONS: dict[str, Animation] = {
 
 
 def load(name: str, phase: float = 0.0) -> Scene:
-    """One of the animations.
+    """The scene of an animation.
 
     Args:
         name: a key of :data:`ANIMATIONS`.

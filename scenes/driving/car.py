@@ -163,8 +163,10 @@ def _details() -> list[tuple[str, Surface]]:
 
 
 def instances(path: Path, start_s: float, end_s: float, interval_s: float = 1.0 / 240.0) -> list[Instance]:
-    """The car on its path, with front wheels that steer and wheels that roll as far as the ground passes along the car:
-    without slipping on straights and, for rear wheels, along the car in bends (the front ones neglect their angle).
+    """The car on its path, with front wheels that steer and wheels that roll.
+
+    Wheels roll as far as the ground passes along the car. They do not slip on straights, and the rear wheels do not in
+    bends; the roll of the front wheels neglects their steering angle.
 
     Args:
         path: of the point between the axles, on the ground.

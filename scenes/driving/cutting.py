@@ -51,8 +51,9 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
 
 
 def carve(surface: Surface, *sides: Callable[[Array], Array]) -> tuple[Surface, Surface]:
-    """Cuts out where every one of several functions of the vertices ``(v, 3)`` is negative, one after the other, so
-    that corners between them stay sharp.
+    """Cuts out the part where each of several functions of the vertices ``(v, 3)`` is negative.
+
+    The cuts are made one after the other, so that corners between them stay sharp.
 
     Returns:
         What was cut out, and the rest.

@@ -50,7 +50,7 @@ class Surface:
         )
 
     def compact(self) -> Surface:
-        """The surface without vertices of no triangle."""
+        """The surface without unused vertices."""
         used = np.zeros(len(self.vertices), bool)
         used[self.faces] = True
         faces = (np.cumsum(used) - 1)[self.faces]

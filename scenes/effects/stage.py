@@ -36,14 +36,14 @@ def paint(color: Rgb, **more: float | Rgb) -> Phong:
 
 
 def placed(at: tuple[float, float, float], size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Matrix:
-    """Scales, then moves."""
+    """A transform that scales and then moves."""
     matrix = np.diag([*size, 1.0])
     matrix[:3, 3] = at
     return matrix
 
 
 def facing_down(at: tuple[float, float, float], half_x: float, half_y: float) -> Matrix:
-    """A rectangle whose outside looks at the floor."""
+    """The transform of a rectangle that faces the floor."""
     return placed(at, (half_x, -half_y, -1.0))
 
 

@@ -270,5 +270,5 @@ def ply_parts(mesh: Mesh) -> Iterator[bytes | memoryview]:
 
 
 def ply_bytes(mesh: Mesh) -> bytes:
-    """All of it at once."""
+    """A mesh as a binary PLY file."""
     return b"".join(ply_parts(mesh))

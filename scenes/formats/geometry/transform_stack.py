@@ -98,7 +98,8 @@ def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack
 
 
 def motion(keys: Sequence[Matrix], times_s: Sequence[float], where: str, report: LossReport) -> RigidTrack | None:
-    """The motion through keys, outside the first of them; None where nothing moves, or not rigidly, reported."""
+    """The motion through keys, outside the first of them, or None where nothing moves; a motion that is not rigid is
+    reported and becomes None."""
     if all(np.array_equal(keys[0], key) for key in keys[1:]):
         return None
     track = rigid_motion(keys, times_s)
@@ -113,7 +114,7 @@ def track_times(track: RigidTrack) -> list[float]:
 
 
 def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
-    """The motion of what moves inside a space that ``matrix`` places; None where that is not rigid."""
+    """A motion as seen from outside a space that ``matrix`` places, or None where it is not rigid there."""
     times_s = track_times(track)
     return rigid_motion([products(matrix, pose_at(track, time_s), inverse(matrix)) for time_s in times_s], times_s)
 

@@ -56,7 +56,7 @@ class LuxSurfaces(Surfaces):
         return ImageTexture(image, size, start, wrap, kinds[kind], str(path))  # type: ignore[arg-type]
 
     def made_texture(self, kind: str, parameters: Parameters) -> Texture:
-        """The spectra of lamps are textures here."""
+        """A texture; in LuxRender the spectra of lamps are textures too."""
         if kind == "blackbody":
             return ConstantTexture(blackbody_rgb(min(max(parameters.number("temperature", 6500.0), 100.0), 1e6), 1.0))
         if kind == "equalenergy":

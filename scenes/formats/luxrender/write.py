@@ -83,7 +83,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         self.lines.append(f'Film "fleximage" {size} "string filename" [ {name} ] "integer haltspp" [ {count} ] {tone}')
 
     def write_camera(self, camera: Camera) -> None:
-        """Placed by ``LookAt``, the one way that LuxCore knows; a mirrored picture by a window from right to left."""
+        """Writes the camera with ``LookAt``, which alone LuxCore knows; a window from right to left mirrors it."""
         poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
         size = power(abs(np.linalg.det(poses[0][:3, :3])), 1.0 / 3.0)
         axes = poses[0][:3, :3] / size
@@ -122,7 +122,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         self.lines.append(f'\tLightSource {line} "float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]')
 
     def _daylight(self, light: SunSky) -> None:
-        """The zenith is z whatever the transform says (LuxCore); a sky that is turned becomes a map."""
+        """Writes sun and sky. The zenith of LuxCore is z whatever the transform; a sky that is turned becomes a map."""
         if light.part != "sky":
             self._sun_or_sky("sun", light.sun_direction, light.turbidity, light.scale / SUN_UNIT)
         if light.part == "sun":
@@ -158,7 +158,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     # --- shapes --------------------------------------------------------------------------------------------------
 
     def write_instance(self, instance: Instance) -> None:
-        """LuxCore makes objects of mesh files only, and shows a motion's last key."""
+        """Writes a shape in its place. LuxCore makes objects of mesh files only and shows the last key of a motion."""
         if isinstance(instance.shape, Sphere) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
             instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)
@@ -197,7 +197,7 @@ def _looking(pose: Matrix) -> str:
 
 
 def _in_motion(lines: list[str], times_s: list[float]) -> list[str]:
-    """Transforms as the keys of a motion; one alone is itself."""
+    """Transforms as the keys of a motion; a single one stays as it is."""
     if len(lines) == 1:
         return lines
     return [f"MotionBegin [ {' '.join(repr(time_s) for time_s in times_s)} ]", *lines, "MotionEnd"]

@@ -135,7 +135,7 @@ def numbers(node: Node, text: str, count: int | None) -> list[float]:
 
 
 def triple(node: Node, default: float, whole: str = "value") -> list[float]:
-    """Three numbers: as ``x``, ``y``, ``z``, or one value."""
+    """Three numbers, given as ``x``, ``y`` and ``z`` or as one value."""
     if whole in node.attributes:
         found = numbers(node, node.get(whole), None)
         if len(found) == 1:
@@ -180,7 +180,7 @@ def color_of(node: Node) -> Rgb:
 
 
 def transform_of(node: Node) -> Matrix:
-    """A transform's steps, each after those before it."""
+    """The product of the steps of a transform, each of which is applied after those before it."""
     matrix = np.eye(4)
     for step in node.children:
         if step.tag == "translate":

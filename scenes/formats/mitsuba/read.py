@@ -72,7 +72,7 @@ class MitsubaReader:
             self._node(node)
 
     def _nodes(self, path: Path, inside: list[Path]) -> list[Node]:
-        """Elements of the scene, included ones in their place, parameters put in, names noted."""
+        """Elements of the scene with those of included files; fills in parameters and notes names."""
         where = str(inside[-1]) if inside else str(path)
         if path in inside:
             raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
@@ -97,7 +97,7 @@ class MitsubaReader:
         return found
 
     def _filled(self, node: Node) -> None:
-        """Puts parameters in the place of ``$name``, and notes what has a name of its own."""
+        """Replaces ``$name`` by the parameter, and notes elements with names."""
         for key, value in node.attributes.items():
             if value.startswith("$"):
                 if value[1:] not in self.defaults:

@@ -178,7 +178,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
             self.matrix(made, "toWorld", light.to_world)
 
     def _daylight(self, light: SunSky) -> None:
-        """Directions are those of the world here; the transform turns the zenith, y or in Mitsuba 3 z."""
+        """Writes sun and sky in directions of the world; the transform turns the zenith (y, in Mitsuba 3 z)."""
         kind = "sunsky" if self.modern or light.part == "both" else light.part
         made = self.plugin("emitter", kind, self.root)
         way = {axis: number(value) for axis, value in zip("xyz", light.sun_direction, strict=True)}
@@ -199,7 +199,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
             self.matrix(made, "toWorld", turn)
 
     def _instance(self, instance: Instance) -> None:
-        """A shape in its place; shared and moving ones as instances of a group, which alone may move."""
+        """Writes a shape in its place; shared and moving shapes are instances of a group, which alone may move."""
         keys, times_s = motion_keys(instance.track, instance.to_world)
         where, shared = instance.name or "shape", part_key(instance) in self.shared
         if shines(instance) or not (shared or (len(keys) > 1 and not self.modern)):

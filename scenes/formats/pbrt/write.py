@@ -54,7 +54,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     times_s: tuple[float, float] = (0.0, 1.0)
 
     def _times(self, scene: Scene) -> None:
-        """All motions share the two times of a PBRT file."""
+        """Writes the two times that all motions of a PBRT file share."""
         tracks = tracks_of(scene)
         if tracks:
             times_s = [time_s for track in tracks for time_s in (track_times(track)[0], track_times(track)[-1])]
@@ -157,7 +157,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     # --- shapes --------------------------------------------------------------------------------------------------
 
     def write_instance(self, instance: Instance) -> None:
-        """A shape, or an object that was made before, in its place."""
+        """Writes a shape, or an object that was made before, in its place."""
         where = instance.name or "shape"
         made = self.part(instance) if part_key(instance) not in self.shared else [self.object_line(instance)]
         placing = self.moved(self.keys(instance.track, instance.to_world, where))
