@@ -99,7 +99,7 @@ def _obtained(folder: Path, render: Callable[[float], torch.Tensor] = _image) ->
     from analysis.storage.reference import ReferenceSpec, obtain
 
     spec = ReferenceSpec("s", "h", "r", start_s=0.5, rate_hz=10.0, count=8, resolution_px=8, samples_per_axis=1)
-    return obtain(folder / "cache", spec, render, lambda done, count: None)
+    return obtain(folder / "cache", spec, render)
 
 
 def _reference(folder: Path) -> int:
@@ -202,7 +202,7 @@ def _tiles(folder: Path) -> int:
         yield from ((number, render_chunk(picture, chunk)) for number, chunk in enumerate(chunks))
 
     size = ("--width-px", "48", "--height-px", "32", "--samples", "4", "--chunk-tiles", "1")
-    alone = patch("analysis.tracer.tiles_command.connected", lambda farm: nullcontext())
+    alone = patch("analysis.tracer.run.connected", lambda farm: nullcontext())
     with alone, patch("analysis.tracer.tiles.rendered", rendered):
         return call("tiles", "plain", *size, "--out", str(folder / "out"))
 

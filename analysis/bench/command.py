@@ -7,24 +7,22 @@ Examples: python scripts/bench.py --out out/bench
 
 from __future__ import annotations
 
-from analysis.bench.turns import BenchOptions
+from analysis.bench.options import BenchOptions
 from analysis.command.cli import bad_input, parse
 
 
 def main() -> None:
     """Parses, measures or compares, and prints one table."""
     options = parse(BenchOptions, __doc__ or "")
-    from analysis.bench.table import comparison_table, console, rows_table
+    from analysis.bench.tables import comparison_table, rows_table
+    from analysis.command.console import show
 
     if options.compare is not None:
         with bad_input():
             table = comparison_table(*options.compare)
-        console().print(table)
+        show(table)
         return
     from analysis.bench.run import run_bench
 
-    found = run_bench(options)
-    shown = console()
-    shown.print(rows_table(found))
     ending = options.file_ending
-    shown.print(f"written to {options.out}: bench{ending}.json, summary{ending}.json")
+    show(rows_table(run_bench(options)), f"written to {options.out}: bench{ending}.json, summary{ending}.json")

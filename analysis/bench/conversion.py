@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.bench.growth import exponent_row
-from analysis.bench.turns import BenchOptions, Row, counted, limit_row
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import Row, limit_row
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.geometry.ply_files import ply_bytes
 from scenes.loading import ASSETS
 
 if TYPE_CHECKING:
-    from analysis.command.progress import Bars
+    from analysis.command.progress import Bars, Task
 
 CONVERSION_LIMIT_S = 0.5
 """Time a scene may take, without its meshes' copying (Hagemann 2018, sec. 5)."""
@@ -50,17 +51,17 @@ _HEAD = 'LookAt 0 0 5 0 0 0 0 1 0\nCamera "perspective"\nWorldBegin\n'
 
 def conversion(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     """Time of a scene, growth with the size of a file, and memory of large ones."""
-    tick = counted(bars.task("conversion", 2 * options.repetitions + 2))
+    task = bars.task("conversion", 2 * options.repetitions + 2)
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
-        yield _scenes_row(options, work, tick)
-        yield _growth_row(options, work, tick)
+        yield _scenes_row(options, work, task)
+        yield _growth_row(options, work, task)
         for kind in ("text", "mesh"):
             yield _memory_row(kind, work)
-            tick()
+            task.advance()
 
 
-def _scenes_row(options: BenchOptions, work: Path, tick: Callable[..., None]) -> Row:
+def _scenes_row(options: BenchOptions, work: Path, task: Task) -> Row:
     files = options.scene_files or DELIVERED
     seconds = []
     for turn in range(options.repetitions + 1):
@@ -71,7 +72,7 @@ def _scenes_row(options: BenchOptions, work: Path, tick: Callable[..., None]) ->
                 if turn:  # the first builds parsers
                     seconds.append(time.perf_counter() - begin)
         if turn:
-            tick()
+            task.advance()
     name = f"scene file to another format, median of {len(files)} x {len(ENDINGS)}"
     slowest = f"slowest {max(seconds):.3f} s"
     return limit_row(Row("conversion", name, "s", 0.0, "limit", note=slowest), seconds, CONVERSION_LIMIT_S)
@@ -114,7 +115,7 @@ def write_mesh_scene(path: Path, megabytes: float) -> int:
     return mesh.stat().st_size + path.stat().st_size
 
 
-def _growth_row(options: BenchOptions, work: Path, tick: Callable[..., None]) -> Row:
+def _growth_row(options: BenchOptions, work: Path, task: Task) -> Row:
     files = [work / f"text-{size}.pbrt" for size in SIZES_MB]
     sizes = [write_text_scene(file, size) for file, size in zip(files, SIZES_MB, strict=True)]
     seconds: list[list[float]] = [[] for _ in files]
@@ -123,7 +124,7 @@ def _growth_row(options: BenchOptions, work: Path, tick: Callable[..., None]) ->
             begin = time.perf_counter()
             save_scene_file(load_scene_file(file), work / "large.xml")
             found.append(time.perf_counter() - begin)
-        tick()
+        task.advance()
     rate = sizes[-1] / median(seconds[-1]) / 1e6
     row = exponent_row("growth with the size of a text", sizes, seconds)
     return dataclasses.replace(row, group="conversion", note=f"{row.note}; {rate:.0f} MB/s")

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import torch
 
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import Row, rate_row
 from analysis.bench.scenes import driving_scenes
-from analysis.bench.turns import BenchOptions, Row, counted, rate_row
 from analysis.command.timing import take_turns
 from scenes.canonical import Scene
 from scenes.effects import scenes as effects
@@ -33,14 +34,14 @@ def features(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     from renderer.trace import Renderer
 
     scenes = _scenes(options)
-    tick = counted(bars.task("features", len(scenes) * options.repetitions))
+    task = bars.task("features", len(scenes) * options.repetitions)
     for name, scene in scenes.items():
         both = {
             kind: Renderer(scene, options.device, packets=False, specialise=kind == "required")
             for kind in ("required", "all")
         }
         pictures = {kind: _picture(renderer) for kind, renderer in both.items()}
-        seconds = take_turns(pictures, options.repetitions, tick, lead_in=True)
+        seconds = take_turns(pictures, options.repetitions, task, lead_in=True)
         same = torch.equal(pictures["required"](), pictures["all"]())
         for renderer in both.values():
             renderer.close()

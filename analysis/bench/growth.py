@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import torch
 
 from analysis.bench.cycles import Tilings, Turns, cycles, default_stages, steady, synthetic_trace
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import Row, limit_row, limited_row
 from analysis.bench.scenes import driving_scenes, renderer_of
-from analysis.bench.turns import BenchOptions, Row, counted, limit_row, limited_row
 from analysis.command.cli import InputError
 from analysis.command.timing import take_turns
 from tsar.config import TilingConfig, TsarConfig
@@ -21,7 +22,7 @@ from tsar.config import TilingConfig, TsarConfig
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from analysis.command.progress import Bars
+    from analysis.command.progress import Bars, Task
 
 EXPONENT_LIMIT = 1.05
 PEAK_LIMIT = 1.02
@@ -35,10 +36,10 @@ _MEMORY_EVERY = 20
 
 def growth(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     """All rows of the group."""
-    tick = counted(bars.task("growth", 3 * options.repetitions))
-    yield batch_row(options, tick)
-    yield picture_row(options, tick)
-    yield tiling_row(options, tick)
+    task = bars.task("growth", 3 * options.repetitions)
+    yield batch_row(options, task)
+    yield picture_row(options, task)
+    yield tiling_row(options, task)
     yield from memory_rows(options, bars.task("memory", options.cycles))
 
 
@@ -77,7 +78,7 @@ def exponent_row(
     return limited_row(row, found, EXPONENT_LIMIT, [2.0 ** (EXPONENT_LIMIT - value) for value in found])
 
 
-def batch_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
+def batch_row(options: BenchOptions, task: Task) -> Row:
     """Cycle time against batch size on the first scene."""
     scene = next(iter(driving_scenes(options).values()))
     renderer = renderer_of(scene, options)
@@ -86,22 +87,22 @@ def batch_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
     cases = {
         str(size): Turns(steady(TsarConfig(batch_size=size, resolution_px=side)), renderer.trace) for size in sizes
     }
-    take_turns(cases, options.repetitions, tick)
+    take_turns(cases, options.repetitions, task)
     renderer.close()
     rounds = [[median(sum(taken.values()) for taken in turn) for turn in case.turns()] for case in cases.values()]
     return exponent_row(f"cycle against batch, {scene.name}", sizes, rounds)
 
 
-def picture_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
+def picture_row(options: BenchOptions, task: Task) -> Row:
     """Reconstruction time against pixels, of pictures that ripple."""
     configs = [steady(TsarConfig(batch_size=options.batch_size, resolution_px=side)) for side in SIDES_PX]
     cases = {str(config.resolution_px): Turns(config, synthetic_trace, cycles_per_turn=2) for config in configs}
-    take_turns(cases, options.repetitions, tick)
+    take_turns(cases, options.repetitions, task)
     rounds = [[median(taken["reconstruction"] for taken in turn) for turn in case.turns()] for case in cases.values()]
     return exponent_row("reconstruction against pixels", [side**2 for side in SIDES_PX], rounds)
 
 
-def tiling_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
+def tiling_row(options: BenchOptions, task: Task) -> Row:
     """Tiling time over ``log n`` against the bound ``n`` on the tiles: an exponent of 1 is ``n log n``."""
     generator = torch.Generator().manual_seed(0)
     config = TsarConfig(resolution_px=2048)
@@ -110,15 +111,15 @@ def tiling_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
     field *= 4.0 * max(TILE_BOUNDS) * config.samples / field.sum()
     configs = [TsarConfig(resolution_px=2048, tiling=TilingConfig(tile_count_max=bound)) for bound in TILE_BOUNDS]
     cases = {str(found.tile_count_max): Tilings(found, field) for found in configs}
-    take_turns(cases, options.repetitions, tick)
+    take_turns(cases, options.repetitions, task)
     rounds = [case.seconds[1:] for case in cases.values()]
     return exponent_row("tiling over log n against its bound n", TILE_BOUNDS, rounds, math.log)
 
 
-def memory_rows(options: BenchOptions, show: Callable[[int], None]) -> Iterator[Row]:
+def memory_rows(options: BenchOptions, task: Task) -> Iterator[Row]:
     """Resident memory of a pipeline in a process of its own."""
     config = TsarConfig(batch_size=options.batch_size, resolution_px=options.resolution_px)
-    before, resident = watched(config, options.cycles, show)
+    before, resident = watched(config, options.cycles, task)
     early = max(resident[: max(1, len(resident) // 10)])
     peak = max(resident)
     note = f"{early / 2**20:.1f} MiB in the first tenth, {peak / 2**20:.1f} MiB in all"
@@ -136,7 +137,7 @@ def memory_rows(options: BenchOptions, show: Callable[[int], None]) -> Iterator[
     )
 
 
-def watched(config: TsarConfig, count: int, show: Callable[[int], None] = lambda done: None) -> tuple[int, list[int]]:
+def watched(config: TsarConfig, count: int, task: Task) -> tuple[int, list[int]]:
     """Resident bytes before the pipeline is built, and every so many cycles of a run past its warm-up.
 
     The first is taken with libraries and kernels loaded. A new process does it, for this one has filled its memory with
@@ -151,7 +152,7 @@ def watched(config: TsarConfig, count: int, show: Callable[[int], None] = lambda
     try:
         while len(found) < 1 + count // _MEMORY_EVERY:
             found.append(receiver.recv())
-            show((len(found) - 1) * _MEMORY_EVERY)
+            task.reach((len(found) - 1) * _MEMORY_EVERY)
     except EOFError:
         raise InputError("growth: the process whose memory is watched ended early") from None
     finally:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.bench.machine import installed
 from analysis.bench.mitsuba_scene import translate
-from analysis.bench.turns import NOT_INSTALLED
+from analysis.bench.rows import NOT_INSTALLED
 from scenes.canonical import Scene
 
 VARIANTS = {"llvm_ad_rgb": 1.2, "scalar_rgb": 3.0}

@@ -12,8 +12,9 @@ import torch
 
 from analysis.bench.cycles import cycles, default_stages, steady
 from analysis.bench.machine import installed
+from analysis.bench.options import FRAMELET_SIDE, BenchOptions
+from analysis.bench.rows import NOT_INSTALLED, Row, limit_row, rate_row
 from analysis.bench.scenes import driving_scenes, morton_batches, renderer_of
-from analysis.bench.turns import FRAMELET_SIDE, NOT_INSTALLED, BenchOptions, Row, counted, limit_row, rate_row
 from analysis.command.timing import take_turns
 from analysis.metrics.cost_model import RAYS, parameters_of, stage_flops
 from tsar.cache import FrameletCache
@@ -25,7 +26,7 @@ from tsar.stages import REFERENCE
 from tsar.types import FrameletBatch, Trace
 
 if TYPE_CHECKING:
-    from analysis.command.progress import Bars
+    from analysis.command.progress import Bars, Task
 
 CONTROL = ("selection", "error", "cache", "response", "tiling")
 CONTROL_LIMIT, RECONSTRUCTION_LIMIT = 0.15, 0.60
@@ -44,25 +45,25 @@ def overhead(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     """Shares of the stages on the driving scenes, and framelets per second of the transform."""
     config = pipeline_config(options)
     scenes = driving_scenes(options)
-    tick = counted(bars.task("overhead", len(scenes) * MEASURED_CYCLES + options.repetitions))
+    task = bars.task("overhead", len(scenes) * MEASURED_CYCLES + options.repetitions)
     everything = []
     for name, scene in scenes.items():
         renderer = renderer_of(scene, options)
-        found = measured_cycles(config, renderer.trace, tick)
+        found = measured_cycles(config, renderer.trace, task)
         renderer.close()
         yield from limit_rows(name, found)
         everything += found
     yield from stage_rows(config, everything)
-    yield transform_row(options, tick)
+    yield transform_row(options, task)
 
 
-def measured_cycles(config: TsarConfig, trace: Trace, tick: Callable[..., None] = lambda: None) -> list[Cycle]:
+def measured_cycles(config: TsarConfig, trace: Trace, task: Task) -> list[Cycle]:
     """Cycles of a run that has filled its cache."""
     found = []
     config = steady(config)
     for record in islice(cycles(config, trace), config.warmup_cycles, config.warmup_cycles + MEASURED_CYCLES):
         found.append(Cycle(record.stage_s, record.counters))
-        tick()
+        task.advance()
     return found
 
 
@@ -141,7 +142,7 @@ class PyWaveletsStream:
         return [low, horizontal, vertical, both]
 
 
-def transform_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
+def transform_row(options: BenchOptions, task: Task) -> Row:
     """The streaming transform of one batch, ours beside PyWavelets, on the same framelets.
 
     Ours cannot be had alone: from colours on, it is one pass with the norms and errors that are made of it, and with
@@ -160,7 +161,7 @@ def transform_row(options: BenchOptions, tick: Callable[..., None]) -> Row:
         stream = PyWaveletsStream(tiles, FRAMELET_SIDE)
         cases["peer"] = lambda: [stream.update(images) for _ in range(_CALLS)]
         note = "ours with luminance, norms, errors, cache; peer: one call of each filter for all framelets of an octave"
-    seconds = take_turns(cases, options.repetitions, tick)
+    seconds = take_turns(cases, options.repetitions, task)
     row = Row("overhead", f"wavelet transform of {tiles} framelets", "k framelets/s", 0.0, "PyWavelets", note=note)
     return rate_row(row, _CALLS * tiles / 1e3, seconds["ours"], seconds.get("peer"), DWT_TARGET)
 

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from analysis.bench.embree import EmbreeMesh
 from analysis.bench.machine import installed
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import NOT_INSTALLED, Row, rate_row
 from analysis.bench.scenes import LIGHT, bumpy_sphere, camera_rays, morton_batches
-from analysis.bench.turns import NOT_INSTALLED, BenchOptions, Row, counted, rate_row
 from analysis.command.timing import take_turns
 from scenes.canonical import Mesh
 
 if TYPE_CHECKING:
-    from analysis.command.progress import Bars
+    from analysis.command.progress import Bars, Task
     from renderer.rays.queries import RayQueries
 
 CLOSEST_TARGETS = {5: 3.0, 8: 2.0}
@@ -72,14 +73,14 @@ Ask = Callable[[Mesh, int, "RayQueries", BenchOptions], list[Question]]
 def _rows(group: str, ask: Ask, options: BenchOptions, bars: Bars) -> Iterator[Row]:
     from renderer.rays.queries import RayQueries
 
-    tick = counted(bars.task(group, 2 * len(options.subdivisions) * options.repetitions))
+    task = bars.task(group, 2 * len(options.subdivisions) * options.repetitions)
     for subdivisions in options.subdivisions:
         mesh = bumpy_sphere(subdivisions)
         ours = RayQueries(mesh.vertices, mesh.faces, threads=1)
         peer = EmbreeMesh(mesh.vertices, mesh.faces) if installed("embreex") else None
         for question in ask(mesh, subdivisions, ours, options):
             row = Row(group, f"{question.name}, {len(mesh.faces):,} triangles", "M rays/s", 0.0, "Embree")
-            yield compare(row, question, ours, peer, options.repetitions, tick)
+            yield compare(row, question, ours, peer, options.repetitions, task)
 
 
 def compare(
@@ -88,7 +89,7 @@ def compare(
     ours: RayQueries,
     peer: EmbreeMesh | None,
     repetitions: int,
-    tick: Callable[..., None] = lambda *_: None,
+    task: Task,
 ) -> Row:
     """Fills a row: both sides take turns with all calls of a question."""
     cases: dict[str, Callable[[], object]] = {"ours": lambda: [_ask(ours, rays) for rays in question.calls]}
@@ -97,7 +98,7 @@ def compare(
         cases["peer"] = lambda: [_ask(peer, rays) for rays in question.calls]
         wrong = sum(disagreements(ours, peer, rays) for rays in question.calls)
         note = f"{wrong} of {sum(rays.count for rays in question.calls):,} rays disagree"
-    seconds = take_turns(cases, repetitions, tick)
+    seconds = take_turns(cases, repetitions, task)
     work = sum(rays.count for rays in question.calls) / 1e6
     row = dataclasses.replace(row, note=note)
     return rate_row(row, work, seconds["ours"], seconds.get("peer"), question.target)

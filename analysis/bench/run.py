@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,18 +9,19 @@ from analysis.bench.conversion import conversion
 from analysis.bench.features import features
 from analysis.bench.growth import growth
 from analysis.bench.machine import machine, versions
+from analysis.bench.options import ON_CPU_ONLY, BenchOptions
 from analysis.bench.overhead import overhead
 from analysis.bench.rays import coherent, incoherent
+from analysis.bench.rows import SPREAD, Group, Row
 from analysis.bench.scenes import driving_scenes
 from analysis.bench.shading import shaded
 from analysis.bench.start import start_rows
 from analysis.bench.threads import cores, order
-from analysis.bench.turns import ON_CPU_ONLY, SPREAD, BenchOptions, Group, Row
 from analysis.command import progress
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.ownership import own_folder
 from analysis.storage.files import write_json
-from analysis.storage.provenance import provenance
+from analysis.storage.summary import with_source
 
 MEASURED_BY: Mapping[str, Group] = {
     "coherent": coherent,
@@ -70,12 +70,10 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
 
 
 def _summary(options: BenchOptions, rows: list[Row]) -> dict[str, Any]:
-    config = dataclasses.asdict(options)
-    return {
+    found = {
         "groups": options.groups,
         "rows": len(rows),
         "targets_met": sum(row.met is True for row in rows),
         "targets_missed": [f"{row.group}: {row.name}" for row in rows if row.met is False],
-        "config": config,
-        "provenance": provenance(config, device=options.device),
     }
+    return with_source(found, options, device=options.device)

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from analysis.bench.turns import FRAMELET_SIDE, BenchOptions
+from analysis.bench.options import FRAMELET_SIDE, BenchOptions
 from scenes.canonical import (
     ConstantTexture,
     Instance,

@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.bench import mitsuba as peer
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import Row, rate_row
 from analysis.bench.scenes import bumpy_scene, driving_scenes, renderer_of
-from analysis.bench.turns import BenchOptions, Row, counted, rate_row
 from analysis.command.timing import take_turns
 from scenes.canonical import Scene
 from tsar.config import closed_choices
 
 if TYPE_CHECKING:
-    from analysis.command.progress import Bars
+    from analysis.command.progress import Bars, Task
     from renderer.trace import Renderer
 
 DRIVING_S = 0.8
@@ -65,17 +66,17 @@ def stills(options: BenchOptions) -> Iterator[Still]:
 def shaded(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     """Pictures per second as samples per second, beside each variant that runs here."""
     found = list(stills(options))
-    tick = counted(bars.task("shaded", len(found) * options.repetitions))
+    task = bars.task("shaded", len(found) * options.repetitions)
     renderers: dict[int, Renderer] = {}
     for still in found:
         if id(still.scene) not in renderers:
             renderers[id(still.scene)] = renderer_of(still.scene, options)
-        yield from compare(still, renderers[id(still.scene)], options, tick)
+        yield from compare(still, renderers[id(still.scene)], options, task)
     for renderer in renderers.values():
         renderer.close()
 
 
-def compare(still: Still, renderer: Renderer, options: BenchOptions, tick: Callable[..., None]) -> Iterator[Row]:
+def compare(still: Still, renderer: Renderer, options: BenchOptions, task: Task) -> Iterator[Row]:
     """One picture beside all variants, in turns."""
     side, axis = options.resolution_px, still.samples_per_axis
     reasons = {variant: peer.missing(variant) for variant in peer.VARIANTS}
@@ -86,7 +87,7 @@ def compare(still: Still, renderer: Renderer, options: BenchOptions, tick: Calla
     }
     cases: dict[str, Callable[[], object]] = {"ours": lambda: renderer.render_frame(still.time_s, side, side, axis)}
     cases |= {variant: picture.repeated(axis**2) for variant, picture in pictures.items()}
-    seconds = take_turns(cases, options.repetitions, tick, rest_s=_REST_S)
+    seconds = take_turns(cases, options.repetitions, task, rest_s=_REST_S)
     mine = renderer.render_frame(still.time_s, side, side, axis).numpy()
     for variant, reason in reasons.items():
         note = reason

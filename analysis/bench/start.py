@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.bench.turns import BenchOptions, Row, counted, limit_row
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import Row, limit_row
 from analysis.command.cli import InputError
 
 if TYPE_CHECKING:
@@ -73,24 +74,24 @@ def first_cycle(found: Started) -> tuple[float, str]:
 
 def start_rows(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     """Help and first cycle with kernels in the cache, then the first cycle without."""
-    tick = counted(bars.task("start", 2 * options.repetitions + COLD_REPETITIONS + 1))
+    task = bars.task("start", 2 * options.repetitions + COLD_REPETITIONS + 1)
     helped, warm = [], []
     with tempfile.TemporaryDirectory() as folder:
         short = ("run.py", "fly-by", *_SHORT_RUN, "--out", f"{folder}/run", "--cache", f"{folder}/references")
         start({}, *short)  # fills the cache of kernels and that of references
-        tick()
+        task.advance()
         for _ in range(options.repetitions):
             helped.append(start({}, "run.py", "--help").seconds)
-            tick()
+            task.advance()
             warm.append(first_cycle(start({}, *short)))
-            tick()
+            task.advance()
         yield limit_row(Row("start", "run.py --help, warm", "s", 0.0, "limit"), helped, HELP_LIMIT_S)
         row = Row("start", "run.py to its first cycle, warm", "s", 0.0, "limit", note=warm[-1][1])
         yield limit_row(row, [seconds for seconds, _ in warm], FIRST_CYCLE_LIMIT_S)
         cold = []
         for number in range(COLD_REPETITIONS):
             cold.append(start({_KERNELS: f"{folder}/kernels{number}"}, *short))
-            tick()
+            task.advance()
     yield cold_row(cold)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import Row, rate_row
 from analysis.bench.scenes import bumpy_scene, driving_scenes, in_rows, morton_batches, renderer_of
-from analysis.bench.turns import BenchOptions, Row, counted, rate_row
 from analysis.command.timing import take_turns
 from scenes.canonical import Scene
 from tsar.types import FrameletBatch, Trace
@@ -38,13 +39,13 @@ def cores(options: BenchOptions, bars: Bars) -> Iterator[Row]:
         return
     scenes = _scenes(options)
     chosen = _CORES_SCENE if _CORES_SCENE in scenes else next(iter(scenes))
-    tick = counted(bars.task("cores", 2 * options.repetitions))
+    task = bars.task("cores", 2 * options.repetitions)
     for name in dict.fromkeys((chosen, "bumpy sphere")):
         scene = scenes[name]
         batches = morton_batches(options, scene.duration_s)
         renderers = {threads: renderer_of(scene, options, threads) for threads in (1, 2)}
         cases = {str(threads): _tracing(renderer.trace, batches) for threads, renderer in renderers.items()}
-        seconds = take_turns(cases, options.repetitions, tick, lead_in=True)
+        seconds = take_turns(cases, options.repetitions, task, lead_in=True)
         for renderer in renderers.values():
             renderer.close()
         row = Row("cores", f"{name}, 2 threads", "M samples/s", 0.0, "1 thread")
@@ -54,7 +55,7 @@ def cores(options: BenchOptions, bars: Bars) -> Iterator[Row]:
 def order(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     """The same batches in Morton order and row by row, on all cores."""
     scenes = _scenes(options)
-    tick = counted(bars.task("order", len(scenes) * options.repetitions))
+    task = bars.task("order", len(scenes) * options.repetitions)
     for name, scene in scenes.items():
         batches = morton_batches(options, scene.duration_s)
         renderer = renderer_of(scene, options)
@@ -62,7 +63,7 @@ def order(options: BenchOptions, bars: Bars) -> Iterator[Row]:
             "Morton": _tracing(renderer.trace, batches),
             "rows": _tracing(renderer.trace, [in_rows(batch) for batch in batches]),
         }
-        seconds = take_turns(cases, options.repetitions, tick, lead_in=True)
+        seconds = take_turns(cases, options.repetitions, task, lead_in=True)
         renderer.close()
         row = Row("order", f"{name}, Morton order", "M samples/s", 0.0, "row order")
         yield rate_row(row, _samples(batches), seconds["Morton"], seconds["rows"])

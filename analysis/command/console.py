@@ -2,32 +2,98 @@
 
 from __future__ import annotations
 
-import pandas as pd
-from rich.console import Console
-from rich.table import Table
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-_WIDTH = 150
-"""Characters a line of a data frame at least."""
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.console import Console
+    from rich.table import Table as RichTable
+
+_FILE_WIDTH = 150
+"""Characters a line where the output is not a terminal."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text under a header.
+
+    Attributes:
+        title, note: above and below it.
+        header: names of the columns; a table without names has none.
+        rows: a text for every column.
+        words: how many columns, from the left, hold words; the others hold numbers and are aligned to the right.
+        grouped: whether a line separates rows that differ in the first column.
+    """
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    words: int = 1
+    grouped: bool = False
 
 
 def console(width: int | None = None) -> Console:
     """Standard output. Text appears as it is: a path may hold brackets or colons, which rich would take for markup.
 
     Args:
-        width: characters a line; by default those of the terminal.
+        width: characters a line; by default those of the terminal, or 150 where the output is a file.
     """
-    return Console(width=width, markup=False, emoji=False)
+    from rich.console import Console
+
+    shown = Console(width=width, markup=False, emoji=False)
+    if width is None and not shown.is_terminal:
+        shown.width = _FILE_WIDTH
+    return shown
 
 
-def frame_table(rows: pd.DataFrame, title: str = "") -> None:
-    """Prints a data frame; numbers with four digits."""
-    table = Table(title=title or None)
-    for name in rows.columns:
-        table.add_column(str(name), justify="right" if pd.api.types.is_numeric_dtype(rows[name]) else "left")
-    for row in rows.itertuples(index=False):
-        table.add_row(*(_short(value) for value in row))
-    console(max(_WIDTH, console().width)).print(table)
+def show(*parts: Table | str) -> None:
+    """Prints tables and lines of text, one below the other."""
+    shown = console()
+    for part in parts:
+        if isinstance(part, str):
+            shown.print(part, soft_wrap=True)
+        else:
+            shown.print(laid_out(part))
 
 
-def _short(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else f"{value:,}" if isinstance(value, int) else str(value)
+def laid_out(table: Table) -> RichTable:
+    """A table as rich draws it."""
+    from rich.table import Table as RichTable
+
+    found = RichTable(
+        title=table.title or None,
+        caption=table.note or None,
+        show_header=any(table.header),
+        title_justify="left",
+        caption_justify="left",
+    )
+    for number, name in enumerate(table.header):
+        found.add_column(name, justify="left" if number < table.words else "right")
+    for number, row in enumerate(table.rows):
+        if table.grouped and number and row[0] != table.rows[number - 1][0]:
+            found.add_section()
+        found.add_row(*row)
+    return found
+
+
+def frame_table(rows: pd.DataFrame, title: str = "", digits: str = ".4g") -> Table:
+    """A data frame as a table; NaN becomes a dash.
+
+    Args:
+        rows: a row each.
+        title: above it.
+        digits: format of numbers that are not whole.
+    """
+    kinds = [str(kind) for kind in rows.dtypes]
+    words = next((number for number, kind in enumerate(kinds) if kind[:3] in ("int", "flo")), len(kinds))
+    body = [[_cell(value, digits) for value in row] for row in rows.itertuples(index=False)]
+    return Table(title, [str(name) for name in rows.columns], body, words=words)
+
+
+def _cell(value: object, digits: str) -> str:
+    if isinstance(value, float):
+        return "—" if value != value else f"{value:{digits}}"
+    return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else str(value)

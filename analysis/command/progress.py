@@ -4,26 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 
-class Bars:
-    """Bars, one a task."""
+@dataclass
+class Task:
+    """How far a piece of work is. Without a bar it only counts. Changes in place.
 
-    def __init__(self, progress: Progress) -> None:
+    Attributes:
+        done: steps that are done.
+        show: told of that number whenever it changes.
+    """
+
+    done: int = 0
+    show: Callable[[int], object] = lambda done: None
+
+    def advance(self, steps: int = 1) -> None:
+        """Some more steps are done."""
+        self.reach(self.done + steps)
+
+    def reach(self, done: int) -> None:
+        """So many steps are done in all."""
+        self.done = done
+        self.show(done)
+
+
+class Bars:
+    """Bars, one a task; without a display they show nothing."""
+
+    def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
 
-    def task(self, label: str, total: int) -> Callable[[int], None]:
-        """Adds a bar; returns a function that takes how much is done."""
-        self._progress.start()
-        number = self._progress.add_task(label, total=total)
-        return lambda done: self._progress.update(number, completed=done)
+    def task(self, label: str, total: int) -> Task:
+        """Adds a bar."""
+        progress = self._progress
+        if progress is None:
+            return Task()
+        progress.start()
+        number = progress.add_task(label, total=total)
+        return Task(show=lambda done: progress.update(number, completed=done))
 
     def say(self, line: str) -> None:
         """Prints a line above the bars."""
-        self._progress.console.print(line, highlight=False, soft_wrap=True)
+        if self._progress is not None:
+            self._progress.console.print(line, highlight=False, soft_wrap=True)
 
 
 @contextmanager

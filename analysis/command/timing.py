@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from analysis.command.progress import Task
 
 
 def take_turns(
     cases: Mapping[str, Callable[[], object]],
     repetitions: int,
-    on_round: Callable[[int], None] = lambda done: None,
+    task: Task | None = None,
     rest_s: float = 0.0,
     lead_in: bool = False,
 ) -> dict[str, list[float]]:
@@ -20,7 +24,7 @@ def take_turns(
     Args:
         cases: what is measured, by name.
         repetitions: turns of each.
-        on_round: told how many rounds are done.
+        task: of which a step is a round.
         rest_s: pause before each turn. Threads of the case before may spin for milliseconds, waiting for more to do.
         lead_in: each turn runs twice and the second run counts: a core that another case left idle is slow to come
             back, and a renderer in use does not leave it idle.
@@ -36,5 +40,6 @@ def take_turns(
             start = time.perf_counter()
             cases[name]()
             seconds[name].append(time.perf_counter() - start)
-        on_round(number + 1)
+        if task is not None:
+            task.advance()
     return seconds

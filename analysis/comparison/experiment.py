@@ -156,12 +156,10 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
         resolution_px=side,
         samples_per_axis=axis,
     )
-    show = bars.task("reference", count)
+    task = bars.task("reference", count)
     with bad_input():
         renderer = setup.renderer_of(1)
-        return obtain(
-            options.cache, spec, lambda t: renderer.render_frame(t, side, side, axis), lambda done, _: show(done)
-        )
+        return obtain(options.cache, spec, lambda t: renderer.render_frame(t, side, side, axis), task)
 
 
 def _runs(options: RunOptions, setup: Setup, writer: StepWriter) -> dict[str, PolicyRun]:
@@ -208,10 +206,10 @@ def _compare(
     stride = max(1, round(options.reference_rate_hz / 60.0))
     span_s = options.start_s, options.start_s + options.seconds
     film = ComparisonFilm(min(options.tsar.resolution_px, 512), scales, span_s, list(runs), options.policy)
-    steps, show = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
+    steps, task = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
 
     def on_view(view: View) -> None:
-        show(view.number + 1)
+        task.advance()
         if options.frames:
             write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
 

@@ -6,14 +6,12 @@ Examples: python scripts/inputs.py --out out/inputs
 
 from __future__ import annotations
 
-import dataclasses
-
 from analysis.command.cli import bad_input, parse, require_unbroken
 from analysis.command.ownership import own_folder
 from analysis.comparison.experiment import run_experiment
-from analysis.comparison.repetitions import InputsOptions, row
+from analysis.comparison.repetitions import InputsOptions, ratio_table, row
 from analysis.comparison.stored import finished
-from analysis.storage.files import plain, write_json
+from analysis.storage.files import plain
 
 
 def main() -> None:
@@ -22,18 +20,11 @@ def main() -> None:
     with bad_input():
         own_folder(options.out, "out")
         runs = options.runs()
-    rows = []
-    for run in runs:
-        rows.append(row(run, finished(run) or plain(run_experiment(run))))
-        low, high = rows[-1]["ratio_quartiles"]
-        percentile = f"{rows[-1]['suitable_percentile']:.0f}"
-        print(f"| {rows[-1]['run']} | {rows[-1]['ratio_median']:.3f} | {low:.3f} – {high:.3f} | {percentile} |")
+    rows = [row(run, finished(run) or plain(run_experiment(run))) for run in runs]
+    from analysis.command.console import show
+    from analysis.storage.summary import write_summary
 
-    from analysis.storage.provenance import provenance
-
-    config = dataclasses.asdict(options)
-    source = provenance(config, seed=options.tsar.seed, device="cpu")
-    write_json(
-        options.out / "summary.json", {"ledger": options.ledger, "runs": rows, "config": config, "provenance": source}
-    )
+    found = {"ledger": options.ledger, "runs": rows}
+    write_summary(options.out, found, options, seed=options.tsar.seed, device="cpu")
+    show(ratio_table(rows), f"written to {options.out}: summary.json, a folder a run")
     require_unbroken([line["run"] for line in rows if not line["invariants_ok"]])

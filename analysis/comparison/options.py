@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
+from analysis.command.options import REFERENCES, Device, References, Threads, Unprefixed
 from analysis.metrics import METRICS
 from analysis.metrics.cost_model import (
     CAPACITY_DEFAULT,
@@ -31,7 +32,7 @@ class RunOptions:
 
     input: Annotated[str, tyro.conf.Positional]
     """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
-    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline."""
     seconds: float = 2.0
     """Simulated time to measure, seconds."""
@@ -63,10 +64,8 @@ class RunOptions:
     """Reference images per simulated second."""
     reference_samples_per_axis: int = 3
     """Samples along a pixel's side of the reference."""
-    device: Literal["cpu", "cuda:0"] = "cpu"
-    """Where rays are traced."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
+    device: Device = "cpu"
+    threads: Threads = 0
     stages: StagesName = "compiled"
     """What runs the stages around tracing: kernels, or the tensor operations that they are checked against."""
     frames: bool = False
@@ -75,8 +74,7 @@ class RunOptions:
     """Write comparison.mp4."""
     out: Path = Path("out/run")
     """Folder for the results."""
-    cache: Path = Path(".cache/reference")
-    """Folder for references, shared by all runs."""
+    cache: References = REFERENCES
 
     def __post_init__(self) -> None:
         limits.within(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,7 +11,9 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from analysis.command import limits
-from analysis.comparison.experiment import RunOptions
+from analysis.command.console import Table
+from analysis.command.options import Unprefixed
+from analysis.comparison.options import RunOptions
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, Ledger
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
@@ -28,7 +30,7 @@ class InputsOptions:
     """What differs between repetitions: the seed (0, 1, …) or the phase (0, 1/n, …)."""
     repetitions: int = 3
     """Runs of each input."""
-    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; its seed is set here where seeds vary."""
     seconds: float = 2.0
     """Simulated time to measure, seconds."""
@@ -85,3 +87,13 @@ def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
         "invariants_ok": summary["invariants"]["ok"],
         "stage_wall_s": summary["stage_wall_s"],
     }
+
+
+def ratio_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Error ratios of all runs."""
+    lines = []
+    for found in rows:
+        low, high = found["ratio_quartiles"]
+        ratios = (f"{found['ratio_median']:.3f}", f"{low:.3f} – {high:.3f}")
+        lines.append((found["run"], *ratios, f"{found['suitable_percentile']:.0f}"))
+    return Table("MSE ratio to the framed renderer", ("run", "median", "quartiles", "suitable percentile"), lines)

@@ -16,12 +16,9 @@ def main() -> None:
     options = parse(RunOptions, __doc__ or "")
     summary = run_experiment(options, process_began_s())
 
-    from rich.table import Table
-
-    from analysis.command.console import console
+    from analysis.command.console import Table, show
 
     title = f"{options.input}: {summary['policy']}, ledger {summary['ledger']}"
-    table = Table(title=title, show_header=False, title_justify="left")
     rows = {}
     for rival, statistics in summary.get("ratio_statistics", {}).items():
         low, high = statistics.quartile_low, statistics.quartile_high
@@ -38,9 +35,6 @@ def main() -> None:
         "invariants": holds[checked and checked["ok"]],
         "non-finite values": str(sum(summary["nonfinite"].values())),
     }
-    for name, value in rows.items():
-        table.add_row(name, value)
-    shown = console()
-    shown.print(table)
-    shown.print(f"written to {options.out}: {', '.join(['summary.json', *summary['files']])}")
+    files = ", ".join(["summary.json", *summary["files"]])
+    show(Table(title, ("", ""), list(rows.items()), words=2), f"written to {options.out}: {files}")
     require_unbroken([] if checked is None or checked["ok"] else [options.input])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.command.console import Table
 from analysis.metrics.cost_model import (
     LEDGERS,
     MODELLED,
@@ -21,7 +22,6 @@ from analysis.metrics.cost_model import (
 )
 from analysis.metrics.quality import Floats, RatioStatistics, ratio, ratio_statistics
 from analysis.page.player import Step
-from analysis.page.report import Table
 from analysis.study.displays import Seen
 from analysis.study.runs import PolicyRun, Totals
 

@@ -3,48 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tyro
 
-from analysis.command import limits
+from analysis.command.progress import Task
+from analysis.conversion.options import CheckOptions
 from analysis.conversion.peers import Picture, rendered
-from tsar.config import require
 
 if TYPE_CHECKING:
     from scenes.canonical import Instance, Scene
-
-
-@dataclass(frozen=True)
-class CheckOptions:
-    """Renders scene files as converted for Mitsuba 3 and for LuxCore, and compares the pictures."""
-
-    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
-    """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
-    markers: bool = False
-    """Where lamps at known places appear in the picture, from every format to every other."""
-    plain: bool = False
-    """Compare both renderers on each scene with every surface matte, too: what differs then is not materials."""
-    width_px: int = 160
-    """Width, pixels; the height follows the film."""
-    samples: int = 256
-    """Samples per pixel."""
-    root: Path | None = None
-    """Folder that scenes may read from; by default their own."""
-    limit_s: float = 240.0
-    """Seconds for each picture at most."""
-    out: Path = Path("out/conversion-check")
-    """Folder for the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
-
-    def __post_init__(self) -> None:
-        limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))
-        require(bool(self.scenes) or self.markers, "scenes", "scene files, or --markers", "neither")
-        for scene in self.scenes:
-            require(scene.is_file(), "scenes", "scene files", scene)
 
 
 def flip(first: Picture, second: Picture) -> float:
@@ -64,7 +33,7 @@ def shown_as(picture: Picture) -> np.ndarray:
     return encode_srgb(torch.as_tensor(np.ascontiguousarray(picture)))
 
 
-def checked(options: CheckOptions, tick: Callable[[], None]) -> list[dict[str, Any]]:
+def checked(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
     """A row for each pair of pictures of each scene, the source's own rendering first where there is one."""
     rows: list[dict[str, Any]] = []
     shown: list[tuple[str, Picture]] = []
@@ -78,7 +47,7 @@ def checked(options: CheckOptions, tick: Callable[[], None]) -> list[dict[str, A
         if options.plain:
             rows.append(_plain_row(options, name, scene, folder))
         shown += [(f"{name}: {what}", one) for what, one in pictures.items() if not isinstance(one, str)]
-        tick()
+        task.advance()
     if shown:
         _sheet(options.out / "pictures.jpg", shown)
     return rows

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from analysis.command import limits
 from scenes.formats import FORMATS
 from tsar.config import require
 
@@ -40,3 +41,31 @@ class ConvertOptions:
     def report_file(self) -> Path:
         """Where the losses go."""
         return self.report or self.target.with_name(f"{self.target.name}.losses.json")
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """Renders scene files as converted for Mitsuba 3 and for LuxCore, and compares the pictures."""
+
+    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
+    markers: bool = False
+    """Where lamps at known places appear in the picture, from every format to every other."""
+    plain: bool = False
+    """Compare both renderers on each scene with every surface matte, too: what differs then is not materials."""
+    width_px: int = 160
+    """Width, pixels; the height follows the film."""
+    samples: int = 256
+    """Samples per pixel."""
+    root: Path | None = None
+    """Folder that scenes may read from; by default their own."""
+    limit_s: float = 240.0
+    """Seconds for each picture at most."""
+    out: Path = Path("out/conversion-check")
+    """Folder for the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
+
+    def __post_init__(self) -> None:
+        limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))
+        require(bool(self.scenes) or self.markers, "scenes", "scene files, or --markers", "neither")
+        for scene in self.scenes:
+            require(scene.is_file(), "scenes", "scene files", scene)

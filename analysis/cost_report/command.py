@@ -13,27 +13,16 @@ from analysis.cost_report.options import CostReportOptions
 def main() -> None:
     """Parses, evaluates, measures, prints tables and where the files are."""
     options = parse(CostReportOptions, __doc__ or "")
+    from analysis.command.console import show
     from analysis.cost_report.run import write_report
-
-    summary = write_report(options)
-
-    from rich.table import Table
-
-    from analysis.command.console import console
     from analysis.cost_report.tables import tables
 
-    shown = console()
-    for found in tables(summary):
-        table = Table(title=found.title, title_justify="left", caption=found.note or None, caption_justify="left")
-        for number, name in enumerate(found.header):
-            table.add_column(name, justify="right" if number else "left")
-        for row in found.rows:
-            table.add_row(*row)
-        shown.print(table)
+    summary = write_report(options)
+    show(*tables(summary))
     rows = ", ".join(f"{batch} at {side}²" for batch, side in summary["admitted"])
     segments = f"{options.admitted_segments:g} segments"
-    shown.print(f"admitted at {segments}, ledger {options.ledger}: {len(summary['admitted'])} rows: {rows or 'none'}")
+    show(f"admitted at {segments}, ledger {options.ledger}: {len(summary['admitted'])} rows: {rows or 'none'}")
     crossing = summary["crossing_batch"]
-    shown.print(f"equal cost at batch {'none' if crossing is None else f'{crossing:,.1f}'}")
+    show(f"equal cost at batch {'none' if crossing is None else f'{crossing:,.1f}'}")
     names = ", ".join(sorted(path.name for path in options.out.iterdir() if path.is_file()))
-    shown.print(f"written to {options.out}: {names}")
+    show(f"written to {options.out}: {names}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from statistics import median
@@ -21,7 +21,7 @@ from analysis.metrics.cost_model import RAYS
 from tsar.config import TsarConfig
 
 if TYPE_CHECKING:
-    from analysis.command.progress import Bars
+    from analysis.command.progress import Bars, Task
     from renderer.trace import Renderer
     from scenes.canonical import Scene
     from tsar.policy import Policy
@@ -82,8 +82,8 @@ def measure(options: MeasurementOptions, ready: tuple[Scene, Mapping[int, Render
     scene, found = ready
     load, memory = os.getloadavg()[0], None
     if options.memory_cycles:
-        renderer, show = found[options.measured_resolution], bars.task("memory", options.memory_cycles)
-        memory = watch_memory(options, renderer, scene.duration_s, show)
+        renderer, task = found[options.measured_resolution], bars.task("memory", options.memory_cycles)
+        memory = watch_memory(options, renderer, scene.duration_s, task)
     cells = measure_cells(options, found, bars.task("measurement", options.repetitions + 1))
     threads = next(iter(found.values())).threads
     return Measurement(cells, memory, options.device, threads, torch.get_num_threads(), load)
@@ -161,15 +161,13 @@ def _needed_bytes(options: MeasurementOptions) -> float:
     return cached + sum(config.resolution_px**2 * _BYTES_PER_PIXEL for config in configs)
 
 
-def measure_cells(
-    options: MeasurementOptions, found: Mapping[int, Renderer], on_round: Callable[[int], None] = lambda done: None
-) -> list[Cell]:
+def measure_cells(options: MeasurementOptions, found: Mapping[int, Renderer], task: Task) -> list[Cell]:
     """Runs every setting in turns; the first turn after the warm-up is not counted.
 
     Args:
         options: the settings.
         found: a renderer for each output side.
-        on_round: told how many of ``repetitions + 1`` rounds are done, the first being the warm-up.
+        task: of ``repetitions + 1`` rounds, the first of which is the warm-up.
     """
     from analysis.command.timing import take_turns
 
@@ -177,9 +175,9 @@ def measure_cells(
     framed = {side: _Framed(options.pipeline(options.measured_batch, side), found[side], options) for side in found}
     for cell in adaptive.values():
         cell.warm_up()
-    on_round(1)
+    task.advance()
     cases = {str(key): case for key, case in (*adaptive.items(), *framed.items())}
-    take_turns(cases, options.repetitions, lambda done: on_round(done + 1))
+    take_turns(cases, options.repetitions, task)
     return [_cell(setting, cell, framed[setting[1]]) for setting, cell in adaptive.items()]
 
 
@@ -202,9 +200,7 @@ def _cell(setting: tuple[int, int], adaptive: _Adaptive, framed: _Framed) -> Cel
     )
 
 
-def watch_memory(
-    options: MeasurementOptions, renderer: Renderer, span_s: float, on_cycle: Callable[[int], None] = lambda done: None
-) -> MemoryTrace:
+def watch_memory(options: MeasurementOptions, renderer: Renderer, span_s: float, task: Task) -> MemoryTrace:
     """Resident memory over a run of the centre setting that takes ``span_s`` of animation time at most."""
     import psutil
 
@@ -221,7 +217,7 @@ def watch_memory(
         if record.cycle >= 0 and record.cycle % options.memory_every == 0:
             cycles.append(record.cycle)
             bytes_.append(resident().rss)
-            on_cycle(record.cycle)
+            task.reach(record.cycle)
     return MemoryTrace(*options.centre, before, cycles, bytes_)
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
+from typing import Literal
 
 from analysis.command import limits
+from analysis.command.options import Device, Threads, Unprefixed
 from analysis.metrics.cost_model import CostParameters
 from tsar.config import TsarConfig, closed_choices, require
 
@@ -90,10 +89,8 @@ class MeasurementOptions:
     """Cycles over which resident memory is watched; 0 leaves it out."""
     memory_every: int = 10
     """Cycles between two looks at resident memory."""
-    device: Literal["cpu", "cuda:0"] = "cpu"
-    """Where rays are traced."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
+    device: Device = "cpu"
+    threads: Threads = 0
 
     def __post_init__(self) -> None:
         for name in ("measured_batches", "measured_resolutions"):
@@ -145,13 +142,9 @@ class MeasurementOptions:
 class CostReportOptions:
     """Cost of an adaptive cycle and of a framed image: the model under every ledger, and this machine."""
 
-    parameters: Annotated[TableParameters, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
-        default_factory=TableParameters
-    )
+    parameters: Unprefixed[TableParameters] = field(default_factory=TableParameters)
     """The model's parameters."""
-    measurement: Annotated[MeasurementOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
-        default_factory=MeasurementOptions
-    )
+    measurement: Unprefixed[MeasurementOptions] = field(default_factory=MeasurementOptions)
     """What is measured."""
     ledger: Literal["thesis", "printed", "summed"] = "thesis"
     """How the model counts; figures are drawn under it, tables show all."""

@@ -217,16 +217,14 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
 
         with progress.bars() as bars:
             measured = measure(options.measurement, ready, bars)
-    from analysis.storage.provenance import provenance
+    from analysis.storage.summary import with_source
 
     found = refitted(options.measurement, measured) if measured else None
-    config = dataclasses.asdict(options)
     machine: dict[str, Any] = {
         name: getattr(measured, name) if measured else None for name in ("device", "threads", "torch_threads")
     }
     scene = options.measurement.input if measured else None
-    source = provenance(config, scene=scene, **machine)
-    summary = {**summarise(options, found), "config": config, "provenance": source}
+    summary = with_source(summarise(options, found), options, scene=scene, **machine)
     with full_disk(options.out):
         _draw(options, summary)
         write_json(options.out / "summary.json", summary)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from analysis.command.console import Table
 from analysis.metrics.cost_model import MODELLED
-from analysis.page.report import Table
 
 _MIB = 2.0**20
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from PIL import Image
 
+from analysis.command.console import Table
 from analysis.page import player as played
 from analysis.page.pictures import Pixels
 from analysis.page.player import Player
@@ -26,16 +27,6 @@ table{border-collapse:collapse;margin:.6em 0} td,th{padding:.2em .9em .2em 0;tex
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums} tr{border-bottom:1px solid #eee} .wide{overflow-x:auto}
 img{max-width:100%} .note{color:#555} code{font-size:.92em;overflow-wrap:anywhere}
 """
-
-
-@dataclass(frozen=True)
-class Table:
-    """Rows of text under a header; columns from the second on are numbers."""
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -110,7 +101,7 @@ def _figure(caption: str, png: bytes) -> str:
 
 def _table(table: Table) -> str:
     def row(cells: Sequence[str], tag: str) -> str:
-        kinds = ["" if number == 0 else " class='n'" for number in range(len(cells))]
+        kinds = ["" if number < table.words else " class='n'" for number in range(len(cells))]
         return "<tr>" + "".join(f"<{tag}{k}>{escape(c)}</{tag}>" for k, c in zip(kinds, cells, strict=True)) + "</tr>"
 
     note = f"<p class='note'>{escape(table.note)}</p>" if table.note else ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import pandas as pd
 
 from analysis.command.cli import InputError, require_unbroken
 from analysis.command.cluster import ClusterOptions
+from analysis.command.progress import Task
 from analysis.perception.observers import Observer, correct_probability
 from analysis.perception.options import AdaptiveOptions
 from analysis.perception.psychometrics import THRESHOLD
@@ -24,7 +24,7 @@ SIDE_PX = 512
 """Output side of the rows of table 7.2 that are compared, before the scale divides it."""
 
 
-def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFrame:
+def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
     """JOD from the reference of both renderers at equal cost, a row an input and batch size.
 
     Results and references are kept as those of the other studies are, so that this goes on where it was stopped.
@@ -45,7 +45,7 @@ def scores(options: AdaptiveOptions, done: Callable[[int], None]) -> pd.DataFram
                 case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
                 cases[name, row, policy] = case
     place = Place(options.out / "runs", Path(options.cache))
-    keys, failures = run_cases(list(cases.values()), place, ClusterOptions(options.workers), done)
+    keys, failures = run_cases(list(cases.values()), place, ClusterOptions(options.workers), task)
     if failures:
         for line in describe_failures({case.name: reason for case, reason in failures.items()}):
             print(line, file=sys.stderr)

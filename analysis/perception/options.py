@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
+from analysis.command.options import REFERENCES, References, Threads
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.cases import INPUTS
 from tsar.config import closed_choices, require
@@ -39,8 +40,7 @@ class StimuliOptions:
     """The middle part of the shutter's time that the box filter spans."""
     seed: int = 0
     """Of point sets and shifts."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
+    threads: Threads = 0
     out: Path = Path("out/perception")
     """Folder for the stimuli, manifest.json and summary.json."""
 
@@ -188,8 +188,7 @@ class AdaptiveOptions:
     """Processes; 0 takes one per core."""
     seed: int = 0
     """Of the runs."""
-    cache: Path = Path(".cache/reference")
-    """Folder of references, shared by all runs."""
+    cache: References = REFERENCES
     out: Path = Path("out/perception-adaptive")
     """Folder for the runs, adaptive.csv, thresholds.csv and summary.json."""
 

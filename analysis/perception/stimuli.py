@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from analysis.command.cli import InputError
+from analysis.command.progress import Bars
 from analysis.metrics.display_model import DisplayModel
 from analysis.perception.options import StimuliOptions
 from analysis.storage.journal import Journal
@@ -29,12 +30,12 @@ COLUMNS = ("scene", "point_set", "time_filter", "samples", "folder", "files", "s
 """What the manifest says of every stimulus, among other things."""
 
 
-def render_stimuli(options: StimuliOptions, task: Callable[[str, int], Callable[[int], None]]) -> dict[str, Any]:
+def render_stimuli(options: StimuliOptions, bars: Bars) -> dict[str, Any]:
     """Renders what is missing and writes the manifest.
 
     Args:
         options: jobs, size and length.
-        task: shows how far it is.
+        bars: show how far it is.
 
     Returns:
         The manifest: a row a stimulus, with its folder, number of frames and their hash.
@@ -54,7 +55,7 @@ def render_stimuli(options: StimuliOptions, task: Callable[[str, int], Callable[
         work = prepare(job)
         scene = work.settings.name
         folder = options.out / scene
-        found = run_job(work, dataclasses.replace(job, out=folder), task)
+        found = run_job(work, dataclasses.replace(job, out=folder), bars)
         for combination, row in zip(work.job.combinations, found, strict=True):
             files = [folder / combination.name / f"frame{number:05d}.{options.format}" for number in work.frames]
             video = {}
@@ -181,9 +182,7 @@ def check_frames(folder: Path, row: dict[str, Any]) -> list[Path]:
     return files
 
 
-def differences(
-    folder: Path, display: DisplayModel, tick: Callable[[], None], total: Callable[[int], None] = lambda count: None
-) -> pd.DataFrame:
+def differences(folder: Path, display: DisplayModel, bars: Bars) -> pd.DataFrame:
     """How many JOD every stimulus is from the one with the most samples of its scene, set and filter.
 
     Scores are kept in ``jod.journal`` of the folder, by the hashes of both stimuli, the display and the metric.
@@ -191,8 +190,7 @@ def differences(
     Args:
         folder: of the stimuli.
         display: that the scores hold for.
-        tick: called after each.
-        total: told how many there are.
+        bars: show how far it is.
     """
     from analysis.metrics.perceptual import jod
 
@@ -200,8 +198,7 @@ def differences(
     journal = Journal(folder / "jod.journal")
     kept = {row["key"]: float(row["jod"]) for row in journal.rows()}
     table = pd.DataFrame(manifest["stimuli"])
-    total(len(table))
-    rows = []
+    task, rows = bars.task("JOD", len(table)), []
     for _, group in table.groupby(["scene", "point_set", "time_filter"], sort=False):
         ordered = group.sort_values("samples").to_dict("records")
         reference, reference_frames = ordered[-1], None
@@ -218,5 +215,5 @@ def differences(
             rows.append(
                 {name: row[name] for name in ("scene", "point_set", "time_filter", "samples")} | {"jod": kept[key]}
             )
-            tick()
+            task.advance()
     return pd.DataFrame(rows)

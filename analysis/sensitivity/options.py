@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
+from typing import Literal
 
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
+from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import Ledger
 from analysis.study.cases import INPUTS, ROWS, SCALES
 from tsar.config import TsarConfig, closed_choices, require
@@ -41,18 +40,15 @@ class SensitivityOptions:
     """The input that is shown as pictures."""
     still_s: float = 0.65
     """When the pictures are taken, seconds after the start."""
-    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The default setting, marked by an asterisk; batch and resolution come from the row, seed from the repetition."""
     ledger: Ledger = "thesis"
     """How cost is counted; wall is refused, for it gives no result twice."""
-    farm: Annotated[ClusterOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
-        default_factory=ClusterOptions
-    )
+    farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
     """Where the runs are made."""
     out: Path = Path("out/sensitivity")
     """Folder for the results."""
-    cache: Path = Path(".cache/reference")
-    """Folder for references, shared by all runs."""
+    cache: References = REFERENCES
 
     def __post_init__(self) -> None:
         require(set(self.inputs) <= set(INPUTS), "inputs", f"names out of {', '.join(INPUTS)}", self.inputs)

@@ -16,6 +16,8 @@ from analysis.sensitivity.runs import AXES, Setting, sweeps
 if TYPE_CHECKING:
     import pandas as pd
 
+    from analysis.command.console import Table
+
 Floats = NDArray[np.float64]
 
 ALL = "all inputs"
@@ -146,3 +148,20 @@ def bowl(points: Floats, mse: Floats) -> Line:
     values = [slope @ one + one @ second @ one / 2 for one in np.array(candidates)]
     least = np.array(candidates[int(np.argmin(values))]) + centre
     return found | {"fit_edge": "flat" if np.ptp(np.log(mse)) < _FLAT else edge(least, points, AXES["slopes"])}
+
+
+def shown_tables(optima: Sequence[Line]) -> list[Table]:
+    """The best setting of every sweep, and how flat the sweep is, for a terminal."""
+    import pandas as pd
+
+    from analysis.command.console import frame_table
+
+    found = []
+    for sweep, axes in AXES.items():
+        part = pd.DataFrame([line for line in optima if line["sweep"] == sweep])
+        best = [name for name in ("input", *axes, *BEST) if name in part]
+        flat = ["input", *(name for name in part if name not in (*best, "sweep"))]
+        for title, names in (("best", best), ("flatness", flat)) if len(part) else ():
+            shown = pd.DataFrame(part, columns=names).dropna(axis=1, how="all")
+            found.append(frame_table(shown, f"{sweep}, {title}", ".3g"))
+    return found

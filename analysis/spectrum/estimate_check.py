@@ -6,7 +6,7 @@ The estimate φ sees a framelet at the current rates and the one before; the tru
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 from torch import Tensor
 
+from analysis.command.progress import Task
 from analysis.spectrum.ideal_density import ideal_band, octant_power, power_norm, raster, share_of_total, tile_volume
 from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
 from tsar import haar
@@ -149,13 +150,13 @@ class Example:
         return {"f_s": f_s, "f_t": f_t, "samples_per_pixel_side": space, "refresh_ms": 1e3 / time}
 
 
-def measure_example(options: SpectrumOptions, trace: Trace, done: Callable[[], None] = lambda: None) -> Example:
+def measure_example(options: SpectrumOptions, trace: Trace, task: Task) -> Example:
     """Renders the tile of the options at its high rate; the estimate is tried at every rate the volume holds."""
     tsar, level = options.tsar, torch.tensor([options.tile_level])
     cell = torch.tensor([[int(place * 2**options.tile_level)] for place in options.tile_at])
     index = interleave(*cell) if options.tile_index is None else torch.tensor([options.tile_index])
     times_s = [options.start_s + options.span_s * frame / options.frames for frame in range(options.frames)]
-    volume = tile_volume(trace, level, index, options.samples, times_s, done)
+    volume = tile_volume(trace, level, index, options.samples, times_s, task)
     octaves = options.samples.bit_length() - FRAMELET_SIDE.bit_length() + 1
     space = tuple(1 << octave for octave in reversed(range(octaves)))
     time = tuple(1 << octave for octave in range(1, options.frames.bit_length() - 2))
@@ -174,9 +175,7 @@ def measure_example(options: SpectrumOptions, trace: Trace, done: Callable[[], N
     )
 
 
-def measure_input(
-    options: SpectrumOptions, number: int, trace: Trace, duration_s: float, done: Callable[[], None] = lambda: None
-) -> Tiles:
+def measure_input(options: SpectrumOptions, number: int, trace: Trace, duration_s: float, task: Task) -> Tiles:
     """Tiles drawn at random at four times over an input."""
     rng = np.random.default_rng((options.tsar.seed, number))
     side, frames = options.agreement_samples, options.agreement_frames
@@ -188,7 +187,7 @@ def measure_input(
         drawn = rng.choice(4**options.agreement_level, options.tiles_per_input // _TIMES, replace=False)
         for index in torch.from_numpy(drawn).split(_TILES_AT_ONCE):
             level = torch.full_like(index, options.agreement_level)
-            volume = tile_volume(trace, level, index, side, times_s.tolist(), done)
+            volume = tile_volume(trace, level, index, side, times_s.tolist(), task)
             found.append(measure(volume, rates, options.tsar.error)[0])
     return joined(found)
 

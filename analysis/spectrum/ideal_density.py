@@ -8,12 +8,13 @@ Source: Stephens 2011, sec. 5.1.2.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from analysis.command.progress import Task
 from tsar.error import compressed_luminance
 from tsar.morton import raster_to_morton
 from tsar.selection import sample_positions
@@ -26,14 +27,14 @@ def tile_volume(
     index: Int64[Tensor, " n"],
     side: int,
     times_s: Sequence[float],
-    done: Callable[[], None] = lambda: None,
+    task: Task,
 ) -> Float[Tensor, "n t samples"]:
-    """Renders tiles with ``side * side`` samples each at every time, all in one batch a time."""
+    """Renders tiles with ``side * side`` samples each at every time; a time is one batch and one step of the task."""
     position = sample_positions(level, index, side)
     volume = torch.empty(position.shape[0], len(times_s), side * side)
     for frame, time_s in enumerate(times_s):
         volume[:, frame] = compressed_luminance(trace(FrameletBatch(level, index, position, time_s)).color)
-        done()
+        task.advance()
     return volume
 
 

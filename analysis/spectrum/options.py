@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
+from analysis.command.options import Threads, Unprefixed
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, adaptive_flops, parameters_of
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
@@ -32,7 +33,7 @@ class SpectrumOptions:
     """Pictures to measure beside our own: PNG, JPEG or EXR of any size from 32 pixels."""
     only: Part | None = None
     """Do one part only: slopes (figs 1.3, 1.4), ideal (figs 5.3–5.5) or agreement; without it all three."""
-    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline: template of the error estimate, realizable rates, resolution, seed."""
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs whose slopes and tiles are measured."""
@@ -66,8 +67,7 @@ class SpectrumOptions:
     """Agreement: samples along a tile's side, an octave above the finest rate that is tried."""
     agreement_frames: int = 64
     """Agreement: times over the span; the estimate is tried with every second, fourth and eighth."""
-    threads: int = 0
-    """Threads for tracing; 0 takes one per core."""
+    threads: Threads = 0
     out: Path = Path("out/spectrum")
     """Folder for the results."""
 

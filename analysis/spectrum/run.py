@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 from analysis.command.cli import bad_input, full_disk, require_memory
@@ -23,7 +21,7 @@ from analysis.spectrum.spectra import (
     shown,
 )
 from analysis.storage.files import write_json
-from analysis.storage.provenance import provenance
+from analysis.storage.summary import with_source
 
 _BYTES_PER_SAMPLE = 32  # of a tile's volume; 27 were measured, its transform and a windowed copy included
 _BYTES_PER_PIXEL = 400
@@ -57,10 +55,10 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
             found["ideal"] = _ideal(options, shown_bars)
         if options.does("agreement"):
             found["agreement"] = _agreement(options, shown_bars)
-        config = dataclasses.asdict(options)
-        source = provenance(config, scene=", ".join(options.inputs), seed=options.tsar.seed, device="cpu")
         derived = {"level_max": options.tsar.level_max, "cycle_s": options.cycle_s()}
-        summary = {**found, "config": {**config, "resolved": derived}, "provenance": source}
+        source = {"scene": ", ".join(options.inputs), "seed": options.tsar.seed, "device": "cpu"}
+        summary = with_source(found, options, **source)
+        summary["config"]["resolved"] = derived
         write_json(options.out / "summary.json", summary)
     return summary
 
@@ -72,16 +70,10 @@ def _pictures(options: SpectrumOptions) -> list[Spectrum]:
     return photographs + [picture_spectrum(path, "pictures given") for path in options.images]
 
 
-def _counter(show: Callable[[int], None]) -> Callable[[], None]:
-    """Moves a bar on by one at each call."""
-    steps = iter(range(1, 1 << 62))
-    return lambda: show(next(steps))
-
-
 def _slopes(options: SpectrumOptions, pictures: list[Spectrum], shown_bars: Bars) -> dict[str, Any]:
     levels = options.tsar.level_max - options.tsar.level_min + 1
-    done = _counter(shown_bars.task("slopes", len(options.inputs) * (2 * options.frames_per_input + levels)))
-    own = [spectrum for name in options.inputs for spectrum in input_spectra(options, name, done)]
+    task = shown_bars.task("slopes", len(options.inputs) * (2 * options.frames_per_input + levels))
+    own = [spectrum for name in options.inputs for spectrum in input_spectra(options, name, task)]
     groups = list(dict.fromkeys(spectrum.group for spectrum in own))
     ordered = pictures + sorted(own, key=lambda spectrum: groups.index(spectrum.group))
     save(plots.slope_figure(ordered), options.out / "slopes.png")
@@ -97,8 +89,8 @@ def _slopes(options: SpectrumOptions, pictures: list[Spectrum], shown_bars: Bars
 
 def _ideal(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:
     renderer, _ = open_input(options, options.input)
-    done = _counter(shown_bars.task("ideal", options.frames))
-    example = measure_example(options, renderer.trace, done)
+    task = shown_bars.task("ideal", options.frames)
+    example = measure_example(options, renderer.trace, task)
     times_s = [options.start_s + options.span_s * i / (_FRAMES_SHOWN - 1) for i in range(_FRAMES_SHOWN)]
     side = options.tsar.resolution_px
     frames = [shown(renderer.render_frame(time_s, side, side, 2).numpy()) for time_s in times_s]
@@ -112,11 +104,11 @@ def _ideal(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:
 
 def _agreement(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:
     batches = -(-(options.tiles_per_input // 4) // 16)
-    show = shown_bars.task("agreement", 4 * batches * options.agreement_frames * len(options.inputs))
-    done, tiles = _counter(show), {}
+    task = shown_bars.task("agreement", 4 * batches * options.agreement_frames * len(options.inputs))
+    tiles = {}
     for number, name in enumerate(options.inputs):
         renderer, duration_s = open_input(options, name)
-        tiles[name] = measure_input(options, number, renderer.trace, duration_s, done)
+        tiles[name] = measure_input(options, number, renderer.trace, duration_s, task)
         renderer.close()
     found = check_estimate(tiles, options.tau)
     save(plots.agreement_figure(tiles, found, options.tau), options.out / "agreement.png")

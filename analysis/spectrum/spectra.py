@@ -17,6 +17,7 @@ from analysis.command.cli import InputError, bad_input
 from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
 
 if TYPE_CHECKING:
+    from analysis.command.progress import Task
     from renderer.trace import Renderer
 
 Floats = NDArray[np.float64]
@@ -144,7 +145,7 @@ def shown(color: NDArray[np.float32]) -> NDArray[np.uint8]:
     return encode_srgb(torch.from_numpy(color[::step, ::step].copy()))
 
 
-def input_spectra(options: SpectrumOptions, name: str, done: Callable[[], None]) -> Iterator[Spectrum]:
+def input_spectra(options: SpectrumOptions, name: str, task: Task) -> Iterator[Spectrum]:
     """Frames of an input with one sample a pixel and supersampled, and its framelets at every level of the tiling."""
     renderer, duration_s = open_input(options, name)
     times_s = (np.arange(options.frames_per_input) + 0.5) * duration_s / options.frames_per_input
@@ -154,12 +155,12 @@ def input_spectra(options: SpectrumOptions, name: str, done: Callable[[], None])
             color = renderer.render_frame(float(time_s), side, side, axis).numpy()
             names = {"name": f"{name} {time_s:.2f} s", "group": f"frames, {axis}² samples a pixel", "source": name}
             yield spectrum_of(squares, color, **names, picture=shown(color))
-            done()
+            task.advance()
     for level in levels:
         color = np.concatenate([_framelets(renderer, level, float(time_s)) for time_s in times_s])
         group = f"framelets, level {level}"
         yield spectrum_of(_planes, color, name=f"{name} {group}", group=group, source=name)
-        done()
+        task.advance()
     renderer.close()
 
 

@@ -10,9 +10,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PARTIAL = ".partial"
 """Ending of the name a file has while it is being written."""
@@ -78,3 +81,9 @@ def write_json(path: Path, value: Any) -> None:
     text = json.dumps(plain(value), indent=1, allow_nan=False)
     with atomic(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def write_table(path: Path, rows: pd.DataFrame) -> None:
+    """Writes a data frame as CSV, atomically."""
+    with atomic(path) as temporary:
+        rows.to_csv(temporary, index=False)

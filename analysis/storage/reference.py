@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from analysis.command.progress import Task
 from analysis.storage.files import atomic, locked
 from analysis.storage.journal import Journal, warn
 from analysis.storage.source import code_hash
@@ -138,7 +139,7 @@ Render = Callable[[float], Tensor]
 """``time_s -> (height, width, 3)`` linear RGB, already down-filtered to the resolution of the reference."""
 
 
-def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[[int, int], None]) -> Reference:
+def obtain(cache: Path, spec: ReferenceSpec, render: Render, task: Task | None = None) -> Reference:
     """The reference from disk, where every image is checked; what is missing or damaged is rendered now.
 
     Two processes that want the same reference do not both render it: the second waits.
@@ -147,14 +148,14 @@ def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[
         cache: folder of references.
         spec: what is wanted.
         render: called for each image that is not on disk.
-        progress: called with images done and images in all.
+        task: of which a step is an image.
 
     Raises:
         ValueError: the disk has no room for it, or the renderer returns another shape.
         OSError: it cannot be written.
     """
     cache.mkdir(parents=True, exist_ok=True)
-    stored, rendered = _Images(cache, spec), 0
+    stored, task, rendered = _Images(cache, spec), task or Task(), 0
     nonfinite = stored.checked(say=lambda line: None)
     if len(nonfinite) < spec.count:
         with locked(cache / f"{spec.key}.lock"):
@@ -162,10 +163,10 @@ def obtain(cache: Path, spec: ReferenceSpec, render: Render, progress: Callable[
             missing = [number for number in range(spec.count) if number not in nonfinite]
             with stored.opened(fresh=len(missing) == spec.count) as file:
                 for number in missing:
-                    progress(len(nonfinite), spec.count)
+                    task.reach(len(nonfinite))
                     nonfinite[number] = stored.write(file, number, render(spec.start_s + number / spec.rate_hz))
                     rendered += 1
-    progress(spec.count, spec.count)
+    task.reach(spec.count)
     images = np.load(stored.path, mmap_mode="r")
     return Reference(spec, images, sum(nonfinite.values()), rendered)
 

@@ -153,9 +153,7 @@ def render_reference(input: str, phase: float, start_s: float, scale: Scale, pla
             samples_per_axis=scale.reference_samples_per_axis,
         )
         side, axis = scale.reference_px, scale.reference_samples_per_axis
-        return obtain(
-            place.references, spec, lambda t: renderer.render_frame(t, side, side, axis), lambda done, count: None
-        )
+        return obtain(place.references, spec, lambda t: renderer.render_frame(t, side, side, axis))
 
 
 @lru_cache(maxsize=4)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.progress import Task
 from analysis.storage.files import PARTIAL
 from analysis.study.cases import Case, Scale
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def run_cases(
-    cases: Sequence[Case], place: Place, options: ClusterOptions, on_done: Callable[[int], None] = lambda done: None
+    cases: Sequence[Case], place: Place, options: ClusterOptions, task: Task | None = None
 ) -> tuple[dict[Case, str], dict[Case, str]]:
     """Runs every case whose result is not on disk yet; a case that fails does not stop the others.
 
@@ -30,7 +31,7 @@ def run_cases(
         cases: what to run; one that occurs twice is run once.
         place: where results and references go; on a cluster, folders that all of its machines see.
         options: the cluster.
-        on_done: told how many cases are done.
+        task: of which a step is a case.
 
     Returns:
         The key of every case's result, and the reason of every failure.
@@ -40,8 +41,8 @@ def run_cases(
     source = source_of_results()
     keys = {case: case.key(source) for case in dict.fromkeys(cases)}
     missing = [case for case in keys if finished(keys[case], place) is None]
-    done, failures = len(keys) - len(missing), dict[Case, str]()
-    on_done(done)
+    task, failures = task or Task(), dict[Case, str]()
+    task.advance(len(keys) - len(missing))
     if not missing:
         return keys, failures
     try:
@@ -50,8 +51,7 @@ def run_cases(
             for case, reason in _outcomes(client, _submit(client, missing, keys, place)):
                 if reason is not None:
                     failures[case] = reason
-                done += 1
-                on_done(done)
+                task.advance()
     except KeyboardInterrupt:
         if not options.scheduler:  # its workers cannot do it any more
             for left in place.results.rglob(f"*{PARTIAL}*"):

@@ -18,20 +18,13 @@ def main() -> None:
     """Runs what is missing; prints the tables."""
     options = parse(SuitabilityOptions, __doc__ or "")
     require_extra("study", "perception")
+    from analysis.command.console import show
+    from analysis.suitability.page import shown_tables
     from analysis.suitability.run import study
 
     summary, tables = study(options)
-
-    from analysis.command.console import console
-    from analysis.suitability.run import console_tables
-
-    shown = console(max(110, console().width))
-    for table in console_tables(tables):
-        shown.print(table)
-    done = summary["runs_done"]
-    shown.print(
-        f"{done} of {summary['runs']} runs; written to {options.out}: summary.json, tables/, figures/, report.html"
-    )
+    written = f"written to {options.out}: summary.json, tables/, figures/, report.html"
+    show(*shown_tables(tables), f"{summary['runs_done']} of {summary['runs']} runs; {written}")
     require_unbroken(summary["broken_invariants"])
     if summary["failures"]:
         sys.exit(1)

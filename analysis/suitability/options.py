@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
+from typing import Literal
 
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
+from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import Ledger
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.cases import INPUTS, ROWS, SCALES
@@ -32,7 +31,7 @@ class SuitabilityOptions:
     quarter of the side, against a reference half as often. All last 2 s."""
     repetitions: int = 3
     """Runs of each: repetition r has seed r and phase r / repetitions."""
-    tsar: Annotated[TsarConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(default_factory=TsarConfig)
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
     policies: tuple[str, ...] = ("framed supersampled", "frameless", "afr", "oracle")
     """Policies that are compared beside TSAR and the framed renderer, at one row."""
@@ -54,14 +53,11 @@ class SuitabilityOptions:
     """Part of each that it scores, seconds after the start; a second of it costs more than the run."""
     display: DisplayModel = field(default_factory=DisplayModel)
     """The display it scores for."""
-    farm: Annotated[ClusterOptions, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes] = field(
-        default_factory=ClusterOptions
-    )
+    farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
     """Where the runs are made."""
     out: Path = Path("out/suitability")
     """Folder for the results."""
-    cache: Path = Path(".cache/reference")
-    """Folder for references, shared by all runs."""
+    cache: References = REFERENCES
 
     def __post_init__(self) -> None:
         unknown = [one for one in self.inputs if one not in INPUTS]

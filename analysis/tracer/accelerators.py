@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 from functools import partial
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.command.progress import Bars, Task
 from analysis.command.timing import take_turns
 from analysis.tracer.options import AcceleratorOptions
 from scenes.canonical import Mesh
@@ -55,7 +55,7 @@ def random_rays(count: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.
     return rng.uniform(-1.0, 1.0, (count, 3)).astype(np.float32), direction.astype(np.float32)
 
 
-def measure(triangles: int, options: AcceleratorOptions, tick: Callable[[], None]) -> list[dict[str, Any]]:
+def measure(triangles: int, options: AcceleratorOptions, task: Task) -> list[dict[str, Any]]:
     """Rows of the table for one mesh: a structure and a kind of rays each.
 
     Raises:
@@ -80,7 +80,7 @@ def measure(triangles: int, options: AcceleratorOptions, tick: Callable[[], None
         parts = {name: (origin[chosen[name]], direction[chosen[name]]) for name in STRUCTURES}
         cases = {name: partial(built[name].closest, *parts[name]) for name in STRUCTURES}
         seconds = take_turns(cases, options.repetitions)
-        tick()
+        task.advance()
         for name in STRUCTURES:
             count, work = len(origin[chosen[name]]), found[name][1]
             rows.append(
@@ -99,17 +99,7 @@ def measure(triangles: int, options: AcceleratorOptions, tick: Callable[[], None
     return rows
 
 
-def table(options: AcceleratorOptions, task: Callable[[str, int], Callable[[int], None]]) -> pd.DataFrame:
-    """Tests, visits, build times and rates against triangle count."""
-    done = task("meshes", 2 * len(options.triangles))
-    count = iter(range(1, 2 * len(options.triangles) + 1))
-    rows = [row for size in options.triangles for row in measure(size, options, lambda: done(next(count)))]
-    return pd.DataFrame(rows)
-
-
-def render_report_image(
-    name: str, options: AcceleratorOptions, task: Callable[[str, int], Callable[[int], None]]
-) -> tuple[Tensor, dict[str, Any]]:
+def render_report_image(name: str, options: AcceleratorOptions, bars: Bars) -> tuple[Tensor, dict[str, Any]]:
     """One of the report's images with 32 samples a pixel, and the rays and tests it took beside the report's."""
     from renderer.frames import render_image, tile_count
     from renderer.sampling.plan import SamplePlan
@@ -120,9 +110,9 @@ def render_report_image(
     threads, work = options.threads or None, Counter[str]()
     renderer = Renderer(scene, threads=threads, seed=options.seed, structure=options.structure, count_work=True)
     plan = SamplePlan(report.SAMPLES, "hammersley", options.seed, "gaussian")
-    done = task(name, tile_count(width, height))
+    task = bars.task(name, tile_count(width, height))
     start = time.perf_counter()
-    image = render_image(renderer, plan, width, height, 0.0, renderer.shutter_s, done=done, counters=work)
+    image = render_image(renderer, plan, width, height, 0.0, renderer.shutter_s, done=task.reach, counters=work)
     wall_s = time.perf_counter() - start
     renderer.close()
     rays = sum(count for kind, count in work.items() if kind.endswith("_rays"))
@@ -144,13 +134,13 @@ def render_report_image(
     }
 
 
-def lines(found: Sequence[tuple[str, dict[str, Any]]]) -> list[str]:
-    """What there is to say about rendered images."""
+def lines(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """What rendered images took, beside what the report says of them."""
     return [
         f"{name}: {each['size_px'][0]} x {each['size_px'][1]}, {each['polygons']:,} polygons, {each['wall_s']:.1f} s, "
         f"{each['rays'] / 1e6:.1f} M rays, {each['triangle_tests'] / 1e9:.2f} G triangle tests "
         f"({each['tests_per_ray']:.1f} a ray, {each['fewer_tests_than_brute']:.0f} times fewer than brute force, "
         f"{each['fewer_tests_than_brute_for_primary_rays']:.0f} times than brute force for the primary rays alone); "
         f"report: {each['report']['triangle_tests'] / 1e9:.1f} G tests, {each['report']['one_process_s']:.0f} s"
-        for name, each in found
+        for name, each in found.items()
     ]

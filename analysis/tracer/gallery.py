@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.command.console import Table
+from analysis.command.progress import Task
 from analysis.storage.files import atomic
 from analysis.tracer.options import GalleryOptions
 from scenes.effects import scenes as effects
@@ -22,9 +23,7 @@ if TYPE_CHECKING:
 COLUMNS = 4
 
 
-def render_effect(
-    name: str, plan: SamplePlan, options: GalleryOptions, done: Callable[[int], None]
-) -> tuple[NDArray[np.uint8], dict]:
+def render_effect(name: str, plan: SamplePlan, options: GalleryOptions, task: Task) -> tuple[NDArray[np.uint8], dict]:
     """Renders the scene of an effect and writes ``NAME.png`` and ``NAME.exr``.
 
     Returns:
@@ -39,7 +38,7 @@ def render_effect(
     scene = effects.load(name)
     renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
     start = time.perf_counter()
-    image = render_image(renderer, plan, options.width_px, options.height_px, 0.0, renderer.shutter_s, done=done)
+    image = render_image(renderer, plan, options.width_px, options.height_px, 0.0, renderer.shutter_s, done=task.reach)
     wall_s = time.perf_counter() - start
     renderer.close()
     nonfinite = write_image(options.out / f"{name}.png", image)
@@ -106,16 +105,15 @@ def sample_plan(options: GalleryOptions) -> SamplePlan:
     return SamplePlan(options.samples, options.point_set, options.seed, options.space_filter)
 
 
-def render_gallery(
-    options: GalleryOptions, plan: SamplePlan, task: Callable[[str, int], Callable[[int], None]]
-) -> dict[str, Any]:
-    """Renders all effects that are asked for, and the sheet; what ``summary.json`` says of them."""
-    from renderer.frames import tile_count
-
-    found, pictures = {}, []
-    for name in names(options):
-        done = task(name, tile_count(options.width_px, options.height_px))
-        picture, found[name] = render_effect(name, plan, options, done)
-        pictures.append(picture)
-    write_sheet(options.out / "gallery.jpg", pictures, [effects.EFFECTS[name].what for name in names(options)])
-    return {"effects": found, "config": dataclasses.asdict(options)}
+def effect_table(found: Mapping[str, Mapping[str, Any]]) -> Table:
+    """What each picture took."""
+    rows = [
+        (
+            name,
+            "packets" if each["packets"] else f"{len(each['features'])} features",
+            f"{each['wall_s']:.2f}",
+            f"{each['samples_per_s'] / 1e6:.2f}",
+        )
+        for name, each in found.items()
+    ]
+    return Table("", ("effect", "kernels", "seconds", "M samples/s"), rows, words=2)

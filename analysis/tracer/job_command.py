@@ -7,35 +7,17 @@ Examples: python scripts/job.py scenes/assets/plane/plane_job.txt --out out/plan
 
 from __future__ import annotations
 
-import dataclasses
-
-from analysis.command.cli import bad_input, full_disk, parse
-from analysis.command.ownership import own_folder
-from analysis.storage.files import write_json
+from analysis.command.cli import parse
 from analysis.tracer.options import JobOptions
 
 
 def main() -> None:
     """Parses, renders what is missing, prints how much that was."""
     options = parse(JobOptions, __doc__ or "")
-    from analysis.tracer.jobs import prepare, run_job
+    from analysis.command.console import show
+    from analysis.tracer.run import job
 
-    with bad_input():
-        work = prepare(options)
-        own_folder(options.out, "out")
-    from analysis.command.progress import bars
-    from analysis.storage.provenance import provenance
-    from renderer.film.files import FilmError
-
-    config = dataclasses.asdict(options)
-    source = provenance(config, scene=work.settings.name, seed=options.seed)
-    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
-        rows = run_job(work, options, shown.task)
-        found = {"job": dataclasses.asdict(work.job), "settings": dataclasses.asdict(work.settings), "rows": rows}
-        write_json(options.out / "summary.json", {**found, "config": config, "provenance": source})
-    rendered, bad = (sum(row[name] for row in rows) for name in ("rendered_now", "nonfinite"))
-    frames = len(rows) * len(work.frames)
-    print(
-        f"{work.job.name}: {len(rows)} combinations, {frames} frames ({rendered} rendered now, {bad} values not finite)"
-    )
-    print(f"written to {options.out}")
+    work, found = job(options)
+    rendered, bad = (sum(row[name] for row in found["rows"]) for name in ("rendered_now", "nonfinite"))
+    counts = f"{len(found['rows'])} combinations, {len(found['rows']) * len(work.frames)} frames"
+    show(f"{work.job.name}: {counts} ({rendered} rendered now, {bad} values not finite)", f"written to {options.out}")

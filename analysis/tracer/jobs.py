@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.command.progress import Bars, Task
 from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
 from analysis.tracer.options import JobOptions
@@ -52,13 +52,13 @@ def prepare(options: JobOptions) -> Work:
     return Work(job, scene, settings, size, range(options.first_frame, end))
 
 
-def run_job(work: Work, options: JobOptions, task: Callable[[str, int], Callable[[int], None]]) -> list[dict[str, Any]]:
+def run_job(work: Work, options: JobOptions, bars: Bars) -> list[dict[str, Any]]:
     """Renders what is not on disk yet; a row per combination.
 
     Args:
         work: from :func:`prepare`.
         options: of the job.
-        task: shows how far it is.
+        bars: show how far it is.
     """
     from analysis.tracer.stills import render_stills
     from renderer.frames import pictures
@@ -69,8 +69,8 @@ def run_job(work: Work, options: JobOptions, task: Callable[[str, int], Callable
     renderer = Renderer(work.scene, threads=options.threads or None, seed=options.seed)
     rows = []
     for combination in work.job.combinations:
-        done = task(combination.name, len(work.frames))
-        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, content, done)})
+        task = bars.task(combination.name, len(work.frames))
+        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, content, task)})
     renderer.close()
     return rows
 
@@ -81,7 +81,7 @@ def _run(
     work: Work,
     options: JobOptions,
     content: str,
-    done: Callable[[int], None],
+    task: Task,
 ) -> dict[str, Any]:
     from analysis.tracer.stills import render_stills
     from renderer.frames import pictures
@@ -101,5 +101,5 @@ def _run(
     key = content_hash((plan, content))
     times_s = {number: work.settings.frame_start_s(number) for number in work.frames}
     picture = pictures(renderer, plan, *work.size_px)
-    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", key, done)
+    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", key, task)
     return {"frames": len(work.frames), "rendered_now": rendered, "nonfinite": nonfinite}

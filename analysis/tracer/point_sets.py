@@ -14,6 +14,7 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from analysis.command.progress import Task
 from analysis.tracer.options import PointSetOptions
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ def squared_error(points: Points, found: Integrands, shifts: Float[NDArray[np.fl
     return float(((found.values(moved).mean(axis=1) - found.integral) ** 2).mean())
 
 
-def measure(options: PointSetOptions, tick: Callable[[], None]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def measure(options: PointSetOptions, task: Task) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Tables of evenness, and of errors by integrand; a row a set and level."""
     from renderer.sampling.point_sets import point_set
 
@@ -127,7 +128,7 @@ def measure(options: PointSetOptions, tick: Callable[[], None]) -> tuple[pd.Data
             shifts = rng.random((options.cases, 3))
             mse = float(np.mean([squared_error(points, found, shifts) for points in sets]))
             errors.append({"set": name, "points": level, "integrand": kind, "mse": mse, "rmse": math.sqrt(mse)})
-        tick()
+        task.advance()
     return pd.DataFrame(even), pd.DataFrame(errors)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from torch import Tensor
 
+from analysis.command.progress import Task
 from analysis.storage.store import Store
 from renderer.film.files import write_image
 from renderer.film.sequence import still_path
@@ -22,7 +23,7 @@ def render_stills(
     folder: Path,
     ending: str,
     key: str,
-    done: Callable[[int], None] = lambda count: None,
+    task: Task | None = None,
 ) -> tuple[int, int]:
     """Renders the stills that are not on disk as they were made under this key.
 
@@ -31,7 +32,7 @@ def render_stills(
         times_s: animation time of each still by its number, seconds.
         folder, ending: where stills go, and their format.
         key: hash of everything that decides a still but its number and time.
-        done: called with the number of stills that are on disk.
+        task: of which a step is a still.
 
     Returns:
         How many were rendered now, and how many values of all of them, whenever rendered, were not finite.
@@ -43,13 +44,14 @@ def render_stills(
     store, rendered, nonfinite = Store(folder, key), 0, 0
     names = {number: still_path(folder, number, ending).name for number in times_s}
     store.require_own(names.values())
-    for count, (number, time_s) in enumerate(times_s.items(), 1):
+    task = task or Task()
+    for number, time_s in times_s.items():
         found = store.find(names[number])
         if found is None:
             with store.make(names[number]) as found:
                 found.facts["nonfinite"] = write_image(found.path, picture(number, time_s))
             rendered += 1
         nonfinite += found.facts["nonfinite"]
-        done(count)
+        task.advance()
     store.discard_outdated("frame*")
     return rendered, nonfinite

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.command.progress import Task
 from analysis.tracer.tiles import Picture, assembled, rendered
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def study(
     chunks: Sequence[range],
     counts: Sequence[int],
     repetitions: int,
-    tick: Callable[[], None],
+    task: Task,
 ) -> dict[str, Any]:
     """Times a picture on subsets of a cluster's workers, in turns, fits the model and lets it predict.
 
@@ -114,7 +115,7 @@ def study(
         chunks: runs of tiles.
         counts: numbers of workers; 1 is always among them.
         repetitions: turns of each.
-        tick: called after every turn.
+        task: of which a step is a turn.
 
     Returns:
         Rows for tables, the parameters of the model, and whether all pictures were the same bits.
@@ -141,7 +142,7 @@ def study(
             assembly_s.append(end - joining)
             worker_s[count].append(np.array([found[number][2] for number in range(len(chunks))]))
             images.append(image.numpy().tobytes())
-            tick()
+            task.advance()
     medians = {count: median(values) for count, values in wall_s.items()}
     chunk_s = {count: np.median(np.stack(values), axis=0) for count, values in worker_s.items()}
     cores = len(os.sched_getaffinity(0))
@@ -183,3 +184,13 @@ def _row(count: int, seconds: Sequence[float], one_s: float, model: FarmModel) -
         "modelled_s": model.seconds(count),
         "modelled_over_measured": model.seconds(count) / median(seconds),
     }
+
+
+def described(found: Mapping[str, Any]) -> str:
+    """What a study found, in one line."""
+    predicted, reported = found["predicted"], found["predicted"]["reported"]
+    beside = f" (report: {reported:.1f})" if reported else ""
+    return (
+        f"same bits from all: {found['same_bits']}; by the model {predicted['workers']} workers with a core each are "
+        f"{predicted['speedup']:.1f} times as fast as one{beside}"
+    )

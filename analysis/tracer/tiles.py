@@ -6,7 +6,7 @@ import dataclasses
 import io
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.command.progress import Task
 from analysis.storage.reference import content_hash
 from analysis.storage.source import brought, code_hash
 from analysis.storage.store import Store
@@ -157,16 +158,14 @@ def assembled(picture: Picture, chunks: Sequence[range], pixels: Sequence[NDArra
     return image
 
 
-def render_resumed(
-    client: Client, picture: Picture, options: TileOptions, done: Callable[[int], None]
-) -> tuple[Tensor, dict[str, Any]]:
+def render_resumed(client: Client, picture: Picture, options: TileOptions, task: Task) -> tuple[Tensor, dict[str, Any]]:
     """Renders what an interrupted run of the same picture has not left on disk, and puts the picture together.
 
     Args:
         client: of the cluster.
         picture: what to render.
         options: of the command.
-        done: told how many chunks are on disk.
+        task: of which a step is a chunk.
 
     Returns:
         The picture, and how it came about.
@@ -179,14 +178,12 @@ def render_resumed(
     names = [f"chunk{number:06d}.npz" for number in range(len(chunks))]
     store.require_own(names)
     missing = [number for number, name in enumerate(names) if store.find(name) is None]
-    count = len(chunks) - len(missing)
-    done(count)
+    task.reach(len(chunks) - len(missing))
     start = time.perf_counter()
     for place, (pixels, rays, seconds) in rendered(client, picture, [chunks[number] for number in missing]):
         with store.make(names[missing[place]]) as making:
             np.savez(making.path, pixels=pixels, seconds=seconds, kinds=list(rays), rays=list(rays.values()))
-        count += 1
-        done(count)
+        task.advance()
     wall_s, rays, seconds, parts = time.perf_counter() - start, Counter[str](), 0.0, []
     for name in names:
         content = store.read(name)

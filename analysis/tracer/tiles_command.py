@@ -7,14 +7,8 @@ Examples: python scripts/tiles.py report-one --out out/tiles
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
-
-from analysis.command.cli import bad_input, full_disk, parse
-from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.cli import parse
 from analysis.command.extras import require_extra
-from analysis.command.ownership import own_folder
-from analysis.storage.files import write_json
 from analysis.tracer.options import TileOptions
 
 
@@ -22,40 +16,16 @@ def main() -> None:
     """Parses, renders or measures, prints what it took."""
     options = parse(TileOptions, __doc__ or "")
     require_extra("study")
-    from analysis.tracer.tiles import chunks_of, picture_of, render_resumed
-
-    farm = ClusterOptions(workers=max(options.study)) if options.study else options.farm
-    with bad_input():
-        picture = picture_of(options, 1 if options.study else farm.threads)
-        own_folder(options.out, "out")
     import pandas as pd
 
-    from analysis.command.console import frame_table
-    from analysis.command.progress import bars
-    from analysis.storage.provenance import provenance
-    from analysis.tracer.tile_speedup import study
-    from renderer.film.files import FilmError, write_image
+    from analysis.command.console import frame_table, show
+    from analysis.tracer.run import tiles
+    from analysis.tracer.tile_speedup import described
 
-    config = dataclasses.asdict(options)
-    chunks = chunks_of(picture, options.chunk_tiles)
-    found: dict = {"config": config, "provenance": provenance(config, scene=picture.scene, seed=options.seed)}
-    with bad_input(), connected(farm) as client, full_disk(options.out, FilmError), bars() as shown:
-        if options.study:
-            turns = len({1, *options.study}) * options.repetitions
-            done, number = shown.task("turns", turns), itertools.count(1)
-            found |= study(client, picture, chunks, options.study, options.repetitions, lambda: done(next(number)))
-        else:
-            image, facts = render_resumed(client, picture, options, shown.task("chunks", len(chunks)))
-            found |= {**facts, "nonfinite": write_image(options.out / f"{picture.scene}.png", image)}
-            write_image(options.out / f"{picture.scene}.exr", image)
-        write_json(options.out / "summary.json", found)
+    found = tiles(options)
     if options.study:
-        frame_table(pd.DataFrame(found["rows"]))
-        predicted, reported = found["predicted"], found["predicted"]["reported"]
-        beside = f" (report: {reported:.1f})" if reported else ""
-        print(f"same bits from all: {found['same_bits']}; by the model {predicted['workers']} workers with a core each "
-              f"are {predicted['speedup']:.1f} times as fast as one{beside}")  # fmt: skip
+        show(frame_table(pd.DataFrame(found["rows"])), described(found))
     else:
-        print(f"{found['chunks']} chunks ({found['chunks_rendered_now']} now) in {found['wall_s']:.1f} s, "
-              f"{found['worker_s']:.1f} s of workers")  # fmt: skip
-    print(f"written to {options.out}")
+        chunks = f"{found['chunks']} chunks ({found['chunks_rendered_now']} now)"
+        show(f"{chunks} in {found['wall_s']:.1f} s, {found['worker_s']:.1f} s of workers")
+    show(f"written to {options.out}")

@@ -11,6 +11,7 @@ import pytest
 import analysis.storage.invariants
 from analysis.bench.cycles import cycles, synthetic_trace
 from analysis.command.cli import BrokenInvariants
+from analysis.command.progress import Task
 from analysis.cost_report.measurement import measure_cells, prepare, watch_memory
 from analysis.cost_report.options import MeasurementOptions
 from analysis.perception import adaptive
@@ -62,11 +63,12 @@ def test_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.
 
 
 def test_a_suitability_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    import analysis.suitability.page as page
     import analysis.suitability.run as report
 
     summary = {"failures": {}, "runs": 1, "runs_done": 1, "broken_invariants": ["tsar-fly-by"]}
     monkeypatch.setattr(report, "study", lambda options: (summary, {}))
-    monkeypatch.setattr(report, "console_tables", lambda tables: [])
+    monkeypatch.setattr(page, "shown_tables", lambda tables: [])
     assert call_script("suitability.py", monkeypatch, "--out", str(tmp_path)) == 3
     assert last_line(capsys) == "error: invariants are broken in 1 runs: tsar-fly-by"
 
@@ -83,9 +85,9 @@ def test_a_measurement_of_cost(strict: None) -> None:
     )  # fmt: skip
     scene, renderers = prepare(settings)
     with pytest.raises(BrokenInvariants):
-        measure_cells(settings, renderers)
+        measure_cells(settings, renderers, Task())
     with pytest.raises(BrokenInvariants):
-        watch_memory(settings, renderers[64], scene.duration_s)
+        watch_memory(settings, renderers[64], scene.duration_s, Task())
 
 
 def test_adaptive_rendering_before_an_observer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,5 +99,5 @@ def test_adaptive_rendering_before_an_observer(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(adaptive, "finished", finished)
     options = AdaptiveOptions(inputs=("fly-by",), scale="quick", out=tmp_path, cache=tmp_path)
     with pytest.raises(BrokenInvariants, match="in 1 runs: tsar-fly-by-b8-128px"):
-        adaptive.scores(options, lambda done: None)
+        adaptive.scores(options, Task())
     assert SCALES["quick"].config(7, TsarConfig()).batch_size == 8

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from analysis.bench.turns import BenchOptions
+from analysis.bench.options import BenchOptions
 from analysis.comparison.options import RunOptions
 from analysis.comparison.repetitions import InputsOptions
-from analysis.conversion.check import CheckOptions
+from analysis.conversion.options import CheckOptions
 from analysis.cost_report.options import CostReportOptions
 from analysis.perception.options import (
     AdaptiveOptions,
@@ -25,8 +25,14 @@ from analysis.perception.options import (
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.spectrum.options import SpectrumOptions
 from analysis.suitability.options import SuitabilityOptions
-from analysis.tracer.options import AcceleratorOptions, GalleryOptions, JobOptions, PointSetOptions, TileOptions
-from analysis.tracer.render_options import RenderOptions
+from analysis.tracer.options import (
+    AcceleratorOptions,
+    GalleryOptions,
+    JobOptions,
+    PointSetOptions,
+    RenderOptions,
+    TileOptions,
+)
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 ROOT = Path(__file__).resolve().parents[2]

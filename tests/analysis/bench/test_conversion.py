@@ -8,7 +8,7 @@ import pytest
 
 from analysis.bench import conversion as bench_conversion
 from analysis.bench.conversion import conversion, relief, write_mesh_scene, write_text_scene
-from analysis.bench.turns import BenchOptions
+from analysis.bench.options import BenchOptions
 from analysis.command.progress import bars
 from scenes.formats.conversion import load_scene_file
 

@@ -7,7 +7,8 @@ import pytest
 
 from analysis.bench.cycles import Turns, steady, synthetic_trace
 from analysis.bench.growth import EXPONENT_LIMIT, TILE_BOUNDS, exponent, exponent_row, memory_rows, tiling_row, watched
-from analysis.bench.turns import BenchOptions
+from analysis.bench.options import BenchOptions
+from analysis.command.progress import Task
 from tsar.config import TsarConfig
 from tsar.stages import Stages
 
@@ -60,7 +61,7 @@ def test_tilings_reach_every_bound(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(stages, decide=decide)
 
     monkeypatch.setattr(bench_cycles, "default_stages", counting)
-    row = tiling_row(BenchOptions(), lambda *_: None)
+    row = tiling_row(BenchOptions(), Task())
     assert sorted(bound for bound, _ in built) == sorted(TILE_BOUNDS)
     assert all(bound - 3 <= tiles <= bound for bound, tiles in built)
     assert row.repetitions == BenchOptions().repetitions
@@ -69,7 +70,7 @@ def test_tilings_reach_every_bound(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_memory_is_watched_in_a_process_of_its_own() -> None:
     shown = []
     before, resident = watched(
-        TsarConfig(batch_size=16, resolution_px=64, sdf_side=16, warmup_cycles=2), 100, shown.append
+        TsarConfig(batch_size=16, resolution_px=64, sdf_side=16, warmup_cycles=2), 100, Task(show=shown.append)
     )
     assert len(resident) == 5 and shown == [0, 20, 40, 60, 80, 100]
     assert min(resident) > before > 10e6
@@ -81,7 +82,7 @@ def test_memory_that_grows_misses_its_target(monkeypatch: pytest.MonkeyPatch) ->
     def rows(last: int):
         grown = [200_000_000] * 19 + [last]
         monkeypatch.setattr(bench_growth, "watched", lambda *_: (100_000_000, grown))
-        return list(memory_rows(BenchOptions(cycles=400), lambda done: None))
+        return list(memory_rows(BenchOptions(cycles=400), Task()))
 
     flat, per_megapixel = rows(201_000_000)
     assert flat.met is True and flat.ours == pytest.approx(1.005)

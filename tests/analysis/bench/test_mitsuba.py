@@ -9,9 +9,11 @@ from analysis.bench import mitsuba as bench_mitsuba
 from analysis.bench import shading as bench_shading
 from analysis.bench.mitsuba import VARIANTS, find_llvm, missing, still
 from analysis.bench.mitsuba_scene import mean_reflectance
+from analysis.bench.options import BenchOptions
+from analysis.bench.rows import NOT_INSTALLED
 from analysis.bench.scenes import bumpy_scene, driving_scenes, renderer_of
 from analysis.bench.shading import DRIVING_S, Still, compare, mean_difference, stills
-from analysis.bench.turns import NOT_INSTALLED, BenchOptions
+from analysis.command.progress import Task
 from scenes.canonical import ConstantTexture, Phong
 
 SMALL = BenchOptions(Path("unused"), resolution_px=64, batch_size=4, scenes=("fly-by",))
@@ -63,7 +65,7 @@ def test_the_mean_of_the_fresnel_term_is_its_integral() -> None:
 def test_rows_of_one_picture_beside_all_variants() -> None:
     scene = bumpy_scene(3)
     picture = Still("bumpy", scene, 0.0, "direct", 2, VARIANTS)
-    rows = list(compare(picture, renderer_of(scene, SMALL), SMALL, lambda *_: None))
+    rows = list(compare(picture, renderer_of(scene, SMALL), SMALL, Task()))
     assert [row.name for row in rows] == ["bumpy, llvm_ad_rgb", "bumpy, scalar_rgb"]
     assert [row.target for row in rows] == [1.2, 3.0]
     for row in rows:
@@ -82,7 +84,7 @@ def test_without_mitsuba_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench_mitsuba, "installed", lambda module: False)
     scene = bumpy_scene(3)
     picture = bench_shading.Still("bumpy", scene, 0.0, "direct", 2, VARIANTS)
-    rows = list(compare(picture, renderer_of(scene, SMALL), SMALL, lambda *_: None))
+    rows = list(compare(picture, renderer_of(scene, SMALL), SMALL, Task()))
     assert [row.note for row in rows] == [NOT_INSTALLED] * 2
     assert all(row.peer is None and row.met is None and row.ours > 0.0 for row in rows)
 

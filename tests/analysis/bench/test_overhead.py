@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from analysis.bench.cycles import synthetic_trace
+from analysis.bench.options import BenchOptions
 from analysis.bench.overhead import (
     CONTROL,
     MEASURED_CYCLES,
@@ -15,7 +16,8 @@ from analysis.bench.overhead import (
     stage_rows,
     transform_row,
 )
-from analysis.bench.turns import NOT_INSTALLED, BenchOptions
+from analysis.bench.rows import NOT_INSTALLED
+from analysis.command.progress import Task
 from tsar import haar
 from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton
@@ -56,7 +58,7 @@ def test_a_run_is_measured_past_its_warm_up() -> None:
         return synthetic_trace(batch)
 
     config = TsarConfig(batch_size=16, resolution_px=64, sdf_side=16, cache_size=64, warmup_cycles=2)
-    found = measured_cycles(config, trace)
+    found = measured_cycles(config, trace, Task())
     assert len(found) == MEASURED_CYCLES and found[0].counters["primary_rays"] == 16 * 256
     assert set(CONTROL) < set(found[0].stage_s)
     assert asked[-MEASURED_CYCLES:] == list(range(MEASURED_CYCLES))
@@ -87,8 +89,8 @@ def test_pywavelets_finds_the_coefficients_that_ours_finds() -> None:
 
 def test_the_transform_is_measured_with_and_without_a_peer(monkeypatch: pytest.MonkeyPatch) -> None:
     options = BenchOptions(batch_size=8)
-    ticks = []
-    row = transform_row(options, lambda *_: ticks.append(1))
-    assert row.target == 5.0 and row.peer and row.ratio and len(ticks) == row.repetitions == options.repetitions
+    task = Task()
+    row = transform_row(options, task)
+    assert row.target == 5.0 and row.peer and row.ratio and task.done == row.repetitions == options.repetitions
     monkeypatch.setattr("analysis.bench.overhead.installed", lambda module: False)
-    assert transform_row(options, lambda *_: None).note == NOT_INSTALLED
+    assert transform_row(options, Task()).note == NOT_INSTALLED

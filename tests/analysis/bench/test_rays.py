@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.bench import rays as bench_rays
+from analysis.bench.options import BenchOptions
 from analysis.bench.rays import (
     CLOSEST_TARGETS,
     Rays,
@@ -19,17 +20,13 @@ from analysis.bench.rays import (
     seen,
     shadow_rays,
 )
+from analysis.bench.rows import NOT_INSTALLED, Row
 from analysis.bench.scenes import LIGHT, bumpy_sphere
-from analysis.bench.turns import NOT_INSTALLED, BenchOptions, Row
+from analysis.command.progress import Bars, Task
 from renderer.rays.queries import RayQueries
 
 SMALL = BenchOptions(Path("unused"), resolution_px=256, batch_size=128, subdivisions=(4,), repetitions=7)
 MESH = bumpy_sphere(4)
-
-
-class NoBars:
-    def task(self, label: str, total: int):
-        return lambda done: None
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +92,7 @@ def test_random_rays_are_as_often_up_as_down() -> None:
 
 
 def test_rows_of_both_groups() -> None:
-    rows = [*coherent(SMALL, NoBars()), *incoherent(SMALL, NoBars())]  # pyright: ignore[reportArgumentType]
+    rows = [*coherent(SMALL, Bars()), *incoherent(SMALL, Bars())]
     assert [row.name for row in rows] == [
         f"{kind}, 5,120 triangles" for kind in ("camera rays", "shadow rays", "glossy bounces", "random directions")
     ]
@@ -106,5 +103,5 @@ def test_rows_of_both_groups() -> None:
 
 def test_without_embree_the_row_says_so(ours: RayQueries) -> None:
     question = bench_rays.Question("camera rays", framelet_calls(SMALL)[:1], 3.0)
-    row = compare(Row("coherent", "a", "M rays/s", 0.0, "Embree"), question, ours, None, 7)
+    row = compare(Row("coherent", "a", "M rays/s", 0.0, "Embree"), question, ours, None, 7, Task())
     assert row.note == NOT_INSTALLED and row.peer is None and row.met is None and row.ours > 0.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from analysis.bench.options import BenchOptions
 from analysis.bench.scenes import bumpy_scene, bumpy_sphere, camera_rays, driving_scenes, in_rows, morton_batches
-from analysis.bench.turns import BenchOptions
 from renderer.trace import Renderer
 from tsar.selection import sample_positions
 

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.command.console import console, frame_table
+from analysis.command.console import frame_table, show
 from analysis.command.progress import bars
 from analysis.comparison import run_command
 from tests.scripts.commands import call_script
@@ -19,15 +19,14 @@ ODD = "a[/b] [red]c :smile: [bold"
 
 
 def test_text_is_printed_as_it_is(capsys: pytest.CaptureFixture) -> None:
-    console().print(f"written to {ODD}")
-    frame_table(pd.DataFrame({ODD: [ODD]}), title=f"of {ODD}")
+    show(f"written to {ODD}", frame_table(pd.DataFrame({ODD: [ODD]}), title=f"of {ODD}"))
     printed = capsys.readouterr().out
     assert f"written to {ODD}" in printed and f"of {ODD}" in printed and printed.count(ODD) == 4
 
 
 def test_bars_show_names_as_they_are(capsys: pytest.CaptureFixture) -> None:
     with bars() as shown:
-        shown.task(ODD, 2)(1)
+        shown.task(ODD, 2).advance()
         shown.say(f"made {ODD}")
     assert f"made {ODD}" in capsys.readouterr().err
 

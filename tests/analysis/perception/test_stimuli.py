@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import analysis.metrics.perceptual
+from analysis.command.progress import Bars
 from analysis.metrics.display_model import DisplayModel
 from analysis.perception.stimuli import differences
 from tests.analysis.perception.builders import LEVELS, write_stimuli
@@ -30,7 +31,7 @@ def test_scores_are_kept_and_a_damaged_one_is_made_again(
 
     def found() -> tuple[pd.DataFrame, int]:
         scored.clear()
-        return differences(folder, shown, lambda: None), len(scored)
+        return differences(folder, shown, Bars()), len(scored)
 
     whole, made = found()
     assert made == len(LEVELS) - 1 and whole["jod"].iloc[-1] == 0.0 and (whole["jod"].iloc[:-1] > 0.0).all()

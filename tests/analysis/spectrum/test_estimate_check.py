@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from analysis.command.progress import Task
 from analysis.spectrum.estimate_check import (
     Rates,
     Tiles,
@@ -146,7 +147,7 @@ SMALL = SpectrumOptions(
 
 
 def test_an_example_in_physical_units() -> None:
-    example = measure_example(SMALL, disk)
+    example = measure_example(SMALL, disk, Task())
     assert example.index == int(interleave(torch.tensor(1), torch.tensor(2)))
     assert example.place(512) == (128.0, 256.0, 128.0)
     assert example.unit == (4 / 512, 2.0) and example.power.shape == (17, 17)
@@ -158,16 +159,16 @@ def test_an_example_in_physical_units() -> None:
     slow, fast = found["realizable"]["refreshes_per_s"]
     assert fast == pytest.approx(1 / SMALL.cycle_s()) and slow == pytest.approx(fast / 16)
     assert [row["tau"] for row in found["other_tau"]] == [0.003, 0.01, 0.03, 0.1]
-    by_index = measure_example(SpectrumOptions(samples=32, frames=8, tile_level=2, tile_index=9), disk)
+    by_index = measure_example(SpectrumOptions(samples=32, frames=8, tile_level=2, tile_index=9), disk, Task())
     assert by_index.index == 9 and by_index.place(512) == (128.0, 256.0, 128.0)
 
 
 def test_tiles_of_an_input_and_the_check() -> None:
-    calls = []
-    first = measure_input(SMALL, 0, disk, 6.0, lambda: calls.append(1))
-    assert len(calls) == 4 * 16 and first.phi.shape == first.phi_last.shape == (8, 9, 2)
+    task = Task()
+    first = measure_input(SMALL, 0, disk, 6.0, task)
+    assert task.done == 4 * 16 and first.phi.shape == first.phi_last.shape == (8, 9, 2)
     assert first.theta.tolist() == Rates((4, 2, 1), (2, 4, 8)).densities(64, 16).tolist()
-    again, other = measure_input(SMALL, 0, disk, 6.0), measure_input(SMALL, 1, disk, 6.0)
+    again, other = measure_input(SMALL, 0, disk, 6.0, Task()), measure_input(SMALL, 1, disk, 6.0, Task())
     assert torch.equal(first.norm, again.norm) and not torch.equal(first.norm, other.norm)
     found = check_estimate({"a": first, "b": other}, 0.01)
     assert found["all"]["tiles"] == 16 and found["all"]["pairs"] == 16 * 9

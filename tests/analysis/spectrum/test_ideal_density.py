@@ -7,6 +7,7 @@ from math import pi
 import pytest
 import torch
 
+from analysis.command.progress import Task
 from analysis.spectrum.ideal_density import (
     ideal_band,
     octant_power,
@@ -121,9 +122,9 @@ def test_threshold_means_the_same_at_any_rate() -> None:
 
 def test_volumes_hold_compressed_luminance_of_the_tile() -> None:
     level, index = torch.tensor([2, 2]), torch.tensor([0, 9])
-    calls = []
-    volume = tile_volume(disk, level, index, 16, [0.0, 0.5], lambda: calls.append(1))
-    assert volume.shape == (2, 2, 256) and len(calls) == 2
+    task = Task()
+    volume = tile_volume(disk, level, index, 16, [0.0, 0.5], task)
+    assert volume.shape == (2, 2, 256) and task.done == 2
     position = sample_positions(level, index, 16)
     batch = FrameletBatch(level, index, position, 0.5)
     torch.testing.assert_close(volume[:, 1], compressed_luminance(disk(batch).color))

@@ -14,6 +14,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from analysis.command.progress import Task
 from analysis.storage.journal import Journal
 from analysis.storage.reference import Reference, ReferenceSpec, obtain
 
@@ -35,19 +36,19 @@ class Renderer:
 
 
 def get(cache: Path, render: Callable[[float], Tensor], spec: ReferenceSpec = SPEC) -> Reference:
-    return obtain(cache, spec, render, lambda done, total: None)
+    return obtain(cache, spec, render)
 
 
 def test_renders_every_time_once_and_reuses(tmp_path: Path) -> None:
     first, shown = Renderer(), []
-    found = obtain(tmp_path / "new", SPEC, first, lambda done, total: shown.append((done, total)))
+    found = obtain(tmp_path / "new", SPEC, first, Task(show=shown.append))
     assert np.allclose(first.times, [0.5, 0.6, 0.7, 0.8, 0.9]) and found.rendered == 5
-    assert shown == [(i, 5) for i in range(6)]
+    assert shown == list(range(6))
     expected = np.stack([(torch.arange(48.0).reshape(4, 4, 3) / 64 + t).numpy() for t in first.times])
     assert found.images.dtype == np.float16 and np.array_equal(found.images, expected.astype(np.float16))
     second, shown = Renderer(), []
-    again = obtain(tmp_path / "new", SPEC, second, lambda done, total: shown.append((done, total)))
-    assert second.times == [] and again.rendered == 0 and shown == [(5, 5)]
+    again = obtain(tmp_path / "new", SPEC, second, Task(show=shown.append))
+    assert second.times == [] and again.rendered == 0 and shown == [5]
     assert np.array_equal(again.images, found.images)
     assert Journal(tmp_path / "new" / f"{SPEC.key}.journal").rows()[0]["resolution_px"] == 4
 

@@ -15,6 +15,7 @@ from PIL import Image
 
 import analysis.study.evaluation as evaluation
 from analysis.command.cluster import ClusterOptions
+from analysis.command.progress import Task
 from analysis.study.cases import Case, Scale, framed_config
 from analysis.study.evaluation import Place, evaluate, finished, source_of_results, times_of
 from analysis.study.farm import run_cases
@@ -174,7 +175,7 @@ def test_two_processes_give_what_one_gives_and_a_failure_stops_no_other(
     cases = [case(), bad, case("framed"), case("afr"), case()]
     many = Place(tmp_path / "many", references)
     told: list[int] = []
-    keys, failures = run_cases(cases, many, ClusterOptions(workers=2), told.append)
+    keys, failures = run_cases(cases, many, ClusterOptions(workers=2), Task(show=told.append))
     assert set(failures) == {bad} and "nothing is shown yet" in failures[bad]
     assert told == [0, 1, 2, 3, 4], "one that occurs twice is one"
     for one in (case(), case("framed"), case("afr")):

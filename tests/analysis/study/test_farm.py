@@ -17,6 +17,7 @@ import psutil
 import pytest
 
 from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.progress import Task
 from analysis.study import farm
 from analysis.study.cases import Case, Scale
 from analysis.study.evaluation import Place
@@ -64,7 +65,7 @@ def test_runs_whose_workers_die_fail_with_the_reason(place: Place, monkeypatch: 
     monkeypatch.setattr(farm, "_prepare", exit_as_a_run)
     asked, told = cases(2), list[int]()
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        _, failures = run_cases(asked, place, ClusterOptions(workers=1), told.append)
+        _, failures = run_cases(asked, place, ClusterOptions(workers=1), Task(show=told.append))
     assert set(failures) == set(asked) and told[-1] == 2
     assert all("KilledWorker" in reason for reason in failures.values()), failures
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.command.progress import Task
 from analysis.tracer.point_sets import (
     INTEGRANDS,
     SETS,
@@ -71,9 +72,9 @@ def test_random_points_err_by_their_variance() -> None:
 
 def test_tables_and_slopes() -> None:
     options = PointSetOptions(levels=(1, 8, 64, 216), cases=256, sets_of_each=8)
-    turns = []
-    even, errors = measure(options, lambda: turns.append(1))
-    assert len(even) == len(SETS) * 4 == len(turns) and len(errors) == len(SETS) * 4 * 3
+    task = Task()
+    even, errors = measure(options, task)
+    assert len(even) == len(SETS) * 4 == task.done and len(errors) == len(SETS) * 4 * 3
     fitted = slopes(errors).set_index("set")
     for kind in INTEGRANDS:
         assert fitted.loc["random", kind] == pytest.approx(-1.0, abs=0.25)

@@ -14,6 +14,7 @@ import pytest
 import torch
 
 from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.progress import Task
 from analysis.tracer.tile_speedup import FarmModel, fitted, study
 from analysis.tracer.tiles import (
     Picture,
@@ -97,8 +98,8 @@ def test_an_interrupted_picture_goes_on_where_it_stopped(client, expected, tmp_p
     options = TileOptions("quad-light", 70, 50, 8, seed=3, chunk_tiles=4, out=tmp_path)
     picture = picture_of(options, threads=1)
     assert picture == PICTURE
-    shown: list[int] = []
-    image, facts = render_resumed(client, picture, options, shown.append)
+    shown = list[int]()
+    image, facts = render_resumed(client, picture, options, Task(show=shown.append))
     assert torch.equal(image, expected)
     assert (facts["chunks"], facts["chunks_rendered_now"], shown) == (5, 5, [0, 1, 2, 3, 4, 5])
     assert facts["rays"]["primary_rays"] == 20 * 256 * 8  # tiles that hang over are traced whole
@@ -106,14 +107,14 @@ def test_an_interrupted_picture_goes_on_where_it_stopped(client, expected, tmp_p
     chunks[1].unlink()
     chunks[3].write_bytes(chunks[3].read_bytes()[:-1000])
     np.savez(chunks[4], pixels=np.zeros((1, 256, 3), np.float32), seconds=1.0, kinds=["primary_rays"], rays=[7])
-    again, facts = render_resumed(client, picture, options, shown.append)
+    again, facts = render_resumed(client, picture, options, Task(show=shown.append))
     assert facts["chunks_rendered_now"] == 3 and torch.equal(again, expected)
     assert facts["rays"]["primary_rays"] == 20 * 256 * 8
     said = capsys.readouterr().err
     assert [str(file) in said for file in chunks] == [False, False, False, True, True]
     (tmp_path / "chunks" / "chunk-notes.md").write_text("mine")
     larger = dataclasses.replace(options, chunk_tiles=7)
-    assert render_resumed(client, picture, larger, shown.append)[1]["chunks_rendered_now"] == 3
+    assert render_resumed(client, picture, larger, Task(show=shown.append))[1]["chunks_rendered_now"] == 3
     left = sorted(path.name for path in (tmp_path / "chunks").iterdir())
     assert left == ["chunk-notes.md", "chunk000000.npz", "chunk000001.npz", "chunk000002.npz", "files.journal"]
     assert "2 files of an earlier run" in capsys.readouterr().err
@@ -129,7 +130,7 @@ def test_a_chunk_that_fails_is_tried_again(client, expected) -> None:
     """Such as for want of memory that others have for a moment."""
 
     def fail_twice() -> None:
-        import analysis.tiles
+        import analysis.tracer.tiles
 
         real, left = analysis.tracer.tiles._renderer, [2]
 
@@ -147,7 +148,7 @@ def test_a_chunk_that_fails_is_tried_again(client, expected) -> None:
 
 
 def test_a_study_counts_and_compares(client) -> None:
-    found = study(client, PICTURE, chunks_of(PICTURE, 5), (2,), 1, lambda: None)
+    found = study(client, PICTURE, chunks_of(PICTURE, 5), (2,), 1, Task())
     assert [row["workers"] for row in found["rows"]] == [1, 2] and found["same_bits"]
     # how near the model comes is for scripts/tiles.py to say: here other work may run beside it
     assert found["rows"][0]["speedup"] == 1.0

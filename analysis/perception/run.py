@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from itertools import count, product
+from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from analysis.command.cli import InputError
+from analysis.command.cli import InputError, bad_input, full_disk
+from analysis.command.ownership import own_folder
+from analysis.command.progress import Bars, bars
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
 from analysis.perception.observers import TASK, drawn_observers, simulated_trials
@@ -24,13 +26,14 @@ from analysis.perception.options import (
 )
 from analysis.perception.protocol import Session
 from analysis.perception.server import serving
-from analysis.perception.stimuli import differences, read_manifest, render_stimuli
+from analysis.perception.stimuli import differences, render_stimuli
 from analysis.perception.trials import CONDITIONS, checked_trials
-from analysis.storage.files import atomic
+from analysis.storage.files import atomic, write_table
+from analysis.storage.summary import write_summary
 from analysis.tracer.options import LEVELS
 
-Task = Callable[[str, int], Callable[[int], None]]
 Found = tuple[dict[str, Any], str]
+Options = StimuliOptions | SimulateOptions | ServeOptions | AdaptiveOptions | AnalyseOptions | RecoverOptions
 
 SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
 """Noise of a stimulus, JOD, that the sweep of the observer covers."""
@@ -38,9 +41,33 @@ SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
 POWER_OBSERVERS, POWER_ANSWERS = (6, 12, 24, 48), (4, 12)
 
 
-def stimuli(options: StimuliOptions, task: Task) -> Found:
+def run(options: Options) -> str:
+    """Runs one step of the study and writes its summary; what there is to say about it.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    from renderer.film.files import FilmError
+
+    steps: dict[type, Callable[[Any, Bars], Found]] = {
+        StimuliOptions: stimuli,
+        SimulateOptions: simulate,
+        ServeOptions: serve,
+        AdaptiveOptions: adaptive,
+        AnalyseOptions: analyse,
+        RecoverOptions: recover,
+    }
+    with bad_input():
+        own_folder(options.out, "out")
+    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
+        found, text = steps[type(options)](options, shown)
+        write_summary(options.out, found, options, seed=options.seed)
+    return text
+
+
+def stimuli(options: StimuliOptions, bars: Bars) -> Found:
     """Renders stimuli and their manifest."""
-    manifest = render_stimuli(options, task)
+    manifest = render_stimuli(options, bars)
     rows = manifest["stimuli"]
     rendered, frames = sum(row["rendered_now"] for row in rows), sum(len(row["files"]) for row in rows)
     summary = {"stimuli": len(rows), "frames": frames, "rendered_now": rendered}
@@ -48,14 +75,12 @@ def stimuli(options: StimuliOptions, task: Task) -> Found:
     return summary, f"{len(rows)} stimuli, {frames} frames ({rendered} rendered now)"
 
 
-def simulate(options: SimulateOptions, task: Task) -> Found:
+def simulate(options: SimulateOptions, bars: Bars) -> Found:
     """Scores stimuli in JOD and has simulated observers answer."""
-    done, number = task("JOD", len(read_manifest(options.stimuli)["stimuli"])), count(1)
-    jod = differences(options.stimuli, options.display, lambda: done(next(number)))
+    jod = differences(options.stimuli, options.display, bars)
     people = drawn_observers(options.observers, options.seed, options.sensitivity_spread, options.lapse_mean)
     trials = simulated_trials(jod, people, options.repetitions, options.seed, options.sigma_jod)
-    with atomic(options.out / "jod.csv") as path:
-        jod.to_csv(path, index=False)
+    write_table(options.out / "jod.csv", jod)
     with atomic(options.out / "trials-simulated.parquet") as path:
         trials.to_parquet(path, index=False)
     sweep = []
@@ -65,8 +90,7 @@ def simulate(options: SimulateOptions, task: Task) -> Found:
             row = analyses.fit_row(swept.loc[swept["scene"] == scene], 0, options.seed)
             sweep.append({"sigma_jod": sigma, "scene": scene, **row})
     table = pd.DataFrame(sweep)
-    with atomic(options.out / "sigma_sweep.csv") as path:
-        table.to_csv(path, index=False)
+    write_table(options.out / "sigma_sweep.csv", table)
     from analysis.page.figures import save
 
     save(plots.sweep_figure(table, list(dict.fromkeys(jod["scene"]))), options.out / "sigma_sweep.png")
@@ -80,25 +104,25 @@ def simulate(options: SimulateOptions, task: Task) -> Found:
     return found, f"{len(trials)} trials of {len(people)} simulated observers ({TASK}), sigma {options.sigma_jod:g} JOD"
 
 
-def serve(options: ServeOptions, task: Task, say: Callable[[str], None]) -> Found:
+def serve(options: ServeOptions, bars: Bars) -> Found:
     """Shows trials to a person until all are answered, or until this is interrupted."""
     with Session(options.out, options.stimuli, options.observer, options.repetitions, options.seed) as session:
-        _answered(session, options, task, say)
+        _answered(session, options, bars)
     table = session.table()
     late = int(np.count_nonzero(table["dropped_frames"].to_numpy() > 0))
     found = {"observer": options.observer, "trials": len(session.trials), "answered": len(table), "with_dropped": late}
     return found, f"{len(table)} of {len(session.trials)} trials answered, {late} with late frames"
 
 
-def _answered(session: Session, options: ServeOptions, task: Task, say: Callable[[str], None]) -> None:
-    done = task("answers", len(session.trials))
-    done(len(session.answers))
+def _answered(session: Session, options: ServeOptions, bars: Bars) -> None:
+    task = bars.task("answers", len(session.trials))
+    task.reach(len(session.answers))
     try:
         with serving(session, options.port, options.break_every) as address:
-            say(f"open {address} in a browser; Ctrl-C ends, and the same command goes on")
+            bars.say(f"open {address} in a browser; Ctrl-C ends, and the same command goes on")
             while session.current is not None:
                 time.sleep(0.2)
-                done(len(session.answers))
+                task.reach(len(session.answers))
                 if session.fault is not None:
                     time.sleep(1.0)  # for the page to hear of it
                     raise session.fault
@@ -107,15 +131,14 @@ def _answered(session: Session, options: ServeOptions, task: Task, say: Callable
         pass  # answers are on disk
 
 
-def adaptive(options: AdaptiveOptions, task: Task) -> Found:
+def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
     """Puts TSAR and the framed renderer before the same observer."""
     from analysis.perception.adaptive import judged, scores, thresholds
 
-    table = judged(scores(options, task("runs", 12 * len(options.inputs))), options.sigma_jod)
+    table = judged(scores(options, bars.task("runs", 12 * len(options.inputs))), options.sigma_jod)
     found = thresholds(table)
     for name, rows in (("adaptive", table), ("thresholds", found)):
-        with atomic(options.out / f"{name}.csv") as path:
-            rows.to_csv(path, index=False)
+        write_table(options.out / f"{name}.csv", rows)
     lines = [
         f"{row['input']}: TSAR noticed at batch {row['noticed_at']}, preferred to framed at {row['preferred_at']}, "
         f"framed preferred at {row['framed_preferred_at']}"
@@ -124,17 +147,16 @@ def adaptive(options: AdaptiveOptions, task: Task) -> Found:
     return {"rows": table.to_dict("records"), "thresholds": found.to_dict("records")}, "\n".join(lines)
 
 
-def recover(options: RecoverOptions, task: Task) -> Found:
+def recover(options: RecoverOptions, bars: Bars) -> Found:
     """Fits answers drawn from known functions."""
     cases = list(product(options.jnds, options.sigmas, options.lapses))
-    done, rows = task("functions", len(cases)), []
+    task, rows = bars.task("functions", len(cases)), []
     for case in cases:
         sizes = options.trials, options.experiments, options.bootstraps
         rows.append(analyses.recovery(LEVELS, *case, *sizes, options.seed))
-        done(len(rows))
+        task.advance()
     table = pd.DataFrame(rows)
-    with atomic(options.out / "recovery.csv") as path:
-        table.to_csv(path, index=False)
+    write_table(options.out / "recovery.csv", table)
     lines = [
         f"JND {row['jnd']:g}, width {row['sigma']:g} octaves, lapses {row['lapse']:g}: the 95 % interval holds it in "
         f"{100 * row['coverage']:.1f} % ({100 * row['coverage_low']:.1f} – {100 * row['coverage_high']:.1f}), "
@@ -144,20 +166,20 @@ def recover(options: RecoverOptions, task: Task) -> Found:
     return {"rows": rows}, "\n".join(lines)
 
 
-def analyse(options: AnalyseOptions, task: Task) -> Found:
+def analyse(options: AnalyseOptions, bars: Bars) -> Found:
     """Fits, tests, power and figures from a table of trials."""
     try:
         table = pd.read_parquet(options.trials)
     except (OSError, ValueError) as error:
         raise InputError(f"trials: {options.trials}: cannot be read as Parquet ({error})") from None
     trials, kind = checked_trials(table, str(options.trials))
-    steps = task("analysis", 4)
+    task = bars.task("analysis", 4)
     fitted = analyses.fits(trials, options.bootstraps, options.seed, options.psignifit)
-    steps(1)
+    task.advance()
     tested = analyses.comparisons(trials)
-    steps(2)
+    task.advance()
     _figures(options, trials, fitted, kind)
-    steps(3)
+    task.advance()
     pairs = analyses.strongest(tested)
     tables = {"fits": fitted, "tests": tested, "pairs": pairs}
     if options.power_repetitions and len(set(trials["samples"])) > 1:
@@ -167,10 +189,9 @@ def analyse(options: AnalyseOptions, task: Task) -> Found:
         tables["power"] = analyses.power(
             levels, jnds, width, POWER_OBSERVERS, POWER_ANSWERS, options.power_repetitions, options.seed
         )
-    steps(4)
+    task.advance()
     for name, rows in tables.items():
-        with atomic(options.out / f"{name}.csv") as path:
-            rows.to_csv(path, index=False)
+        write_table(options.out / f"{name}.csv", rows)
     found = {name: rows.to_dict("records") for name, rows in tables.items()}
     return {"observer_kind": kind, "thesis_jnd": analyses.THESIS_JND, **found}, _text(fitted, tested, pairs, kind)
 

@@ -6,25 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
-from analysis.bench.turns import SPREAD
-from analysis.command import console as tables
+from analysis.bench.rows import SPREAD
+from analysis.command.console import Table
 from analysis.storage.store import read_json
-
-_WIDTH = 150
-"""Characters a line where the output is not a terminal."""
 
 _ROW = {"group": str, "name": str, "unit": str, "ours": float | None, "less_is_better": bool}
 """What a row of a stored benchmark must hold to be compared."""
 _MET = {True: "yes", False: "NO", None: ""}
-
-
-def console() -> Console:
-    """Standard output, wide enough for a row where it goes into a file."""
-    shown = tables.console()
-    return shown if shown.is_terminal else tables.console(_WIDTH)
 
 
 def figure(value: float | None) -> str:
@@ -40,28 +28,22 @@ def rows_table(found: Mapping[str, Any]) -> Table:
     Args:
         found: its content.
     """
-    table = Table(title=_title(found), title_justify="left", caption=_caption(found), caption_justify="left")
-    for name in ("group", "name", "unit", "ours", "peer", "ratio", "spread", "target", "met"):
-        table.add_column(name, justify="left" if name in ("group", "name", "unit") else "right")
-    last = ""
-    for row in found["rows"]:
-        if last not in ("", row["group"]):
-            table.add_section()
-        last = row["group"]
-        spread = row["spread"]
-        peer = " ".join(part for part in (figure(row["peer"]), row["peer_name"]) if part)
-        table.add_row(
+    header = ("group", "name", "unit", "ours", "peer", "ratio", "spread", "target", "met")
+    rows = [
+        (
             row["group"],
             row["name"],
             row["unit"],
             figure(row["ours"]),
-            peer,
+            " ".join(part for part in (figure(row["peer"]), row["peer_name"]) if part),
             figure(row["ratio"]),
-            f"{figure(spread[0])} – {figure(spread[1])}" if spread else "",
+            " – ".join(figure(value) for value in row["spread"] or ()),
             figure(row["target"]),
             _MET[row["met"]],
         )
-    return table
+        for row in found["rows"]
+    ]
+    return Table(_title(found), header, rows, _caption(found), words=3, grouped=True)
 
 
 def _title(found: Mapping[str, Any]) -> str:
@@ -105,13 +87,11 @@ def comparison_table(first: Path, second: Path) -> Table:
     shared = [key for key in before if key in after]
     if not shared:
         raise ValueError(f"compare: {str(first)!r} and {str(second)!r} share no row")
-    table = Table(title=f"{first} against {second}", title_justify="left")
-    for name in ("group", "name", "unit", "first", "second", "ratio"):
-        table.add_column(name, justify="left" if name in ("group", "name", "unit") else "right")
+    rows = []
     for key in shared:
         a, b = before[key], after[key]
-        table.add_row(*key, a["unit"], figure(a["ours"]), figure(b["ours"]), figure(better_by(a, b)))
-    return table
+        rows.append((*key, a["unit"], figure(a["ours"]), figure(b["ours"]), figure(better_by(a, b))))
+    return Table(f"{first} against {second}", ("group", "name", "unit", "first", "second", "ratio"), rows, words=3)
 
 
 def better_by(before: Mapping[str, Any], after: Mapping[str, Any]) -> float | None:

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from analysis.bench.turns import GROUPS, BenchOptions, Row, counted, limit_row, limited_row, rate_row
+from analysis.bench.options import GROUPS, BenchOptions
+from analysis.bench.rows import Row, limit_row, limited_row, rate_row
+from analysis.command.progress import Task
 from analysis.command.timing import take_turns
 
 ROW = Row("coherent", "camera rays", "M rays/s", 0.0, "Embree", note="kept")
@@ -12,7 +14,7 @@ ROW = Row("coherent", "camera rays", "M rays/s", 0.0, "Embree", note="kept")
 
 def test_cases_take_turns_both_ways() -> None:
     order, rounds = [], []
-    seconds = take_turns({name: lambda name=name: order.append(name) for name in "abc"}, 3, rounds.append)
+    seconds = take_turns({name: lambda name=name: order.append(name) for name in "abc"}, 3, Task(show=rounds.append))
     assert "".join(order) == "abc" + "abccbaabc"
     assert rounds == [1, 2, 3] and all(len(values) == 3 for values in seconds.values())
 
@@ -54,14 +56,6 @@ def test_a_stored_row_says_whether_it_met_its_target() -> None:
     stored = limit_row(ROW, [1.0, 1.0], 2.0).record()
     wanted = {"group", "name", "unit", "ours", "peer_name", "peer", "ratio", "spread", "target", "met", "repetitions"}
     assert wanted <= set(stored) and stored["met"] is True
-
-
-def test_a_bar_moves_on_by_one_a_call() -> None:
-    shown = []
-    tick = counted(shown.append)
-    tick()
-    tick(17)
-    assert shown == [1, 2]
 
 
 @pytest.mark.parametrize(

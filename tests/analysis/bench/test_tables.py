@@ -1,14 +1,13 @@
 """The benchmark as a table, and two of them compared."""
 
-import io
 import json
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
-from analysis.bench.table import better_by, comparison_table, figure, rows_table
-from analysis.bench.turns import SPREAD, Row, limit_row, rate_row
+from analysis.bench.rows import SPREAD, Row, limit_row, rate_row
+from analysis.bench.tables import better_by, comparison_table, figure, rows_table
+from analysis.command.console import Table, show
 
 RATE = rate_row(Row("coherent", "camera rays", "M rays/s", 0.0, "Embree"), 30.0, [1.0] * 7, [3.5] * 7, 3.0)
 LIMIT = limit_row(Row("growth", "cycle", "exponent", 0.0, "limit", note="16: 2 ms"), [1.2] * 7, 1.05)
@@ -19,10 +18,9 @@ FOUND = {
 }
 
 
-def text(table) -> str:
-    console = Console(width=150, record=True, file=io.StringIO())
-    console.print(table)
-    return console.export_text()
+def text(table: Table, capsys: pytest.CaptureFixture) -> str:
+    show(table)
+    return capsys.readouterr().out
 
 
 def write(folder: Path, name: str, *rows: Row) -> Path:
@@ -31,8 +29,8 @@ def write(folder: Path, name: str, *rows: Row) -> Path:
     return path
 
 
-def test_a_table_names_machine_versions_figures_and_notes() -> None:
-    shown = text(rows_table(FOUND))
+def test_a_table_names_machine_versions_figures_and_notes(capsys: pytest.CaptureFixture) -> None:
+    shown = text(rows_table(FOUND), capsys)
     for part in (
         "Some CPU, 2 cores, 23.5 GiB, load average before 0.50",
         "torch 2.13.0",
@@ -60,11 +58,11 @@ def test_a_comparison_knows_which_way_is_better() -> None:
     assert better_by(limit_row(Row("growth", "a", "s", 0.0), [1.0], 1.0).record(), {"ours": -0.1}) is None
 
 
-def test_two_files_are_compared_row_by_row(tmp_path: Path) -> None:
+def test_two_files_are_compared_row_by_row(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     first = write(tmp_path, "a.json", RATE, LIMIT)
     faster = rate_row(Row("coherent", "camera rays", "M rays/s", 0.0), 45.0, [1.0] * 7, None)
     second = write(tmp_path, "b.json", faster)
-    shown = text(comparison_table(first, second))
+    shown = text(comparison_table(first, second), capsys)
     assert "1.5" in next(line for line in shown.splitlines() if "camera rays" in line)
     assert "exponent" not in shown
 

@@ -1,7 +1,11 @@
-"""Figures of point sets, after figures 4, 5, 7 and 9 of the motion-blur perception thesis; computes nothing."""
+"""Figures of accelerators and of point sets; computes nothing.
+
+Those of point sets follow figures 4, 5, 7 and 9 of the motion-blur perception thesis.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -9,7 +13,30 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "#b02a2a", "0.45")
+from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
+
+_STRUCTURE_INK = {"brute": OTHER, "kdtree": FRAMED, "bvh": ADAPTIVE}
+_LABEL = {"brute": "brute force", "kdtree": "kd-tree", "bvh": "tree of boxes"}
+_SET_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "#b02a2a", "0.45")
+
+
+def tests_figure(rows: pd.DataFrame) -> Figure:
+    """Two panels: triangle tests and node visits per ray; full lines for camera rays, broken ones for random rays."""
+    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    for axis, column, label in zip(
+        figure.subplots(1, 2), ("tests_per_ray", "visits_per_ray"), ("triangle tests", "node visits"), strict=True
+    ):
+        for name, kind in itertools.product(_STRUCTURE_INK, ("camera", "random")):
+            part = rows[(rows["structure"] == name) & (rows["rays"] == kind)]
+            if np.asarray(part[column]).max(initial=0.0) > 0.0:
+                style = "-" if kind == "camera" else "--"
+                axis.loglog(part["triangles"], part[column], style, marker="o", ms=3.5, color=_STRUCTURE_INK[name],
+                            label=f"{_LABEL[name]}, {kind} rays")  # fmt: skip
+        axis.set_xlabel("triangles")
+        axis.set_ylabel(f"{label} per ray")
+        axis.grid(True, which="major", alpha=0.3)
+        axis.legend(fontsize=7)
+    return figure
 
 
 def projections_figure(sets: Mapping[str, NDArray[np.float64]]) -> Figure:
@@ -62,7 +89,7 @@ def convergence_figure(errors: pd.DataFrame, sets: Sequence[str], kinds: Sequenc
     """Mean squared error against the number of points, a panel an integrand."""
     figure = Figure(figsize=(4.0 * len(kinds), 3.6), layout="constrained")
     for axis, kind in zip(np.atleast_1d(figure.subplots(1, len(kinds))), kinds, strict=True):
-        for name, ink in zip(sets, _INK, strict=True):
+        for name, ink in zip(sets, _SET_INK, strict=True):
             part = errors[(errors["set"] == name) & (errors["integrand"] == kind) & (errors["points"] > 1)]
             axis.loglog(part["points"], np.maximum(part["mse"], 1e-12), marker="o", ms=3, color=ink, label=name)
         axis.set(title=kind, xlabel="samples", ylabel="mean squared error")

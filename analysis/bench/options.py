@@ -1,0 +1,77 @@
+"""Options of the benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from analysis.command import limits
+from tsar.config import closed_choices, require
+
+GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "features", "overhead", "growth", "conversion", "start")
+"""Groups of rows, in the order of the table."""
+
+ON_CPU_ONLY = ("coherent", "incoherent", "cores", "conversion", "start")
+"""Groups of what does not run on a GPU."""
+
+FRAMELET_SIDE = 16
+_FEWEST_REPETITIONS = 7
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class BenchOptions:
+    """How fast the simulator is, and beside whom: rays, shaded samples, overhead, growth, start."""
+
+    out: Path = Path("out/bench")
+    """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
+    only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
+    cores, order, features, overhead, growth, conversion, start."""
+    compare: tuple[Path, Path] | None = None
+    """Two bench.json whose figures of ours are compared; runs nothing."""
+    device: Literal["cpu", "cuda:0"] = "cpu"
+    """Where our side runs; peers stay on the CPU."""
+    repetitions: int = 9
+    """Turns of each case; medians count."""
+    resolution_px: int = 512
+    """Side of the pictures, pixels, a power of two."""
+    subdivisions: tuple[int, ...] = (4, 5, 6, 8)
+    """Meshes of the groups coherent and incoherent, of 20 * 4^subdivisions triangles."""
+    batch_size: int = 128
+    """Framelets per batch."""
+    cycles: int = 10_000
+    """Cycles over which the group growth watches memory."""
+    scenes: tuple[str, ...] = ()
+    """Built-in scenes; all where none is named."""
+    scene_files: tuple[Path, ...] = ()
+    """Scene files that the group conversion converts; the delivered Cornell boxes where none is named."""
+    scene_root: Path | None = None
+    """Folder that they may read from; by default their own."""
+
+    def __post_init__(self) -> None:
+        for name in self.groups:
+            require(name in GROUPS, "only", f"one of {', '.join(GROUPS)}", name)
+        least = _FEWEST_REPETITIONS
+        limits.within(self, repetitions=(least, limits.REPETITIONS[1]), subdivisions=(0, 9), cycles=(100, 10**6))
+        side = self.resolution_px
+        require(64 <= side <= 4096 and side & (side - 1) == 0, "resolution_px", "a power of two in [64, 4096]", side)
+        most = (side // FRAMELET_SIDE) ** 2
+        require(1 <= self.batch_size <= most, "batch_size", f"between 1 and {most}, a picture's", self.batch_size)
+        for file in self.scene_files:
+            require(file.is_file(), "scene_files", "scene files", file)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups to run, in the order of the table."""
+        asked = [name.strip() for part in self.only for name in part.split(",")] or list(GROUPS)
+        known = [name for name in GROUPS if name in asked]
+        return tuple(known + [name for name in asked if name not in GROUPS])
+
+    @property
+    def file_ending(self) -> str:
+        """What sets apart the names of files that hold figures of a GPU."""
+        return "" if self.device == "cpu" else "-cuda"

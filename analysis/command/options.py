@@ -1,0 +1,25 @@
+"""Options that several commands share, each stated once: type, help and, in :mod:`analysis.command.limits`, bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, TypeVar
+
+import tyro
+
+Record = TypeVar("Record")
+
+Seed = Annotated[int, tyro.conf.arg(help="Seed of everything random.")]
+"""In :data:`analysis.command.limits.SEEDS`."""
+
+Threads = Annotated[int, tyro.conf.arg(help="Threads for tracing; 0 takes one per core.")]
+"""In :data:`analysis.command.limits.THREADS`."""
+
+Device = Annotated[Literal["cpu", "cuda:0"], tyro.conf.arg(help="Where rays are traced.")]
+
+References = Annotated[Path, tyro.conf.arg(help="Folder for references, shared by all runs.")]
+REFERENCES = Path(".cache/reference")
+"""The folder that commands share unless they are told otherwise."""
+
+Unprefixed = Annotated[Record, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes]
+"""A record whose fields are options of the command itself, without its name before theirs."""

@@ -1,0 +1,59 @@
+"""Runs the commands about scene files, each from its options to files and a summary."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pandas as pd
+
+from analysis.command.cli import bad_input
+from analysis.command.console import Table, frame_table
+from analysis.command.ownership import own_folder
+from analysis.command.progress import bars
+from analysis.conversion.options import CheckOptions, ConvertOptions
+from analysis.storage.files import write_json, write_table
+from analysis.storage.summary import with_source, write_summary
+
+
+def convert(options: ConvertOptions) -> dict[str, Any]:
+    """Converts a scene file; returns what the report of losses holds.
+
+    Raises:
+        InputError: the scene cannot be read or written, or something is lost where that is an error.
+    """
+    from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
+    from scenes.formats.losses import LossReport
+
+    report = LossReport()
+    with bad_input():
+        begun = time.perf_counter()
+        scene = load_scene_file(options.source, options.root, report)
+        read = time.perf_counter()
+        save_scene_file(scene, options.target, options.to or format_of(options.target), report, options.strict)
+        seconds = {"read": read - begun, "written": time.perf_counter() - read}
+        found = {"losses": report.rows(), "instances": len(scene.instances), "lights": len(scene.lights)}
+        write_json(options.report_file, with_source({**found, "seconds": seconds}, options, seed=0))
+    return {**found, "lines": [str(loss) for loss in report.losses]}
+
+
+def check(options: CheckOptions) -> list[Table]:
+    """Renders converted scenes and compares their pictures; returns what was found as tables.
+
+    Raises:
+        InputError: a scene cannot be read or written.
+    """
+    from analysis.conversion.check import checked
+    from analysis.conversion.markers import marker_offsets
+
+    with bad_input():
+        own_folder(options.out, "out")
+    with bad_input(), bars() as shown:
+        rows = checked(options, shown.task("scenes", len(options.scenes)))
+        markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []
+        found = {name: part for name, part in (("table", rows), ("markers", markers)) if part}
+        for name, part in found.items():
+            write_table(options.out / f"{name}.csv", pd.DataFrame(part))
+        write_summary(options.out, {"rows": rows, "markers": markers}, options, seed=0)
+    brief = [{**row, "losses": len(row["losses"])} for row in rows]
+    return [frame_table(pd.DataFrame(part)) for part in (brief, markers) if part]

@@ -1,0 +1,58 @@
+"""Runs the sensitivity study and writes its tables and figures."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import pandas as pd
+
+from analysis.command.cli import bad_input, full_disk
+from analysis.command.ownership import own_folder, writable_folder
+from analysis.command.progress import bars
+from analysis.sensitivity.options import SensitivityOptions
+from analysis.sensitivity.plots import write_all
+from analysis.sensitivity.runs import runs, sweeps
+from analysis.sensitivity.tables import optimum_table, setting_table
+from analysis.storage.files import write_table
+from analysis.storage.summary import write_summary
+from analysis.study.evaluation import Place, broken, finished, times_of
+from analysis.study.farm import describe_failures, run_cases
+
+
+def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
+    """Runs what is missing and writes everything to ``options.out``.
+
+    Returns:
+        What is in ``summary.json``, and names of the results whose cycles broke an invariant.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    with bad_input():
+        planned = runs(options)
+        own_folder(options.out, "out")
+        writable_folder(options.cache, "cache")
+    out = options.out.resolve()
+    place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
+    (out / "summary.json").unlink(missing_ok=True)
+    with full_disk(out), bars() as show:
+        place.results.mkdir(exist_ok=True)
+        keys, failures = run_cases([run.case for run in planned], place, options.farm, show.task("runs", len(planned)))
+    summaries = {run: finished(keys[run.case], place) for run in planned}
+    done = {run: keys[run.case] for run, found in summaries.items() if found}
+    missing = [run for run in planned if run not in done]
+    failed = {f"{run.case.name} {run.setting or ''}".strip(): failures.get(run.case, "no result") for run in missing}
+    for line in describe_failures(failed):  # at once: what follows may fail for the same reasons, such as a full disk
+        print(line, file=sys.stderr)
+    results = {run.place: times_of(key, place) for run, key in done.items()}
+    tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}
+    stills = {run.setting: key for run, key in done.items() if run.place == (options.figure_input, run.setting, 0)}
+    head = {"runs": len(planned), "runs_done": len(done), "failures": failed, "ledger": options.ledger}
+    with full_disk(out):
+        for name, lines in tables.items():
+            write_table(out / "tables" / f"{name}.csv", pd.DataFrame(lines))
+        write_all(out / "figures", options, tables["settings"], sweeps(options)["slopes"], stills, place)
+        seeds = list(range(options.repetitions))
+        summary = write_summary(out, {**head, **tables}, options, device="cpu", seeds=seeds)
+    return summary, broken(summaries.values())

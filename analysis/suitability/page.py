@@ -1,0 +1,75 @@
+"""The suitability study for people: tables to look at first, and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.command.console import Table, frame_table
+from analysis.page.report import Report, write_report
+
+Tables = Mapping[str, pd.DataFrame]
+
+
+def shown_tables(tables: Tables) -> list[Table]:
+    """The tables that people look at first, as text."""
+    percentiles = tables["table_7_2"]
+    names = [name for name in percentiles.columns if f"{name} thesis" in percentiles.columns]
+    rows = [
+        [f"{line['row']}", f"{line['batch']}", f"{line['side']}²"]
+        + [f"{_whole(line[name])} ({line[f'{name} thesis']:.0f})" for name in names]
+        for line in percentiles.to_dict("records")
+    ]
+    header = ["row", "batch", "resolution", *names]
+    return [
+        Table("Greatest suitable percentile, ours (thesis)", header, rows, words=0),
+        *(
+            frame_table(tables[name], title, f".{digits}f")
+            for title, name, digits in (
+                ("Summary shares", "shares", 3),
+                ("Policies, and their share of the oracle's gain", "policies", 4),
+                ("Causes of the error", "causes", 5),
+                ("Runs in which TSAR is better, by metric", "votes", 0),
+                ("Agreement of metrics on the ranks of runs", "ranks", 3),
+            )
+        ),
+    ]
+
+
+def _whole(value: float) -> str:
+    return "—" if value != value else f"{value:.0f}"
+
+
+def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures: Mapping[str, Path]) -> None:
+    """Writes ``report.html``."""
+    config = summary["config"]
+    shown = [
+        *shown_tables(tables),
+        frame_table(tables["regions"], "Causes of the error by region", ".5f"),
+        frame_table(tables["disagreements"], "Runs whose better renderer depends on the metric (1: TSAR)", ".0f"),
+    ]
+    lead = [
+        f"{summary['runs_done']} of {summary['runs']} runs at scale {config['scale']}, ledger {summary['ledger']}, "
+        f"{config['repetitions']} repetitions, each with its seed and phase. The ratio is the mean squared error "
+        f"of TSAR over that of the framed renderer at each reference time. A framed image of one sample a pixel is "
+        f"shown {config['framed_rate_hz']:g} times a second.",
+        f"JOD by ColorVideoVDP for the display {summary['display'].name} at {summary['display'].rate_hz:g} Hz, from "
+        f"{config['jod_span_s'][0]:g} s to {config['jod_span_s'][1]:g} s of the first {config['jod_repetitions']} "
+        "repetitions.",
+    ]
+    if summary["failures"]:
+        lead.append(f"Failed: {'; '.join(f'{name}: {reason}' for name, reason in summary['failures'].items())}")
+    write_report(
+        path,
+        Report(
+            title="Suitability of TSAR",
+            lead=lead,
+            key_numbers=shown[0],
+            figures=[(caption, file.read_bytes()) for caption, file in pictures.items()],
+            tables=shown[1:],
+            details={"Configuration": config, "Provenance": summary["provenance"]},
+        ),
+    )
