@@ -84,3 +84,7 @@ def _known(name: str, known: dict[str, str], what: str) -> str:
     near = difflib.get_close_matches(name, known, n=1)
     hint = f" (nearest: {near[0]})" if near else ""
     raise InputError(f"{what}: expected one of {', '.join(known)}, got {name!r}{hint}")
+
+
+if __name__ == "__main__":
+    main()

@@ -63,6 +63,7 @@ class Named(Generic[Entry]):
     @contextmanager
     def lent(self, **entries: Entry | str) -> Iterator[None]:
         """Holds further entries for the length of a block; then the table is as it was before."""
+        self._search()  # what is found within the block would be forgotten after it
         before = dict(self._entries), dict(self._places), set(self._own), dict(self._brought_by)
         for name, entry in entries.items():
             self.add(name, entry)

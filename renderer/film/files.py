@@ -122,8 +122,14 @@ def write_ppm(path: Path, image: Float[Tensor, "h w 3"]) -> int:
     return count_nonfinite(image)
 
 
-def write_image(path: Path, image: Float[Tensor, "h w 3"]) -> int:
-    """Writes in the format that the name ends in; returns and raises as :func:`write_exr`."""
+def write_image(path: str | Path, image: Float[Tensor, "h w 3"] | NDArray[np.floating]) -> int:
+    """Writes in the format that the name ends in; returns and raises as :func:`write_exr`.
+
+    Args:
+        path: ending in .exr, .png or .ppm.
+        image: linear RGB; an array, too.
+    """
+    path, image = Path(path), torch.as_tensor(image)
     writers = {".exr": write_exr, ".png": write_png, ".ppm": write_ppm}
     ending = path.suffix.lower()
     if ending not in writers:

