@@ -19,8 +19,8 @@ from analysis.bench.start import start_rows
 from analysis.bench.threads import cores, order
 from analysis.command import progress
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.ownership import own_folder
 from analysis.storage.files import write_json
+from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 
 MEASURED_BY: Mapping[str, Group] = {
@@ -47,7 +47,7 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, (f"bench{options.file_ending}.json", f"summary{options.file_ending}.json"))
         driving_scenes(options)
         from renderer.compute.device import pick
 

@@ -24,7 +24,10 @@ EXIT_INTERRUPTED = 130
 
 _SPINNING = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
 _SPINS = "1000"  # from 300 to 3000 cycles were measured to take alike
-_NO_MEMORY = re.compile(r"can't allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread|out of memory")
+_NO_MEMORY = re.compile(
+    r"can't allocate memory|[Cc]annot allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread"
+    r"|out of memory|failed to map segment"
+)
 _FRAME = re.compile(r"[╭╮╰╯│─]+|-{3,}")
 
 
@@ -64,14 +67,23 @@ def bad_input() -> Iterator[None]:
 def _lack_of_memory(error: BaseException) -> InputError | None:
     """What to say of an error that means that memory ran out; None of any other."""
     text = " ".join(str(error).split())
-    if not (
-        isinstance(error, MemoryError)
-        or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
-        or (isinstance(error, RuntimeError) and _NO_MEMORY.search(text))
-    ):
+    if not any(map(_tells_of_memory, _with_causes(error))):
         return None
     free = free_memory_bytes() / 2**30
     return InputError(f"out of memory ({text or type(error).__name__}); {free:.1f} GiB are free now: ask for less")
+
+
+def _with_causes(error: BaseException | None) -> Iterator[BaseException]:
+    """An error, what it was raised from, and so on."""
+    while error is not None:
+        yield error
+        error = error.__cause__
+
+
+def _tells_of_memory(error: BaseException) -> bool:
+    if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+        return True
+    return isinstance(error, (RuntimeError, OSError, ImportError)) and bool(_NO_MEMORY.search(str(error)))
 
 
 @contextlib.contextmanager
@@ -149,7 +161,7 @@ def run_cli(main: Callable[[], None]) -> None:
             raise
         _end(missing, EXIT_BAD_INPUT)
     except ImportError as error:
-        _end(error, EXIT_BAD_INPUT)
+        _end(_lack_of_memory(error) or error, EXIT_BAD_INPUT)
     except (MemoryError, RuntimeError, OSError) as error:
         lack = _lack_of_memory(error)
         if lack is None:

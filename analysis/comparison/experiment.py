@@ -14,10 +14,11 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import InputError, bad_input, full_disk, require_memory
-from analysis.command.ownership import own_folder, writable_folder
+from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
 from analysis.comparison.stored import FILES, SUMMARY, added_by, content_of, write_summary
+from analysis.storage.results import own_results
 
 if TYPE_CHECKING:
     from analysis.command.progress import Bars
@@ -56,7 +57,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
         require_memory(need, f"resolution_px: {options.tsar.resolution_px}")
         slots = options.tsar.cache_slots
         require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
-        own_folder(options.out, "out")
+        own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
         writable_folder(options.cache, "cache")
     with first_imports():
         from scenes import catalog

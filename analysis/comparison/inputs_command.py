@@ -7,18 +7,18 @@ Examples: python scripts/inputs.py --out out/inputs
 from __future__ import annotations
 
 from analysis.command.cli import bad_input, parse, require_unbroken
-from analysis.command.ownership import own_folder
 from analysis.comparison.experiment import run_experiment
 from analysis.comparison.repetitions import InputsOptions, ratio_table, row
 from analysis.comparison.stored import finished
 from analysis.storage.files import plain
+from analysis.storage.results import own_results
 
 
 def main() -> None:
     """Runs what is missing, prints and writes a table of the ratios."""
     options = parse(InputsOptions, __doc__ or "")
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, ())
         runs = options.runs()
     rows = [row(run, finished(run) or plain(run_experiment(run))) for run in runs]
     from analysis.command.console import show

@@ -9,10 +9,10 @@ import pandas as pd
 
 from analysis.command.cli import bad_input
 from analysis.command.console import Table, frame_table
-from analysis.command.ownership import own_folder
 from analysis.command.progress import bars
 from analysis.conversion.options import CheckOptions, ConvertOptions
 from analysis.storage.files import write_json, write_table
+from analysis.storage.results import own_results
 from analysis.storage.summary import with_source, write_summary
 
 
@@ -47,7 +47,7 @@ def check(options: CheckOptions) -> list[Table]:
     from analysis.conversion.markers import marker_offsets
 
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, ("table.csv", "markers.csv", "pictures.jpg", "markers/*", "[0-9][0-9]-*/*"))
     with bad_input(), bars() as shown:
         rows = checked(options, shown.task("scenes", len(options.scenes)))
         markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []

@@ -24,5 +24,5 @@ def main() -> None:
     show(f"admitted at {segments}, ledger {options.ledger}: {len(summary['admitted'])} rows: {rows or 'none'}")
     crossing = summary["crossing_batch"]
     show(f"equal cost at batch {'none' if crossing is None else f'{crossing:,.1f}'}")
-    names = ", ".join(sorted(path.name for path in options.out.iterdir() if path.is_file()))
+    names = ", ".join(sorted(path.name for path in options.out.iterdir() if path.suffix in (".png", ".vtp", ".json")))
     show(f"written to {options.out}: {names}")

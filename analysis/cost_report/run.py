@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.ownership import own_folder
 from analysis.cost_report.measurement import measure, prepare
 from analysis.cost_report.options import CostReportOptions, MeasurementOptions
 from analysis.cost_report.refit import Cell
@@ -25,6 +24,7 @@ from analysis.metrics.cost_model import (
 )
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json
+from analysis.storage.results import own_results
 
 if TYPE_CHECKING:
     from pyvista import PolyData
@@ -198,6 +198,9 @@ def summarise(options: CostReportOptions, measurement: Mapping[str, Any] | None)
     }
 
 
+_FILES = ("fig_7_*.png", "fig_7_6.vtp", "advantage.png", "refit.png", "scaling.png", "memory.png")
+
+
 def write_report(options: CostReportOptions) -> dict[str, Any]:
     """Measures if asked to, writes figures, the surface and the summary to ``options.out``.
 
@@ -208,7 +211,7 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, _FILES)
     (options.out / "summary.json").unlink(missing_ok=True)
     measured = None
     if options.measure:

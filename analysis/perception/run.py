@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.command.cli import InputError, bad_input, full_disk
-from analysis.command.ownership import own_folder
 from analysis.command.progress import Bars, bars
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
@@ -29,6 +28,7 @@ from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, render_stimuli
 from analysis.perception.trials import CONDITIONS, checked_trials
 from analysis.storage.files import atomic, write_table
+from analysis.storage.results import own_results
 from analysis.storage.summary import write_summary
 from analysis.tracer.options import LEVELS
 
@@ -39,6 +39,13 @@ SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
 """Noise of a stimulus, JOD, that the sweep of the observer covers."""
 
 POWER_OBSERVERS, POWER_ANSWERS = (6, 12, 24, 48), (4, 12)
+
+_TABLES = ("*.csv", "*.png")
+_FILES = {
+    StimuliOptions: ("manifest.json",),
+    SimulateOptions: (*_TABLES, "trials-simulated.parquet"),
+    ServeOptions: ("trials-human.parquet",),
+}
 
 
 def run(options: Options) -> str:
@@ -58,7 +65,7 @@ def run(options: Options) -> str:
         RecoverOptions: recover,
     }
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, _FILES.get(type(options), _TABLES))
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
         found, text = steps[type(options)](options, shown)
         write_summary(options.out, found, options, seed=options.seed)

@@ -8,13 +8,14 @@ from typing import Any
 import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.ownership import own_folder, writable_folder
+from analysis.command.ownership import writable_folder
 from analysis.command.progress import bars
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.plots import write_all
 from analysis.sensitivity.runs import runs, sweeps
 from analysis.sensitivity.tables import optimum_table, setting_table
 from analysis.storage.files import write_table
+from analysis.storage.results import own_results
 from analysis.storage.summary import write_summary
 from analysis.study.evaluation import Place, broken, finished, times_of
 from analysis.study.farm import describe_failures, run_cases
@@ -31,7 +32,7 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
     """
     with bad_input():
         planned = runs(options)
-        own_folder(options.out, "out")
+        own_results(options.out, ("tables/*.csv", "figures/*.png"))
         writable_folder(options.cache, "cache")
     out = options.out.resolve()
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)

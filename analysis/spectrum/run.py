@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from analysis.command.cli import bad_input, full_disk, require_memory
-from analysis.command.ownership import own_folder
 from analysis.command.progress import Bars, bars
 from analysis.page.figures import save
 from analysis.spectrum import plots
@@ -21,6 +20,7 @@ from analysis.spectrum.spectra import (
     shown,
 )
 from analysis.storage.files import write_json
+from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 
 _BYTES_PER_SAMPLE = 32  # of a tile's volume; 27 were measured, its transform and a windowed copy included
@@ -44,7 +44,7 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
         need = 16 * _BYTES_PER_SAMPLE * options.agreement_samples**2 * options.agreement_frames
         require_memory(need, f"agreement_samples: {options.agreement_samples}")
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, ("slopes.png", "spectra.png", "ideal_*.png", "agreement.png"))
         pictures = _pictures(options) if options.does("slopes") else []
     (options.out / "summary.json").unlink(missing_ok=True)
     found: dict[str, Any] = {}

@@ -74,6 +74,8 @@ class _Files:
         if rows is not self._rows:
             self._rows, self._indexed, self._entries = rows, 0, {}
         for row in rows[self._indexed :]:
+            if "name" not in row:  # what commands may call their files; see analysis.storage.results
+                continue
             if row.get("discarded"):
                 self._entries.pop(row["name"], None)
             else:

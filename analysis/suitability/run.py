@@ -10,9 +10,10 @@ from typing import Any
 import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.ownership import own_folder, writable_folder
+from analysis.command.ownership import writable_folder
 from analysis.command.progress import bars
 from analysis.storage.files import write_json, write_table
+from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 from analysis.study.cases import ROWS, SCALES, Case
 from analysis.study.evaluation import Place, broken, finished, times_of
@@ -49,7 +50,7 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     """
     with bad_input():
         planned = runs(options)
-        own_folder(options.out, "out")
+        own_results(options.out, ("report.html", "timing.csv", "tables/*.csv", "figures/*.png"))
         writable_folder(options.cache, "cache")
     out = options.out.resolve()
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.cluster import ClusterOptions, connected
-from analysis.command.ownership import own_folder
 from analysis.command.progress import bars
 from analysis.storage.files import write_table
+from analysis.storage.results import own_results
 from analysis.storage.summary import write_summary
 from analysis.tracer.options import (
     AcceleratorOptions,
@@ -67,7 +67,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
 
     with bad_input():
         check_frame_size(options.width_px, options.height_px, 1 if options.samples else options.samples_per_axis)
-        own_folder(options.out, "out")
+        own_results(options.out, ["film.mp4"] if options.format == "mp4" else [])
         renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
         kinds = options.point_set, options.seed, options.space_filter
         plan = (
@@ -100,7 +100,7 @@ def job(options: JobOptions) -> tuple[Work, dict[str, Any]]:
 
     with bad_input():
         work = prepare(options)
-        own_folder(options.out, "out")
+        own_results(options.out, ())
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
         found = {"job": asdict(work.job), "settings": asdict(work.settings), "rows": run_job(work, options, shown)}
         return work, write_summary(options.out, found, options, scene=work.settings.name, seed=options.seed)
@@ -119,7 +119,7 @@ def tiles(options: TileOptions) -> dict[str, Any]:
     farm = ClusterOptions(workers=max(options.study)) if options.study else options.farm
     with bad_input():
         picture = picture_of(options, 1 if options.study else farm.threads)
-        own_folder(options.out, "out")
+        own_results(options.out, [f"{picture.scene}.png", f"{picture.scene}.exr"])
     chunks = chunks_of(picture, options.chunk_tiles)
     with bad_input(), connected(farm) as client, full_disk(options.out, FilmError), bars() as shown:
         if options.study:
@@ -145,7 +145,8 @@ def gallery(options: GalleryOptions) -> dict[str, Any]:
 
     with bad_input():
         plan = sample_plan(options)
-        own_folder(options.out, "out")
+        files = [f"{name}.{ending}" for name in names(options) for ending in ("png", "exr")]
+        own_results(options.out, ["gallery.jpg", *files])
     found, pictures = {}, []
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
         for name in names(options):
@@ -170,7 +171,8 @@ def accelerators(options: AcceleratorOptions) -> dict[str, Any]:
     from renderer.film.files import FilmError, write_image
 
     with bad_input():
-        own_folder(options.out, "out")
+        files = [f"{name}.{ending}" for name in options.image for ending in ("png", "exr")]
+        own_results(options.out, files or ("table.csv", "tests.png"))
     with full_disk(options.out, FilmError), bars() as shown:
         found: dict[str, Any] = {}
         for name in dict.fromkeys(options.image):
@@ -197,7 +199,7 @@ def point_sets(options: PointSetOptions) -> dict[str, pd.DataFrame]:
     from analysis.tracer.point_sets import SETS, measure, slopes
 
     with bad_input():
-        own_folder(options.out, "out")
+        own_results(options.out, ("*.csv", "*.png"))
     with full_disk(options.out), bars() as shown:
         even, errors = measure(options, shown.task("sets", len(SETS) * len(set(options.levels))))
         tables = {"evenness": even, "errors": errors, "slopes": slopes(errors)}

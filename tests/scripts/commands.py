@@ -45,8 +45,8 @@ def assert_refused(status: int, capsys: pytest.CaptureFixture, parts: tuple[str,
 
 
 def nothing_in(folder: Path) -> bool:
-    """Whether nothing was written; what says whose the folder is stays until its process ends."""
-    return not folder.exists() or not any(path.name != ".owner" for path in folder.iterdir())
+    """Whether no result was written; what says whose the folder and its names are stays."""
+    return not folder.exists() or not any(path.name not in (".owner", "files.journal") for path in folder.iterdir())
 
 
 def started_script(name: str, folder: Path, *arguments: str) -> subprocess.Popen[str]:

@@ -163,6 +163,13 @@ def test_bad_input_lets_other_faults_through() -> None:
         raise KeyError("a")
 
 
+def of_a_library() -> Exception:
+    """As Warp says it where there is no room for its libraries."""
+    error = RuntimeError("Failed to load the shared library 'warp.so'")
+    error.__cause__ = OSError("warp.so: failed to map segment from shared object")
+    return error
+
+
 @pytest.mark.parametrize(
     "error",
     [
@@ -170,6 +177,8 @@ def test_bad_input_lets_other_faults_through() -> None:
         RuntimeError("[enforce fail at alloc_cpu.cpp:132] DefaultCPUAllocator: can't allocate memory: you tried to"),
         RuntimeError("Failed to allocate 123 bytes on device 'cpu'"),
         OSError(errno.ENOMEM, "Cannot allocate memory"),
+        ImportError("libtorch_cpu.so: failed to map segment from shared object"),
+        of_a_library(),
     ],
 )
 def test_a_lack_of_memory_is_one_line(error: Exception, capsys: pytest.CaptureFixture) -> None:

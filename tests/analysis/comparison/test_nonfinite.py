@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ import torch
 
 from analysis.study.cases import Case, Scale, framed_config
 from analysis.study.evaluation import Place, evaluate, finished, source_of_results
+from analysis.study.runs import Totals
 from renderer.trace import Renderer
 from tests.scripts.commands import call_script
 from tsar.config import TsarConfig
-from tsar.types import SampleBatch
+from tsar.policies import framed
+from tsar.types import SampleBatch, StepRecord
 
 BATCH, BAD = 16, 16
 """Framelets a cycle, and samples in each that are not finite: every 17th of 256."""
@@ -43,20 +46,45 @@ def broken_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Renderer, "render_frame", one_bad)
 
 
+def run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, dict[str, Any]]:
+    """Exit status and summary of a small run."""
+    small = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", str(BATCH), "--warmup-cycles", "4")
+    reference = ("--reference-samples-per-axis", "1", "--reference-rate-hz", "20", "--cache", str(folder / "cache"))
+    rest = ("--rivals", *RIVALS, "--no-film", "--out", str(folder / "out"))
+    status = call_script("run.py", monkeypatch, "fly-by", *small, *reference, *rest)
+    return status, json.loads((folder / "out" / "summary.json").read_text())
+
+
 def test_a_run(
     tmp_path: Path, broken_renderer: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    small = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", str(BATCH), "--warmup-cycles", "4")
-    reference = ("--reference-samples-per-axis", "1", "--reference-rate-hz", "20", "--cache", str(tmp_path / "cache"))
-    rest = ("--rivals", *RIVALS, "--no-film", "--out", str(tmp_path / "out"))
-    assert call_script("run.py", monkeypatch, "fly-by", *small, *reference, *rest) == 0
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    status, summary = run(tmp_path, monkeypatch)
     found, cycles = summary["nonfinite"], pd.read_parquet(tmp_path / "out" / "steps.parquet")["cycle"]
-    assert found["tsar"] == BATCH * BAD * (cycles >= 0).sum() > 0
+    assert status == 0 and found["tsar"] == BATCH * BAD * (cycles >= 0).sum() > 0
     assert all(found[name] > 0 for name in RIVALS)
     assert found["fields"] == 0 and found["reference"] == 4
     printed = [line for line in capsys.readouterr().out.splitlines() if "non-finite" in line]
     assert len(printed) == 1 and str(sum(found.values())) in printed[0]
+
+
+def test_images_and_fields_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two values of every whole frame, and three densities of every cycle."""
+    whole, add = framed.frame_image, Totals.add
+
+    def two_bad(*arguments: Any) -> torch.Tensor:
+        image = whole(*arguments).clone()
+        image[5, 6, :2] = float("nan")
+        return image
+
+    def three_bad(totals: Totals, record: StepRecord) -> None:
+        add(totals, dataclasses.replace(record, nonfinite_fields=3))
+
+    monkeypatch.setattr(framed, "frame_image", two_bad)
+    monkeypatch.setattr(Totals, "add", three_bad)
+    status, summary = run(tmp_path, monkeypatch)
+    found = summary["nonfinite"]
+    assert status == 0 and found["fields"] == 3 * summary["cycles"] > 0
+    assert found["framed"] == 2 * summary["images"]["framed"] > 0 and found["tsar"] == found["afr"] == 0
 
 
 @pytest.mark.parametrize("policy", ["tsar", *RIVALS, "oracle"])

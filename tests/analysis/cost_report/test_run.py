@@ -264,7 +264,7 @@ def test_figures_of_a_measurement(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         summary = write_report(dataclasses.replace(DEFAULT, measure=True, out=tmp_path))
-    assert {path.name for path in tmp_path.iterdir()} - {".owner"} == {
+    assert {path.name for path in tmp_path.iterdir()} - {".owner", "files.journal"} == {
         *(f"fig_7_{number}.png" for number in (3, 4, 5, 6)),
         *("fig_7_6.vtp", "advantage.png", "refit.png", "scaling.png", "memory.png", "summary.json"),
     }

@@ -114,12 +114,12 @@ def test_statistics() -> None:
 
 
 def test_whiskers_end_within_one_and_a_half_boxes() -> None:
-    """The box of 0 … 8 reaches from 2 to 6, so whiskers from -4 to 12: values there count, just beyond they do not."""
+    """The box reaches from 11.5 to 16.5, so whiskers from 4 to 24: values there count, just beyond they do not."""
     inner = np.arange(9.0) + 10.0
     for beyond, (low, high), outliers in (
-        (np.array([7.0, 21.5]), (7.0, 21.5), 0),
-        (np.array([3.0, 25.0]), (10.0, 18.0), 2),
-        (np.array([2.0, 21.5]), (10.0, 21.5), 1),
+        (np.array([4.0, 24.0]), (4.0, 24.0), 0),
+        (np.array([3.99, 24.01]), (10.0, 18.0), 2),
+        (np.array([3.99, 24.0]), (10.0, 24.0), 1),
     ):
         s = quality.ratio_statistics(np.concatenate([inner, beyond]), np.ones(11))
         assert (s.quartile_low, s.quartile_high) == (11.5, 16.5)
