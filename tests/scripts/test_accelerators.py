@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from scenes.effects import report_images as report
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import call_script
 
 
 def test_the_table_says_what_rays_take(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -54,17 +54,3 @@ def test_the_scenes_have_what_the_report_names() -> None:
     assert (one.film.width_px, one.film.height_px, two.film.width_px, two.film.height_px) == (1000, 800, 800, 600)
     assert one.integrator.reflection_rays == two.integrator.reflection_rays == two.integrator.refraction_rays == 8
     assert one.integrator.shadow_rays == "one"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--triangles", "3"), ("triangles", "between 16", "3")),
-        (("--scale", "0"), ("scale", "0")),
-        (("--image", "report-three"), ("report-three",)),
-    ],
-)
-def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
-    status = call_script("accelerators.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")

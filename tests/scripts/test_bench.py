@@ -36,30 +36,6 @@ def test_a_part_is_run_and_compared(
     assert "fly-by, Morton order" in capsys.readouterr().out and nothing_in(out)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--only", "order,nonsense"), ("only", "nonsense")),
-        (("--repetitions", "3"), ("repetitions", "3")),
-        (("--resolution-px", "100"), ("resolution_px", "100")),
-        (("--scenes", "nonsense", "--only", "order"), ("nonsense", "fly-by")),
-        (("--compare", "missing-a.json", "missing-b.json"), ("compare", "missing-a.json")),
-        (("--nonsense",), ("--nonsense",)),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    out = tmp_path / "out"
-    status = call_script("bench.py", monkeypatch, *arguments, "--out", str(out))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(out)
-
-
 def test_a_missing_gpu_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

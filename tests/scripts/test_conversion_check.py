@@ -33,7 +33,7 @@ from scenes.canonical import (
 from scenes.catalog import load_any
 from scenes.formats.conversion import save_scene_file
 from scenes.loading import asset
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import call_script
 
 
 def peers() -> None:
@@ -118,17 +118,3 @@ def test_a_renderer_that_fails_is_a_line(tmp_path: Path) -> None:
     assert isinstance(rendered("mitsuba", tmp_path / "none.xml", tmp_path / "a.npy", (8, 8), 1, 60.0), str)
     found = rendered("luxcore", tmp_path / "none.lxs", tmp_path / "b.npy", (8, 8), 1, 60.0)
     assert isinstance(found, str) and "\n" not in found
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("gone.xml",), ("scenes", "scene files")),
-        ((), ("scenes", "scene files, or --markers")),
-        (("--width-px", "2", __file__), ("width_px", "between 16 and 4096")),
-    ],
-)
-def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
-    status = call_script("conversion_check.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")

@@ -11,7 +11,7 @@ import pyvista
 from PIL import Image
 
 from tests.analysis.cost_report.test_run import TABLE_7_2
-from tests.scripts.commands import assert_refused, call_script, nothing_in, run_script
+from tests.scripts.commands import assert_refused, call_script, run_script
 
 
 def test_a_report_without_a_measurement(tmp_path: Path) -> None:
@@ -65,33 +65,6 @@ def test_parameters_come_from_the_command_line(tmp_path: Path, monkeypatch: pyte
     assert summary["flops_per_cycle"]["adaptive"]["tracing"] == 64 * 256 * 5 * (8 * 16 + 64 + 96)
     assert summary["flops_per_cycle"]["nonadaptive"] == 65536 * 5 * (8 * 16 + 64 + 96)
     assert summary["admitted"] == [[16, 512], [64, 512]]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--batch-size", "-1"), ("batch_size", "-1")),
-        (("--trace-segments", "nan"), ("trace_segments", "nan")),
-        (("--tree-size", "1"), ("tree_size", "1")),
-        (("--ledger", "wall"), ("--ledger", "wall")),
-        (("--batches", "0", "32"), ("batches", "between 1 and 1048576")),
-        (("--measured-resolutions", "100", "200", "300"), ("resolution_px", "power of two", "100")),
-        (("--repetitions", "0"), ("repetitions", "0")),
-        (("--input", "nonsense"), ("nonsense", "fly-by")),
-        (("--nonsense",), ("--nonsense",)),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    out = tmp_path / "out"
-    status = call_script("cost_report.py", monkeypatch, *arguments, "--out", str(out))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(out)
 
 
 def test_a_folder_that_cannot_be_written(

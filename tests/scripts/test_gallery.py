@@ -6,12 +6,11 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 from PIL import Image
 
 from renderer.film.files import read_exr
 from scenes.effects import scenes as effects
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import call_script
 
 SIZE = ("--width-px", "32", "--height-px", "24", "--samples", "4")
 
@@ -30,20 +29,6 @@ def test_named_effects_are_rendered_and_put_on_a_sheet(tmp_path: Path, monkeypat
     with Image.open(out / "gallery.jpg") as sheet:
         assert sheet.width > 800
     assert "quad-light" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("fog",), ("effects", "one of plain", "fog")),
-        (("plain", "--samples", "26", "--point-set", "stratified"), ("expected a cube of samples", "27", "26")),
-        (("plain", "--width-px", "0"), ("width_px", "0")),
-    ],
-)
-def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
-    status = call_script("gallery.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")
 
 
 def test_every_effect_can_be_loaded_and_has_words() -> None:

@@ -15,7 +15,7 @@ from analysis.comparison.repetitions import InputsOptions, row
 from analysis.comparison.stored import content_of, finished, write_summary
 from analysis.study.cases import INPUTS
 from scenes import catalog
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import call_script
 from tsar.config import ConfigError, TsarConfig
 
 FOUND = {
@@ -182,25 +182,3 @@ def test_the_summary_holds_every_run(made: list[str], tmp_path: Path, monkeypatc
         ("fly-by-phase1", 0.5),
     ]
     assert found["ledger"] == "work" and found["config"]["repetitions"] == 2 and found["provenance"]["device"] == "cpu"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--repetitions", "0"), ("repetitions", "between 1 and 1000", "0")),
-        (("--vary", "weather"), ("--vary", "weather")),
-        (("--seconds", "0"), ("seconds", "between 1e-06 and")),
-        (("--capacity", "-1"), ("capacity", "-1.0")),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    made: list[str],
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    status = call_script("inputs.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert made == [] and nothing_in(tmp_path / "out")

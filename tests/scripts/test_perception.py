@@ -17,7 +17,7 @@ from PIL import Image
 from analysis.perception.observers import drawn_observers, simulated_trials
 from analysis.perception.stimuli import frames_of, hash_of, png_of
 from tests.analysis.perception.builders import write_stimuli
-from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, started_script
+from tests.scripts.commands import call_script, one_line, started_script
 
 
 def summary(folder: Path) -> dict:
@@ -123,26 +123,6 @@ def test_a_changed_stimulus_is_noticed(tmp_path: Path, monkeypatch, capsys) -> N
     status = call_script("perception.py", monkeypatch, "simulate", str(stimuli), "--out", str(tmp_path / "out"))
     error = capsys.readouterr().err
     assert status == 2 and "expected the frames of the manifest" in error and "Traceback" not in error
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("stimuli", "gone.txt"), ("gone.txt", "cannot be read")),
-        (("stimuli", "--width-px", "4"), ("width_px", "4")),
-        (("simulate", "nowhere"), ("manifest.json", "stimuli")),
-        (("recover", "--jnds", "1000"), ("jnds", "between 1 and 512", "1000")),
-        (("analyse", "nowhere.parquet"), ("nowhere.parquet", "cannot be read as Parquet")),
-        (("serve", " "), ("observer", "a name")),
-        (("sing",), ("sing",)),
-    ],
-)
-def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
-    extra = ("--out", str(tmp_path / "out")) if arguments[0] != "sing" else ()
-    status = call_script("perception.py", monkeypatch, *arguments, *extra)
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")
 
 
 def test_a_session_is_served_once_and_ends_with_its_table(tmp_path: Path, monkeypatch, capsys) -> None:

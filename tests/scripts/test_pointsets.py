@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
 from analysis.tracer.point_sets import SETS
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import call_script
 
 
 def test_tables_and_figures(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -23,17 +22,3 @@ def test_tables_and_figures(tmp_path: Path, monkeypatch, capsys) -> None:
     )
     assert len(json.loads((out / "summary.json").read_text())["slopes"]) == len(SETS)
     assert "slopes" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--levels", "8", "27", "60"), ("levels", "cubes", "60")),
-        (("--levels", "8", "27"), ("levels", "at least three")),
-        (("--cases", "0"), ("cases", "0")),
-    ],
-)
-def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
-    status = call_script("pointsets.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")

@@ -13,7 +13,7 @@ from PIL import Image
 
 import analysis.storage.source
 from renderer.film.files import read_exr
-from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
+from tests.scripts.commands import call_script, one_line, run_script
 
 MESH = """
 v -1 -1 0
@@ -161,32 +161,6 @@ def test_exr_is_linear_and_png_its_encoding(render, tmp_path: Path) -> None:
     encoded = np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1.0 / 2.4) - 0.055)
     shown = picture(tmp_path / "out" / "frame00000.png") / 255.0
     assert np.abs(shown - encoded).max() < 2.5 / 255.0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("nonsense",), ("scene", "'nonsense'")),
-        (("fly-by", "--width-px", "0"), ("width_px", "0")),
-        (("fly-by", "--frames", "-3"), ("frames", "-3")),
-        (("fly-by", "--fps", "0"), ("fps", "between 1e-06 and")),
-        (("fly-by", "--time-s", "inf"), ("time_s", "inf")),
-        (("fly-by", "--samples-per-axis", "65"), ("samples_per_axis", "65")),
-        (("fly-by", "--format", "gif"), ("gif", "png")),
-        (("fly-by", "--phase", "1"), ("phase", "1.0")),
-        (("fly-by", "--threads", "-1"), ("threads", "-1")),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    status = call_script("render.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")
 
 
 def test_a_file_in_place_of_the_folder(

@@ -22,7 +22,7 @@ from analysis.comparison.experiment import RunOptions, prepare, run_experiment
 from analysis.storage.files import plain
 from renderer.film.files import read_exr
 from scenes import loading
-from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
+from tests.scripts.commands import call_script, nothing_in, one_line, run_script
 from tsar.config import TsarConfig
 
 BATCH, SIDE, IMAGES = 16, 64, 5
@@ -201,36 +201,6 @@ def test_options_leave_out_what_they_say(folder: Path, again: tuple[dict[str, An
 
 
 # --- what cannot be run ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("fly-by", "--batch-size", "-1"), ("batch_size", "-1")),
-        (("fly-by", "--batch-size", "many"), ("--batch-size", "many")),
-        (("fly-by", "--capacity", "0"), ("capacity", "between 1e-12 and", "0.0")),
-        (("fly-by", "--capacity", "nan"), ("capacity", "nan")),
-        (("fly-by", "--resolution-px", "100"), ("resolution_px", "power of two", "100")),
-        (("fly-by", "--solver", "magic"), ("solver", "magic", "waterfill")),
-        (("fly-by", "--seconds", "-2"), ("seconds", "-2.0")),
-        (("fly-by", "--warmup-cycles", "2"), ("warmup_cycles", "at least 4")),
-        (("fly-by", "--nonsense"), ("--nonsense",)),
-        ((), ("required",)),
-        (("nonsense", *SIZE), ("scene", "fly-by", "'nonsense'")),
-        (("fly-by", "--phase", "1", *SIZE), ("phase", "[0, 1)", "1.0")),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    out = tmp_path / "out"
-    status = call_script("run.py", monkeypatch, *arguments, "--out", str(out), "--cache", str(tmp_path / "cache"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(out) and nothing_in(tmp_path / "cache")
 
 
 @pytest.mark.parametrize(

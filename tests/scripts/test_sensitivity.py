@@ -19,7 +19,7 @@ from analysis.sensitivity.runs import Run, Setting, runs
 from analysis.study import cases, farm
 from analysis.study.cases import Case, Scale
 from analysis.study.evaluation import Place, finished, source_of_results
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import assert_refused, call_script
 from tsar.config import TsarConfig
 
 SMALL = ("--inputs", "chase", "fast-crossing", "--offsets", "-2", "0", "2", "--biases", "0", "1")
@@ -129,37 +129,6 @@ def test_failures_are_listed_and_the_rest_is_shown(
     assert best["fast-crossing"]["spatial_slope"] == -2.0 and best["fast-crossing"]["settings"] == 9
     assert best["chase"]["spatial_slope"] == -1.0 and best["chase"]["settings"] == 7
     assert {path.name for path in (out / "figures").iterdir()} == FIGURES
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--inputs", "moon"), ("inputs", "moon")),
-        (("--row", "16"), ("row", "16")),
-        (("--scale", "huge"), ("--scale", "huge")),
-        (("--still-s", "-1"), ("still_s", "-1")),
-        (("--figure-input", "fly-by", "--inputs", "chase"), ("figure_input", "fly-by")),
-        (("--spatial-slopes", "-1", "-1"), ("spatial_slopes", "none twice")),
-        (("--spatial-slopes", "99"), ("spatial_slopes", "99")),
-        (("--offsets", "nan"), ("offsets", "nan")),
-        (("--biases", "9"), ("biases", "9")),
-        (("--repetitions", "0"), ("repetitions", "0")),
-        (("--ledger", "wall"), ("ledger", "wall")),
-        (("--workers", "-1"), ("workers", "-1")),
-        (("--nonsense",), ("--nonsense",)),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    out, cache = tmp_path / "out", tmp_path / "cache"
-    status = call_script("sensitivity.py", monkeypatch, *arguments, "--out", str(out), "--cache", str(cache))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(out)
 
 
 def test_a_folder_that_cannot_be_written(

@@ -80,25 +80,3 @@ def test_pictures_that_are_refused(
     status = call_script("spectrum.py", monkeypatch, str(path), "--only", "slopes", "--out", str(tmp_path / "out"))
     assert_refused(status, capsys, (str(path),))
     assert nothing_in(tmp_path / "out")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--samples", "100"), ("samples", "100")),
-        (("--inputs", "car"), ("inputs", "car")),
-        (("--only", "colours"), ("only", "colours")),
-        (("--only", "ideal", "--samples", "1024", "--frames", str(2**15)), ("samples", "GiB")),
-        (("--tau", "2"), ("tau", "2")),
-    ],
-)
-def test_options_that_are_refused(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-    tmp_path: Path,
-) -> None:
-    status = call_script("spectrum.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")

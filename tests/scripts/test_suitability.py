@@ -18,34 +18,9 @@ import pytest
 
 from analysis.study.cases import POLICIES, Case
 from analysis.suitability.tables import METRICS
-from tests.scripts.commands import ROOT, assert_refused, call_script, nothing_in, started_script
+from tests.scripts.commands import ROOT, call_script, started_script
 
 SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-repetitions", "0")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("--inputs", "nowhere"), ("inputs", "nowhere")),
-        (("--rows", "16"), ("rows", "0 to 15")),
-        (("--scale", "huge"), ("--scale", "huge")),
-        (("--repetitions", "0"), ("repetitions", "between 1 and 1000")),
-        (("--ledger", "wall"), ("ledger", "wall")),
-        (("--workers", "-1"), ("workers", "-1")),
-        (("--display.rate-hz", "75"), ("rate_hz", "60 or 120")),
-        (("--framed-rate-hz", "0"), ("framed_rate_hz", "between 0.01 and 1000")),
-    ],
-)
-def test_bad_input_ends_with_one_line(
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-) -> None:
-    out = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
-    assert_refused(call_script("suitability.py", monkeypatch, *arguments, *out), capsys, parts)
-    assert nothing_in(tmp_path / "out")
 
 
 def test_a_scheduler_that_does_not_answer(

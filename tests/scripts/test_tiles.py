@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
-
 from renderer.film.files import read_exr
-from tests.scripts.commands import assert_refused, call_script, nothing_in
+from tests.scripts.commands import call_script
 
 
 def test_a_picture_and_its_summary(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -20,18 +18,3 @@ def test_a_picture_and_its_summary(tmp_path: Path, monkeypatch, capsys) -> None:
     assert found["chunks"] == found["chunks_rendered_now"] == 1 and found["nonfinite"] == 0
     assert found["rays"]["primary_rays"] == 6 * 256 * 4
     assert "1 chunks (1 now)" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
-        (("fog",), ("scene", "one of", "fog")),
-        (("plain", "--samples", "9", "--point-set", "stratified"), ("expected a cube of samples", "9")),
-        (("plain", "--farm.scheduler", "nowhere"), ("scheduler", "nowhere")),
-        (("plain", "--study", "0"), ("study", "0")),
-    ],
-)
-def test_bad_input(arguments, parts, tmp_path: Path, monkeypatch, capsys) -> None:
-    status = call_script("tiles.py", monkeypatch, *arguments, "--out", str(tmp_path / "out"))
-    assert_refused(status, capsys, parts)
-    assert nothing_in(tmp_path / "out")

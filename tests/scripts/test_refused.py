@@ -1,0 +1,119 @@
+"""Bad input of every command: status 2, one line that says what was expected and what arrived, and nothing written."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from tests.scripts.commands import assert_refused, call_script, nothing_in
+
+SMALL = "--resolution-px 64 --batch-size 16"
+CACHED = ("run", "sensitivity", "suitability")
+"""Commands that have a cache of references."""
+
+REFUSED: dict[str, tuple[str, ...]] = {
+    "accelerators --triangles 3": ("triangles", "between 16", "3"),
+    "accelerators --scale 0": ("scale", "0"),
+    "accelerators --image report-three": ("report-three",),
+    "bench --only order,nonsense": ("only", "nonsense"),
+    "bench --repetitions 3": ("repetitions", "3"),
+    "bench --resolution-px 100": ("resolution_px", "100"),
+    "bench --scenes nonsense --only order": ("nonsense", "fly-by"),
+    "bench --compare missing-a.json missing-b.json": ("compare", "missing-a.json"),
+    "bench --nonsense": ("--nonsense",),
+    "conversion_check gone.xml": ("scenes", "scene files"),
+    "conversion_check": ("scenes", "scene files, or --markers"),
+    f"conversion_check --width-px 2 {__file__}": ("width_px", "between 16 and 4096"),
+    "cost_report --batch-size -1": ("batch_size", "-1"),
+    "cost_report --trace-segments nan": ("trace_segments", "nan"),
+    "cost_report --tree-size 1": ("tree_size", "1"),
+    "cost_report --ledger wall": ("--ledger", "wall"),
+    "cost_report --batches 0 32": ("batches", "between 1 and 1048576"),
+    "cost_report --measured-resolutions 100 200 300": ("resolution_px", "power of two", "100"),
+    "cost_report --repetitions 0": ("repetitions", "0"),
+    "cost_report --input nonsense": ("nonsense", "fly-by"),
+    "cost_report --nonsense": ("--nonsense",),
+    "gallery fog": ("effects", "one of plain", "fog"),
+    "gallery plain --samples 26 --point-set stratified": ("expected a cube of samples", "27", "26"),
+    "gallery plain --width-px 0": ("width_px", "0"),
+    "inputs --repetitions 0": ("repetitions", "between 1 and 1000", "0"),
+    "inputs --vary weather": ("--vary", "weather"),
+    "inputs --seconds 0": ("seconds", "between 1e-06 and"),
+    "inputs --capacity -1": ("capacity", "-1.0"),
+    "perception stimuli gone.txt": ("gone.txt", "cannot be read"),
+    "perception stimuli --width-px 4": ("width_px", "4"),
+    "perception simulate nowhere": ("manifest.json", "stimuli"),
+    "perception recover --jnds 1000": ("jnds", "between 1 and 512", "1000"),
+    "perception analyse nowhere.parquet": ("nowhere.parquet", "cannot be read as Parquet"),
+    "perception serve ' '": ("observer", "a name"),
+    "perception sing": ("sing",),
+    "pointsets --levels 8 27 60": ("levels", "cubes", "60"),
+    "pointsets --levels 8 27": ("levels", "at least three"),
+    "pointsets --cases 0": ("cases", "0"),
+    "render nonsense": ("scene", "'nonsense'"),
+    "render fly-by --width-px 0": ("width_px", "0"),
+    "render fly-by --frames -3": ("frames", "-3"),
+    "render fly-by --fps 0": ("fps", "between 1e-06 and"),
+    "render fly-by --time-s inf": ("time_s", "inf"),
+    "render fly-by --samples-per-axis 65": ("samples_per_axis", "65"),
+    "render fly-by --format gif": ("gif", "png"),
+    "render fly-by --phase 1": ("phase", "1.0"),
+    "render fly-by --threads -1": ("threads", "-1"),
+    "run fly-by --batch-size -1": ("batch_size", "-1"),
+    "run fly-by --batch-size many": ("--batch-size", "many"),
+    "run fly-by --capacity 0": ("capacity", "between 1e-12 and", "0.0"),
+    "run fly-by --capacity nan": ("capacity", "nan"),
+    "run fly-by --resolution-px 100": ("resolution_px", "power of two", "100"),
+    "run fly-by --solver magic": ("solver", "magic", "waterfill"),
+    "run fly-by --seconds -2": ("seconds", "-2.0"),
+    "run fly-by --warmup-cycles 2": ("warmup_cycles", "at least 4"),
+    "run fly-by --nonsense": ("--nonsense",),
+    "run": ("required",),
+    f"run nonsense {SMALL}": ("scene", "fly-by", "'nonsense'"),
+    f"run fly-by --phase 1 {SMALL}": ("phase", "[0, 1)", "1.0"),
+    "sensitivity --inputs moon": ("inputs", "moon"),
+    "sensitivity --row 16": ("row", "16"),
+    "sensitivity --scale huge": ("--scale", "huge"),
+    "sensitivity --still-s -1": ("still_s", "-1"),
+    "sensitivity --figure-input fly-by --inputs chase": ("figure_input", "fly-by"),
+    "sensitivity --spatial-slopes -1 -1": ("spatial_slopes", "none twice"),
+    "sensitivity --spatial-slopes 99": ("spatial_slopes", "99"),
+    "sensitivity --offsets nan": ("offsets", "nan"),
+    "sensitivity --biases 9": ("biases", "9"),
+    "sensitivity --repetitions 0": ("repetitions", "0"),
+    "sensitivity --ledger wall": ("ledger", "wall"),
+    "sensitivity --workers -1": ("workers", "-1"),
+    "sensitivity --nonsense": ("--nonsense",),
+    "spectrum --samples 100": ("samples", "100"),
+    "spectrum --inputs car": ("inputs", "car"),
+    "spectrum --only colours": ("only", "colours"),
+    "spectrum --only ideal --samples 1024 --frames 32768": ("samples", "GiB"),
+    "spectrum --tau 2": ("tau", "2"),
+    "suitability --inputs nowhere": ("inputs", "nowhere"),
+    "suitability --rows 16": ("rows", "0 to 15"),
+    "suitability --scale huge": ("--scale", "huge"),
+    "suitability --repetitions 0": ("repetitions", "between 1 and 1000"),
+    "suitability --ledger wall": ("ledger", "wall"),
+    "suitability --workers -1": ("workers", "-1"),
+    "suitability --display.rate-hz 75": ("rate_hz", "60 or 120"),
+    "suitability --framed-rate-hz 0": ("framed_rate_hz", "between 0.01 and 1000"),
+    "tiles fog": ("scene", "one of", "fog"),
+    "tiles plain --samples 9 --point-set stratified": ("expected a cube of samples", "9"),
+    "tiles plain --farm.scheduler nowhere": ("scheduler", "nowhere"),
+    "tiles plain --study 0": ("study", "0"),
+}
+"""Command lines, and parts of what each is told."""
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_bad_input_is_refused(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name, *arguments = shlex.split(line)
+    arguments += ["--out", "out"] if line != "perception sing" else []
+    arguments += ["--cache", "cache"] if name in CACHED else []
+    assert_refused(call_script(f"{name}.py", monkeypatch, *arguments), capsys, REFUSED[line])
+    assert nothing_in(tmp_path / "out") and nothing_in(tmp_path / "cache")
