@@ -20,7 +20,8 @@ from analysis.command.cli import InputError
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
-_WAIT_S = 30
+WAIT_S = 30
+"""How long a scheduler, or a worker, is waited for, seconds."""
 LOOPBACK = "127.0.0.1"
 
 
@@ -63,7 +64,7 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # reasons are told in a line
     if options.scheduler:
         try:
-            client = Client(options.scheduler, timeout=_WAIT_S)
+            client = Client(options.scheduler, timeout=WAIT_S)
         except (OSError, ValueError, TimeoutError) as error:
             raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({error})") from error
         with client:

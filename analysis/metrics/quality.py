@@ -75,6 +75,7 @@ class Hold(Generic[Payload]):
 
     Attributes:
         refresh_s: display times of the images that have been shown so far.
+        nonfinite: values of those images that are not finite.
     """
 
     def __init__(self, displays: Iterable[tuple[Payload, ShownImage]]) -> None:
@@ -82,6 +83,7 @@ class Hold(Generic[Payload]):
         self._current: tuple[Payload, ShownImage] | None = None
         self._next = next(self._stream, None)
         self.refresh_s: list[float] = []
+        self.nonfinite = 0
 
     def at(self, time_s: float) -> tuple[Payload, ShownImage]:
         """The image on the display at ``time_s``; times must not decrease.
@@ -91,7 +93,9 @@ class Hold(Generic[Payload]):
         """
         while self._next is not None and self._next[1].display_time_s <= time_s:
             self._current = self._next
-            self.refresh_s.append(self._current[1].display_time_s)
+            shown = self._current[1]
+            self.refresh_s.append(shown.display_time_s)
+            self.nonfinite += int((~torch.isfinite(shown.image)).sum())
             self._next = next(self._stream, None)
         if self._current is None:
             raise InputError(f"warmup_cycles: expected enough for an image at {time_s:.4f} s, nothing is shown yet")

@@ -52,7 +52,7 @@ class Seen:
     Attributes:
         rows: a line a reference time: ``time_s``, ``mse``, ``log_mse``, how many images had been shown, and metrics.
         refresh_s: display times of the images that have been shown.
-        nonfinite: values of the images shown that were not finite, each image counted once.
+        nonfinite: values of all images shown that were not finite.
         splits: causes of the error.
         frames: encoded images of the display and of the reference that were kept.
     """
@@ -128,7 +128,7 @@ class _Watcher:
         self.seen = Seen(refresh_s=hold.refresh_s)
         self._truths, self._times_s, self._measuring = truths, times_s, measuring
         self._before: tuple[Tensor, Tensor] | None = None
-        self._last: ShownImage | None = None
+        self._hold = hold
         rate_hz = 1.0 / (times_s[1] - times_s[0]) if len(times_s) > 1 else 0.0
         self._step = max(1, round(_MOTION_S * rate_hz))
 
@@ -149,8 +149,7 @@ class _Watcher:
         if asked.kept[0] <= number < asked.kept[1]:
             for kept, one in zip(seen.frames, (shown, wanted), strict=True):
                 kept.append((one * 255.0 + 0.5).to(torch.uint8).numpy())
-        seen.nonfinite += errors.nonfinite if display is not self._last else 0
-        self._last = display
+        seen.nonfinite = self._hold.nonfinite
         seen.rows.append(row)
         return errors.mse
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.cluster import WAIT_S, ClusterOptions, connected
 from analysis.command.progress import Task
 from analysis.storage.files import PARTIAL
 from analysis.study.cases import Case, Scale
@@ -81,8 +81,8 @@ def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Cas
             yield waiting[future], _failure(future)
         if done or _has_workers(client):
             seen_s = time.monotonic()
-        elif time.monotonic() - seen_s > _WAIT_S:
-            yield from ((waiting[future], f"no worker was there for {_WAIT_S} s") for future in pending)
+        elif time.monotonic() - seen_s > WAIT_S:
+            yield from ((waiting[future], f"no worker was there for {WAIT_S} s") for future in pending)
             return
 
 

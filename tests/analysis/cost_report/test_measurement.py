@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 
+from analysis.command.progress import Task
 from analysis.cost_report.measurement import measure, prepare
 from analysis.cost_report.options import MeasurementOptions
 from analysis.cost_report.refit import (
@@ -165,8 +166,8 @@ class Silent:
     def __init__(self) -> None:
         self.told: dict[str, list[int]] = {}
 
-    def task(self, label: str, total: int) -> Callable[[int], None]:
-        return self.told.setdefault(label, [total]).append
+    def task(self, label: str, total: int) -> Task:
+        return Task(show=self.told.setdefault(label, [total]).append)
 
 
 def test_the_cache_is_full_before_a_setting_is_measured() -> None:

@@ -93,7 +93,7 @@ def cluster() -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
 def test_a_cluster_that_ends_is_said(ended: str, cluster: Any, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     address, scheduler, workers = cluster
     monkeypatch.setattr(farm, "_prepare", sleep_as_a_run)
-    monkeypatch.setattr(farm, "_WAIT_S", 3)
+    monkeypatch.setattr(farm, "WAIT_S", 3)
     asked = cases(3)
 
     def end() -> None:

@@ -90,7 +90,7 @@ def test_cells_are_as_many_in_time_as_the_ratio_wants(count: int, ratio: float, 
 
 @given(st.integers(1, 300), st.sampled_from(["cells-even", "cells-space", "cells-time"]))
 @settings(max_examples=30, deadline=None)
-def test_cells_have_one_point_each(count: int, name: PointSet) -> None:
+def test_cells_have_one_point_each(count: int, name: str) -> None:
     sides = cell_counts(count, {"cells-even": 1.0, "cells-space": 0.125, "cells-time": 8.0}[name])
     assert np.prod(sides) == count
     assert len(np.unique(np.floor(point_set(name, count) * sides), axis=0)) == count
