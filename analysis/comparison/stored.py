@@ -8,7 +8,6 @@ from analysis.command.cli import bad_input
 from analysis.command.start import first_imports
 from analysis.comparison.options import RunOptions
 from analysis.metrics import METRICS
-from analysis.storage.store import Store
 from tsar.choices import chosen
 from tsar.policies import POLICIES
 
@@ -29,6 +28,7 @@ def finished(options: RunOptions) -> dict[str, Any] | None:
         InputError: the scene cannot be read.
     """
     with first_imports():
+        from analysis.storage.store import Store
         from scenes import catalog
 
     with bad_input():
@@ -55,6 +55,8 @@ def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any
     Returns:
         What is in the summary: what was given, and the files.
     """
+    from analysis.storage.store import Store
+
     store = Store(options.out, summary["provenance"]["content"])
     files = [name for name in FILES if (options.out / name).exists()]
     for name in files:
