@@ -14,7 +14,7 @@ MEASURED = ("provenance", "start", "machine", "stage_wall_s", "wall", "wall_s", 
 """Entries of JSON files that differ between two runs of the same: where, when and how fast a run was made."""
 
 _PICTURES = (".png", ".ppm", ".exr")
-_NOT_COMPARED = (".html", ".log", ".lock")
+_NOT_COMPARED = (".html", ".log", ".lock", ".journal")
 
 
 @dataclass
