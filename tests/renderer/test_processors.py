@@ -73,7 +73,7 @@ def hashes(value, path, found, seen):
 SCENES = (
     HASHED
     + """
-from renderer.buffers import build_buffers
+from renderer.tables.buffers import build_buffers
 from scenes import catalog
 
 found = {}
@@ -108,9 +108,9 @@ from scenes.loading import decode_srgb
 from scenes.models import read_model
 from renderer.sampling import plan as sampling
 from renderer.film.files import encode_srgb
-from renderer.materials import mip_levels
-from typing import get_args
-from renderer.point_sets import PointSet, point_set
+from renderer.tables.materials import mip_levels
+from renderer.sampling import POINT_SETS
+from renderer.sampling.point_sets import point_set
 
 found = {}
 rng = np.random.default_rng(0)
@@ -122,7 +122,7 @@ hashes(encode_srgb(torch.as_tensor(picture)), "encoded", found, set())
 for number, level in enumerate(mip_levels(picture)):
     hashes(level, f"mip level {number}", found, set())
 hashes(np.array(sampling.gaussian_warp(*rng.random((2, 4000)), 0.4)), "warp", found, set())
-for name in get_args(PointSet):
+for name in POINT_SETS:
     hashes(point_set(name, 64, 3), f"points {name}", found, set())
 print(json.dumps(found))
 """
@@ -176,7 +176,7 @@ TARGETS = {"AVX2": "-target-cpu haswell", "SSE2": ""}
 FRAMES = (
     HASHED
     + """
-import renderer.device
+import renderer.compute.device
 target, *names = sys.argv[1:]
 wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", target)
 from renderer.trace import Renderer

@@ -16,7 +16,7 @@ from analysis.command.cli import parse
 from analysis.sensitivity import runs as sensitivity
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.runs import Run, Setting, runs
-from analysis.study import cases, farm
+from analysis.study import cases
 from analysis.study.cases import Case, Scale
 from analysis.study.evaluation import Place, finished, source_of_results
 from tests.scripts.commands import assert_refused, call_script
@@ -115,7 +115,7 @@ def test_failures_are_listed_and_the_rest_is_shown(
     def no_workers(asked: Any, *rest: Any) -> tuple[dict[Any, str], dict[Any, str]]:
         return {case: case.key(source) for case in asked}, {failed[0].case: "RuntimeError: out of luck"}
 
-    monkeypatch.setattr(farm, "run_cases", no_workers)
+    monkeypatch.setattr("analysis.sensitivity.run.run_cases", no_workers)
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
     assert status == 1
     shown = capsys.readouterr()
