@@ -28,7 +28,7 @@ _KERNELS = "WARP_CACHE_PATH"
 _FIRST_CYCLE = re.compile(r"first cycle after ([0-9.]+) s")
 _SHORT_RUN = (
     *("--seconds", "0.02", "--warmup-cycles", "4", "--no-film"),
-    *("--supersampled-samples-per-axis", "0", "--reference-samples-per-axis", "1"),
+    *("--rivals", "framed", "--reference-samples-per-axis", "1"),
 )
 
 
