@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
+from analysis.command.interrupts import heeded
 from analysis.command.ownership import release_folders
 from tsar.memory import free_memory_bytes
 
@@ -148,7 +149,8 @@ def run_cli(main: Callable[[], None]) -> None:
     _spin_briefly()
     warnings.showwarning = _one_warning
     try:
-        main()
+        with heeded():
+            main()
     except InputError as error:
         _end(error, EXIT_BAD_INPUT)
     except BrokenInvariants as error:

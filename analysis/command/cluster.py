@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from analysis.command import limits
 from analysis.command.cli import InputError
+from analysis.command.interrupts import SIGNALS
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -93,13 +94,23 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
     """Has threads and processes that are started within not hear of Ctrl-C, which a terminal sends to all of them; this
-    thread hears of it after the block."""
+    thread hears of it after the block.
+
+    A thread that was there before can still take the signal, and Python would then raise KeyboardInterrupt here, within
+    libraries that may lose it; so it is noted meanwhile.
+    """
     resource_tracker.ensure_running()  # it unblocks interrupts where it is started, so it must not be started within
+    heard = list[int]()
+    handlers = {number: signal.signal(number, lambda number, frame: heard.append(number)) for number in SIGNALS}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    if heard:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _end_workers(cluster: LocalCluster) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.command.cli import InputError, bad_input, full_disk
+from analysis.command.interrupts import settled
 from analysis.command.progress import Bars, bars
 from analysis.perception import analysis as analyses
 from analysis.perception import plots
@@ -135,7 +136,7 @@ def _answered(session: Session, options: ServeOptions, bars: Bars) -> None:
                     raise session.fault
             time.sleep(1.0)  # for the page to hear of its last answer
     except KeyboardInterrupt:
-        pass  # answers are on disk
+        settled()  # answers are on disk
 
 
 def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:

@@ -1,0 +1,50 @@
+"""Ctrl-C that is not lost: libraries drop a KeyboardInterrupt that reaches them in a callback or while they load."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_AGAIN_S = 0.5
+
+SIGNALS = (signal.SIGINT, signal.SIGALRM)
+"""What interrupts: Ctrl-C, and the clock that repeats it."""
+
+
+@contextmanager
+def heeded() -> Iterator[None]:
+    """Has Ctrl-C raise KeyboardInterrupt in the block, again every half second unless that is being handled.
+
+    What is cleaned up meanwhile is not disturbed. Outside the main thread, or where Ctrl-C does something else already,
+    nothing changes.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    before = {number: signal.signal(number, _interrupt) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        settled()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def settled() -> None:
+    """Says that a Ctrl-C has been heeded: it is not raised again."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
+    error = sys.exc_info()[1]
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return
+        error = error.__context__
+    raise KeyboardInterrupt

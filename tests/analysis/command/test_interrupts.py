@@ -1,0 +1,93 @@
+"""Ctrl-C ends a command, whoever loses it, and lets it clean up."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from analysis.command import interrupts
+from analysis.command.cli import run_cli
+from analysis.command.interrupts import heeded, settled
+
+
+@pytest.fixture(autouse=True)
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interrupts, "_AGAIN_S", 0.02)
+
+
+def lost() -> None:
+    """A library that loses a Ctrl-C."""
+    with suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_one_that_is_lost_comes_again(capsys: pytest.CaptureFixture) -> None:
+    def main() -> None:
+        lost()
+        time.sleep(60.0)
+
+    with pytest.raises(SystemExit) as stop:
+        run_cli(main)
+    assert stop.value.code == 130 and capsys.readouterr().err.count("\n") == 1
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_what_is_cleaned_up_is_not_disturbed() -> None:
+    done = []
+
+    def main() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            time.sleep(0.1)
+            done.append("with")
+            with suppress(ValueError):
+                raise ValueError
+            time.sleep(0.1)
+            done.append("all")
+
+    with pytest.raises(SystemExit) as stop:
+        run_cli(main)
+    assert stop.value.code == 130 and done == ["with", "all"]
+
+
+def test_one_that_was_heeded_does_not_come_again() -> None:
+    with heeded():
+        lost()
+        settled()
+        time.sleep(0.1)
+    with heeded():
+        pass
+    time.sleep(0.05)
+
+
+def test_one_that_comes_while_workers_start_is_heard_afterwards() -> None:
+    """Also where another thread takes it, so that Python would raise it in this one."""
+    program = """
+import os, signal, threading, time
+from analysis.command.cli import run_cli
+from analysis.command.cluster import _interrupts_blocked
+taker = threading.Thread(target=time.sleep, args=(60,), daemon=True)
+taker.start()
+def main():
+    with _interrupts_blocked():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.3)
+        except KeyboardInterrupt:
+            print("lost within")
+    print("went on")
+run_cli(main)
+"""
+    root = Path(__file__).resolve().parents[3]
+    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True, timeout=60, preexec_fn=heed
+    )
+    assert (done.returncode, done.stdout) == (130, "") and done.stderr.startswith("interrupted; "), done
