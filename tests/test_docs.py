@@ -37,11 +37,22 @@ def test_pictures_are_used() -> None:
 
 def test_commands_and_targets_exist() -> None:
     text = "".join(page.read_text() for page in PAGES)
-    scripts = set(re.findall(r"scripts/(\w+\.py)", text))
+    scripts = set(re.findall(r"(?<!tests/)scripts/(\w+\.py)", text))
     targets = set(re.findall(r"(?m)(?:`|^)make ([a-z-]+)", text))
     assert {name for name in scripts if not (ROOT / "scripts" / name).is_file()} == set()
     assert targets - set(re.findall(r"(?m)^([a-z-]+):", (ROOT / "Makefile").read_text())) == set()
     assert len(scripts) > 10 and len(targets) > 4
+
+
+def test_tests_that_pages_name_exist() -> None:
+    text = "".join(page.read_text() for page in PAGES)
+    named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", text)
+    missing = [
+        f"{file}::{name}"
+        for file, name in named
+        if not (ROOT / file).is_file() or (name and f"def {name}(" not in (ROOT / file).read_text())
+    ]
+    assert len(named) > 30 and missing == []
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
