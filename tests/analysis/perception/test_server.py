@@ -148,7 +148,12 @@ def test_other_hosts_and_origins_are_refused(client: Client, session: Session) -
         f"0.0.0.0:{client.port}",
     ):
         for path, content in (("", None), ("state", None), ("frame/0/0", None), ("answer", body)):
-            status, said = client.ask(path, content, {"Host": host})
+            try:
+                status, said = client.ask(path, content, {"Host": host})
+            except ConnectionError:
+                # closed before the body was read, for these are not requests of HTTP/1.1
+                assert not host and content, (host, path)
+                continue
             assert status in (400, 421) and session.token.encode() not in said, (host, path)
     for origin in ("http://evil.example", "null", f"https://{own}", "http://127.0.0.1:1", f"http://{own}.evil.example"):
         assert client.ask("answer", body, {"Origin": origin})[0] == 403
