@@ -22,8 +22,8 @@ PACKAGES = {
 
 
 def machine(device: str = "cpu") -> dict[str, Any]:
-    """CPU model, cores this process may use, memory, the GPU where one is used, and what other programs were at: the
-    load average of the last minute."""
+    """CPU model, cores this process may use, memory, the GPU where one is used, and the load average of the last
+    minute."""
     import psutil
 
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()

@@ -1,7 +1,7 @@
 """Mitsuba 3 as a peer: its variants in one process, and pictures of a scene by one of them.
 
-Its LLVM variant compiles with a shared LLVM that it looks for when it is imported; the newest it is known to work with
-here is put into the variable that it reads, unless that is set.
+Its LLVM variant compiles with a shared library of LLVM that it looks for when it is imported. The newest version that
+is known to work is named in the environment variable that it reads, unless that is set.
 """
 
 from __future__ import annotations

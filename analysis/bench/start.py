@@ -1,4 +1,4 @@
-"""Group start: how long fresh processes take until they answer, with kernels in Warp's cache and without."""
+"""Group start: the time until new processes answer, with kernels in Warp's cache and without."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ EXIT_BROKEN = 3
 EXIT_INTERRUPTED = 130
 
 _SPINNING = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
-_SPINS = "1000"  # from 300 to 3000 cycles were measured to take alike
+_SPINS = "1000"  # 300 to 3000 cycles were measured to be equally fast
 _NO_MEMORY = re.compile(
     r"can't allocate memory|[Cc]annot allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread"
     r"|out of memory|failed to map segment"
@@ -37,7 +37,7 @@ class InputError(ValueError):
 
 
 class BrokenInvariants(RuntimeError):
-    """Runs of the adaptive pipeline broke an invariant: what they say cannot be relied on."""
+    """Runs of the adaptive pipeline broke an invariant, so their results cannot be relied on."""
 
 
 def require_unbroken(broken: Sequence[str]) -> None:
@@ -48,7 +48,7 @@ def require_unbroken(broken: Sequence[str]) -> None:
 
 @contextlib.contextmanager
 def bad_input() -> Iterator[None]:
-    """Marks a block in which a ValueError, an OSError or a lack of memory is the fault of the input."""
+    """Marks a block in which a ValueError, an OSError or a lack of memory is caused by the input."""
     try:
         yield
     except InputError:
@@ -66,7 +66,7 @@ def bad_input() -> Iterator[None]:
 
 
 def _lack_of_memory(error: BaseException) -> InputError | None:
-    """What to say of an error that means that memory ran out; None of any other."""
+    """The error to report where memory ran out; None for any other error."""
     text = " ".join(str(error).split())
     if not any(map(_tells_of_memory, _with_causes(error))):
         return None
@@ -143,7 +143,7 @@ def _one_line(box: str) -> str:
 def run_cli(main: Callable[[], None]) -> None:
     """Runs a script's main function and ends the process.
 
-    Bad input, and a package that is not installed or in a version that does not serve, end with one line on standard
+    Bad input, and a package that is missing or of an unsupported version, end with one line on standard
     error and status 2, broken invariants with one line and status 3, Ctrl-C with one line and status 130.
     """
     _spin_briefly()
@@ -183,16 +183,16 @@ def _end(error: Exception, status: int) -> NoReturn:
 
 
 def _one_warning(message: Warning | str, *_: object) -> None:
-    """A warning in one line, without the place in the code that a user has nothing of."""
+    """Prints a warning in one line, without its place in the code."""
     text = re.sub(r"\s+", " ", str(message)).strip()
     print(f"warning: {text}", file=sys.stderr)
 
 
 def _spin_briefly() -> None:
-    """Has torch's idle threads sleep soon, unless the user has said what they should do.
+    """Makes torch's idle threads sleep soon, unless the user has set that.
 
-    By default they spin for milliseconds after every operation, on the cores that trace rays then; with another busy
-    process beside this one, operations wait for threads that wait for a core. Heeded only before torch is imported.
+    By default they spin for milliseconds after every operation, on cores that then trace rays. Where another process is
+    busy too, operations wait for threads that wait for a core. This has an effect only before torch is imported.
     """
     if not any(name in os.environ for name in _SPINNING):
         os.environ[_SPINNING[0]] = _SPINS

@@ -1,6 +1,6 @@
 """Processes and machines that share work: a Dask cluster on this machine by default, or any other by its address.
 
-Workers of another cluster must see the same folders and run the same source.
+Workers of another cluster must see the same folders and run the same source code.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class ClusterOptions:
     """Processes of the local cluster; 0 takes one per core."""
     scheduler: str = ""
     """Address of a running Dask scheduler, such as tcp://host:8786; empty starts a local cluster, which listens on this
-    machine only. A scheduler of your own listens where it is told to, and whoever reaches it can run code: keep it in a
-    network that you trust, and have its dashboard on loopback (--dashboard-address 127.0.0.1:8787)."""
+    machine only. Anyone who reaches a scheduler of your own can run code on its workers: keep it in a network that you
+    trust, and its dashboard on loopback (--dashboard-address 127.0.0.1:8787)."""
 
     def __post_init__(self) -> None:
         limits.within(self, workers=limits.WORKERS)
@@ -62,7 +62,7 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
     dask.config.set({"distributed.worker.profile.enabled": False})
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # reasons are told in a line
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # failures are reported in one line each
     if options.scheduler:
         try:
             client = Client(options.scheduler, timeout=WAIT_S)
@@ -78,7 +78,7 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
                 threads_per_worker=1,
                 processes=True,
                 host=LOOPBACK,
-                dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not meet
+                dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not collide
                 memory_limit=0,
                 silence_logs=logging.CRITICAL,
             )
@@ -93,8 +93,8 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
 
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Has threads and processes that are started within not hear of Ctrl-C, which a terminal sends to all of them; this
-    thread hears of it after the block.
+    """Threads and processes that are started within ignore Ctrl-C, which a terminal sends to all of them; this
+    thread receives it after the block.
 
     A thread that was there before can still take the signal, and Python would then raise KeyboardInterrupt here, within
     libraries that may lose it; so it is noted meanwhile.
@@ -114,7 +114,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _end_workers(cluster: LocalCluster) -> None:
-    """Ends workers in the middle of what they do: what counts is on disk, and to wait would take as long as a run."""
+    """Kills the workers. Finished results are on disk, and waiting would take as long as a run."""
     for nanny in cluster.workers.values():
         nanny.auto_restart = False
         if nanny.pid is not None:

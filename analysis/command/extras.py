@@ -1,4 +1,4 @@
-"""The extras of the distribution, and the line that a command prints where one is not installed."""
+"""The extras of the distribution, and the message of a command that needs one that is not installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "peers": {"embreex": "embreex", "mitsuba": "mitsuba", "pyluxcore": "pyluxcore", "pywt": "PyWavelets"},
     "psignifit": {"psignifit": "psignifit"},
 }
-"""Of each extra the modules that it brings, and the distribution of each, as the project file has them."""
+"""For each extra its modules and their distributions, as in the project file."""
 
 
 def require_extra(*extras: str) -> None:
@@ -35,7 +35,7 @@ def require_extra(*extras: str) -> None:
 
 
 def extra_of(error: ModuleNotFoundError) -> InputError | None:
-    """What to tell the user about an import that failed; None where the module belongs to no extra."""
+    """The error to report for an import that failed; None where the module belongs to no extra."""
     root = (error.name or "").partition(".")[0]
     for extra, modules in EXTRAS.items():
         for module, distribution in modules.items():

@@ -1,4 +1,4 @@
-"""Bounds that options of several commands share, and what a run takes, known before it begins."""
+"""Bounds that options of several commands share, and checks of a run's size before it begins."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ THREADS = (0, 1024)
 WORKERS = (0, 256)
 SIDES_PX = (1, 32768)
 TIMES_S = (-1e9, 1e9)
-"""Animation times, seconds; float64 tells times apart there by 1.2e-7 s."""
+"""Animation times, seconds; float64 resolves 1.2e-7 s there."""
 SPANS_S = (1e-6, 1e6)
 RATES_HZ = (1e-3, 1e6)
 SEGMENTS = (1e-3, 1e6)
@@ -21,7 +21,7 @@ REPETITIONS = (1, 1000)
 CYCLES_MOST = 1_000_000
 """Cycles, framed images or reference images of one run."""
 _STEPS_PER_CYCLE = 1000
-"""Times that float64 must tell apart within a cycle."""
+"""Steps that float64 must resolve within a cycle."""
 
 
 def within(options: object, **bounds: tuple[float, float]) -> None:
@@ -49,7 +49,7 @@ def require_count(name: str, value: object, count: float, what: str, most: int =
     """Refuses a run of more than ``most`` steps.
 
     Args:
-        name, value: the option to blame, and what it was given.
+        name, value: the option that is at fault, and its value.
         count: how many steps the options ask for.
         what: what they are.
 
@@ -63,7 +63,7 @@ def require_pace(name: str, value: object, cycle_s: float, start_s: float, secon
     """Refuses a simulated machine on which cycles are too long, too many, or too short for their times to differ.
 
     Args:
-        name, value: the option that sets its speed, and what it was given.
+        name, value: the option that sets its speed, and its value.
         cycle_s: what a cycle takes on it, seconds.
         start_s, seconds: start and length of what is measured.
         warmup_cycles: cycles before it.

@@ -1,4 +1,4 @@
-"""Folders that one process writes to at a time."""
+"""Locks on folders: one process writes to a folder at a time."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from typing import TextIO
 
 @contextmanager
 def owned(path: Path, what: str) -> Iterator[None]:
-    """Holds a lock file for this process alone, and writes into it who that is.
+    """Holds a lock file for this process alone, and writes this process into it.
 
-    The system releases the lock even if this process is killed. The file stays: one that is removed could be held by
-    two at once.
+    The system releases the lock even if this process is killed. The file stays, for two processes could each hold a
+    file that had been removed in between.
 
     Raises:
         ValueError: another process holds it; the message names ``what``, the folder and who.
@@ -28,7 +28,7 @@ def owned(path: Path, what: str) -> Iterator[None]:
 
 
 def _taken(path: Path, what: str) -> TextIO:
-    """A lock file that this process holds until it is closed, with who that is in it."""
+    """A lock file that names this process, which holds it until the file is closed."""
     while True:
         file = path.open("a+", encoding="utf-8")
         try:

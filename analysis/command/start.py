@@ -1,5 +1,4 @@
-"""The start of a run: how long it takes until the first cycle has ended, and imports that do not wait for the collector
-of garbage."""
+"""The start of a run: the time until the first cycle has ended, and imports without garbage collection."""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ _START_FIELD = 22 - 3  # of those after the name: clock ticks from boot to the s
 
 
 def process_began_s() -> float:
-    """When this process began, on the clock of :func:`time.monotonic`, seconds; good to 10 ms."""
+    """When this process began, on the clock of :func:`time.monotonic`, seconds, to within 10 ms."""
     try:
         ticks = int(_STAT.read_text().rpartition(")")[2].split()[_START_FIELD])
         age_s = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
@@ -35,8 +34,8 @@ def process_began_s() -> float:
 def first_imports() -> Iterator[None]:
     """Marks a block that imports large packages.
 
-    What they make stays for good, so the collector of garbage need not look through it: neither now, over and over, nor
-    later.
+    The objects that an import makes are kept until the process ends. The garbage collector is switched off meanwhile,
+    and leaves those objects out afterwards.
     """
     before, collecting = len(sys.modules), gc.isenabled()
     gc.disable()

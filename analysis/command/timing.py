@@ -1,4 +1,4 @@
-"""Wall seconds of cases that take turns, so that a machine's ups and downs fall on all alike."""
+"""Wall seconds of cases that take turns, so that changes of the machine's speed affect all cases alike."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ def take_turns(
 ) -> dict[str, list[float]]:
     """Wall seconds of every case, ``repetitions`` times each, after one run that is not counted.
 
-    Cases take turns, forwards and backwards, so that neither drift nor an order of precedence favours one.
+    Cases take turns, forwards and backwards, so that neither drift nor their order favours one of them.
 
     Args:
         cases: what is measured, by name.
         repetitions: turns of each.
         task: of which a step is a round.
-        rest_s: pause before each turn. Threads of the case before may spin for milliseconds, waiting for more to do.
-        lead_in: each turn runs twice and the second run counts: a core that another case left idle is slow to come
-            back, and a renderer in use does not leave it idle.
+        rest_s: pause before each turn. Threads of the previous case may go on spinning for milliseconds.
+        lead_in: each turn runs twice and the second run counts. A core that another case left idle is slow at first,
+            and a renderer in use does not leave cores idle.
     """
     for run in cases.values():
         run()

@@ -1,6 +1,6 @@
-"""Measured cost of the real pipeline over a grid of settings, and the cost model's constants refitted to it.
+"""Measured cost of the pipeline over a grid of settings.
 
-Settings take turns, so that a machine's ups and downs fall on all alike. Knows the renderer and the pipeline; both are
+Settings take turns, so that changes of the machine's speed affect all settings alike. The renderer and the pipeline are
 imported when a measurement begins.
 """
 

@@ -131,7 +131,7 @@ class MeasurementOptions:
         return self.measured_batch, self.measured_resolution
 
     def pipeline(self, batch_size: int, resolution_px: int) -> TsarConfig:
-        """Configuration of a setting; what is not said here is the pipeline's own."""
+        """Configuration of a setting; everything else has the pipeline's defaults."""
         config = TsarConfig(batch_size=batch_size, resolution_px=resolution_px)
         full = max(config.warmup_cycles, -(-config.cache_slots // batch_size))
         return dataclasses.replace(config, warmup_cycles=self.measured_warmup or full)

@@ -1,4 +1,4 @@
-"""Lines and power laws through measured cost: what a stage's operation takes here, and how time and memory grow."""
+"""Lines and power laws through measured cost: the price of a stage's operation, and the growth of time and memory."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Cell:
         """Modelled operations per cycle of every stage that was measured.
 
         Deviation: the thesis counts nothing for storing framelets; here ``cache`` counts one operation per sample
-        stored, so that what it takes can be told at all.
+        stored, so that its price can be fitted.
         """
         p = self.parameters
         flops = {name: float(value) for name, value in stage_flops(p).items()}
@@ -139,7 +139,7 @@ class StageFit:
 
     @property
     def best(self) -> Line:
-        """With a fixed cost where one can be told."""
+        """With a fixed cost where one can be fitted."""
         return self.affine or self.origin
 
 

@@ -6,10 +6,9 @@ and B the most that samples as dense as those shown could carry of R', all displ
     D - R = (D - B) + (B - R') + (R' - R)
           = aliasing + blur + lag.
 
-What D holds beside its newest samples, older ones that are blended in, is in the first term too. The mean squares of
-the three do not add up to that of the sum: twice the sum of their products is left, which is reported as ``mixed``, so
-that the five entries always add up. R' is the nearest reference image in time, so lag is known to half the interval of
-the reference.
+Older samples that are blended into D count in the first term too. The mean squares of the three terms do not add up to
+that of the sum: twice the sum of their products remains and is reported as ``mixed``. R' is the nearest reference image
+in time, so lag is known to half the interval of the reference.
 
 *Flicker* is not a fourth part: it is the share of the error that changes from one reference time to the next where the
 picture stands still, half its mean squared change.

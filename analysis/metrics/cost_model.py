@@ -190,7 +190,7 @@ def work_flops(p: CostParameters, counters: Mapping[str, int]) -> float:
 
 
 def policy_flops(p: CostParameters, price: Price, ledger: Ledger = "thesis") -> Value:
-    """FLOPs of one cycle of a policy: its samples, the adaptive stages if it has them, and what it names beside."""
+    """FLOPs of one cycle of a policy: its samples, the adaptive stages if it has them, and its other work."""
     return price.samples * naive_per_pixel(p, ledger) + control_flops(p, price, ledger)
 
 
@@ -231,12 +231,12 @@ def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters, price: Pri
 
 
 def expected_ledger(ledger: Ledger) -> Ledger:
-    """The ledger that tells before a run about what this one will count: rays to come are taken from ``thesis``."""
+    """The ledger that predicts this one before a run: rays that will be counted are predicted by ``thesis``."""
     return "thesis" if ledger == "work" else ledger
 
 
 def parameters_of(config: TsarConfig, trace_segments: float) -> CostParameters:
-    """Parameters for a configuration of the pipeline. What the pipeline does not decide stays as in table 7.1."""
+    """Parameters for a configuration of the pipeline. Parameters that it does not set keep the values of table 7.1."""
     return CostParameters(
         batch_size=config.batch_size,
         sdf_size=config.sdf_side**2,

@@ -1,4 +1,4 @@
-"""The display that a perceptual score holds for. Imports nothing heavy: command lines are made from it."""
+"""The display that a perceptual score holds for. Imports little, because command lines are made from it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Perceptual metrics of what a display shows, on display-encoded images: JOD, FLIP, SSIM.
 
-All run on one thread: the libraries do not promise the same bits for another number.
+All run on one thread, because the libraries do not promise the same bits for another number of threads.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Quality of what the display shows against a reference, streaming: two images at a time, whatever the length.
+"""Quality of what a display shows against a reference, as a stream: two images are held at a time.
 
 The main error is the MSE of display-encoded images (sRGB, clipped to [0, 1]): that is what a viewer is shown, it is
 bounded, and a highlight a hundred times brighter than white cannot outvote the rest of the picture as it would in
@@ -25,7 +25,7 @@ from analysis.command.cli import InputError
 from tsar.types import ShownImage, StepRecord
 
 WHISKERS = 1.5
-"""Interquartile ranges beyond the box at which whiskers end at the latest, in tables and figures."""
+"""Greatest length of whiskers beyond the box, in interquartile ranges, in tables and figures."""
 
 Floats = NDArray[np.float64]
 Payload = TypeVar("Payload")

@@ -1,8 +1,8 @@
 """Lets ``torchvision`` be imported where its compiled extension does not load.
 
 The metric ColorVideoVDP imports ``torchvision`` but uses none of its operators. Beside a CPU build of torch the
-compiled extension of ``torchvision`` is not found, and its import ends at a fake implementation for the operator
-``torchvision::nms``, which nobody has declared. Declaring the schemas is enough for the import to succeed.
+compiled extension of ``torchvision`` is not found, and its import fails at a fake implementation of the operator
+``torchvision::nms``, which is not declared then. Declaring the schemas is enough for the import to succeed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What all figures share: paper, colours, and files."""
+"""What all figures share: axes, colours and files."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def with_scale(image: Pixels, bounds: tuple[float, float], unit: str, name: str)
 
 
 def number(value: float) -> str:
-    """Three digits, and fractions below one as 1/n where they are that."""
+    """Three digits; reciprocals of whole numbers as 1/n."""
     if 0 < value < 1 and abs(1 / value - round(1 / value)) < 1e-9:
         return f"1/{round(1 / value)}"
     return f"{value:.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"

@@ -1,7 +1,7 @@
-"""The part of a page that is played: pictures of many times behind one slider, and curves with a cursor.
+"""The player of a page: pictures of many times behind one slider, and curves with a cursor.
 
-Everything that changes from step to step is worked out here and put into the page as one block of JSON; the script of
-the page (``report_page.js``) only shows it.
+Everything that changes from step to step is computed here and put into the page as one block of JSON, which the script
+of the page (``report_page.js``) shows.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Curve:
-    """A value at every time of a player, drawn on a logarithmic axis; what is not positive and finite leaves a gap."""
+    """A value at every time of a player, on a logarithmic axis; values that are not positive and finite leave gaps."""
 
     label: str
     colour: str

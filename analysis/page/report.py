@@ -1,4 +1,4 @@
-"""A record as one HTML file that needs nothing else: figures are embedded, everything from outside is escaped."""
+"""A report as one self-contained HTML file: figures are embedded, and all text is escaped."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Scales:
 
 
 def to_pixels(image: Tensor) -> Pixels:
-    """``(h, w, 3)`` uint8 sRGB of linear RGB; what is not finite is black."""
+    """``(h, w, 3)`` uint8 sRGB of linear RGB; values that are not finite become black."""
     finite = image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0)
     return (encode(finite) * 255.0 + 0.5).clamp(0, 255).byte().contiguous().numpy()
 

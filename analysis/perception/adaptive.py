@@ -1,4 +1,4 @@
-"""Adaptive and framed rendering before the same observer: at which batch size is a difference noticed?"""
+"""Adaptive and framed rendering judged by the same observer: the batch sizes at which a difference is noticed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Answers of a session on disk. What was acknowledged is not lost, whatever ends the process or fills the disk.
+"""Answers of a session on disk. An acknowledged answer is not lost when the process is killed or the disk is full.
 
 The store is one SQLite file. An answer is acknowledged once its transaction is on disk. Every row carries a seal, a
 SHA-256 over the seal before it and its own text, and the last seal stands beside the number of answers: a row that is
@@ -176,7 +176,7 @@ def _sealed(before: str, text: str) -> str:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Has the names of files in a folder on disk too."""
+    """Writes the names of a folder's files to disk."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -1,4 +1,4 @@
-"""Observers that are simulated: what they see of a difference, and how they answer.
+"""Simulated observers: how visible a difference is to them, and how they answer.
 
 The task is a dual pair: of two pairs shown side by side one is identical and one differs, and the observer says which
 differs. An observer that compares the differences within the pairs is right with probability

@@ -1,4 +1,4 @@
-"""The steps of the study, each from its options to files and a few lines of text."""
+"""Runs the steps of the study, each from its options to files and a few lines of text."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _FILES = {
 
 
 def run(options: Options) -> str:
-    """Runs one step of the study and writes its summary; what there is to say about it.
+    """Runs one step of the study and writes its summary; returns a few lines of text about it.
 
     Raises:
         InputError: something asked for cannot be had.

@@ -1,7 +1,7 @@
-"""A page on this machine that shows a session's trials and takes the answers. Nothing else can reach it.
+"""A page on this machine that shows a session's trials and takes the answers.
 
-It listens on the loopback interface, heeds only requests to that address that come from its own page, and takes answers
-only with the token that stands in the page, which other pages of the browser cannot read.
+The server listens on the loopback interface, accepts only requests to that address from its own page, and takes answers
+only with the token in the page, which other pages of the browser cannot read.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HOST = "127.0.0.1"
 BODY_MAX = 1 << 16
 """Bytes of an answer that are read."""
 CONNECTIONS_MAX = 64
-"""Open connections; one more closes the oldest, so that those which never ask anything keep nobody out."""
+"""Open connections; one more closes the oldest, so that idle connections block no other."""
 TIMEOUT_S = 30.0
 """To send a whole request in."""
 

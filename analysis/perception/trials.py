@@ -1,4 +1,4 @@
-"""Tables of trials, of whoever made them: every column that is read is checked, and converted where that is honest."""
+"""Tables of trials from any source: every column that is read is checked, and converted where its meaning is clear."""
 
 from __future__ import annotations
 

@@ -92,8 +92,9 @@ def _optimum(found: Floats, base: Floats, settings: Sequence[Setting], axes: tup
 def beyond_spread(found: Floats, base: Floats) -> Line:
     """Whether the best of settings ``(settings, repetitions)`` beats the default ``(repetitions,)`` beyond the spread.
 
-    ``held_out`` is the error, over the default's, of settings each chosen on the other repetitions: the best of many is
-    partly luck. Both it and the bootstrap interval have to lie below 1. With one repetition nothing can be said.
+    ``held_out`` is the error, over the default's, of settings that were chosen on the other repetitions, because the
+    best of many is partly best by chance. Both it and the bootstrap interval have to lie below 1. With one repetition
+    nothing can be said.
     """
     count = len(base)
     if count == 1:

@@ -63,8 +63,8 @@ def squares(plane: Floats) -> Floats:
 def radial_power(planes: Floats) -> Floats:
     """Mean power per frequency of square planes ``(n, side, side)`` at 1 … side / 2 cycles, over angles and planes.
 
-    The mean is taken off and a Hann window laid over each plane: its opposite borders do not meet, and their jump would
-    be a bright cross along the axes, of slope -2 whatever the picture shows.
+    The mean is subtracted and a Hann window applied to each plane. Without it, the jump between opposite borders would
+    add a cross along the axes, of slope -2 for any picture.
     """
     side = planes.shape[1]
     hann = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(side) / side)
@@ -97,8 +97,8 @@ def fit_slope(power: Floats) -> tuple[float, float]:
 def spectrum_of(planes: Callable[[Floats], Floats], color: NDArray[np.float32], **names: Any) -> Spectrum:
     """Spectrum of linear RGB ``(..., 3)``, whose luminance a function turns into square planes.
 
-    Compressed luminance leads: the error estimate works on it, it is close to what a display is sent, and in linear
-    luminance one sun is a picture's whole spectrum.
+    The spectrum is that of compressed luminance: the error estimate uses it, it is close to what a display is sent, and
+    in linear luminance the sun alone would dominate a picture's spectrum.
     """
     import torch
 

@@ -1,4 +1,4 @@
-"""Writing files so that a reader never sees half of one."""
+"""Files that are written atomically: a reader never sees half of one."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def plain(value: Any) -> Any:
-    """A value made of what JSON knows: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null."""
+    """A value of types that JSON has: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null."""
     if is_dataclass(value) and not isinstance(value, type):
         return plain(asdict(value))
     if isinstance(value, Mapping):

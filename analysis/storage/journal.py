@@ -18,14 +18,14 @@ _LINE_CHECK = 2 * _CHECK_BYTES
 
 
 def warn(line: str) -> None:
-    """Says on standard error what is damaged."""
+    """Prints a line about damage on standard error."""
     print(line, file=sys.stderr, flush=True)
 
 
 class Journal:
     """Rows that are appended to a file, each on the disk before it counts; a row is a dictionary that JSON can hold.
 
-    Every line begins with its own checksum, so that one that was cut off or has changed is noticed and does not count.
+    Every line begins with its own checksum: a line that was cut off or has changed is detected and ignored.
     Several processes may append to one journal.
     """
 
@@ -47,14 +47,14 @@ class Journal:
         except FileNotFoundError:
             self._rows, self._read, self._file = [], 0, None
             return []
-        # without an end it is being written, or was cut off
+        # a line without an end is being written, or was cut off
         whole = fresh[: fresh.rfind(b"\n") + 1]
         for line in whole.split(b"\n"):
             row = _row(line)
             if row is not None:
                 self._rows.append(row)
             elif line:
-                warn(f"{self.path}: holds a damaged line; what it told of is made again")
+                warn(f"{self.path}: holds a damaged line; its entry is made again")
         self._read += len(whole)
         return self._rows
 

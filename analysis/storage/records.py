@@ -72,7 +72,7 @@ def checked_fields(record: StepRecord) -> dict[str, np.ndarray]:
 
 
 class StepWriter:
-    """Streams step records to Parquet in row groups; the file appears under its name when it is closed in good order.
+    """Streams step records to Parquet in row groups; the file appears under its name when it is closed without error.
 
     Columns ``stage_<name>_s`` hold measured stage seconds and ``count_<name>`` counters, named by the first record.
     Densities and errors are float32, Morton order.

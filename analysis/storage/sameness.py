@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 MEASURED = ("provenance", "start", "machine", "stage_wall_s", "wall", "wall_s", "created", "peak_memory_bytes")
-"""Entries of JSON files that differ between two runs of the same: where, when and how fast a run was made."""
+"""Entries of JSON files that differ between two equal runs: where, when and how fast they were made."""
 
 _PICTURES = (".png", ".ppm", ".exr")
 _NOT_COMPARED = (".html", ".log", ".lock", ".journal")

@@ -1,4 +1,4 @@
-"""What code made a result: a hash of all files and versions that decide it, found by following imports.
+"""The code that made a result: a hash of all files and versions that decide it, found by following imports.
 
 A stored result is used again where this hash is the same. No list of files has to be kept: what a module imports
 belongs to it, wherever it lies, and so does what lies beside it and is no Python, such as C++ headers and assets.

@@ -1,11 +1,11 @@
-"""What commands made, on disk: each file is listed with its checksum before it counts, and checked when it is read.
+"""Files that commands made: each is listed with its checksum before it counts, and checked when it is read.
 
 A :class:`Store` is a folder and a key, the hash of everything that decides what its files hold. The folder's list,
 ``files.journal``, names every file that was ever made there, with its key, its checksum and facts about it, such as how
 many of its values were not finite. A file counts only where the list has it under the store's key and its content is
-what the list says. One that is missing, was cut off, or comes from another key is not there: make it again. One whose
-content is no longer what was written is named in a line on standard error and is not there either. A process may be
-killed at any moment: what counts is whole, the rest is made again.
+what the list says. A file that is missing, cut off or of another key counts as missing. So does one whose content is no
+longer what was written, which is reported in a line on standard error. A process may be killed at any moment: files
+that count are complete, the others are made again.
 
 A command that keeps files asks, makes what is missing, and reads what was checked::
 
@@ -20,8 +20,8 @@ A command that keeps files asks, makes what is missing, and reads what was check
 ``find`` checks the file and gives its entry, ``read`` gives the checked bytes and ``read_json`` the checked value of a
 JSON file. ``listed`` names the files that commands made in the folder: only those may be deleted, by ``discard``.
 
-JSON that comes from elsewhere goes through :func:`read_json` of this module: what is valid but not what was expected is
-one line of an error, as what is no JSON is.
+JSON from elsewhere is read by :func:`read_json` of this module: invalid JSON, and valid JSON of another form, are
+errors of one line.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class _Files:
 
 @dataclass
 class Making:
-    """A file that is being made: where its content goes, and what is to be known of it. Changes in place."""
+    """A file that is being made: its temporary path, and facts about it. Changes in place."""
 
     path: Path
     facts: dict[str, Any] = field(default_factory=dict)

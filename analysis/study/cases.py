@@ -1,4 +1,4 @@
-"""What a study is made of: one policy on one input at one setting, as data that can be sent anywhere and named."""
+"""Cases of a study: one policy on one input at one setting, as data that can be named and sent to other processes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ROWS = (
 class Scale:
     """How large a study is.
 
-    ``divisor`` makes everything that is counted in pixels or samples smaller alike: the side of the image and of the
+    ``divisor`` scales down everything that is counted in pixels or samples: the side of the image and of the
     fields by it, batch, cache, tiles and the machine's speed by its square. A row is then the same row seen through a
     smaller window: samples per pixel, cycles per framed image and the tiling stay as they are.
 
@@ -100,7 +100,7 @@ SCALES: dict[str, Scale] = {
 @dataclass(frozen=True)
 @closed_choices()
 class Case:
-    """One policy on one input at one setting. Everything that decides its result.
+    """One policy on one input at one setting: everything that decides its result.
 
     Attributes:
         input: built-in input.

@@ -1,6 +1,6 @@
 """What displays show, measured at every reference time: the one engine that compares runs with a reference.
 
-All runs go side by side; two images of each are held at a time, whatever the length.
+All runs advance together; two images of each are held at a time, however long the runs are.
 """
 
 from __future__ import annotations

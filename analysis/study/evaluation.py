@@ -1,6 +1,6 @@
 """Runs one case of a study and puts its result on disk.
 
-Beside ``experiment.py`` the one module of this package that wires scenes, renderer and pipeline. A result is a table
+A result is a table
 over the reference times (Parquet), stills, and what was measured of the whole run (JSON), which is written last. The
 case is done where all of them are as they were written. Nothing in them depends on the number of threads, processes or
 machines, except the entry ``machine`` of the JSON file, which holds measured seconds and memory.
@@ -76,8 +76,8 @@ def _store(results: Path) -> Store:
 def source_of_results() -> str:
     """Hash of the source, assets and libraries that decide a result.
 
-    It is taken once in a process, for the process goes on with what it has imported and read: a worker that is older
-    than a change must not pass for one that knows it.
+    It is taken once in a process, because the process keeps the modules that it has imported: a worker that was started
+    before a change must not report results under the new hash.
     """
     return code_hash(evaluate)
 

@@ -74,7 +74,7 @@ def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Cas
             done, pending = outcome
         except TimeoutError:
             done = set[Any]()
-        except Exception as error:  # of whatever library the connection is made of
+        except Exception as error:  # the connection may raise errors of several libraries
             yield from ((waiting[future], f"the scheduler is gone ({_reason(error)})") for future in pending)
             return
         for future in done:
@@ -99,7 +99,7 @@ def _failure(future: Future) -> str | None:
 def _has_workers(client: Client) -> bool:
     try:
         return bool(client.scheduler_info(n_workers=1)["workers"])
-    except Exception:  # of whatever library the connection is made of
+    except Exception:  # the connection may raise errors of several libraries
         return False
 
 
@@ -115,10 +115,10 @@ def describe_failures(failures: Mapping[str, str]) -> list[str]:
 
 
 def _keep_freed_memory() -> None:
-    """Has a worker keep the memory it frees, from one heap for all of its threads.
+    """Makes a worker keep the memory that it frees, in one heap for all of its threads.
 
-    Images come and go by the hundred a second; glibc would give each back to the system, from the heaps of threads at
-    once, and a third of a worker's time would go into having them again. Elsewhere this does nothing.
+    A worker allocates and frees hundreds of images a second. By default glibc returns each to the system, and a third
+    of a worker's time goes into allocating them again. With another C library this does nothing.
     """
     arena_max, mmap_threshold, trim_threshold = -8, -3, -1
     try:

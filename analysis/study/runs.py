@@ -1,4 +1,4 @@
-"""A policy on a scene by a clock: its images, what it asked of the renderer, and what its cycles add up to."""
+"""A run of a policy on a scene: its images, the work of the renderer, and sums over its cycles."""
 
 from __future__ import annotations
 

@@ -181,7 +181,7 @@ def policy_table(results: Results, row: int, side_px: int, seed: int = 0) -> pd.
             line["jod"] = _jod(results, label, name, row, side_px)
             line["ratio"] = _mean(errors[label], both) / _mean(framed, both) if both else math.nan
             known = sorted(set(both) & set(oracle))
-            line |= _gain(errors[label], framed, oracle, known, seed)
+            line |= _oracle_share(errors[label], framed, oracle, known, seed)
             lines.append(line)
     return pd.DataFrame(lines)
 
@@ -205,11 +205,11 @@ def _mean(errors: Mapping[int, float], numbers: Sequence[int]) -> float:
     return float(np.mean([errors[number] for number in numbers])) if numbers else math.nan
 
 
-def _gain(
+def _oracle_share(
     errors: Mapping[int, float], framed: Mapping[int, float], oracle: Mapping[int, float], known: list[int], seed: int
 ) -> dict[str, float]:
     if not known:
-        return {"gain": math.nan, "gain_low": math.nan, "gain_high": math.nan}
+        return dict.fromkeys(("oracle_share", "oracle_share_low", "oracle_share_high"), math.nan)
     mine, base, best = (np.array([one[number] for number in known]) for one in (errors, framed, oracle))
     drawn = np.random.default_rng(seed).integers(0, len(known), (DRAWS, len(known)))
 
@@ -218,7 +218,8 @@ def _gain(
         return (base[pick].mean(-1) - mine[pick].mean(-1)) / gap
 
     low, high = np.percentile(share(drawn), INTERVAL) if len(known) > 1 else (math.nan, math.nan)
-    return {"gain": float(share(np.arange(len(known)))), "gain_low": float(low), "gain_high": float(high)}
+    found = float(share(np.arange(len(known))))
+    return {"oracle_share": found, "oracle_share_low": float(low), "oracle_share_high": float(high)}
 
 
 def disagreement_table(results: Results) -> pd.DataFrame:

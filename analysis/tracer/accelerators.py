@@ -1,4 +1,4 @@
-"""What structures over triangles save: tests per ray against triangle count, and the two images of the report."""
+"""Savings of structures over triangles: tests per ray against triangle count, and the two images of the report."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ REPORTED = {
 """What the report says of its images."""
 
 STRUCTURES = ("brute", "kdtree", "bvh")
-_BRUTE_TESTS = 4e8  # of a turn; rays without any structure are as few as that takes
+_BRUTE_TESTS = 4e8  # in a turn; brute force traces as few rays as keep to it
 _SIDE_PX = 256
 
 

@@ -27,7 +27,7 @@ def render_effect(name: str, plan: SamplePlan, options: GalleryOptions, task: Ta
     """Renders the scene of an effect and writes ``NAME.png`` and ``NAME.exr``.
 
     Returns:
-        The picture in sRGB, and what there is to say about it.
+        The picture in sRGB, and facts about it.
     """
     from renderer.film.files import encode_srgb, write_image
     from renderer.frames import render_image

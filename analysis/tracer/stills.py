@@ -1,4 +1,4 @@
-"""Stills of a sequence on disk: what an interrupted rendering left is kept, and no file is touched but a command's own.
+"""Stills of a sequence on disk: finished stills of an interrupted rendering are kept, and foreign files are left alone.
 
 Stills that the same command made of something else, such as another scene or with other settings, are replaced one by
 one and removed when the new ones are there.

@@ -1,4 +1,4 @@
-"""How much faster a picture is rendered by more workers, why not by more still, and what twenty would do."""
+"""How much faster more workers render a picture, what limits them, and a prediction for twenty."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture in tiles over processes or machines: the same bits as from one, whoever renders which tile, and when."""
+"""A picture in tiles over processes or machines: the same bits in whatever order and wherever tiles are rendered."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ class Picture:
 def source_of(scene: str, point_set: str) -> str:
     """Hash of the content of a scene and of the code that renders it with a point set.
 
-    It is taken once in a process, for the process goes on with what it has imported and read: a worker that is older
-    than a change must not pass for one that knows it.
+    It is taken once in a process, because the process keeps the modules that it has imported: a worker that was started
+    before a change must not deliver tiles under the new hash.
     """
     from renderer.sampling import POINT_SETS
     from scenes import catalog

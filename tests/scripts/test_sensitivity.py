@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from analysis.command.cli import parse
+from analysis.sensitivity import run as study
 from analysis.sensitivity import runs as sensitivity
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.runs import Run, Setting, runs
@@ -97,6 +98,7 @@ def test_broken_invariants_end_with_a_status_of_their_own(
     out, planned = tmp_path / "out", runs(options(*SMALL))
     one = next(run.case for run in planned if run.case.policy == "tsar")
     fill(out, planned, {one: {"invariants": {"ok": False}}})
+    monkeypatch.setattr(study, "write_all", lambda *_: [])
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
     assert status == 3 and f"invariants are broken in 1 runs: {one.name}" in capsys.readouterr().err
     assert summary(out)["runs_done"] == 30
@@ -115,7 +117,7 @@ def test_failures_are_listed_and_the_rest_is_shown(
     def no_workers(asked: Any, *rest: Any) -> tuple[dict[Any, str], dict[Any, str]]:
         return {case: case.key(source) for case in asked}, {failed[0].case: "RuntimeError: out of luck"}
 
-    monkeypatch.setattr("analysis.sensitivity.run.run_cases", no_workers)
+    monkeypatch.setattr(study, "run_cases", no_workers)
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
     assert status == 1
     shown = capsys.readouterr()
