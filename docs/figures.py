@@ -24,7 +24,7 @@ from tsar.clock import fixed_clock
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
 from tsar.morton import deinterleave, raster_to_morton
-from tsar.policies.adaptive import Adaptive
+from tsar.policies.thesis import Thesis
 from tsar.policy import Setting, run
 from tsar.response.local import Box, constrain
 from tsar.response.mixture import mix
@@ -56,7 +56,7 @@ def trace(batch: FrameletBatch) -> SampleBatch:
 
 def played(config: TsarConfig) -> list[tuple[StepRecord, ShownImage]]:
     """The cycles of a run."""
-    return list(run(Adaptive(Setting(config)), trace, fixed_clock(CYCLE_S), 0.4, 0.4 + CYCLES * CYCLE_S))
+    return list(run(Thesis(Setting(config)), trace, fixed_clock(CYCLE_S), 0.4, 0.4 + CYCLES * CYCLE_S))
 
 
 def raster(field: Tensor) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Compare TSAR with the framed renderer on several inputs, repeated over seeds or animation phases."""
+"""Compare the policy of the dissertation with the framed renderer on several inputs, repeated over seeds or phases."""
 
 import sys
 from pathlib import Path

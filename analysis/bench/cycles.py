@@ -12,7 +12,7 @@ import torch
 from analysis.storage.invariants import unbroken
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TsarConfig
-from tsar.policies.adaptive import Adaptive
+from tsar.policies.thesis import Thesis
 from tsar.policy import Setting, run
 from tsar.stages import Stages
 from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, StepRecord, Trace
@@ -37,7 +37,7 @@ def default_stages(config: TsarConfig) -> Stages:
 
 def cycles(config: TsarConfig, trace: Trace, cycle_s: float = CYCLE_S) -> Iterator[StepRecord]:
     """Records of an endless run, those of the warm-up too, of which the numbers are negative."""
-    policy = Adaptive(Setting(config, default_stages))
+    policy = Thesis(Setting(config, default_stages))
     return unbroken(run(policy, trace, fixed_clock(cycle_s), 0.0, math.inf))
 
 

@@ -82,7 +82,7 @@ class Result:
 
 def compare(
     scene: str | PathLike[str] | Scene,
-    policies: Sequence[str | Make] = ("tsar", "framed"),
+    policies: Sequence[str | Make] = ("thesis", "framed"),
     metrics: Sequence[str | Callable[[Tensor, Tensor], float]] = (),
     seconds: float = 2.0,
     *,

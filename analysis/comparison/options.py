@@ -50,7 +50,7 @@ class RunOptions:
     """Speed of the simulated machine, FLOP/s. The default shows 8 framed images a second at 512²."""
     trace_segments: float = 4.0
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
-    policy: str = "tsar"
+    policy: str = "thesis"
     """Who decides what is sampled: a policy by name."""
     rivals: tuple[str, ...] = ("framed", "framed supersampled")
     """Policies that it is compared with at equal cost; ratios are to the first."""

@@ -92,10 +92,10 @@ def measure(options: MeasurementOptions, ready: tuple[Scene, Mapping[int, Render
 def _policy(config: TsarConfig, renderer: Renderer) -> Policy:
     """The adaptive pipeline on all threads of a renderer."""
     from renderer.stages.control import stages
-    from tsar.policies.adaptive import Adaptive
+    from tsar.policies.thesis import Thesis
     from tsar.policy import Setting
 
-    return Adaptive(Setting(config, lambda config: stages(config, threads=renderer.threads)))
+    return Thesis(Setting(config, lambda config: stages(config, threads=renderer.threads)))
 
 
 @dataclass

@@ -40,7 +40,7 @@ def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
         for row in rows:
             config = scale.config(row, TsarConfig(seed=options.seed))
             framed = framed_config(config.resolution_px)
-            pair: tuple[tuple[str, TsarConfig], ...] = (("tsar", config), ("framed", framed))
+            pair: tuple[tuple[str, TsarConfig], ...] = (("thesis", config), ("framed", framed))
             for policy, chosen in pair:
                 case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
                 cases[name, row, policy] = case
@@ -55,7 +55,7 @@ def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
     table = []
     for name in options.inputs:
         for row in rows:
-            seen = {policy: _distance(found[name, row, policy]) for policy in ("tsar", "framed")}
+            seen = {policy: _distance(found[name, row, policy]) for policy in ("thesis", "framed")}
             table.append(
                 {"input": name, "batch": ROWS[row][0], **{f"jod_{policy}": jod for policy, jod in seen.items()}}
             )
@@ -71,31 +71,32 @@ def judged(table: pd.DataFrame, sigma: float) -> pd.DataFrame:
     """What a simulated observer without lapses makes of the distances.
 
     Adds the shares of right answers in the dual-pair task of either renderer against the reference, and of preferring
-    TSAR to the framed renderer (of two stimuli with noise ``sigma`` each, the one that looks nearer the reference).
+    ``thesis`` to the framed renderer (of two stimuli with noise ``sigma`` each, the one that looks nearer the
+    reference).
     """
     from scipy import stats
 
     plain = Observer("ideal", 1.0, 0.0)
-    tsar, framed = (table[f"jod_{name}"].to_numpy(np.float64) for name in ("tsar", "framed"))
+    thesis, framed = (table[f"jod_{name}"].to_numpy(np.float64) for name in ("thesis", "framed"))
     return table.assign(
-        noticed_tsar=correct_probability(tsar, plain, sigma),
+        noticed_thesis=correct_probability(thesis, plain, sigma),
         noticed_framed=correct_probability(framed, plain, sigma),
-        tsar_preferred=stats.norm.cdf((framed - tsar) / (np.sqrt(2.0) * sigma)),
+        thesis_preferred=stats.norm.cdf((framed - thesis) / (np.sqrt(2.0) * sigma)),
     )
 
 
 def thresholds(table: pd.DataFrame) -> pd.DataFrame:
-    """By input: the batch sizes at which TSAR differs noticeably from the reference, and is preferred, or not, to the
-    framed renderer in three of four pairs."""
+    """By input: the batch sizes at which ``thesis`` differs noticeably from the reference, and is preferred, or not, to
+    the framed renderer in three of four pairs."""
     rows = []
     for name in dict.fromkeys(table["input"]):
         part = table.loc[table["input"] == name]
         batch = part["batch"].to_numpy()
-        preferred = part["tsar_preferred"].to_numpy(np.float64)
+        preferred = part["thesis_preferred"].to_numpy(np.float64)
         rows.append(
             {
                 "input": name,
-                "noticed_at": _listed(batch[part["noticed_tsar"].to_numpy(np.float64) >= THRESHOLD]),
+                "noticed_at": _listed(batch[part["noticed_thesis"].to_numpy(np.float64) >= THRESHOLD]),
                 "framed_noticed": bool((part["noticed_framed"] >= THRESHOLD).any()),
                 "preferred_at": _listed(batch[preferred >= THRESHOLD]),
                 "framed_preferred_at": _listed(batch[preferred <= 1.0 - THRESHOLD]),

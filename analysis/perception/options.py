@@ -172,7 +172,7 @@ class ServeOptions:
 @dataclass(frozen=True)
 @closed_choices()
 class AdaptiveOptions:
-    """Puts TSAR and the framed renderer before the simulated observer, by batch size at equal cost."""
+    """Puts thesis and the framed renderer before the simulated observer, by batch size at equal cost."""
 
     inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
     """Inputs of the study of suitability."""

@@ -140,7 +140,7 @@ def _answered(session: Session, options: ServeOptions, bars: Bars) -> None:
 
 
 def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
-    """Puts TSAR and the framed renderer before the same observer."""
+    """Puts thesis and the framed renderer before the same observer."""
     from analysis.perception.adaptive import judged, scores, thresholds
 
     table = judged(scores(options, bars.task("runs", 12 * len(options.inputs))), options.sigma_jod)
@@ -148,7 +148,7 @@ def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
     for name, rows in (("adaptive", table), ("thresholds", found)):
         write_table(options.out / f"{name}.csv", rows)
     lines = [
-        f"{row['input']}: TSAR noticed at batch {row['noticed_at']}, preferred to framed at {row['preferred_at']}, "
+        f"{row['input']}: thesis noticed at batch {row['noticed_at']}, preferred to framed at {row['preferred_at']}, "
         f"framed preferred at {row['framed_preferred_at']}"
         for row in found.to_dict("records")
     ]

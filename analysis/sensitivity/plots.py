@@ -170,7 +170,7 @@ def map_figure(lines: Lines) -> Figure | None:
     ticks = [1 / end, end**-0.5, 1.0, end**0.5, end]
     bar.set_ticks(ticks, labels=[number(tick) for tick in ticks])
     bar.minorticks_off()
-    figure.suptitle("Error of TSAR / framed (* default, box: best)", fontsize=10, x=0.01, ha="left")
+    figure.suptitle("Error of thesis / framed (* default, box: best)", fontsize=10, x=0.01, ha="left")
     figure.supxlabel(_SPATIAL, fontsize=9)
     figure.supylabel(_TEMPORAL, fontsize=9)
     return figure
@@ -213,7 +213,7 @@ def line_figure(lines: Lines) -> Figure | None:
         axis.set_axisbelow(True)
         axis.set_xlabel(f"{kind}{', octaves' if kind == 'bias' else ', log2 of power'}")
         axis.set_xticks(sorted({line[column] for line in part}))
-    axes[0].set_ylabel("error of TSAR / framed (* default)")
+    axes[0].set_ylabel("error of thesis / framed (* default)")
     axes[0].yaxis.set_major_locator(LogLocator(subs=tuple(range(1, 10))))
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].yaxis.set_minor_formatter("")

@@ -94,7 +94,7 @@ def runs(options: SensitivityOptions) -> list[Run]:
         for setting in (None, *settings):
             case = Case(
                 input=name,
-                policy="tsar" if setting else "framed",
+                policy="thesis" if setting else "framed",
                 tsar=setting.applied(seeded) if setting else framed,
                 scale=scale,
                 phase=repetition / options.repetitions,

@@ -34,9 +34,9 @@ class SuitabilityOptions:
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
     policies: tuple[str, ...] = ("framed supersampled", "frameless", "afr", "oracle")
-    """Policies that are compared beside TSAR and the framed renderer, at one row."""
+    """Policies that are compared beside thesis and the framed renderer, at one row."""
     solvers: tuple[str, ...] = ("trivial",)
-    """Solvers of TSAR that are compared beside the chosen one, at that row."""
+    """Solvers of thesis that are compared beside the chosen one, at that row."""
     policy_row: int = 7
     """The row at which policies and solvers are compared."""
     ledger: Ledger = "thesis"

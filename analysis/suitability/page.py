@@ -32,7 +32,7 @@ def shown_tables(tables: Tables) -> list[Table]:
                 ("Summary shares", "shares", 3),
                 ("Policies, and their share of the oracle's gain", "policies", 4),
                 ("Causes of the error", "causes", 5),
-                ("Runs in which TSAR is better, by metric", "votes", 0),
+                ("Runs in which thesis is better, by metric", "votes", 0),
                 ("Agreement of metrics on the ranks of runs", "ranks", 3),
             )
         ),
@@ -49,13 +49,13 @@ def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures:
     shown = [
         *shown_tables(tables),
         frame_table(tables["regions"], "Causes of the error by region", ".5f"),
-        frame_table(tables["disagreements"], "Runs whose better renderer depends on the metric (1: TSAR)", ".0f"),
+        frame_table(tables["disagreements"], "Runs whose better renderer depends on the metric (1: thesis)", ".0f"),
     ]
     lead = [
         f"{summary['runs_done']} of {summary['runs']} runs at scale {config['scale']}, ledger {summary['ledger']}, "
         f"{config['repetitions']} repetitions, each with its seed and phase. The ratio is the mean squared error "
-        f"of TSAR over that of the framed renderer at each reference time. A framed image of one sample a pixel is "
-        f"shown {config['framed_rate_hz']:g} times a second.",
+        f"of the policy thesis over that of the framed renderer at each reference time. A framed image of one sample "
+        f"a pixel is shown {config['framed_rate_hz']:g} times a second.",
         f"JOD by ColorVideoVDP for the display {summary['display'].name} at {summary['display'].rate_hz:g} Hz, from "
         f"{config['jod_span_s'][0]:g} s to {config['jod_span_s'][1]:g} s of the first {config['jod_repetitions']} "
         "repetitions.",
@@ -65,7 +65,7 @@ def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures:
     write_report(
         path,
         Report(
-            title="Suitability of TSAR",
+            title="Suitability of the policy thesis",
             lead=lead,
             key_numbers=shown[0],
             figures=[(caption, file.read_bytes()) for caption, file in pictures.items()],

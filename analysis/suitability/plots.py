@@ -159,7 +159,7 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
         axis.set_xlabel("row of table 7.2")
     if not drawn:
         return None
-    axes[0].set_ylabel("error of TSAR / framed")
+    axes[0].set_ylabel("error of thesis / framed")
     axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].yaxis.set_minor_formatter("")
@@ -168,7 +168,7 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     handles = [_patch(color, here[side]) for side, color in _INK.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     note = f"; {unbounded} infinite ratios not drawn" if unbounded else ""
-    figure.suptitle(f"{title}: below 1 TSAR is better{note}", fontsize=10, x=0.01, ha="left")
+    figure.suptitle(f"{title}: below 1 thesis is better{note}", fontsize=10, x=0.01, ha="left")
     return figure
 
 
@@ -182,12 +182,12 @@ def errors(results: Results, name: str) -> Figure | None:
     """Error over time: framed runs bold, adaptive runs thin, a column per resolution."""
     first = results.repetitions[0]
     found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
-    sides = sorted({one.run.side_px for one in found if one.run.label == "tsar"})
+    sides = sorted({one.run.side_px for one in found if one.run.label == "thesis"})
     if not sides:
         return None
     figure, axes = _axes(max(5.0, 3.6 * len(sides)), 3.6, len(sides), sharey=True)
     for axis, side in zip(axes, sides, strict=True):
-        ours = [one for one in found if one.run.side_px == side and one.run.label == "tsar"]
+        ours = [one for one in found if one.run.side_px == side and one.run.label == "thesis"]
         ours.sort(key=lambda one: ROWS[one.run.row or 0][0])
         for place, one in enumerate(ours):
             batch = ROWS[one.run.row or 0][0]
@@ -233,7 +233,7 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
     axis.yaxis.set_major_formatter("{x:g}")
     axis.yaxis.set_minor_formatter("")
     axis.set_xlabel("simulated time, s   (dotted: the framed display changes)")
-    axis.set_ylabel("error of TSAR / framed")
+    axis.set_ylabel("error of thesis / framed")
     axis.set_title(
         f"{results.inputs[0]}, row {row}: batch {ROWS[row][0]}, {ROWS[row][1]}², drawn at {pairs[0][0].run.side_px}²",
         loc="left",
@@ -246,7 +246,7 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
 def write_strip(
     path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Place
 ) -> Path | None:
-    """Reference, framed renderer and TSAR of growing batch at one time, finest resolution there is of each batch."""
+    """Reference, framed renderer and ``thesis`` of growing batch at one time, finest resolution of each batch."""
     # the fast vehicle is gone by the second
     first, number = results.repetitions[0], 0 if name == INPUTS[4] else len(STILLS) - 1
     found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
@@ -256,10 +256,10 @@ def write_strip(
     pictures = [("reference", place.still(keys[framed.run.case], "reference", number))]
     pictures.append((f"framed {framed.run.side_px}²", place.still(keys[framed.run.case], "shown", number)))
     for batch in _STRIP_BATCHES:
-        ours = [one for one in found if one.run.label == "tsar" and ROWS[one.run.row or 0][0] == batch]
+        ours = [one for one in found if one.run.label == "thesis" and ROWS[one.run.row or 0][0] == batch]
         best = max(ours, key=lambda one: one.run.side_px, default=None)
         if best is not None:
-            label = f"TSAR batch {batch}, {best.run.side_px}²"
+            label = f"thesis batch {batch}, {best.run.side_px}²"
             pictures.append((label, place.still(keys[best.run.case], "shown", number)))
     pictures = [(label, file) for label, file in pictures if file.exists()]
     if not pictures:

@@ -20,7 +20,7 @@ class Run:
     """A case and its place in the study.
 
     Attributes:
-        label: who decides what is sampled: a policy, or ``tsar`` and a solver.
+        label: who decides what is sampled: a policy, or ``thesis`` and a solver.
         row: of table 7.2; None for a framed renderer, which serves all rows of its resolution.
         side_px: output resolution.
         repetition: 0, 1, …
@@ -71,13 +71,13 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
     for side in sorted({config.resolution_px for _, config in rows}):
         yield run("framed", None, "framed", framed_config(side))
     for row, config in rows:
-        yield run("tsar", row, "tsar", config)
+        yield run("thesis", row, "thesis", config)
     for policy in compared:
         if policy == "framed supersampled":
             yield run(policy, None, policy, framed_config(at_row.resolution_px))
-        elif policy not in ("framed", "tsar"):
+        elif policy not in ("framed", "thesis"):
             yield run(policy, options.policy_row, policy, at_row)
     for solver in options.solvers if options.policy_row in options.rows else ():
         if solver != at_row.response.solver:
             changed = dataclasses.replace(at_row, response=dataclasses.replace(at_row.response, solver=solver))
-            yield run(f"tsar {solver}", options.policy_row, "tsar", changed)
+            yield run(f"thesis {solver}", options.policy_row, "thesis", changed)

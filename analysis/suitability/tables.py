@@ -61,7 +61,7 @@ class Results:
         }
         self.repetitions = sorted({one.run.repetition for one in self.all})
         self.inputs = [name for name in INPUTS if any(one.run.case.input == name for one in self.all)]
-        self.rows = sorted({one.run.row for one in self.all if one.run.label == "tsar" and one.run.row is not None})
+        self.rows = sorted({one.run.row for one in self.all if one.run.label == "thesis" and one.run.row is not None})
 
     def get(self, label: str, name: str, row: int | None, side_px: int, repetition: int) -> Result | None:
         return self._by.get((label, name, row, side_px, repetition))
@@ -70,7 +70,7 @@ class Results:
         """The adaptive run and its framed one, for every repetition that has both."""
         found = []
         for one in self.all:
-            if (one.run.label, one.run.case.input, one.run.row) == ("tsar", name, row):
+            if (one.run.label, one.run.case.input, one.run.row) == ("thesis", name, row):
                 framed = self.get("framed", name, None, one.run.side_px, one.run.repetition)
                 found += [(one, framed)] if framed is not None else []
         return sorted(found, key=lambda pair: pair[0].run.repetition)
@@ -93,7 +93,7 @@ def run_table(results: Results) -> pd.DataFrame:
             line |= {"suitable_percentile": statistics.suitable_percentile, "share_suitable": statistics.share_suitable}
             line |= {"outliers": statistics.outliers, "infinite": statistics.infinite}
             for metric in METRICS:
-                line |= {f"{metric}_tsar": ours.value(metric), f"{metric}_framed": framed.value(metric)}
+                line |= {f"{metric}_thesis": ours.value(metric), f"{metric}_framed": framed.value(metric)}
             line |= {"cycles": ours.summary["cycles"], "cycle_s": ours.summary["cycle_s"]}
             line |= {"invariants_ok": ours.summary["invariants"]["ok"], "nonfinite": ours.summary["nonfinite_samples"]}
             lines.append(line)
@@ -223,7 +223,7 @@ def _oracle_share(
 
 
 def disagreement_table(results: Results) -> pd.DataFrame:
-    """Runs on which metrics disagree about which renderer is better, one line each; +1 is better for TSAR."""
+    """Runs on which metrics disagree about which renderer is better, one line each; +1 is better for ``thesis``."""
     lines = []
     for name, row in itertools.product(results.inputs, results.rows):
         for ours, framed in results.pairs(name, row):
@@ -237,14 +237,14 @@ def disagreement_table(results: Results) -> pd.DataFrame:
 
 
 def vote_table(results: Results) -> pd.DataFrame:
-    """In how many runs each metric says that TSAR is better than the framed renderer."""
+    """In how many runs each metric says that ``thesis`` is better than the framed renderer."""
     runs = run_table(results)
     lines = []
     for metric, sign in METRICS.items() if len(runs) else ():
-        gain = sign * (runs[f"{metric}_tsar"] - runs[f"{metric}_framed"]).to_numpy()
+        gain = sign * (runs[f"{metric}_thesis"] - runs[f"{metric}_framed"]).to_numpy()
         known = ~np.isnan(gain)
-        lines.append({"metric": metric, "TSAR better": int((gain[known] > 0).sum()), "runs": int(known.sum())})
-    return pd.DataFrame(lines, columns=["metric", "TSAR better", "runs"])
+        lines.append({"metric": metric, "thesis better": int((gain[known] > 0).sum()), "runs": int(known.sum())})
+    return pd.DataFrame(lines, columns=["metric", "thesis better", "runs"])
 
 
 def rank_table(results: Results) -> pd.DataFrame:
@@ -252,7 +252,7 @@ def rank_table(results: Results) -> pd.DataFrame:
     runs = run_table(results)
     lines = []
     for one, other in itertools.combinations(METRICS, 2) if len(runs) else ():
-        values = [METRICS[name] * runs[f"{name}_tsar"].to_numpy() for name in (one, other)]
+        values = [METRICS[name] * runs[f"{name}_thesis"].to_numpy() for name in (one, other)]
         known = ~np.isnan(values[0]) & ~np.isnan(values[1])
         found: Any = spearmanr(values[0][known], values[1][known])[0] if known.sum() > 2 else math.nan
         lines.append({"metric": one, "and": other, "rank correlation": float(found), "runs": int(known.sum())})

@@ -64,10 +64,10 @@ def player(labels: list[str] = LABELS) -> Player:
     times = np.arange(TIMES)
     steps = [Step(2 * step, {label: picture(step, i) for i, label in enumerate(labels)}) for step in range(STEPS)]
     curves = [
-        Curve("TSAR", "#c9570c", (1e-3 * 1.3**times).tolist()),
+        Curve("thesis", "#c9570c", (1e-3 * 1.3**times).tolist()),
         Curve("framed", "#1f6fb4", np.where(times == 6, 0.0, 2e-2 / 1.2**times).tolist()),
     ]
-    ratio = {"TSAR / framed": [f"{0.1 * time:.3f}" for time in times]}
+    ratio = {"thesis / framed": [f"{0.1 * time:.3f}" for time in times]}
     return Player(times / 30, steps, curves, "mean squared error", [0.1, 0.2, 0.3], ratio, "A note on the views.")
 
 

@@ -58,7 +58,7 @@ def truths_of(renderer: Renderer, start_s: float) -> Truths:
 
 def play(policy: str, renderer: Renderer, start_s: float) -> list:
     chosen = stages(CONFIG, policy, 1) if policy in ("compiled", "reference") else REFERENCE
-    name = "tsar" if policy in ("compiled", "reference") else policy
+    name = "thesis" if policy in ("compiled", "reference") else policy
     truth, end_s = truths_of(renderer, start_s).at, start_s + CYCLES * CYCLE_S
     return list(runs.play(name, CONFIG, renderer.trace, fixed_clock(CYCLE_S), start_s, end_s, chosen, truth))
 
@@ -84,12 +84,12 @@ def test_a_run_far_from_time_zero_is_the_run_at_time_zero(renderers, policy: str
                 assert torch.equal(record.densities.spatial, expected.densities.spatial)
 
 
-@pytest.mark.parametrize("policy", ["tsar", "framed"])
+@pytest.mark.parametrize("policy", ["thesis", "framed"])
 def test_errors_far_from_time_zero_are_those_at_time_zero(renderers, policy: str) -> None:
     scale = dataclasses.replace(SCALES["quick"], seconds=0.25, reference_rate_hz=RATE_HZ)
     found = {}
     for later in (0.0, *LATE_S):
-        shown = play({"tsar": "compiled", "framed": "framed"}[policy], renderers[later], later)
+        shown = play({"thesis": "compiled", "framed": "framed"}[policy], renderers[later], later)
         times_s = later + np.arange(4) / RATE_HZ
         measuring = Measuring(metrics=("ssim", "flip"), stride=scale.stride, causes=True)
         seen = watch({policy: shown}, truths_of(renderers[later], later), times_s, measuring)[policy]

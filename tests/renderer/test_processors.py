@@ -158,7 +158,7 @@ def shown(name, displays):
                    f"{name} densities {number}", found, set())
 
 for name, stages in (("compiled", compiled_stages(config)), ("reference", REFERENCE)):
-    shown(name, play("tsar", config, renderer.trace, fixed_clock(0.02), 0.0, 0.2, stages))
+    shown(name, play("thesis", config, renderer.trace, fixed_clock(0.02), 0.0, 0.2, stages))
 for name in ("afr", "frameless"):
     shown(name, play(name, config, renderer.trace, fixed_clock(0.02), 0.0, 0.06))
 print(json.dumps(found))

@@ -66,11 +66,11 @@ def test_a_suitability_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
     import analysis.suitability.page as page
     import analysis.suitability.run as report
 
-    summary = {"failures": {}, "runs": 1, "runs_done": 1, "broken_invariants": ["tsar-fly-by"]}
+    summary = {"failures": {}, "runs": 1, "runs_done": 1, "broken_invariants": ["thesis-fly-by"]}
     monkeypatch.setattr(report, "study", lambda options: (summary, {}))
     monkeypatch.setattr(page, "shown_tables", lambda tables: [])
     assert call_script("suitability.py", monkeypatch, "--out", str(tmp_path)) == 3
-    assert last_line(capsys) == "error: invariants are broken in 1 runs: tsar-fly-by"
+    assert last_line(capsys) == "error: invariants are broken in 1 runs: thesis-fly-by"
 
 
 def test_measurements_of_time(strict: None) -> None:
@@ -94,10 +94,10 @@ def test_adaptive_rendering_before_an_observer(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(adaptive, "run_cases", lambda cases, *rest: ({case: case.name for case in cases}, {}))
 
     def finished(key: str, place: Any) -> dict[str, Any]:
-        return {"key": key, "jod": 9.0, **({"invariants": BROKEN} if key.startswith("tsar-fly-by-b8-") else {})}
+        return {"key": key, "jod": 9.0, **({"invariants": BROKEN} if key.startswith("thesis-fly-by-b8-") else {})}
 
     monkeypatch.setattr(adaptive, "finished", finished)
     options = AdaptiveOptions(inputs=("fly-by",), scale="quick", out=tmp_path, cache=tmp_path)
-    with pytest.raises(BrokenInvariants, match="in 1 runs: tsar-fly-by-b8-128px"):
+    with pytest.raises(BrokenInvariants, match="in 1 runs: thesis-fly-by-b8-128px"):
         adaptive.scores(options, Task())
     assert SCALES["quick"].config(7, TsarConfig()).batch_size == 8

@@ -21,7 +21,7 @@ from tsar.config import ConfigError, TsarConfig
 FOUND = {
     "ratio_median": 0.5,
     "ratio_quartiles": [0.4, 0.6],
-    "policy": "tsar",
+    "policy": "thesis",
     "ratio_statistics": {},
     "share_suitable": 1.0,
     "suitable_percentile": 100.0,

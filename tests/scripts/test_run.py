@@ -121,7 +121,7 @@ def test_the_film_has_a_frame_of_every_reference_time(folder: Path, printed: str
 
 def test_errors_are_given_at_every_reference_time(summary: dict[str, Any]) -> None:
     assert summary["reference_time_s"] == pytest.approx(np.arange(IMAGES) / 20.0)
-    adaptive, framed = np.array(summary["mse"]["tsar"]), np.array(summary["mse"]["framed"])
+    adaptive, framed = np.array(summary["mse"]["thesis"]), np.array(summary["mse"]["framed"])
     assert adaptive.shape == framed.shape == (IMAGES,) and (adaptive > 0.0).all() and (framed > 0.0).all()
     assert summary["ratio"] == pytest.approx(adaptive / framed)
     assert max(adaptive.max(), framed.max()) < 0.1, "both resemble the reference"

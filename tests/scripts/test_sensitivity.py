@@ -96,7 +96,7 @@ def test_broken_invariants_end_with_a_status_of_their_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     out, planned = tmp_path / "out", runs(options(*SMALL))
-    one = next(run.case for run in planned if run.case.policy == "tsar")
+    one = next(run.case for run in planned if run.case.policy == "thesis")
     fill(out, planned, {one: {"invariants": {"ok": False}}})
     monkeypatch.setattr(study, "write_all", lambda *_: [])
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))

@@ -86,7 +86,7 @@ def let_fail(policies: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None
         monkeypatch.setattr(f"analysis.suitability.run.{name}", made)
 
 
-@pytest.mark.parametrize("policies", [("tsar",), ("framed",), ("tsar", "framed"), POLICIES])
+@pytest.mark.parametrize("policies", [("thesis",), ("framed",), ("thesis", "framed"), POLICIES])
 @pytest.mark.parametrize("full", [False, True])
 def test_the_reasons_of_failures_are_said_whatever_is_left(
     policies: tuple[str, ...],

@@ -191,7 +191,7 @@ def error(displays, picture):
 @pytest.mark.parametrize("picture", [EDGE, pictures.textured_motion], ids=["edge", "texture"])
 def test_seeing_the_answer_beats_uniform_and_estimated_allocation(picture):
     found = error(play(picture), picture)
-    estimated = list(runs.images("tsar", CONFIG, pictures.tracer(picture), fixed_clock(CYCLE), 0.0, 0.2))
+    estimated = list(runs.images("thesis", CONFIG, pictures.tracer(picture), fixed_clock(CYCLE), 0.0, 0.2))
     assert 0.0 < found <= error(play_uniform(picture, 10), picture)
     assert found <= error(estimated, picture)
 

@@ -21,7 +21,7 @@ def small(**more):
 
 def play(config, picture, cycles, start_s=0.0):
     return list(
-        runs.play("tsar", config, pictures.tracer(picture), fixed_clock(CYCLE), start_s, start_s + cycles * CYCLE)
+        runs.play("thesis", config, pictures.tracer(picture), fixed_clock(CYCLE), start_s, start_s + cycles * CYCLE)
     )
 
 
@@ -156,7 +156,7 @@ def test_nonfinite_samples_are_counted_and_never_shown():
         color[:, ::17] = float("nan")
         return SampleBatch(color, {})
 
-    for record, display in runs.play("tsar", small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
+    for record, display in runs.play("thesis", small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
         assert record.nonfinite == 32 * 16 and bool(torch.isfinite(display.image).all())
 
 
@@ -166,13 +166,13 @@ def test_radiance_at_the_end_of_float32_reaches_neither_image_nor_densities():
         color[:, ::31] = torch.finfo(torch.float32).max
         return SampleBatch(color, {})
 
-    for record, display in runs.play("tsar", small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
+    for record, display in runs.play("thesis", small(warmup_cycles=2), trace, fixed_clock(CYCLE), 0.0, 0.05):
         assert record.nonfinite == 32 * 9 and bool(torch.isfinite(display.image).all()) and display.image.max() <= 1.0
         assert bool(torch.isfinite(record.densities.spatial).all())
 
 
 def test_wall_clock_time_advances_by_what_a_cycle_took():
-    run_ = runs.play("tsar", small(warmup_cycles=2), pictures.tracer(pictures.constant), wall_clock, 0.0, 1e9)
+    run_ = runs.play("thesis", small(warmup_cycles=2), pictures.tracer(pictures.constant), wall_clock, 0.0, 1e9)
     records = [next(run_)[0] for _ in range(5)]
     for now, after in pairwise(records):
         assert after.sim_time_s == pytest.approx(now.sim_time_s + now.cost_s)
@@ -213,7 +213,7 @@ def test_temporal_density_gathers_where_a_moving_edge_is_and_leaves_where_it_was
 def test_a_clock_that_stops_time_is_refused():
     for seconds in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="finite, positive cycle time"):
-            next(runs.play("tsar", small(), pictures.tracer(pictures.constant), fixed_clock(seconds), 0.0, 1.0))
+            next(runs.play("thesis", small(), pictures.tracer(pictures.constant), fixed_clock(seconds), 0.0, 1.0))
 
 
 @pytest.mark.parametrize(

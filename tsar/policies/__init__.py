@@ -16,7 +16,7 @@ POLICIES: Named[Make] = Named(
     "policy",
     "tsar.policies",
     {
-        "tsar": "tsar.policies.adaptive:Adaptive",
+        "thesis": "tsar.policies.thesis:Thesis",
         "framed": "tsar.policies.framed:Framed",
         "framed supersampled": "tsar.policies.framed:supersampled",
         "frameless": "tsar.policies.frameless:Frameless",

@@ -24,8 +24,8 @@ from tsar.config import TsarConfig
 from tsar.error import replace_nonfinite
 from tsar.haar import state_size
 from tsar.morton import morton_to_raster, raster_to_morton
-from tsar.policies.adaptive import Adaptive
 from tsar.policies.scatter import double_width
+from tsar.policies.thesis import Thesis
 from tsar.policy import Moment, Picture, Policy, Setting
 from tsar.reconstruction import reconstruct
 from tsar.selection import sample_positions
@@ -46,7 +46,7 @@ class Foresight:
 class Oracle(Policy[Foresight]):
     """The adaptive pipeline's cache, display, latency and cost under a controller that looks at the truth."""
 
-    latency_cycles = Adaptive.latency_cycles
+    latency_cycles = Thesis.latency_cycles
 
     def __init__(self, setting: Setting) -> None:
         """Takes the truth and a renderer that is not charged.

@@ -18,7 +18,7 @@ def main() -> None:
         "error": ErrorConfig(norm="mean"),
         "reconstruction": ReconstructionConfig(method="smooth"),
     }
-    result = compare("pendulum", ["tsar", "interlaced"], **SMALL, **changed)
+    result = compare("pendulum", ["thesis", "interlaced"], **SMALL, **changed)
     print(result.table().to_string())
     print("added:", *(f"{one.kind} {one.name}" for one in result.summary["provenance"]["added"]), sep="\n  ")
     print(f"picture: {render('pendulum', 64, point_set='r3', samples_per_pixel=8).mean():.3f}")

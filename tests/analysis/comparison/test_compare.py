@@ -36,15 +36,15 @@ def mean_difference(shown: torch.Tensor, reference: torch.Tensor) -> float:
 def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     out = tmp_path_factory.mktemp("compared")
     scene = load_scene("fly-by")
-    return compare(scene, ["tsar", Late], [mean_difference], 0.2, out=out, image_times_s=[0.0, 0.11], **SMALL)
+    return compare(scene, ["thesis", Late], [mean_difference], 0.2, out=out, image_times_s=[0.0, 0.11], **SMALL)
 
 
 def test_a_result_has_a_row_a_run(result: Result) -> None:
     table = result.table()
-    assert list(table.index) == ["tsar", "Late"] and np.isnan(table.loc["tsar", "ratio"])
+    assert list(table.index) == ["thesis", "Late"] and np.isnan(table.loc["thesis", "ratio"])
     expected = result.errors["mse"].median("time_s").sel(run="Late")
     assert table.loc["Late", "mse"] == float(expected) > 0
-    ratio = result.errors["mse"].sel(run="tsar") / result.errors["mse"].sel(run="Late")
+    ratio = result.errors["mse"].sel(run="thesis") / result.errors["mse"].sel(run="Late")
     assert table.loc["Late", "ratio"] == pytest.approx(float(ratio.median()))
     assert table.loc["Late", "mean_difference"] == pytest.approx(
         float(result.errors["mean_difference"].sel(run="Late").mean())
@@ -54,11 +54,11 @@ def test_a_result_has_a_row_a_run(result: Result) -> None:
 def test_images_are_those_of_the_times_asked_for(result: Result) -> None:
     images = result.images
     assert images.dims == ("run", "time_s", "row", "column", "channel") and images.shape == (3, 2, 64, 64, 3)
-    assert list(images["run"].values) == ["tsar", "Late", "reference"]
+    assert list(images["run"].values) == ["thesis", "Late", "reference"]
     np.testing.assert_allclose(images["time_s"], [0.0, 0.1])
     from analysis.metrics.quality import pixel_errors
 
-    for run in ("tsar", "Late"):
+    for run in ("thesis", "Late"):
         for time_s in images["time_s"].values:
             shown, truth = (torch.from_numpy(images.sel(run=one, time_s=time_s).values) for one in (run, "reference"))
             assert pixel_errors(shown, truth)[0].mse == pytest.approx(
@@ -83,7 +83,7 @@ def test_the_report_is_one_file(result: Result, tmp_path: Path) -> None:
 def test_a_finished_run_is_read_back(result: Result) -> None:
     found = load(result.folder)
     np.testing.assert_array_equal(found["mse"], result.errors["mse"])
-    assert found.attrs["policy"] == "tsar" and json.loads(found.attrs["config"])["seconds"] == 0.2
+    assert found.attrs["policy"] == "thesis" and json.loads(found.attrs["config"])["seconds"] == 0.2
     densities = found["density_spatial"]
     assert densities.dims == ("cycle", "row", "column") and densities.shape[1:] == (128, 128)
     assert (np.diff(found["cycle_time_s"]) > 0).all() and int(found["cycle"][0]) == -8
@@ -118,7 +118,7 @@ def test_a_folder_of_its_own_goes_with_the_result() -> None:
     ("arguments", "message"),
     [
         ({"resolution": 64}, "^resolution: expected an option of a run, such as resolution_px$"),
-        ({"policies": ["tsr"]}, "expected one of tsar, framed, .*, got 'tsr' \\(nearest: tsar\\)"),
+        ({"policies": ["thesys"]}, "expected one of thesis, framed, .*, got 'thesys' \\(nearest: thesis\\)"),
         ({"policies": []}, "policies: expected at least one"),
         ({"metrics": ["flp"]}, "metrics: expected one of flip, .*'flp'"),
         ({"scene": "flyby"}, "nearest: fly-by"),

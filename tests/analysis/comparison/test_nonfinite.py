@@ -60,7 +60,7 @@ def test_a_run(
 ) -> None:
     status, summary = run(tmp_path, monkeypatch)
     found, cycles = summary["nonfinite"], pd.read_parquet(tmp_path / "out" / "steps.parquet")["cycle"]
-    assert status == 0 and found["tsar"] == BATCH * BAD * (cycles >= 0).sum() > 0
+    assert status == 0 and found["thesis"] == BATCH * BAD * (cycles >= 0).sum() > 0
     assert all(found[name] > 0 for name in RIVALS)
     assert found["fields"] == 0 and found["reference"] == 4
     printed = [line for line in capsys.readouterr().out.splitlines() if "non-finite" in line]
@@ -84,16 +84,16 @@ def test_images_and_fields_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     status, summary = run(tmp_path, monkeypatch)
     found = summary["nonfinite"]
     assert status == 0 and found["fields"] == 3 * summary["cycles"] > 0
-    assert found["framed"] == 2 * summary["images"]["framed"] > 0 and found["tsar"] == found["afr"] == 0
+    assert found["framed"] == 2 * summary["images"]["framed"] > 0 and found["thesis"] == found["afr"] == 0
 
 
-@pytest.mark.parametrize("policy", ["tsar", *RIVALS, "oracle"])
+@pytest.mark.parametrize("policy", ["thesis", *RIVALS, "oracle"])
 def test_a_case_of_a_study(policy: str, tmp_path: Path, broken_renderer: None) -> None:
     scale = Scale(4, seconds=0.2, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=2)
     config = framed_config(64) if policy == "framed" else scale.config(0, TsarConfig(warmup_cycles=4))
     case, place = Case("fly-by", policy, config, scale), Place(tmp_path / "runs", tmp_path / "cache")
     found = finished(evaluate(case, case.key(source_of_results()), place), place)
     assert found is not None and found["nonfinite_samples"] > 0 and found["reference_nonfinite"] == 4
-    if policy == "tsar":
+    if policy == "thesis":
         assert found["nonfinite_samples"] == config.batch_size * BAD * found["cycles"]
     assert (found["nonfinite"] > 0) == (policy == "framed"), "only whole frames are shown as they were traced"

@@ -17,7 +17,7 @@ QUICK = SCALES["quick"]
 
 
 def case(**changes) -> Case:
-    values = {"input": "fly-by", "policy": "tsar", "tsar": QUICK.config(7, TsarConfig()), "scale": QUICK}
+    values = {"input": "fly-by", "policy": "thesis", "tsar": QUICK.config(7, TsarConfig()), "scale": QUICK}
     return Case(**{**values, **changes})
 
 

@@ -25,7 +25,7 @@ TINY = Scale(4, seconds=0.2, reference_rate_hz=30.0, reference_samples_per_axis=
 TIMES = 6
 
 
-def case(policy="tsar", **changes) -> Case:
+def case(policy="thesis", **changes) -> Case:
     config = framed_config(64) if policy.startswith("framed") else TINY.config(0, TsarConfig(warmup_cycles=8))
     return Case(**{"input": "fly-by", "policy": policy, "tsar": config, "scale": TINY, **changes})
 
@@ -77,10 +77,10 @@ def test_every_policy_runs(policy: str, place: Place) -> None:
 
 def test_the_oracle_is_better_than_what_does_not_look(place: Place) -> None:
     errors = {}
-    for policy in ("tsar", "framed", "oracle"):
+    for policy in ("thesis", "framed", "oracle"):
         one = case(policy)
         errors[policy] = pd.read_parquet(place.files(evaluate(one, key(one), place))["times"])["mse"].mean()
-    assert errors["oracle"] < min(errors["tsar"], errors["framed"])
+    assert errors["oracle"] < min(errors["thesis"], errors["framed"])
 
 
 def test_threads_change_nothing(place: Place, references: Path, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ TINY = Scale(4, seconds=0.2, reference_rate_hz=30.0, reference_samples_per_axis=
 
 def cases(count: int) -> list[Case]:
     configs = [TINY.config(0, TsarConfig(seed=seed)) for seed in range(count)]
-    return [Case(input="fly-by", policy="tsar", tsar=config, scale=TINY) for config in configs]
+    return [Case(input="fly-by", policy="thesis", tsar=config, scale=TINY) for config in configs]
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from tsar.config import ConfigError
 
 def test_the_whole_study() -> None:
     planned = runs(SuitabilityOptions(repetitions=2))
-    adaptive = [run for run in planned if run.label == "tsar"]
+    adaptive = [run for run in planned if run.label == "thesis"]
     assert len(adaptive) == 2 * 5 * 16
     assert {(run.case.input, run.row, run.repetition) for run in adaptive} == {
         (name, row, number) for name in INPUTS for row in range(16) for number in (0, 1)
@@ -27,12 +27,12 @@ def test_the_whole_study() -> None:
 
 def test_policies_are_compared_at_one_row() -> None:
     planned = runs(SuitabilityOptions(inputs=("chase",), rows=(0, 7), repetitions=1))
-    others = {run.label: run for run in planned if run.label not in ("tsar", "framed")}
-    assert set(others) == {"framed supersampled", "frameless", "afr", "oracle", "tsar trivial"}
+    others = {run.label: run for run in planned if run.label not in ("thesis", "framed")}
+    assert set(others) == {"framed supersampled", "frameless", "afr", "oracle", "thesis trivial"}
     assert {run.side_px for run in others.values()} == {128}
-    assert others["tsar trivial"].case.tsar.response.solver == "trivial"
+    assert others["thesis trivial"].case.tsar.response.solver == "trivial"
     only = runs(SuitabilityOptions(inputs=("chase",), rows=(0,), repetitions=1))
-    assert [run.label for run in only] == ["framed", "tsar"], "the row of the policies was not asked for"
+    assert [run.label for run in only] == ["framed", "thesis"], "the row of the policies was not asked for"
 
 
 @pytest.mark.parametrize(

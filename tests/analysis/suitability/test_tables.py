@@ -90,10 +90,10 @@ def test_intervals_are_of_95_percent() -> None:
     def tables(error) -> tuple[pd.Series, pd.Series]:
         results = Results([result(run, error(run)) for run in runs(options)])
         policies = policy_table(results, 7, 128).set_index("policy")
-        return share_table(results).set_index("share").loc["ratios at most 1"], policies.loc["tsar"]
+        return share_table(results).set_index("share").loc["ratios at most 1"], policies.loc["thesis"]
 
     def error(run: Run, different: float, others: float) -> float:
-        if run.label == "tsar":
+        if run.label == "thesis":
             return different if run.repetition == 0 else others
         return 0.0 if run.label == "oracle" else 1.0
 
@@ -124,16 +124,23 @@ def test_one_repetition_has_no_interval() -> None:
     assert table["ours"].tolist() == [1.0] * 4 and table["low"].isna().all()
 
 
-ERRORS = {"tsar": 0.7, "oracle": 0.4, "afr": 0.25, "frameless": 1.3, "tsar trivial": 1.0, "framed supersampled": 0.85}
+ERRORS = {
+    "thesis": 0.7,
+    "oracle": 0.4,
+    "afr": 0.25,
+    "frameless": 1.3,
+    "thesis trivial": 1.0,
+    "framed supersampled": 0.85,
+}
 
 
 def test_gains_are_measured_against_the_oracle() -> None:
     table = policy_table(made(lambda run: ERRORS[run.label]), 7, 128).set_index(["input", "policy"])
     gains = table.loc["chase"]["oracle_share"]
-    assert gains["framed"] == 0.0 and gains["oracle"] == 1.0 and gains["tsar"] == pytest.approx(0.5)
+    assert gains["framed"] == 0.0 and gains["oracle"] == 1.0 and gains["thesis"] == pytest.approx(0.5)
     assert gains["frameless"] == pytest.approx(-0.5) and gains["afr"] == pytest.approx(1.25)
     assert gains["framed supersampled"] == pytest.approx(0.25)
-    assert table.loc["chase"]["ratio"]["tsar"] == pytest.approx(0.7)
+    assert table.loc["chase"]["ratio"]["thesis"] == pytest.approx(0.7)
     assert table.loc["chase"]["jod"]["oracle"] == pytest.approx(10 - 40)
 
 
@@ -147,7 +154,7 @@ def test_disagreements_of_metrics_are_listed() -> None:
     """Of the two inputs one has a better SSIM although its MSE is worse."""
     found = []
     for run in runs(OPTIONS):
-        odd = {"ssim": 0.9} if run.label == "tsar" and run.case.input == "chase" else {}
+        odd = {"ssim": 0.9} if run.label == "thesis" and run.case.input == "chase" else {}
         found.append(result(run, 1.0 if run.label == "framed" else 2.0, **odd))
     table = disagreement_table(Results(found))
     assert set(table["input"]) == {"chase"} and len(table) == 4
@@ -198,7 +205,7 @@ def test_missing_runs_leave_the_others() -> None:
     table = percentile_table(results)
     assert table["chase"].isna().all() and (table["fly-by"] == 100).all()
     assert len(run_table(results)) == 4 and share_table(results)["ours"].tolist() == [1.0] * 4
-    assert math.isnan(policy_table(results, 7, 128).set_index(["input", "policy"]).loc[("chase", "tsar"), "ratio"])
+    assert math.isnan(policy_table(results, 7, 128).set_index(["input", "policy"]).loc[("chase", "thesis"), "ratio"])
 
 
 def test_nothing_at_all() -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from renderer.stages.control import compiled_stages
 from tests.oracles import pictures, runs
 from tsar.config import ErrorConfig, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
-from tsar.policies.adaptive import State
+from tsar.policies.thesis import State
 from tsar.policy import Cycle, step
 from tsar.policy import Moment as When
 
@@ -53,8 +53,8 @@ class Moment:
 
 def moments(config: TsarConfig, first: int, cycles: int, picture=pictures.textured_motion) -> Iterator[Moment]:
     """Cycles from number ``first`` on; those before, in which cache and densities take shape, are compiled ones."""
-    trace, plain = pictures.tracer(picture), runs.made("tsar", config)
-    fast, state = runs.made("tsar", config, compiled_stages(config)), plain.start()
+    trace, plain = pictures.tracer(picture), runs.made("thesis", config)
+    fast, state = runs.made("thesis", config, compiled_stages(config)), plain.start()
     for number in range(first):
         state = step(fast, state, trace, When(number * CYCLE_S, number, CYCLE_S)).after
     for number in range(first, first + cycles):

@@ -156,7 +156,7 @@ def test_a_batch_that_the_tiling_cannot_fill_is_refused() -> None:
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 def test_fields_that_are_not_finite_are_counted(value: float) -> None:
     config = small()
-    state, none = runs.made("tsar", config).start(), torch.zeros(128**2)
+    state, none = runs.made("thesis", config).start(), torch.zeros(128**2)
     newest = torch.zeros(2**config.level_max, 2**config.level_max, dtype=torch.float64)
     for number in range(4):
         spatial, temporal = state.densities.spatial.clone(), state.densities.temporal.clone()
@@ -247,7 +247,13 @@ def test_invariants_hold_over_a_thousand_cycles(monkeypatch: pytest.MonkeyPatch)
     config = small(resolution_px=64, batch_size=16, sdf_side=32, framelet_side=16)
     low, high = config.spatial_bounds
     cycles = runs.play(
-        "tsar", config, pictures.tracer(pictures.textured_motion), fixed_clock(1e-3), 0.0, 1.0, compiled_stages(config)
+        "thesis",
+        config,
+        pictures.tracer(pictures.textured_motion),
+        fixed_clock(1e-3),
+        0.0,
+        1.0,
+        compiled_stages(config),
     )
     count = 0
     for record, display in cycles:
@@ -268,7 +274,7 @@ def test_runs_give_the_same_bits_on_any_number_of_threads() -> None:
     def played(threads: int):
         trace = pictures.tracer(pictures.textured_motion)
         return list(
-            runs.play("tsar", config, trace, fixed_clock(CYCLE_S), 0.0, 6 * CYCLE_S, compiled_stages(config, threads))
+            runs.play("thesis", config, trace, fixed_clock(CYCLE_S), 0.0, 6 * CYCLE_S, compiled_stages(config, threads))
         )
 
     first = played(1)
@@ -285,7 +291,7 @@ def test_runs_give_the_same_bits_on_any_number_of_threads() -> None:
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf"), torch.finfo(torch.float32).max])
 def test_samples_that_are_not_finite_are_counted_and_repaired(value: float) -> None:
     config = small()
-    ours, state = compiled_stages(config), runs.made("tsar", config).start()
+    ours, state = compiled_stages(config), runs.made("thesis", config).start()
     batch = state.due.at(0.0, 0, config)
     color = pictures.tracer(pictures.textured_motion)(batch).color
     color[5, 17, 1] = color[31, 255, 2] = value
@@ -296,14 +302,14 @@ def test_samples_that_are_not_finite_are_counted_and_repaired(value: float) -> N
     assert_same_cache(state.cache, theirs)
     torch.testing.assert_close(found.errors.spatial, wanted.errors.spatial, rtol=0.0, atol=2e-5)
     for record, display in runs.play(
-        "tsar", config, lambda batch: SampleBatch(color), fixed_clock(CYCLE_S), 0.0, 0.05, compiled_stages(config)
+        "thesis", config, lambda batch: SampleBatch(color), fixed_clock(CYCLE_S), 0.0, 0.05, compiled_stages(config)
     ):
         assert record.nonfinite == 2 and bool(torch.isfinite(display.image).all())
 
 
 def test_colours_may_come_in_any_layout_and_precision() -> None:
     config = small()
-    ours, state = compiled_stages(config), runs.made("tsar", config).start()
+    ours, state = compiled_stages(config), runs.made("thesis", config).start()
     batch = state.due.at(0.0, 0, config)
     grey = torch.rand(32, 256, 1, dtype=torch.float64, generator=torch.Generator().manual_seed(0)).expand(-1, -1, 3)
     plain = grey.to(torch.float32).contiguous()
@@ -319,7 +325,7 @@ def test_colours_may_come_in_any_layout_and_precision() -> None:
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_other_solvers_are_left_to_the_reference(solver: str) -> None:
     config = small(response=ResponseConfig(solver=solver))
-    state, g = runs.made("tsar", config).start(), torch.Generator().manual_seed(5)
+    state, g = runs.made("thesis", config).start(), torch.Generator().manual_seed(5)
     errors, history = errors_of("mixed", g, config.sdf_side**2), state.due.history
     found = Control(config).decide(state.densities, errors, history, config, StageTimer())
     wanted = REFERENCE.decide(state.densities, errors, history, config, StageTimer())
@@ -334,7 +340,7 @@ def test_the_stages_are_chosen_by_name() -> None:
 
 
 def test_stages_refuse_another_configuration_than_theirs() -> None:
-    ours, state = compiled_stages(small()), runs.made("tsar", small()).start()
+    ours, state = compiled_stages(small()), runs.made("thesis", small()).start()
     other, none = small(seed=1), Errors(*torch.zeros(2, 128**2).unbind(0))
     with pytest.raises(ValueError, match="expected the configuration that they were made for"):
         ours.decide(state.densities, none, state.due.history, other, StageTimer())
@@ -358,7 +364,7 @@ def test_a_set_of_stages_serves_several_runs_at_once() -> None:
     kinds = (pictures.textured_motion, pictures.static_stripes)
 
     def playing(picture, chosen):
-        return runs.play("tsar", config, pictures.tracer(picture), fixed_clock(CYCLE_S), 0.0, 6 * CYCLE_S, chosen)
+        return runs.play("thesis", config, pictures.tracer(picture), fixed_clock(CYCLE_S), 0.0, 6 * CYCLE_S, chosen)
 
     alone = [[copy.copy(shown.image) for _, shown in playing(kind, compiled_stages(config))] for kind in kinds]
     turns = zip(*(playing(kind, shared) for kind in kinds), strict=True)

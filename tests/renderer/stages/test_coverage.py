@@ -27,7 +27,7 @@ from tsar.config import (
     closed_choices,
 )
 from tsar.norms import total_power
-from tsar.policies.adaptive import State
+from tsar.policies.thesis import State
 from tsar.policy import Cycle, Moment, step
 from tsar.reconstruction import blend
 from tsar.response.transport import waterfill
@@ -53,7 +53,7 @@ class MoreSettings(TsarConfig):
 
 
 def replay(config: TsarConfig, stages: Stages, cycles: int = 3) -> list[Cycle[State]]:
-    policy, trace, found = runs.made("tsar", config, stages), pictures.tracer(pictures.textured_motion), []
+    policy, trace, found = runs.made("thesis", config, stages), pictures.tracer(pictures.textured_motion), []
     state = policy.start()
     for number in range(cycles):
         found.append(step(policy, state, trace, Moment(number * CYCLE_S, number, CYCLE_S)))

@@ -71,7 +71,7 @@ def test_memory_is_shared_or_refused() -> None:
 @pytest.mark.parametrize("way", [0, 1, 2, 3])
 @pytest.mark.parametrize("name", ["densities.spatial", "densities.temporal", "history"])
 def test_a_decision_refuses_other_fields(name: str, way: int) -> None:
-    stages, state = compiled_stages(CONFIG), runs.made("tsar", CONFIG).start()
+    stages, state = compiled_stages(CONFIG), runs.made("thesis", CONFIG).start()
     fields = {
         "densities.spatial": state.densities.spatial,
         "densities.temporal": state.densities.temporal,
@@ -93,7 +93,7 @@ def test_a_decision_refuses_other_fields(name: str, way: int) -> None:
 
 @pytest.mark.parametrize("count", [4, ELEMENTS - 1])
 def test_a_decision_refuses_errors_of_another_length(count: int) -> None:
-    stages, state = compiled_stages(CONFIG), runs.made("tsar", CONFIG).start()
+    stages, state = compiled_stages(CONFIG), runs.made("thesis", CONFIG).start()
     with pytest.raises(ValueError, match=f"^errors.temporal: expected {ELEMENTS} "):
         errors = Errors(torch.zeros(ELEMENTS), torch.zeros(ELEMENTS))
         object.__setattr__(errors, "temporal", torch.zeros(count))
@@ -101,7 +101,7 @@ def test_a_decision_refuses_errors_of_another_length(count: int) -> None:
 
 
 def test_an_account_refuses_another_map() -> None:
-    stages, state = compiled_stages(CONFIG), runs.made("tsar", CONFIG).start()
+    stages, state = compiled_stages(CONFIG), runs.made("thesis", CONFIG).start()
     none = Errors(*torch.zeros(2, ELEMENTS).unbind(0))
     with pytest.raises(ValueError, match=r"^newest_s: expected \d+ contiguous"):
         stages.account(state.densities, none, torch.zeros(2, 2, dtype=torch.float64), CONFIG)

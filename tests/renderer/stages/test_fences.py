@@ -18,7 +18,7 @@ from tests.renderer.stages.builders import CONFIGS, CYCLE_S
 from tests.renderer.stages.fences import Fences, Replaced
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
-from tsar.policies.adaptive import State
+from tsar.policies.thesis import State
 from tsar.types import Densities, Errors, FrameletBatch
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -32,7 +32,7 @@ def replay(config: TsarConfig, fences: Fences | None, cycles: int = 10) -> str:
         fence(fences)
     keep = fences.tensor if fences is not None else lambda values: values
     found, trace = hashlib.sha256(), pictures.tracer(pictures.textured_motion)
-    stages, state = control.compiled_stages(config, threads=2), runs.made("tsar", config).start()
+    stages, state = control.compiled_stages(config, threads=2), runs.made("thesis", config).start()
     if fences is not None:
         fences.around_cache(state.cache)
     for number in range(cycles):

@@ -20,7 +20,7 @@ from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import tolerated_power
 from tsar.haar import octave_count
-from tsar.policies.adaptive import State
+from tsar.policies.thesis import State
 from tsar.selection import request
 from tsar.stages import REFERENCE
 from tsar.tiling import build
@@ -31,7 +31,7 @@ CYCLE_S = 1 / 60
 
 def differences(config: TsarConfig, number: int, cycles: int) -> Iterator[str]:
     """What the two sets of stages do not have in common over some cycles, or what an invariant says against either."""
-    stages, state = compiled_stages(config, 1 + number % 2), runs.made("tsar", config).start()
+    stages, state = compiled_stages(config, 1 + number % 2), runs.made("thesis", config).start()
     for cycle in range(cycles):
         batch = state.due.at(cycle * CYCLE_S, cycle, config)
         color = _color(batch, number + cycle)

@@ -1,4 +1,4 @@
-"""Temporally and spatially adaptive rendering: the pipeline of the dissertation as a recipe.
+"""The policy of the dissertation, ``thesis``: its pipeline as a recipe.
 
 Contains no mathematics; every stage is a function of its own module.
 
@@ -37,7 +37,7 @@ class State:
     nonfinite: int = 0
 
 
-class Adaptive(Policy[State]):
+class Thesis(Policy[State]):
     """The faithful pipeline: render, estimate, cache, respond, re-tile, select, reconstruct."""
 
     latency_cycles = 3
