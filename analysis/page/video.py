@@ -89,8 +89,8 @@ def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels
 
 
 class ComparisonFilm:
-    """Composes frames of two rows of panels: the reference, every run, what the run ``own`` decided, and in the last
-    panel the errors so far. Keeps no images.
+    """Composes frames of two rows of panels: the reference, every run, what the run ``own`` decided, and last the
+    errors so far, which take two panels where the number of runs is odd. Keeps no images.
 
     Attributes:
         width_px, height_px: size of a frame, even.
@@ -104,7 +104,9 @@ class ComparisonFilm:
         self._strip = 2 * max(9, self._side // 24)
         self._scales, self._span, self._own = scales, span_s, own
         self._inks = dict(zip(runs, inks(runs, own), strict=True))
-        self._columns = (1 + len(runs) + len(_MAPS) + 1 + 1) // 2
+        pictures = 1 + len(runs) + len(_MAPS)
+        self._columns = pictures // 2 + 1
+        self._errors = (2 * self._columns - pictures) * self._side
         self.width_px, self.height_px = self._columns * self._side, 2 * (self._side + self._strip)
 
     def frame(self, view: View, times_s: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Pixels:
@@ -117,9 +119,9 @@ class ComparisonFilm:
             if pixels is not None:
                 canvas.paste(Image.fromarray(pixels), (left, top + self._strip))
             self._label(draw, left, top, label if pixels is not None else f"{label}: missing")
-        left, top = self._corner(2 * self._columns - 1)
+        left, top = self._corner(len(shown))
         self._label(draw, left, top, f"squared error, t = {view.time_s:.3f} s")
-        box = (left, top + self._strip, left + self._side, top + self._strip + self._side)
+        box = (left, top + self._strip, left + self._errors, top + self._strip + self._side)
         draw_errors(draw, box, self._span, times_s, {name: (errors[name], ink) for name, ink in self._inks.items()})
         return np.asarray(canvas)
 
