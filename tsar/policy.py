@@ -112,7 +112,8 @@ class Policy(ABC, Generic[State]):
         latency_cycles: cycles between sampling and display.
         probe_cycles: throw-away cycles before a run, the last of which tells how long a cycle takes; the first may
             compile kernels.
-        footprint: samples along a pixel's side that textures are filtered for.
+        footprint: samples along a pixel's side that textures are filtered for; below 1 where samples are farther apart
+            than pixels.
         price: what a cycle costs.
     """
 
@@ -124,8 +125,8 @@ class Policy(ABC, Generic[State]):
         self.config = setting.config
 
     @property
-    def footprint(self) -> int:
-        return 1
+    def footprint(self) -> float:
+        return 1.0
 
     @property
     def warmup_cycles(self) -> int:

@@ -41,7 +41,7 @@ class Setup:
     """What a run needs before it starts."""
 
     scene: Scene
-    renderer_of: Callable[[int], Renderer]
+    renderer_of: Callable[[float], Renderer]
     """A renderer that filters textures for so many samples along a pixel's side."""
     losses: tuple[str, ...] = ()
 
@@ -66,12 +66,12 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
         scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
         for loss in losses:
             print(loss)
-        renderer_of = lru_cache(maxsize=4)(partial(_renderer, options, scene))
+        renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
         renderer_of(1)  # what it refuses is bad input
         return Setup(scene, renderer_of, losses)
 
 
-def _renderer(options: RunOptions, scene: Scene, axis: int) -> Renderer:
+def _renderer(options: RunOptions, scene: Scene, axis: float) -> Renderer:
     """A renderer that filters textures for ``axis`` samples along a pixel's side."""
     with first_imports():
         from renderer.trace import Renderer
@@ -254,6 +254,7 @@ def _truths(options: RunOptions, reference: Reference) -> Truths:
 def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: float) -> dict[str, Any]:
     """Figures, report and summary."""
     from analysis.comparison import results
+    from analysis.comparison.rivalry import best_rival
     from analysis.comparison.summary import summarise
     from analysis.storage.provenance import provenance
 
@@ -273,6 +274,7 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
         "ledger": options.counted,
         "capacity_flops": options.capacity,
         **summarise(measured),
+        **best_rival(measured),
         "start": {"first_cycle_s": first_cycle_s},
         "cost_parameters": options.cost,
         "config": {**config, "resolved": derived},

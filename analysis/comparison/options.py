@@ -52,7 +52,7 @@ class RunOptions:
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
     policy: str = "thesis"
     """Who decides what is sampled: a policy by name."""
-    rivals: tuple[str, ...] = ("framed", "framed supersampled")
+    rivals: tuple[str, ...] = ("framed", "framed-super")
     """Policies that it is compared with at equal cost; ratios are to the first."""
     metrics: tuple[str, ...] = ()
     """Metrics beside the squared errors, such as flip, ssim or jod."""

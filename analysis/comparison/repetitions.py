@@ -15,6 +15,7 @@ from analysis.command.console import Table
 from analysis.command.options import Unprefixed
 from analysis.comparison.options import RunOptions
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, Ledger
+from analysis.metrics.rivals import BEST
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 
@@ -32,6 +33,8 @@ class InputsOptions:
     """Runs of each input."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; its seed is set here where seeds vary."""
+    rivals: tuple[str, ...] = ("framed", "framed-1", "framed-super")
+    """Policies that it is compared with at equal cost; ratios are to the first."""
     seconds: float = 2.0
     """Simulated time to measure, seconds."""
     ledger: Ledger = "thesis"
@@ -45,6 +48,7 @@ class InputsOptions:
 
     def __post_init__(self) -> None:
         limits.within(self, repetitions=limits.REPETITIONS)
+        require(len(self.rivals) >= 1, "rivals", "at least one", self.rivals)
         require(len(self.inputs) >= 1, "inputs", "at least one", self.inputs)
         unknown = [name for name in self.inputs if name not in INPUTS]
         require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
@@ -62,6 +66,7 @@ class InputsOptions:
                         input=name,
                         tsar=self.tsar if by_phase else dataclasses.replace(self.tsar, seed=number),
                         phase=number / self.repetitions if by_phase else 0.0,
+                        rivals=self.rivals,
                         seconds=self.seconds,
                         ledger=self.ledger,
                         capacity=self.capacity,
@@ -76,14 +81,16 @@ class InputsOptions:
 def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
     """What a table over runs shows of one of them."""
     names = ("ratio_median", "ratio_quartiles", "share_suitable", "suitable_percentile", "cycles", "age_spread_s")
-    beside = summary["ratio_statistics"].get("framed supersampled") or {}
+    beside = dict(summary["ratio_statistics"])
+    if "best_rival" in summary:
+        beside[BEST] = summary["best_rival"]["ratio_statistics"]
     return {
         "run": run.out.name,
         "input": run.input,
         "seed": run.tsar.seed,
         "phase": run.phase,
         **{name: summary[name] for name in names},
-        "ratio_median_supersampled": beside.get("median"),
+        "ratio_medians": {name: statistics["median"] for name, statistics in beside.items()},
         "invariants_ok": summary["invariants"]["ok"],
         "stage_wall_s": summary["stage_wall_s"],
     }
@@ -91,9 +98,11 @@ def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
 
 def ratio_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Error ratios of all runs."""
-    lines = []
+    lines, names = [], list(rows[0]["ratio_medians"])
     for found in rows:
         low, high = found["ratio_quartiles"]
         ratios = (f"{found['ratio_median']:.3f}", f"{low:.3f} – {high:.3f}")
-        lines.append((found["run"], *ratios, f"{found['suitable_percentile']:.0f}"))
-    return Table("MSE ratio to the framed renderer", ("run", "median", "quartiles", "suitable percentile"), lines)
+        others = (f"{found['ratio_medians'][name]:.3f}" for name in names[1:])
+        lines.append((found["run"], *ratios, f"{found['suitable_percentile']:.0f}", *others))
+    title = f"MSE ratio to {names[0]}, and its median to others"
+    return Table(title, ("run", "median", "quartiles", "suitable percentile", *names[1:]), lines)

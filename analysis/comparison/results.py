@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analysis.comparison import plots
+from analysis.comparison.rivalry import best_rival_table
 from analysis.comparison.summary import Measured, key_table, ledger_table, metric_table, stage_table
 from analysis.metrics.cost_model import stage_flops
 from analysis.page import figures
@@ -68,7 +69,7 @@ def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> Non
         drawn["Densities over time"] = plots.density_figure(density_quantiles(out / "steps.parquet"), bounds)
         drawn["Stages"] = plots.stage_figure(flops, measured.totals.stage_s)
         tables.insert(0, stage_table(measured))
-    metrics = metric_table(measured)
+    further = [metric_table(measured), best_rival_table(measured)]
     write_report(
         out / "report.html",
         Report(
@@ -77,7 +78,7 @@ def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> Non
             key_numbers=key_table(measured),
             figures=[(caption, _png(figure)) for caption, figure in drawn.items()],
             player=_player(measured),
-            tables=[metrics, *tables] if metrics else tables,
+            tables=[*(table for table in further if table), *tables],
             details={"Configuration": summary["config"], "Provenance": summary["provenance"]},
         ),
     )

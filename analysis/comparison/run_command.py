@@ -25,6 +25,10 @@ def main() -> None:
         rows[f"MSE ratio to {rival}, median"] = f"{statistics.median:.3f} (quartiles {low:.3f} – {high:.3f})"
         rows[f"at most that of {rival}"] = f"{100 * statistics.share_suitable:.0f} % of the time"
         rows[f"greatest suitable percentile to {rival}"] = f"{statistics.suitable_percentile:.0f}"
+    if "best_rival" in summary:
+        statistics = summary["best_rival"]["ratio_statistics"]
+        rows["MSE ratio to the best rival, median"] = f"{statistics.median:.3f}"
+        rows["at most that of the best rival"] = f"{100 * statistics.share_suitable:.0f} % of the time"
     for metric, values in summary["metrics"].items():
         rows[metric] = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
     checked = summary["invariants"]

@@ -135,7 +135,7 @@ def summarise(measured: Measured) -> dict[str, Any]:
         "reference_time_s": measured.times_s,
         "mse": measured.mse,
         "log_mse": {name: one.column("log_mse") for name, one in seen.items()},
-        "metrics": _metrics(measured),
+        "metrics": metrics_of(measured),
         "images": {name: one.images for name, one in seen.items()},
         "refresh_s": {name: one.refresh_s for name, one in seen.items()},
         **_ratios(measured),
@@ -163,7 +163,7 @@ def summarise(measured: Measured) -> dict[str, Any]:
     return found
 
 
-def _metrics(measured: Measured) -> dict[str, dict[str, float]]:
+def metrics_of(measured: Measured) -> dict[str, dict[str, float]]:
     """Mean over the times of what was measured beside the squared errors, by metric and run."""
     known = ("time_s", "mse", "log_mse", "refresh")
     names = dict.fromkeys(name for seen in measured.seen.values() for row in seen.rows for name in row)
@@ -227,7 +227,7 @@ def key_table(measured: Measured) -> Table:
 
 def metric_table(measured: Measured) -> Table | None:
     """Metrics of every run; None where none was asked for."""
-    found = _metrics(measured)
+    found = metrics_of(measured)
     rows = [(name, *(f"{found[metric][name]:.4f}" for metric in found)) for name in measured.seen]
     return Table("Metrics, mean over the times", ("run", *found), rows) if found else None
 

@@ -156,8 +156,8 @@ def render_reference(input: str, phase: float, start_s: float, scale: Scale, pla
         return obtain(place.references, spec, lambda t: renderer.render_frame(t, side, side, axis))
 
 
-@lru_cache(maxsize=4)
-def _renderer(input: str, phase: float, footprint_px: int, threads: int) -> Renderer:
+@lru_cache(maxsize=8)
+def _renderer(input: str, phase: float, footprint_px: float, threads: int) -> Renderer:
     from renderer.trace import Renderer
     from scenes import catalog
 
@@ -278,7 +278,7 @@ def _score(case: Case, seen: Seen) -> float | None:
 
 
 def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
-    def renderer_of(footprint: int) -> Renderer:
+    def renderer_of(footprint: float) -> Renderer:
         return _renderer(case.input, case.phase, case.tsar.resolution_px * footprint, place.threads)
 
     machine = Machine(case.ledger, case.capacity, case.cost)

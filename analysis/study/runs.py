@@ -119,7 +119,7 @@ class PolicyRun:
 def begin(
     name: str,
     config: TsarConfig,
-    renderer_of: Callable[[int], Renderer],
+    renderer_of: Callable[[float], Renderer],
     machine: Machine,
     span_s: tuple[float, float],
     truth: Truth | None = None,

@@ -33,7 +33,7 @@ class SuitabilityOptions:
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
-    policies: tuple[str, ...] = ("framed supersampled", "frameless", "afr", "oracle")
+    policies: tuple[str, ...] = ("framed-super", "frameless", "afr", "oracle")
     """Policies that are compared beside thesis and the framed renderer, at one row."""
     solvers: tuple[str, ...] = ("trivial",)
     """Solvers of thesis that are compared beside the chosen one, at that row."""

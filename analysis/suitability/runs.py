@@ -73,7 +73,7 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
     for row, config in rows:
         yield run("thesis", row, "thesis", config)
     for policy in compared:
-        if policy == "framed supersampled":
+        if policy == "framed-super":
             yield run(policy, None, policy, framed_config(at_row.resolution_px))
         elif policy not in ("framed", "thesis"):
             yield run(policy, options.policy_row, policy, at_row)

@@ -60,7 +60,7 @@ def test_lists_say_where_each_comes_from(monkeypatch, capsys) -> None:
         assert call(monkeypatch, "list") == 0
     shown = capsys.readouterr().out
     assert all(f"{name} (entry points: tsar." in shown for name in TABLES)
-    for name in ("framed supersampled", "flip", "fly-by", "pbrt", "sobol", "waterfill", "linf", "blend"):
+    for name in ("framed-super", "flip", "fly-by", "pbrt", "sobol", "waterfill", "linf", "blend"):
         assert f"  {name} " in shown
     (line,) = (line for line in shown.splitlines() if line.startswith("  mine "))
     assert f"tsar.response.transport ({DISTRIBUTION} " in line

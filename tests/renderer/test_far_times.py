@@ -63,7 +63,7 @@ def play(policy: str, renderer: Renderer, start_s: float) -> list:
     return list(runs.play(name, CONFIG, renderer.trace, fixed_clock(CYCLE_S), start_s, end_s, chosen, truth))
 
 
-POLICIES = ("compiled", "reference", "framed", "framed supersampled", "frameless", "afr", "oracle")
+POLICIES = ("compiled", "reference", "framed", "framed-super", "frameless", "afr", "oracle")
 
 
 @pytest.mark.parametrize("policy", POLICIES)

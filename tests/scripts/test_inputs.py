@@ -22,7 +22,8 @@ FOUND = {
     "ratio_median": 0.5,
     "ratio_quartiles": [0.4, 0.6],
     "policy": "thesis",
-    "ratio_statistics": {},
+    "ratio_statistics": {"framed": {"median": 0.5}, "framed-1": {"median": 0.75}},
+    "best_rival": {"ratio_statistics": {"median": 0.875}},
     "share_suitable": 1.0,
     "suitable_percentile": 100.0,
     "cycles": 7,
@@ -58,7 +59,7 @@ def test_all_inputs_by_default() -> None:
     assert [run.input for run in runs[::3]] == list(INPUTS) and len({run.out for run in runs}) == len(runs) == 15
 
 
-@pytest.mark.parametrize("bad", [{"repetitions": 0}, {"inputs": ()}])
+@pytest.mark.parametrize("bad", [{"repetitions": 0}, {"inputs": ()}, {"rivals": ()}, {"rivals": ("magic",)}])
 def test_nothing_to_run_is_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=next(iter(bad))):
         InputsOptions(**bad)
@@ -69,9 +70,9 @@ def test_a_row_says_which_run_it_was(tmp_path: Path) -> None:
     found = row(run, FOUND)
     assert (found["run"], found["input"], found["seed"], found["phase"]) == ("chase-seed4", "chase", 4, 0.5)
     assert found["ratio_median"] == 0.5 and found["invariants_ok"] is True
-    assert found["ratio_median_supersampled"] is None
-    beside = {**FOUND, "ratio_statistics": {"framed supersampled": {"median": 0.8}}}
-    assert row(run, beside)["ratio_median_supersampled"] == 0.8
+    assert found["ratio_medians"] == {"framed": 0.5, "framed-1": 0.75, "best-rival": 0.875}
+    alone = {name: value for name, value in FOUND.items() if name != "best_rival"}
+    assert row(run, {**alone, "ratio_statistics": {"afr": {"median": 0.8}}})["ratio_medians"] == {"afr": 0.8}
 
 
 @pytest.fixture
@@ -100,7 +101,7 @@ def test_finished_runs_are_not_repeated(
     assert made == ["fly-by-seed0", "fly-by-seed1"]
     shown = capsys.readouterr().out
     (line,) = (line for line in shown.splitlines() if "fly-by-seed0" in line)
-    assert line.replace("│", " ").split() == ["fly-by-seed0", "0.500", "0.400", "–", "0.600", "100"]
+    assert line.replace("│", " ").split() == ["fly-by-seed0", *"0.500 0.400 – 0.600 100 0.750 0.875".split()]
 
     assert call_script("inputs.py", monkeypatch, *arguments) == 0
     assert made == ["fly-by-seed0", "fly-by-seed1"] and capsys.readouterr().out == shown

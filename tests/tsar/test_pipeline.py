@@ -8,8 +8,6 @@ from tsar.choices import SOLVERS
 from tsar.clock import StageTimer, fixed_clock, wall_clock
 from tsar.config import ConfigError, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
-from tsar.policies.framed import Framed
-from tsar.policy import Setting
 from tsar.types import SampleBatch
 
 CYCLE = 1 / 60
@@ -102,16 +100,6 @@ def test_framed_image_is_the_picture_at_pixel_centres():
     time = torch.tensor(frame.sample_time_s, dtype=torch.float32)
     expected = pictures.textured_motion(centre[None].expand(256, 256), centre[:, None].expand(256, 256), time)
     assert torch.allclose(frame.image, expected, atol=1e-6)
-    fine = next(
-        iter(
-            runs.images(
-                "framed supersampled", config, pictures.tracer(pictures.textured_motion), fixed_clock(0.1), 0.0, 0.5
-            )
-        )
-    )
-    assert fine.image.shape == (256, 256, 3) and (fine.image - expected).abs().mean() < 0.02
-    with pytest.raises(ConfigError, match="samples_per_axis: expected a power of two, got 3"):
-        Framed(Setting(config), 3)
 
 
 @pytest.mark.parametrize(

@@ -126,7 +126,7 @@ def test_maps_of_earlier_images_stay_as_they_were():
 @pytest.mark.parametrize(("per_axis", "level"), [(1, 3), (2, 4)])
 def test_a_frame_is_of_one_age_and_density(per_axis, level):
     """128 pixels are 2^3 framelets of 16 samples wide, 256 samples 2^4."""
-    name = {1: "framed", 2: "framed supersampled"}[per_axis]
+    name = {1: "framed", 2: "framed-super"}[per_axis]
     for shown in play(name, pictures.textured_motion, 5):
         assert [field.tolist() for field in map_of(shown)] == [[[shown.sample_time_s]], [[level]]]
         expected = pixel_truth(pictures.textured_motion, torch.tensor(shown.sample_time_s))

@@ -18,7 +18,10 @@ POLICIES: Named[Make] = Named(
     {
         "thesis": "tsar.policies.thesis:Thesis",
         "framed": "tsar.policies.framed:Framed",
-        "framed supersampled": "tsar.policies.framed:supersampled",
+        "framed-1": "tsar.policies.framed:PromptlyFramed",
+        "framed-super": "tsar.policies.framed:supersampled",
+        "framed-half": "tsar.policies.framed:halved",
+        "framed-quarter": "tsar.policies.framed:quartered",
         "frameless": "tsar.policies.frameless:Frameless",
         "afr": "tsar.policies.afr:Afr",
         "oracle": "tsar.policies.oracle:Oracle",

@@ -14,7 +14,7 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
-from tsar.policy import Moment, Picture, Policy
+from tsar.policy import Moment, Picture, Policy, Price
 from tsar.types import FrameletBatch, SampleBatch
 
 
@@ -31,7 +31,15 @@ class Sweep:
 
 
 class Frameless(Policy[Sweep]):
-    """Every pixel is visited once per sweep, each sweep in a new random order."""
+    """Every pixel is visited once per sweep, each sweep in a new random order.
+
+    Charged are its samples and the four operations that place each; whether holes are filled is not, for there are none
+    after the first sweep.
+    """
+
+    @property
+    def price(self) -> Price:
+        return Price(int(self.config.budget), sample_flops=4.0)
 
     def start(self) -> Sweep:
         nothing = torch.empty(0, dtype=torch.int64)

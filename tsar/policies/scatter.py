@@ -84,8 +84,18 @@ def pull_push(color: Float[Tensor, "3 h w"], weight: Float[Tensor, "1 h w"]) -> 
 
 
 def double_width(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
-    """Twice as many columns, bilinear, the border repeated. Not ``F.interpolate``: it takes another path, with other
-    rounding, when there is one thread."""
+    """Twice as many columns, as :func:`widened` has them."""
+    return widened(plane, 2)
+
+
+def widened(plane: Float[Tensor, "c h w"], factor: int) -> Float[Tensor, "c h w2"]:
+    """``factor`` times as many columns, bilinear, the border repeated. Not ``F.interpolate``: it takes another path,
+    with other rounding, when there is one thread."""
     padded = F.pad(plane, (1, 1), mode="replicate")
-    left, right = 0.25 * padded[..., :-2], 0.25 * padded[..., 2:]
-    return torch.stack((0.75 * plane + left, 0.75 * plane + right), dim=-1).flatten(-2)
+    parts = []
+    for column in range(factor):
+        # centre of the new column, in columns from the centre of the old one
+        offset = (column + 0.5) / factor - 0.5
+        nearer = padded[..., 2:] if offset > 0 else padded[..., :-2]
+        parts.append((1.0 - abs(offset)) * plane + abs(offset) * nearer)
+    return torch.stack(parts, dim=-1).flatten(-2)

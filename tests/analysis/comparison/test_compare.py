@@ -103,6 +103,27 @@ def test_fields_are_in_raster_order(result: Result) -> None:
     assert (field != flat.reshape(128, 128)).any()
 
 
+def test_a_run_stands_beside_the_best_of_its_rivals() -> None:
+    """Of one and of two frames of latency, both of which are in the summary."""
+    metrics = ["ssim", mean_difference]
+    found = compare("fly-by", ["framed-half", "framed", "framed-1"], metrics, 0.2, **SMALL)
+    mse = {name: found.errors["mse"].sel(run=name).values for name in ("framed-half", "framed", "framed-1")}
+    lowest = np.minimum(mse["framed"], mse["framed-1"])
+    best, own = found.summary["best_rival"], mse["framed-half"]
+    np.testing.assert_array_equal(best["mse"], lowest)
+    assert best["ratio_statistics"].median == pytest.approx(np.median(own / lowest))
+    assert best["metrics"]["mse"]["share"] == (own <= lowest).mean()
+    assert best["metrics"]["mse"]["ratio"] == pytest.approx(np.median(own) / np.median(lowest))
+    assert best["share_of_rivals"]["framed-1"] == (mse["framed-1"] <= mse["framed"]).mean() > 0
+    ssim = found.errors["ssim"]
+    most = ssim.sel(run=["framed", "framed-1"]).max("run")
+    assert best["metrics"]["ssim"]["share"] == float((ssim.sel(run="framed-half") >= most).mean())
+    assert set(best["metrics"]) == {"mse", "log_mse", "ssim", "mean_difference"}
+    assert {"framed", "framed-1"} <= found.summary["ratio_statistics"].keys()
+    assert "Beside the best rival" in (found.folder / "report.html").read_text()
+    assert list(found.table().index) == list(mse)
+
+
 def test_a_folder_of_its_own_goes_with_the_result() -> None:
     found = compare("fly-by", ["framed"], seconds=0.05, **SMALL)
     folder = found.folder

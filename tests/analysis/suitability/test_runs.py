@@ -28,7 +28,7 @@ def test_the_whole_study() -> None:
 def test_policies_are_compared_at_one_row() -> None:
     planned = runs(SuitabilityOptions(inputs=("chase",), rows=(0, 7), repetitions=1))
     others = {run.label: run for run in planned if run.label not in ("thesis", "framed")}
-    assert set(others) == {"framed supersampled", "frameless", "afr", "oracle", "thesis trivial"}
+    assert set(others) == {"framed-super", "frameless", "afr", "oracle", "thesis trivial"}
     assert {run.side_px for run in others.values()} == {128}
     assert others["thesis trivial"].case.tsar.response.solver == "trivial"
     only = runs(SuitabilityOptions(inputs=("chase",), rows=(0,), repetitions=1))
