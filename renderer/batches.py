@@ -1,8 +1,10 @@
-"""Batches of samples through packets, at little cost beside the tracing itself."""
+"""Batches of samples: what is refused, and how packets take them at little cost beside the tracing itself."""
 
 from __future__ import annotations
 
+import math
 import threading
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -15,6 +17,46 @@ from renderer.kernels import entry as kernels
 from renderer.kernels import packets
 from renderer.layout.structs import ViewData
 from renderer.tables.buffers import SceneBuffers
+from tsar.types import FrameletBatch, Hits
+
+
+def checked(batch: FrameletBatch) -> FrameletBatch:
+    """A batch that can be traced; its times are one number where all are the same.
+
+    Raises:
+        ValueError: if the shapes do not fit, times are not float64, or a time or footprint is not what it may be.
+    """
+    shape, time_s, footprint = tuple(batch.position.shape), batch.time_s, batch.footprint
+    times = tuple(time_s.shape) if isinstance(time_s, Tensor) else shape[:2]
+    if len(shape) != 3 or shape[2] != 2 or times != shape[:2]:
+        raise ValueError(f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and {times}")
+    if isinstance(time_s, Tensor) and time_s.dtype != torch.float64:
+        raise ValueError(f"FrameletBatch: expected time_s of float64, got {time_s.dtype}")
+    if footprint is not None and tuple(footprint.shape) != shape[:2]:
+        raise ValueError(f"FrameletBatch: expected footprint {shape[:2]}, got {tuple(footprint.shape)}")
+    if not shape[0] * shape[1]:
+        return replace(batch, time_s=0.0, footprint=None)
+    if footprint is not None and not (bounds(footprint)[0] > 0.0 and bounds(footprint)[1] < math.inf):
+        raise ValueError("FrameletBatch: expected footprints that are finite and above 0")
+    earliest, latest = bounds(time_s) if isinstance(time_s, Tensor) else (time_s, time_s)
+    if not (math.isfinite(earliest) and math.isfinite(latest)):
+        raise ValueError("time_s: expected finite times")
+    return replace(batch, time_s=earliest) if earliest == latest else batch
+
+
+def bounds(values: Tensor) -> tuple[float, float]:
+    """Least and greatest value; NaN where there is one."""
+    # by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours
+    given = values.numpy() if values.device.type == "cpu" else values
+    return float(given.min()), float(given.max())
+
+
+def empty_hits(groups: int, group_size: int, device: torch.device) -> Hits:
+    """Hits to be filled in."""
+    return Hits(
+        torch.empty(groups, group_size, dtype=torch.int32, device=device),
+        torch.empty(groups, group_size, 3, device=device),
+    )
 
 
 class PacketBatches:
@@ -40,29 +82,43 @@ class PacketBatches:
         self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
         self._counters = address("taken", self._taken, torch.int32, 1), address("rays", self._rays, torch.int64, 2)
 
-    def shade(self, position: Tensor, time_s: Tensor | float) -> tuple[Tensor, int, int]:
-        """Colours ``(n, s, 3)`` float32, and how many shadow rays and reflections they took.
+    def shade(self, batch: FrameletBatch) -> tuple[Tensor, list[int], Hits | None]:
+        """Colours ``(n, s, 3)`` float32, how many shadow rays and reflections they took, and hits if asked for.
 
         Args:
-            position: ``(n, s, 2)`` float32 on the image plane.
-            time_s: ``(n, s)`` animation times, or one for all samples.
+            batch: from :func:`checked`; all of its tensors on the CPU.
         """
-        groups, group_size, _ = position.shape
-        color = torch.empty(groups, group_size, 3)
+        groups, group_size, _ = batch.position.shape
         count = groups * group_size
+        position, time_s, scale = _plain(batch.position), batch.time_s, batch.footprint
+        color = torch.empty(groups, group_size, 3)
+        hits = empty_hits(groups, group_size, color.device) if batch.hits else None
         places = address("position", position, torch.float32, 2 * count)
         colors = address("color", color, torch.float32, 3 * count)
+        scales = instances = points = 0
+        if scale is not None:
+            scale = _plain(scale)
+            scales = address("footprint", scale, torch.float32, count)
+        if hits is not None:
+            instances = address("instance", hits.instance, torch.int32, count)
+            points = address("point", hits.point, torch.float32, 3 * count)
         with self._lock:
             self._taken[:], self._rays[:] = 0, 0
             command, times = self._moving, 0
             if isinstance(time_s, Tensor):
-                time_s = time_s.to(torch.float64).contiguous()
+                time_s = time_s.contiguous()
                 times = address("time_s", time_s, torch.float64, count)
             else:
                 command = self._still
                 self._pose(time_s)
             taken, rays = self._counters
-            command.set(taken, count, places, times, colors, rays)
+            command.set(taken, count, places, times, scales, colors, instances, points, rays)
             TEAM.run([command] * self._threads)
-            shadow, reflection = self._rays.tolist()
-        return color, shadow, reflection
+            return color, self._rays.tolist(), hits
+
+
+def _plain(values: Tensor) -> Tensor:
+    """Float32 on the CPU, one value after the other."""
+    if values.dtype is torch.float32 and values.is_cpu and values.is_contiguous():
+        return values
+    return values.to("cpu", torch.float32).contiguous()

@@ -11,7 +11,7 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from renderer.batches import PacketBatches
+from renderer.batches import PacketBatches, checked, empty_hits
 from renderer.compute import device as devices
 from renderer.compute.launching import shared
 from renderer.kernels import entry as kernels
@@ -20,14 +20,16 @@ from renderer.kernels.bundles import stack_size
 from renderer.layout.features import ALL, PACKETS, Feature
 from renderer.layout.sizes import BLOCK_PX
 from renderer.layout.structs import Ray, ViewData
+from renderer.singles import SingleSamples
 from renderer.tables.accelerators import STRUCTURES, Structure
 from renderer.tables.buffers import build_buffers
 from renderer.tables.checks import check_frame_size
 from renderer.tables.origin import near_origin
 from renderer.tables.requirements import required
 from renderer.tables.viewing import camera_view, check_camera
+from renderer.viewpoints import viewpoint_of
 from scenes.canonical import Scene
-from tsar.types import FrameletBatch, SampleBatch
+from tsar.types import FrameletBatch, Hits, SampleBatch, Viewpoint
 
 _RANGE = 1024  # samples or pixels per launch without packets: few enough that threads end together
 _RANGE_CUDA = 1 << 18  # few enough that the rays that wait to be followed fit into memory
@@ -126,28 +128,42 @@ class Renderer:
         """Shades the samples of a batch; those of one row are a group, over which secondary rays are spread.
 
         Args:
-            batch: positions ``(n, samples, 2)``, and times ``(n, samples)`` or one for all.
+            batch: positions ``(n, samples, 2)``, and times ``(n, samples)`` or one for all; whether first hits are
+                asked for, and what the footprints of samples are multiplied by.
             aspect: width over height of the image.
             footprint_px: pixels along its shorter axis that textures are filtered for, by default
                 ``footprint_resolution_px``.
 
         Returns:
-            Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, and ray counts.
+            Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, ray counts, and hits if asked for.
+            Colours are the same bits with and without them.
 
         Raises:
-            ValueError: if the shapes do not fit, times are not float64, or a time is not finite.
+            ValueError: if the shapes do not fit, times are not float64, or a time or footprint is not finite.
         """
-        shape = tuple(batch.position.shape)
-        time_s = batch.time_s
-        times = tuple(time_s.shape) if isinstance(time_s, Tensor) else shape[:2]
-        if len(shape) != 3 or shape[2] != 2 or times != shape[:2]:
-            raise ValueError(f"FrameletBatch: expected position (n, s, 2) and time_s (n, s), got {shape} and {times}")
-        if isinstance(time_s, Tensor) and time_s.dtype != torch.float64:
-            raise ValueError(f"FrameletBatch: expected time_s of float64, got {time_s.dtype}")
+        batch = checked(batch)
         if not 0.0 < aspect < math.inf:
             raise ValueError(f"aspect: expected a positive number, got {aspect}")
-        footprint_px = footprint_px or self.footprint_resolution_px
-        return SampleBatch(*self._shade(batch.position, time_s, aspect, footprint_px))
+        return self._shade(batch, aspect, footprint_px or self.footprint_resolution_px)
+
+    def viewpoint(self, time_s: float, aspect: float = 1.0) -> Viewpoint:
+        """Where the camera and all instances are, to the bit as samples of that time find them.
+
+        A scene that lies far from the origin is moved near it before it is traced. Hits, and the world of this record,
+        are in the space of the scene that was moved.
+
+        Args:
+            time_s: animation time, seconds.
+            aspect: width over height of the image.
+
+        Raises:
+            ValueError: if the time is not finite.
+        """
+        if not math.isfinite(time_s):
+            raise ValueError(f"time_s: expected a finite time, got {time_s}")
+        view = self._view(aspect, self.footprint_resolution_px)
+        self._pose(view, float(time_s))
+        return viewpoint_of(self._buffers, view, float(time_s))
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
         """Renders a whole picture: a batch of framelets of all its pixels.
@@ -187,48 +203,30 @@ class Renderer:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _shade(
-        self, position: Tensor, time_s: Tensor | float, aspect: float, footprint_px: float
-    ) -> tuple[Tensor, dict[str, int]]:
-        """Colours ``(n, s, 3)`` and ray counts of groups of samples."""
-        groups, group_size, _ = position.shape
-        count, home = groups * group_size, position.device
+    def _shade(self, batch: FrameletBatch, aspect: float, footprint_px: float) -> SampleBatch:
+        """Colours, ray counts, and hits if asked for, of a batch from :func:`renderer.batches.checked`."""
+        groups, group_size, _ = batch.position.shape
+        count, home = groups * group_size, batch.position.device
         if count == 0:
-            return torch.zeros(groups, group_size, 3, device=home), dict.fromkeys(("primary_rays", *_SECONDARY[:2]), 0)
-        earliest, latest = _bounds(time_s)
-        if not (math.isfinite(earliest) and math.isfinite(latest)):
-            raise ValueError("time_s: expected finite times")
-        if earliest == latest:
-            time_s = earliest
-        if self.packets:
-            if position.dtype != torch.float32 or position.is_cuda or not position.is_contiguous():
-                position = position.to("cpu", torch.float32).contiguous()
-            color, shadow, reflection = self._packet_batches(aspect, footprint_px).shade(position, time_s)
-            totals = [shadow, reflection, 0]
+            color, totals = torch.zeros(groups, group_size, 3, device=home), [0, 0]
+            hits = empty_hits(groups, group_size, home) if batch.hits else None
+        elif self.packets:
+            color, totals, hits = self._packet_batches(aspect, footprint_px).shade(batch)
         else:
-            target = torch.device(self.device)
-            placed = position.to(target, torch.float32).contiguous()
-            color = torch.empty(groups, group_size, 3, device=target)
-            rays = torch.empty(count, 3, dtype=torch.int32, device=target)
-            view = self._view(aspect, footprint_px)
+            view, time_s = self._view(aspect, footprint_px), batch.time_s
             if not isinstance(time_s, Tensor):
                 self._pose(view, time_s)
-                time_s = torch.full((count,), time_s, dtype=torch.float64)
-            shared = (
-                group_size,
-                wp.from_torch(placed.reshape(-1, 2), dtype=wp.vec2),
-                wp.from_torch(time_s.to(target, torch.float64).reshape(-1).contiguous(), dtype=wp.float64),
-                wp.from_torch(color.view(-1, 3), dtype=wp.vec3),
-                wp.from_torch(rays, dtype=wp.vec3i),
-            )
-            self._launch(self._kernels.shade_samples, view, shared, count)
-            totals = _totals(rays)
-        kinds = _SECONDARY if Feature.GLASS in self.features else _SECONDARY[:2]
+            inputs = SingleSamples(batch, torch.device(self.device))
+            self._launch(self._kernels.shade_samples, view, inputs.arguments, count)
+            color, totals, hits = inputs.color, inputs.totals(), inputs.hits
+        kinds = _SECONDARY if Feature.GLASS in self.features and count else _SECONDARY[:2]
         counters = {"primary_rays": count, **dict(zip(kinds, totals, strict=False))}
         if self._work is not None:
             counters |= dict(zip(("node_visits", "triangle_tests"), self._work.tolist(), strict=True))
             self._work[:] = 0
-        return color if color.device == home else color.to(home), counters
+        if hits is not None:
+            hits = Hits(hits.instance.to(home), hits.point.to(home))
+        return SampleBatch(color if color.device == home else color.to(home), counters, hits)
 
     def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:
         """Recorded launches for pictures of one shape."""
@@ -279,19 +277,3 @@ class Renderer:
         wp.launch(kernels.pose_tracks, dim=count, inputs=inputs, device=self.device)
         view.pose_translation, view.pose_rotation = poses
         view.single_time = 1
-
-
-# On the host by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours.
-
-
-def _bounds(time_s: Tensor | float) -> tuple[float, float]:
-    if not isinstance(time_s, Tensor):
-        return time_s, time_s
-    values = time_s.numpy() if time_s.device.type == "cpu" else time_s
-    return float(values.min()), float(values.max())
-
-
-def _totals(rays: Tensor) -> list[int]:
-    if rays.device.type == "cpu":
-        return rays.numpy().sum(axis=0, dtype=np.int64).tolist()
-    return rays.sum(dim=0, dtype=torch.int64).tolist()

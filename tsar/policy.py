@@ -17,7 +17,7 @@ from torch import Tensor
 from tsar.clock import CycleSeconds, StageTimer, checked
 from tsar.config import TsarConfig
 from tsar.stages import REFERENCE, Stages
-from tsar.types import FrameletBatch, SampleBatch, SampleMap, ShownImage, StepRecord, Trace
+from tsar.types import FrameletBatch, SampleBatch, SampleMap, ShownImage, StepRecord, Trace, Viewpoint
 
 State = TypeVar("State")
 
@@ -51,12 +51,14 @@ class Setting:
         stages_of: what runs the stages around tracing of the adaptive pipeline, made when they are needed.
         truth: the picture at any time; None where nothing may look at it.
         trace: a renderer that is not charged, for policies that look at the truth.
+        view: where the camera and all instances are at a time, seconds; None where the scene cannot tell.
     """
 
     config: TsarConfig
     stages_of: Callable[[TsarConfig], Stages] = lambda config: REFERENCE
     truth: Truth | None = None
     trace: Trace | None = None
+    view: Callable[[float], Viewpoint] | None = None
 
 
 @dataclass(frozen=True)

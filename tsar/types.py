@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Literal
 
 import torch
-from jaxtyping import Float, Float64, Int64
+from jaxtyping import Float, Float32, Float64, Int32, Int64
 from torch import Tensor
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -46,6 +47,9 @@ class FrameletBatch:
             have the same.
         cycle: pipeline cycle that asked for it.
         seed: of the run that asked for it. What a renderer draws itself it derives from positions and times.
+        hits: whether the first hits are asked for.
+        footprint: what the width that a renderer filters textures over is multiplied by for each sample; below 1 is
+            sharper. Finite and above 0; None for 1 everywhere.
     """
 
     level: Int64[Tensor, " n"]
@@ -54,6 +58,8 @@ class FrameletBatch:
     time_s: Float64[Tensor, "n samples"] | float
     cycle: int = 0
     seed: int = 0
+    hits: bool = False
+    footprint: Float[Tensor, "n samples"] | None = None
 
     @property
     def times(self) -> Float64[Tensor, "n samples"]:
@@ -64,6 +70,47 @@ class FrameletBatch:
 
 
 @dataclass(frozen=True)
+class Hits:
+    """What the camera rays of a batch meet first.
+
+    Attributes:
+        instance: number of the instance as the renderer holds them, where meshes that move together are one; -1 for
+            what is seen at infinity.
+        point: on the camera ray, in the space of the instance's track, in scene units: the space that the rigid motion
+            acts on, or the world for what stands still. For what is seen at infinity, the unit direction of the ray in
+            the world. :func:`tsar.projection.project` takes both back to the image.
+    """
+
+    instance: Int32[Tensor, "n samples"]
+    point: Float32[Tensor, "n samples 3"]
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """Where the camera and all instances are at one time, in the world of the renderer that made it.
+
+    Attributes:
+        time_s: animation time, seconds.
+        track_of_instance: the rigid motion of each instance; 0 does not move.
+        rotation, translation: of each rigid motion, from its space to the world.
+        to_camera, to_camera_offset: matrix and offset from the world to the camera, which looks along -z with x to the
+            right and y up. It holds the scale of the camera's own placement, if that has one.
+        kind: of the projection. A lens is a pinhole at its centre.
+        tan_x, tan_y: tangents of the half angles of the image; its half size where rays are parallel.
+    """
+
+    time_s: float
+    track_of_instance: Int64[Tensor, " instances"]
+    rotation: Float64[Tensor, "tracks 3 3"]
+    translation: Float64[Tensor, "tracks 3"]
+    to_camera: Float64[Tensor, "3 3"]
+    to_camera_offset: Float64[Tensor, " 3"]
+    kind: Literal["perspective", "parallel", "panorama"]
+    tan_x: float
+    tan_y: float
+
+
+@dataclass(frozen=True)
 class SampleBatch:
     """What the renderer answers.
 
@@ -71,10 +118,12 @@ class SampleBatch:
         color: linear RGB radiance, float32, Morton order within a framelet. May hold non-finite values: the next stage
             counts and replaces them.
         counters: work done, by name (``primary_rays``, ``shadow_rays``, ``reflection_rays``, …).
+        hits: what the camera rays meet first, where it was asked for.
     """
 
     color: Float[Tensor, "n samples 3"]
     counters: dict[str, int] = field(default_factory=dict)
+    hits: Hits | None = None
 
 
 Trace = Callable[[FrameletBatch], SampleBatch]

@@ -146,7 +146,11 @@ def begin(
     from renderer.stages.control import stages as stages_of
 
     setting = Setting(
-        config, lambda config: stages_of(config, stages, threads), truth, lambda batch: renderer_of(1).trace(batch)
+        config,
+        lambda config: stages_of(config, stages, threads),
+        truth,
+        lambda batch: renderer_of(1).trace(batch),
+        lambda time_s: renderer_of(policy.footprint).viewpoint(time_s),
     )
     policy = POLICIES[name](setting)
     meter, totals = Meter(renderer_of(policy.footprint).trace), Totals(config)

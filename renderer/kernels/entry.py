@@ -79,18 +79,30 @@ def specialised(features: Feature) -> ShadingKernels:
         group_size: wp.int32,
         position: wp.array(dtype=wp.vec2),
         time_s: wp.array(dtype=wp.float64),
+        footprint_scale: wp.array(dtype=wp.float32),
         color: wp.array(dtype=wp.vec3),
+        instance: wp.array(dtype=wp.int32),
+        point: wp.array(dtype=wp.vec3),
         rays: wp.array(dtype=wp.vec3i),
     ):
-        """Shades the samples from ``first`` on; ``rays`` receives the shadow, reflected and refracted rays of each."""
+        """Shades the samples from ``first`` on; ``rays`` receives the shadow, reflected and refracted rays of each.
+
+        ``footprint_scale`` of footprints, and ``instance`` and ``point`` of first hits, may be empty.
+        """
         i = first + wp.tid()
         leader = (i / group_size) * group_size
         draw = group_draw(scene.seed, position[leader], time_s[leader], i - leader, group_size)
         origin, direction = camera_ray(wp.static(mask), scene, view, draw, position[i], time_s[i])
-        result, counts = radiance(
-            wp.static(mask), scene, view, time_s[i], draw, origin, direction, stack, wp.tid()
+        factor = wp.float32(1.0)
+        if footprint_scale.shape[0] > 0:
+            factor = footprint_scale[i]
+        result, counts, hit = radiance(
+            wp.static(mask), scene, view, time_s[i], draw, origin, direction, factor, stack, wp.tid()
         )  # fmt: skip
         color[i] = result
+        if instance.shape[0] > 0:
+            instance[i] = hit.instance
+            point[i] = hit.point
         rays[i] = counts
 
     @wp.kernel(enable_backward=False, module=name)
@@ -120,8 +132,8 @@ def specialised(features: Feature) -> ShadingKernels:
                 position = grid_position(column, row, sample, samples, width, height)
                 draw = group_draw(scene.seed, leader, time_s, sample, samples * samples)
                 origin, direction = camera_ray(wp.static(mask), scene, view, draw, position, time_s)
-                result, _counts = radiance(
-                    wp.static(mask), scene, view, time_s, draw, origin, direction, stack, wp.tid()
+                result, _counts, _hit = radiance(
+                    wp.static(mask), scene, view, time_s, draw, origin, direction, 1.0, stack, wp.tid()
                 )  # fmt: skip
                 total = total + result
             image[row, column] = total * (1.0 / wp.float32(samples * samples))

@@ -66,8 +66,10 @@ def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
 
 @wp.func_native(
     """
-    packets::shade_samples(scene, view, (int*)taken, count, (const float*)position, (const double*)time_s,
-                           (float*)color, (long long*)rays);
+    packets::shade_samples(scene, view, (int*)taken,
+                           {count, (const float*)position, (const double*)time_s, (const float*)footprint_scale,
+                            (float*)color, (int*)instance, (float*)point},
+                           (long long*)rays);
     """
 )
 def native_shade_samples(
@@ -77,7 +79,10 @@ def native_shade_samples(
     count: wp.int32,
     position: Address,
     time_s: Address,
+    footprint_scale: Address,
     color: Address,
+    instance: Address,
+    point: Address,
     rays: Address,
 ): ...
 
@@ -127,15 +132,19 @@ def shade_samples(
     count: wp.int32,
     position: Address,
     time_s: Address,
+    footprint_scale: Address,
     color: Address,
+    instance: Address,
+    point: Address,
     rays: Address,
 ):
     """As the kernel of the same name in ``entry.py``, for all samples that no other launch has taken.
 
     Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero. ``rays``
-    receives the totals. Arrays come as addresses, for a launch that is recorded once.
+    receives the totals. Arrays come as addresses, for a launch that is recorded once; zero stands for those that are
+    not given or not asked for.
     """
-    native_shade_samples(scene, view, taken, count, position, time_s, color, rays)
+    native_shade_samples(scene, view, taken, count, position, time_s, footprint_scale, color, instance, point, rays)
 
 
 @wp.kernel(enable_backward=False)

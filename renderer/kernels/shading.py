@@ -18,7 +18,7 @@ from renderer.kernels.surface import surface_at
 from renderer.kernels.textures import texture_color
 from renderer.layout.features import Feature
 from renderer.layout.sizes import FAR, SLANT_LEAST
-from renderer.layout.structs import Draw, MaterialRecord, Ray, SceneData, Surface, ViewData
+from renderer.layout.structs import Draw, FirstHit, MaterialRecord, Ray, SceneData, Surface, ViewData
 
 _EXTENDED = wp.constant(int(Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT))
 
@@ -139,15 +139,20 @@ def radiance(
     draw: Draw,
     origin: wp.vec3,
     direction: wp.vec3,
+    footprint_scale: wp.float32,
     stack: wp.array2d(dtype=Ray),
     row: wp.int32,
 ):
-    """Radiance along a world ray, and how many rays it took: to the lights, reflected, refracted.
+    """Radiance along a world ray; how many rays it took: to the lights, reflected, refracted; and what it meets first.
 
+    ``footprint_scale`` multiplies the footprint that textures are filtered for.
     Rays still to follow wait in ``stack[row]``; without glass and spread bundles there never are any.
     """
     total = wp.vec3(0.0, 0.0, 0.0)
     counts = wp.vec3i(0, 0, 0)
+    first = FirstHit()
+    first.instance = -1
+    first.point = direction
     waiting = wp.int32(0)
     ray = Ray()
     ray.start = origin
@@ -163,10 +168,13 @@ def radiance(
         else:
             surface = surface_at(features, scene, view, time_s, hit, ray.start, ray.towards)
             material = scene.materials[surface.material]
+            if ray.bounces == 0:
+                first.instance = hit.instance
+                first.point = surface.in_track
             ray.travelled = ray.travelled + hit.t
             cosine = -wp.dot(surface.normal, ray.towards)
             slant = wp.max(wp.abs(wp.dot(surface.geometric_normal, ray.towards)), SLANT_LEAST)
-            footprint = (view.width + view.spread * ray.travelled) / slant * surface.uv_density
+            footprint = footprint_scale * (view.width + view.spread * ray.travelled) / slant * surface.uv_density
             glow, rays = left_by(features, scene, view, time_s, surface, material, ray, cosine, footprint)
             counts[0] = counts[0] + rays
             total = total + wp.cw_mul(ray.weight, glow)
@@ -218,4 +226,4 @@ def radiance(
             waiting = waiting - 1
             ray = stack[row, waiting]
             alive = True
-    return total, counts
+    return total, counts, first

@@ -154,6 +154,7 @@ def surface_at(
         shading = wp.quat_rotate(rotation, shading)
     surface = Surface()
     surface.position = position
+    surface.in_track = point
     surface.inside = wp.dot(geometric, direction) > 0.0
     surface.geometric_normal = facing(wp.normalize(geometric), direction)
     shading = wp.normalize(shading)

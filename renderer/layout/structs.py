@@ -258,7 +258,19 @@ class Surface:
     offset: wp.float32  # how far a ray must start off the surface to clear rounding, scene units
     material: wp.int32
     emission: wp.vec3
+    in_track: wp.vec3  # the point of the ray, in the space of the track
     inside: wp.bool  # whether the viewer is on the side that the normal of the shape points away from
+
+
+@wp.struct
+class FirstHit:
+    """What a camera ray meets first: the instance, and the point in the space of its track.
+
+    For a miss ``instance`` is negative, and ``point`` the direction of the ray in world space.
+    """
+
+    instance: wp.int32
+    point: wp.vec3
 
 
 @wp.struct

@@ -44,7 +44,7 @@ inline void render_pixel(const Stage<Scene, View>& stage, int column, int row, i
         camera_rays(stage, ((float)(column * samples) + x + 0.5f) / across, ((float)(row * samples) + y + 0.5f) / down,
                     origin, direction);
         i16 shadow_rays, bounces;
-        total = total + radiance(stage, origin, direction, ALL, shadow_rays, bounces);
+        total = total + radiance(stage, origin, direction, ALL, shadow_rays, bounces, nullptr);
     }
     const float share = 1.0f / (float)per_pixel;
     color[0] = added(total.x) * share, color[1] = added(total.y) * share, color[2] = added(total.z) * share;
@@ -59,7 +59,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     const int left = place % columns * BLOCK_PX + column_of(inner) * PACKET_PX;
     const int top = place / columns * BLOCK_PX + row_of(inner) * PACKET_PX;
     if (left >= width || top >= height) return;
-    Stage<Scene, View> stage = {scene, view, {}};
+    Stage<Scene, View> stage = {scene, view, {}, (f16)1.0f};
     for (int lane = 0; lane < LANES; ++lane) stage.time_s[lane] = time_s;
     const int per_pixel = samples * samples;
     const float across = (float)(width * samples), down = (float)(height * samples);
@@ -93,7 +93,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
         Vec16 origin, direction;
         camera_rays(stage, (x + 0.5f) / across, (y + 0.5f) / down, origin, direction);
         i16 shadow_rays, bounces;
-        const Vec16 color = radiance(stage, origin, direction, busy, shadow_rays, bounces);
+        const Vec16 color = radiance(stage, origin, direction, busy, shadow_rays, bounces, nullptr);
         for (int lane = 0; lane < LANES; ++lane) {
             float* to = sums[pixel[lane]];
             to[0] += color.x[lane], to[1] += color.y[lane], to[2] += color.z[lane];
@@ -108,27 +108,47 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     }
 }
 
-// Shades samples `first` to `first + 15`, as far as there are `count` of them. Adds the shadow rays and reflections it
-// took to `rays`. Times are read only where samples differ in them.
+// A batch: what is read of each sample, and where its answer goes. Times are read only where samples differ in them;
+// `footprint_scale` of footprints, and `instance` and `point` of first hits, may be null.
+struct Samples {
+    int count;
+    const float* position;
+    const double* time_s;
+    const float* footprint_scale;
+    float* color;
+    int* instance;
+    float* point;
+};
+
+// Shades samples `first` to `first + 15`, as far as there are so many. Adds the shadow rays and reflections it took to
+// `rays`.
 template <class Scene, class View>
-inline void shade_packet(const Scene& scene, const View& view, int first, int count, const float* position,
-                         const double* time_s, float* color, long long* rays) {
-    Stage<Scene, View> stage = {scene, view, {}};
-    const int used = count - first < LANES ? count - first : LANES;
+inline void shade_packet(const Scene& scene, const View& view, int first, const Samples& samples, long long* rays) {
+    Stage<Scene, View> stage = {scene, view, {}, (f16)1.0f};
+    const int left = samples.count - first, used = left < LANES ? left : LANES;
     f16 x, y;
     for (int lane = 0; lane < LANES; ++lane) {
         const long long sample = first + (lane < used ? lane : used - 1);
-        x[lane] = position[2 * sample], y[lane] = position[2 * sample + 1];
-        if (!view.single_time) stage.time_s[lane] = time_s[sample];
+        x[lane] = samples.position[2 * sample], y[lane] = samples.position[2 * sample + 1];
+        if (!view.single_time) stage.time_s[lane] = samples.time_s[sample];
+        if (samples.footprint_scale) stage.footprint_scale[lane] = samples.footprint_scale[sample];
     }
     Vec16 origin, direction;
     camera_rays(stage, x, y, origin, direction);
     i16 shadow_rays, bounces;
-    const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces);
+    FirstHit hit;
+    const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces,
+                                  samples.instance ? &hit : nullptr);
     for (int lane = 0; lane < used; ++lane) {
-        float* to = color + 3ll * (first + lane);
+        float* to = samples.color + 3ll * (first + lane);
         to[0] = result.x[lane], to[1] = result.y[lane], to[2] = result.z[lane];
         rays[0] += shadow_rays[lane], rays[1] += bounces[lane];
+    }
+    if (!samples.instance) return;
+    for (int lane = 0; lane < used; ++lane) {
+        float* to = samples.point + 3ll * (first + lane);
+        to[0] = hit.point.x[lane], to[1] = hit.point.y[lane], to[2] = hit.point.z[lane];
+        samples.instance[first + lane] = hit.instance[lane];
     }
 }
 
@@ -139,11 +159,10 @@ template <class Work> inline void share(int* taken, int count, int at_once, Work
 }
 
 template <class Scene, class View>
-inline void shade_samples(const Scene& scene, const View& view, int* taken, int count, const float* position,
-                          const double* time_s, float* color, long long* rays) {
+inline void shade_samples(const Scene& scene, const View& view, int* taken, const Samples& samples, long long* rays) {
     long long mine[2] = {};
-    share(taken, (count + LANES - 1) / LANES, AT_ONCE,
-          [&](int packet) { shade_packet(scene, view, packet * LANES, count, position, time_s, color, mine); });
+    share(taken, (samples.count + LANES - 1) / LANES, AT_ONCE,
+          [&](int packet) { shade_packet(scene, view, packet * LANES, samples, mine); });
     for (int kind = 0; kind < 2; ++kind) __atomic_fetch_add(rays + kind, mine[kind], __ATOMIC_RELAXED);
 }
 

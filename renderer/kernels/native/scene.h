@@ -56,6 +56,7 @@ template <class Scene, class View> struct Stage {
     const Scene& scene;
     const View& view;
     double time_s[LANES];
+    f16 footprint_scale;  // of each sample's footprint
 
     Pose pose(int track) const {
         Pose pose;

@@ -86,10 +86,18 @@ inline Vec16 mirror_direction(const Surface& surface, const Vec16& direction) {
     return unit(mirrored);
 }
 
-// Radiance along rays, and how many shadow rays and reflections it took.
+// What camera rays meet first: the instance, negative for none, and the point in the space of its track; for none the
+// direction of the ray.
+struct FirstHit {
+    Vec16 point;
+    i16 instance;
+};
+
+// Radiance along rays, and how many shadow rays and reflections it took; `first` receives what they meet first, unless
+// it is null.
 template <class Scene, class View>
 inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 towards, unsigned busy, i16& shadow_rays,
-                      i16& bounces) {
+                      i16& bounces, FirstHit* first) {
     const Scene& scene = stage.scene;
     Vec16 total = {(f16)0.0f, (f16)0.0f, (f16)0.0f}, weight = {(f16)1.0f, (f16)1.0f, (f16)1.0f};
     f16 travelled = 0.0f;
@@ -101,17 +109,20 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
         hit.at.face = hit.instance = 0;
         const unsigned met = meet_scene<false>(stage, start, towards, busy, hit);
         const unsigned gone = busy & ~met;
+        if (first) first->point = towards, first->instance = lanes_of(met) ? hit.instance : (i16)-1;
         if (gone) total = pick(lanes_of(gone), total + weight * environment_radiance(scene, towards), total);
         if (!met) break;
         Surface surface = {};
         each_distinct(hit.instance, met, [&](int instance, unsigned same) {
-            take(surface, surface_of(stage, instance, same, hit.at, start, towards), same);
+            Vec16* in_track = first ? &first->point : nullptr;
+            take(surface, surface_of(stage, instance, same, hit.at, start, towards, in_track), same);
         });
+        first = nullptr;
         const i16 on_surface = lanes_of(met);
         travelled += on_surface ? hit.at.t : (f16)0.0f;
         const f16 cosine = -dot(surface.normal, towards);
         const f16 slant = vmax(vabs(dot(surface.geometric_normal, towards)), (f16)SLANT_LEAST);
-        const f16 footprint = stage.view.spread * travelled / slant * surface.uv_density;
+        const f16 footprint = stage.footprint_scale * stage.view.spread * travelled / slant * surface.uv_density;
         const Reflection material = reflection_of(scene, surface, met, cosine, footprint);
         Vec16 leaving = material.emission;
         if (material.lit) {

@@ -110,10 +110,11 @@ inline LocalSurface local_surface(const Scene& scene, const Record& record, cons
     return flat_surface(point, (i16)2, (f16)1.0f);
 }
 
-// The surface of one instance at the lanes of a mask, in world space.
+// The surface of one instance at the lanes of a mask, in world space; `in_track` receives the point of the ray in track
+// space, unless it is null.
 template <class Scene, class View>
 inline Surface surface_of(const Stage<Scene, View>& stage, int instance, unsigned mask, PacketHit hit,
-                          const Vec16& origin, const Vec16& direction) {
+                          const Vec16& origin, const Vec16& direction, Vec16* in_track) {
     const Scene& scene = stage.scene;
     const auto& record = scene.instances.data[instance];
     hit.face = lanes_of(mask) ? hit.face : (i16)0;  // other lanes may hold no face of this mesh
@@ -123,6 +124,7 @@ inline Surface surface_of(const Stage<Scene, View>& stage, int instance, unsigne
         pose = stage.pose(record.track);
         point = pose.to_track(point - pose.translation);
     }
+    if (in_track) *in_track = pick(lanes_of(mask), point, *in_track);
     const Vec16 at = transformed(record.to_local, point) + spread(record.to_local_offset);
     const LocalSurface local = local_surface(scene, record, hit, mask, at);
     Vec16 geometric = transformed_by_transpose(record.to_local, local.geometric_normal);

@@ -1,0 +1,59 @@
+"""Camera and poses at one time, for those who take hits back to the image."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from renderer.layout.kinds import CameraKind
+from renderer.layout.structs import ViewData
+from renderer.tables.buffers import SceneBuffers
+from scenes.arithmetic import inverse, product
+from tsar.types import Viewpoint
+
+_KINDS: dict[int, Literal["perspective", "parallel", "panorama"]] = {
+    CameraKind.PERSPECTIVE: "perspective",
+    CameraKind.PARALLEL: "parallel",
+    CameraKind.PANORAMA: "panorama",
+}
+
+
+def viewpoint_of(buffers: SceneBuffers, view: ViewData, time_s: float) -> Viewpoint:
+    """What a launch at one time works with, in double precision.
+
+    Args:
+        buffers: the scene.
+        view: the camera, with the poses of all tracks at ``time_s``.
+        time_s: animation time, seconds.
+    """
+    rotation = _matrices(view.pose_rotation.numpy().astype(np.float64))
+    translation = view.pose_translation.numpy().astype(np.float64)
+    turned, place = rotation[view.camera_track], translation[view.camera_track]
+    from_camera = product(turned, np.array(view.from_camera, np.float64).reshape(3, 3))
+    offset = product(turned, np.array(view.from_camera_offset, np.float64)) + place
+    to_camera = inverse(from_camera)
+    return Viewpoint(
+        time_s,
+        torch.from_numpy(buffers.data.instances.numpy()["track"].astype(np.int64)),
+        torch.from_numpy(rotation),
+        torch.from_numpy(translation),
+        torch.from_numpy(to_camera),
+        torch.from_numpy(-product(to_camera, offset)),
+        _KINDS[view.kind],
+        view.tan_x,
+        view.tan_y,
+    )
+
+
+def _matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations ``(n, 3, 3)`` as kernels turn by quaternions ``(n, 4)``, ``(x, y, z, w)``:
+    ``v (2 w^2 - 1) + 2 w (a x v) + 2 a (a . v)`` for the axis part ``a``."""
+    x, y, z, w = quaternions.T
+    none = np.zeros_like(w)
+    across = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=-1).reshape(-1, 3, 3)
+    axis = quaternions[:, :3]
+    along = axis[:, :, None] * axis[:, None, :]
+    return (2.0 * w * w - 1.0)[:, None, None] * np.eye(3) + 2.0 * w[:, None, None] * across + 2.0 * along

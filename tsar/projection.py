@@ -1,0 +1,70 @@
+"""Where on the image what was hit earlier is seen, by the poses of another time."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from jaxtyping import Float, Float64, Int
+from torch import Tensor
+
+from tsar.types import Viewpoint
+
+
+def project(
+    view: Viewpoint, instance: Int[Tensor, "*shape"], point: Float[Tensor, "*shape 3"]
+) -> tuple[Float64[Tensor, "*shape 2"], Float64[Tensor, "*shape"]]:
+    """Takes first hits (:class:`tsar.types.Hits`) to the image.
+
+    A point ``p`` of track ``k`` lies at ``q = C (R_k p + t_k) + c`` before the camera, with ``C, c`` from the world to
+    the camera. A perspective camera sees it at ``x = (1 + q_x / (-q_z tan_x)) / 2`` and
+    ``y = (1 - q_y / (-q_z tan_y)) / 2``; where rays are parallel ``-q_z`` is left out. A lens is a pinhole at its
+    centre. All of it is in float64, element by element: the same bits on any number of threads.
+
+    Args:
+        view: camera and poses.
+        instance: number of the instance, -1 for what is seen at infinity.
+        point: in the space of the instance's track, scene units; a direction in the world for what is seen at infinity.
+
+    Returns:
+        Position on the image plane, ``(x, y)`` from the top left corner, in ``[0, 1)`` where the picture shows it; and
+        depth along the axis of the camera, in scene units (times the scale of the camera's placement), ``inf`` for what
+        is seen at infinity. What lies behind the camera has a depth of 0 or below, ``-inf`` at infinity, and a position
+        of NaN with a perspective camera. A camera of parallel rays sees a point at infinity everywhere or nowhere, so
+        that its position is NaN.
+
+    Raises:
+        ValueError: the view is a panorama, whose angles differ in the last bit between processors.
+    """
+    if view.kind == "panorama":
+        raise ValueError("project: expected a perspective or parallel camera, got a panorama")
+    matrix, offset = _to_camera(view)
+    infinite = instance < 0
+    row = torch.where(infinite, len(view.track_of_instance), instance).reshape(-1).to(torch.int64)
+    x, y, z = (component.to(torch.float64).reshape(-1) for component in point.unbind(-1))
+    away = (1.0 - infinite.to(torch.float64)).reshape(-1)
+
+    def seen(axis: int) -> Float64[Tensor, " n"]:
+        first, second, third = (matrix[:, axis, column].contiguous()[row] for column in range(3))
+        return first * x + second * y + third * z + offset[:, axis].contiguous()[row]
+
+    right, up, depth = seen(0), seen(1), -seen(2)
+    unit = depth if view.kind == "perspective" else away
+    inside = unit > 0.0
+    position = torch.stack([0.5 + right / (2.0 * view.tan_x * unit), 0.5 - up / (2.0 * view.tan_y * unit)], dim=-1)
+    position = torch.where(inside[:, None], position, math.nan)
+    depth = torch.where(away > 0.0, depth, torch.where(depth > 0.0, math.inf, -math.inf))
+    return position.reshape((*point.shape[:-1], 2)), depth.reshape(point.shape[:-1])
+
+
+def _to_camera(view: Viewpoint) -> tuple[Float64[Tensor, "rows 3 3"], Float64[Tensor, "rows 3"]]:
+    """Matrix and offset from each instance's track to the camera; the last row is for directions in the world."""
+    # by rows and columns: a matrix product's bits may depend on the library
+    camera = view.to_camera
+    rotation = sum(camera[:, k, None] * view.rotation[:, k, None, :] for k in range(3))
+    offset = sum(camera[:, k] * view.translation[:, k, None] for k in range(3)) + view.to_camera_offset
+    of = view.track_of_instance
+    return (
+        torch.cat([rotation[of], camera[None]]),  # type: ignore[index]
+        torch.cat([offset[of], torch.zeros(1, 3, dtype=torch.float64)]),
+    )
