@@ -85,6 +85,11 @@ class Scale:
         return dataclasses.replace(small, tiling=dataclasses.replace(small.tiling, tile_count_max=tiles))
 
 
+def is_framed(policy: str) -> bool:
+    """Whether a policy makes whole frames, for which nothing but the resolution decides."""
+    return policy == "framed" or policy.startswith("framed-")
+
+
 def framed_config(side_px: int) -> TsarConfig:
     """What a framed renderer reads of a configuration is the resolution; the rest is the same for all that share it."""
     return TsarConfig(batch_size=16, resolution_px=side_px, tiling=TilingConfig(tile_count_max=16))
@@ -136,7 +141,7 @@ class Case:
         POLICIES.require(self.policy)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
-        if not self.policy.startswith("framed"):
+        if not is_framed(self.policy):
             cycle_s = float(adaptive_flops(self.cost, expected_ledger(self.ledger))) / self.capacity
             pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
             limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
@@ -160,7 +165,7 @@ class Case:
     def name(self) -> str:
         """For people: policy, input, batch, resolution, seed and phase."""
         c = self.tsar
-        batch = "" if self.policy.startswith("framed") else f"-b{c.batch_size}"
+        batch = "" if is_framed(self.policy) else f"-b{c.batch_size}"
         text = f"{self.policy}-{self.input}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
         return text.replace(" ", "-")
 

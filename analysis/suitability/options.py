@@ -14,7 +14,7 @@ from analysis.metrics.display_model import DisplayModel
 from analysis.study.cases import INPUTS, ROWS, SCALES
 from tsar.choices import SOLVERS
 from tsar.config import TsarConfig, closed_choices, require
-from tsar.policies import POLICIES
+from tsar.policies import POLICIES, RIVALS
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,16 @@ class SuitabilityOptions:
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
-    policies: tuple[str, ...] = ("framed-super", "frameless", "afr", "oracle")
-    """Policies that are compared beside thesis and the framed renderer, at one row."""
+    policies: tuple[str, ...] = ("thesis",)
+    """Policies that are judged at every row: beside framed, and beside the best of the rivals at each moment."""
+    rivals: tuple[str, ...] = RIVALS
+    """Their rivals, at every row; framed is one of them in any case."""
+    beside: tuple[str, ...] = ("oracle",)
+    """Policies that stand beside all of these at one row only."""
     solvers: tuple[str, ...] = ("trivial",)
     """Solvers of thesis that are compared beside the chosen one, at that row."""
     policy_row: int = 7
-    """The row at which policies and solvers are compared."""
+    """That row."""
     ledger: Ledger = "thesis"
     """How cost is counted; wall is refused, for it gives no result twice."""
     framed_rate_hz: float = 8.0
@@ -62,11 +66,12 @@ class SuitabilityOptions:
     def __post_init__(self) -> None:
         unknown = [one for one in self.inputs if one not in INPUTS]
         require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
-        for one in self.policies:
-            POLICIES.require(one, "policies")
+        for name in ("policies", "rivals", "beside"):
+            for one in getattr(self, name):
+                POLICIES.require(one, name)
         for one in self.solvers:
             SOLVERS.require(one, "solvers")
-        for name in ("inputs", "rows"):
+        for name in ("inputs", "rows", "policies"):
             chosen = getattr(self, name)
             require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
         for name, values in (("rows", self.rows), ("policy_row", (self.policy_row,))):

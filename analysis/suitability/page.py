@@ -9,7 +9,9 @@ from typing import Any
 import pandas as pd
 
 from analysis.command.console import Table, frame_table
+from analysis.metrics.rivals import BEST
 from analysis.page.report import Report, write_report
+from analysis.suitability.rivalry import ALL
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -26,6 +28,7 @@ def shown_tables(tables: Tables) -> list[Table]:
     header = ["row", "batch", "resolution", *names]
     return [
         Table("Greatest suitable percentile, ours (thesis)", header, rows, words=0),
+        *_rivalry(tables),
         *(
             frame_table(tables[name], title, f".{digits}f")
             for title, name, digits in (
@@ -37,6 +40,25 @@ def shown_tables(tables: Tables) -> list[Table]:
             )
         ),
     ]
+
+
+def _rivalry(tables: Tables) -> list[Table]:
+    """Policies beside the framed renderer and the best rival; of the rivals, all rows together."""
+    rivals = tables["rivals"]
+    if len(rivals) and (rivals["row"] == ALL).any():
+        rivals = rivals[rivals["row"] == ALL]
+    return [
+        _beside(tables["judged"], f"Error of policies beside framed (F) and the {BEST} (B)"),
+        _beside(rivals, f"Error of rivals beside framed (F) and the {BEST} (B)"),
+        _beside(tables["judged_metrics"], f"Policies beside framed (F) and the {BEST} (B) by every metric"),
+        frame_table(tables["best_rival"], f"Share of moments at which each rival is the {BEST}", ".3f"),
+    ]
+
+
+def _beside(rows: pd.DataFrame, title: str) -> Table:
+    """With short names of columns: these tables are wide."""
+    short = {name: name.replace("framed: ", "F ").replace(f"{BEST}: ", "B ") for name in rows.columns}
+    return frame_table(rows.rename(columns=short), title, ".3f")
 
 
 def _whole(value: float) -> str:

@@ -21,6 +21,7 @@ from analysis.study.farm import describe_failures, run_cases
 from analysis.suitability import plots
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.page import write_page
+from analysis.suitability.rivalry import groups_of, lead_table, metric_table, rival_table
 from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import (
     Result,
@@ -89,8 +90,16 @@ def collect(planned: list[Run], keys: Mapping[Case, str], place: Place) -> list[
 
 def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
     """Every table by name. Nothing in them depends on machine, order or time."""
-    side = ROWS[options.policy_row][1] // SCALES[options.scale].divisor
+    divisor = SCALES[options.scale].divisor
+    side = ROWS[options.policy_row][1] // divisor
+    rivals = tuple(dict.fromkeys(("framed", *options.rivals)))
+    sides = {row: ROWS[row][1] // divisor for row in options.rows}
+    groups = groups_of(results, sides, (*options.policies, *rivals))
     return {
+        "judged": rival_table(groups, options.policies, rivals),
+        "judged_metrics": metric_table(groups, options.policies, rivals),
+        "rivals": rival_table(groups, rivals, rivals),
+        "best_rival": lead_table(groups, rivals),
         "table_7_2": percentile_table(results),
         "shares": share_table(results),
         "policies": policy_table(results, options.policy_row, side),
@@ -134,7 +143,7 @@ def _summary(
         "runs": len(cases),
         "runs_done": len(measured),
         "failures": {keys[case]: reason for case, reason in sorted(failures.items(), key=lambda one: keys[one[0]])},
-        "invariants_ok": bool(len(runs_table) and runs_table["invariants_ok"].all()),
+        "invariants_ok": not len(runs_table) or bool(runs_table["invariants_ok"].all()),
         "ledger": options.ledger,
         "display": options.display,
         "tables": {name: table.to_dict("records") for name, table in tables.items()},

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from analysis.study.cases import SCALES, Case, framed_config
+from analysis.study.cases import SCALES, Case, framed_config, is_framed
 from analysis.suitability.options import SuitabilityOptions
 from tsar.config import TsarConfig
 
@@ -49,7 +49,8 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
     scale = SCALES[options.scale]
     rows = [(row, scale.config(row, dataclasses.replace(options.tsar, seed=repetition))) for row in options.rows]
     at_row = scale.config(options.policy_row, dataclasses.replace(options.tsar, seed=repetition))
-    compared = [] if options.policy_row not in options.rows else options.policies
+    everywhere = dict.fromkeys(("framed", *options.policies, *options.rivals))
+    at_one = [] if options.policy_row not in options.rows else [one for one in options.beside if one not in everywhere]
 
     def run(label: str, row: int | None, policy: str, config: TsarConfig) -> Run:
         case = Case(
@@ -68,16 +69,19 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
         )
         return Run(label, row, config.resolution_px, repetition, case)
 
-    for side in sorted({config.resolution_px for _, config in rows}):
-        yield run("framed", None, "framed", framed_config(side))
-    for row, config in rows:
-        yield run("thesis", row, "thesis", config)
-    for policy in compared:
-        if policy == "framed-super":
-            yield run(policy, None, policy, framed_config(at_row.resolution_px))
-        elif policy not in ("framed", "thesis"):
-            yield run(policy, options.policy_row, policy, at_row)
-    for solver in options.solvers if options.policy_row in options.rows else ():
+    def runs_at(policy: str, places: Sequence[tuple[int, TsarConfig]]) -> Iterator[Run]:
+        if is_framed(policy):
+            for side in sorted({config.resolution_px for _, config in places}):
+                yield run(policy, None, policy, framed_config(side))
+        else:
+            for row, config in places:
+                yield run(policy, row, policy, config)
+
+    for policy in everywhere:
+        yield from runs_at(policy, rows)
+    for policy in at_one:
+        yield from runs_at(policy, [(options.policy_row, at_row)])
+    for solver in options.solvers if "thesis" in everywhere and options.policy_row in options.rows else ():
         if solver != at_row.response.solver:
             changed = dataclasses.replace(at_row, response=dataclasses.replace(at_row.response, solver=solver))
             yield run(f"thesis {solver}", options.policy_row, "thesis", changed)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from analysis.metrics.quality import ratio, ratio_statistics, suitable_percentile
-from analysis.study.cases import INPUTS, ROWS
+from analysis.study.cases import INPUTS, ROWS, is_framed
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
 from analysis.suitability.runs import Run
 
@@ -188,13 +188,13 @@ def policy_table(results: Results, row: int, side_px: int, seed: int = 0) -> pd.
 
 def _errors(results: Results, label: str, name: str, row: int, side_px: int) -> dict[int, float]:
     """Mean error by repetition."""
-    at = None if label.startswith("framed") else row
+    at = None if is_framed(label) else row
     found = {number: results.get(label, name, at, side_px, number) for number in results.repetitions}
     return {number: one.value("mse") for number, one in found.items() if one is not None}
 
 
 def _jod(results: Results, label: str, name: str, row: int, side_px: int) -> float:
-    at = None if label.startswith("framed") else row
+    at = None if is_framed(label) else row
     found = [results.get(label, name, at, side_px, number) for number in results.repetitions]
     scores = [one.value("jod") for one in found if one is not None]
     known = [score for score in scores if not math.isnan(score)]

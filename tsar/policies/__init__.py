@@ -27,3 +27,7 @@ POLICIES: Named[Make] = Named(
         "oracle": "tsar.policies.oracle:Oracle",
     },
 )
+
+RIVALS = ("framed-1", "framed-super", "framed-half", "framed-quarter", "frameless", "afr")
+"""Rivals beside ``framed`` that look at no truth: a policy is compared with all of them, and with the best at each
+moment."""

@@ -8,6 +8,7 @@ from analysis.study.cases import INPUTS
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.runs import runs
 from tsar.config import ConfigError
+from tsar.policies import RIVALS
 
 
 def test_the_whole_study() -> None:
@@ -25,14 +26,31 @@ def test_the_whole_study() -> None:
     assert len({run.case for run in planned}) == len(planned)
 
 
-def test_policies_are_compared_at_one_row() -> None:
-    planned = runs(SuitabilityOptions(inputs=("chase",), rows=(0, 7), repetitions=1))
-    others = {run.label: run for run in planned if run.label not in ("thesis", "framed")}
-    assert set(others) == {"framed-super", "frameless", "afr", "oracle", "thesis trivial"}
+def test_policies_and_rivals_run_at_every_row() -> None:
+    options = SuitabilityOptions(
+        inputs=("chase",), rows=(0, 7), repetitions=1, policies=("frameless",), rivals=("framed-half", "afr"), beside=()
+    )
+    found = [(run.label, run.row, run.side_px) for run in runs(options)]
+    framed = [(name, None, side) for name in ("framed", "framed-half") for side in (64, 128)]
+    rows = [(name, row, side) for name in ("frameless", "afr") for row, side in ((0, 64), (7, 128))]
+    assert sorted(found, key=str) == sorted(framed + rows, key=str), "solvers are of the policy thesis"
+
+
+def test_all_rivals_run_by_default() -> None:
+    planned = runs(SuitabilityOptions(inputs=("chase",), repetitions=1))
+    assert set(RIVALS) <= {run.label for run in planned} and "oracle" not in RIVALS
+    for name in RIVALS:
+        assert sum(run.label == name for run in planned) == (3 if name.startswith("framed-") else 16)
+
+
+def test_some_stand_beside_at_one_row() -> None:
+    planned = runs(SuitabilityOptions(inputs=("chase",), rows=(0, 7), repetitions=1, rivals=("afr",)))
+    others = {run.label: run for run in planned if run.label not in ("thesis", "framed", "afr")}
+    assert set(others) == {"oracle", "thesis trivial"}
     assert {run.side_px for run in others.values()} == {128}
     assert others["thesis trivial"].case.tsar.response.solver == "trivial"
-    only = runs(SuitabilityOptions(inputs=("chase",), rows=(0,), repetitions=1))
-    assert [run.label for run in only] == ["framed", "thesis"], "the row of the policies was not asked for"
+    only = runs(SuitabilityOptions(inputs=("chase",), rows=(0,), repetitions=1, rivals=()))
+    assert [run.label for run in only] == ["framed", "thesis"], "that row was not asked for"
 
 
 @pytest.mark.parametrize(
@@ -43,6 +61,9 @@ def test_policies_are_compared_at_one_row() -> None:
         ({"rows": (16,)}, "rows.*0 to 15"),
         ({"rows": (1, 1)}, "rows.*none twice"),
         ({"policies": ("magic",)}, "policies"),
+        ({"policies": ()}, "policies"),
+        ({"rivals": ("magic",)}, "rivals"),
+        ({"beside": ("magic",)}, "beside"),
         ({"repetitions": 0}, "repetitions"),
         ({"policy_row": -1}, "policy_row"),
     ],

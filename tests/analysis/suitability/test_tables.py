@@ -26,21 +26,11 @@ from analysis.suitability.tables import (
     share_table,
     vote_table,
 )
+from tests.analysis.suitability.builders import TIMES, result
 
-TIMES = 20
-
-
-def result(run: Run, mse, **columns) -> Result:
-    """A result with errors as given, a number or one per time."""
-    errors = np.broadcast_to(np.asarray(mse, float), (TIMES,)).copy()
-    table = pd.DataFrame({"time_s": np.arange(TIMES) / 30, "mse": errors, "log_mse": errors})
-    for name, value in {"flip": errors, "ssim": 1 - errors, "flicker": 0.0, **columns}.items():
-        table[name] = value
-    summary = {"jod": 10 - 100 * float(errors.mean()) if run.case.jod_span_s else None, "cycles": 9, "cycle_s": 0.01}
-    return Result(run, {**summary, "invariants": {"ok": True}, "nonfinite_samples": 0}, table)
-
-
-OPTIONS = SuitabilityOptions(inputs=("chase", "fly-by"), rows=(6, 7), repetitions=2)
+OPTIONS = SuitabilityOptions(
+    inputs=("chase", "fly-by"), rows=(6, 7), repetitions=2, rivals=("framed-super", "frameless", "afr")
+)
 HALF = np.where(np.arange(TIMES) < TIMES // 2, 0.5, 2.0)
 """Half of the ratios below 1."""
 
@@ -107,7 +97,7 @@ def test_intervals_are_of_95_percent() -> None:
 
 def test_whiskers_of_the_figure_end_within_one_and_a_half_boxes() -> None:
     """Ratios 10 … 18 with one of 25: the box reaches from 11.5 to 16, a whisker to 22.75 at most."""
-    options = SuitabilityOptions(inputs=("chase",), rows=(7,), repetitions=1, policies=(), solvers=())
+    options = SuitabilityOptions(inputs=("chase",), rows=(7,), repetitions=1, rivals=(), beside=(), solvers=())
     ratios = np.resize(np.arange(9.0) + 10.0, TIMES)
     ratios[0] = 25.0
     figure = boxes(Results([result(r, 1.0 if r.label == "framed" else ratios) for r in runs(options)]), ["chase"], "")

@@ -1,0 +1,162 @@
+"""Policies beside the framed renderer and beside the best of their rivals, at every row of a suitability study.
+
+A run here is an input at a row, all repetitions together, as in table 7.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.metrics.quality import Floats, percentile, ratio, suitable_percentile
+from analysis.metrics.rivals import BEST, best_of, best_shares, standing
+from analysis.study.cases import ROWS, is_framed
+from analysis.suitability.tables import METRICS, Result, Results
+
+ALL = "all"
+"""In place of a row: all of them together."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Results that share what is to be seen: an input, a row and a repetition.
+
+    Attributes:
+        input, row: of table 7.2.
+        results: by policy; those that failed are missing.
+    """
+
+    input: str
+    row: int
+    results: Mapping[str, Result]
+
+    def values(self, name: str, metric: str) -> Floats:
+        """A metric at the reference times; the score of a sequence has one value."""
+        one = self.results[name]
+        if metric in one.times:
+            return one.times[metric].to_numpy()
+        return np.array([one.value(metric)])
+
+    def best(self, rivals: Iterable[str], metric: str) -> Floats:
+        """The best of the rivals that ran."""
+        return best_of([self.values(name, metric) for name in rivals if name in self.results], METRICS[metric])
+
+
+def groups_of(results: Results, rows: Mapping[int, int], names: Sequence[str]) -> list[Group]:
+    """Results of some policies, where the framed renderer has one.
+
+    Args:
+        results: of the study.
+        rows: side of the image by row, pixels.
+        names: of the policies.
+    """
+    found = []
+    for row, side in rows.items():
+        for name in results.inputs:
+            for repetition in results.repetitions:
+                made = {one: results.get(one, name, None if is_framed(one) else row, side, repetition) for one in names}
+                present = {one: result for one, result in made.items() if result is not None}
+                if "framed" in present:
+                    found.append(Group(name, row, present))
+    return found
+
+
+def _by_row(groups: Sequence[Group]) -> Iterator[tuple[int | str, list[Group]]]:
+    rows = sorted({group.row for group in groups})
+    if len(rows) > 1:
+        yield ALL, list(groups)
+    yield from ((row, [group for group in groups if group.row == row]) for row in rows)
+
+
+def rival_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
+    """A line a row and policy: error beside the framed renderer's and beside the best rival's.
+
+    ``at most`` is the share of moments at which the error is at most the other's, ``median`` the median of the ratio,
+    ``always`` and ``90 %`` in how many runs it is at most the other's always, and at 90 % of the time by the greatest
+    suitable percentile. ``worst`` is the greatest median of a run. A policy that is a rival is compared with the best
+    of all, itself included, so it is at most that where it is the best.
+    """
+    lines = []
+    for row, found in _by_row(groups):
+        for name in policies:
+            here = [group for group in found if name in group.results]
+            if not here:
+                continue
+            setting = "" if row == ALL else f"{ROWS[int(row)][0]}, {ROWS[int(row)][1]}²"
+            line: dict[str, Any] = {"row": str(row), "setting": setting, "policy": name}
+            line["runs"] = len({(group.input, group.row) for group in here})
+            for label, others in (("framed", ["framed"]), (BEST, rivals)):
+                line |= {f"{label}: {key}": value for key, value in _beside(here, name, others).items()}
+            lines.append(line)
+    return pd.DataFrame(lines)
+
+
+def _beside(groups: Sequence[Group], name: str, others: Sequence[str]) -> dict[str, float]:
+    """Error of a policy over the least of some others'."""
+    of_run: dict[tuple[str, int], list[Floats]] = {}
+    for group in groups:
+        ratios = ratio(group.values(name, "mse"), group.best(others, "mse"))
+        of_run.setdefault((group.input, group.row), []).append(ratios)
+    together = [np.concatenate(ratios) for ratios in of_run.values()]
+    everything = np.concatenate(together)
+    percentiles = np.array([suitable_percentile(ratios) for ratios in together])
+    return {
+        "at most": float((everything <= 1.0).mean()),
+        "median": percentile(np.sort(everything), 50.0),
+        "always": int((percentiles >= 100.0).sum()),
+        "90 %": int((percentiles >= 90.0).sum()),
+        "worst": max(percentile(np.sort(ratios), 50.0) for ratios in together),
+    }
+
+
+def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
+    """Policies by every metric, all rows together: share of moments, and runs in which the mean is better.
+
+    Scores of sequences have no moments: each is one.
+    """
+    lines = []
+    for name in policies:
+        others_than = [one for one in rivals if one != name]
+        here = [group for group in groups if name in group.results and any(one in group.results for one in others_than)]
+        for metric, sign in METRICS.items() if here else ():
+            line: dict[str, Any] = {"policy": name, "metric": metric}
+            for label, others in (("framed", ["framed"]), (BEST, others_than)):
+                own = np.concatenate([group.values(name, metric) for group in here])
+                other = np.concatenate([group.best(others, metric) for group in here])
+                found = standing(own, other, sign)
+                better, known = _better_runs(here, name, others, metric)
+                line |= {f"{label}: at least as good": found.share, f"{label}: ratio of medians": found.ratio}
+                line |= {f"{label}: runs better": better, f"{label}: runs": known}
+            lines.append(line)
+    return pd.DataFrame(lines)
+
+
+def _better_runs(groups: Sequence[Group], name: str, others: Sequence[str], metric: str) -> tuple[int, int]:
+    """In how many runs the mean is better than every other's, and how many have a value."""
+    sign, means = METRICS[metric], dict[tuple[str, int], list[tuple[float, float]]]()
+    for group in groups:
+        own = group.results[name].value(metric)
+        values = [sign * group.results[one].value(metric) for one in others if one in group.results]
+        values = [value for value in values if not math.isnan(value)]
+        if values and not math.isnan(own):
+            means.setdefault((group.input, group.row), []).append((sign * own, max(values)))
+    pairs = [np.mean(found, axis=0) for found in means.values()]
+    return sum(bool(own > other) for own, other in pairs), len(pairs)
+
+
+def lead_table(groups: Sequence[Group], rivals: Sequence[str]) -> pd.DataFrame:
+    """A line a row: share of the moments at which each rival has the lowest error of all; equals count each."""
+    lines = []
+    for row, found in _by_row(groups):
+        shares = []
+        for group in found:
+            errors = {name: group.values(name, "mse") for name in rivals if name in group.results}
+            shares.append(best_shares(errors))
+        names = [name for name in rivals if any(name in share for share in shares)]
+        lines.append({"row": str(row)} | {name: float(np.mean([s.get(name, 0.0) for s in shares])) for name in names})
+    return pd.DataFrame(lines)
