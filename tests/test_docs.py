@@ -67,6 +67,32 @@ def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
     assert written == {"small", "shown.png", "report.html", "glass.png"}
 
 
+def tutorial(folder: Path, *options: str) -> str:
+    """The page of the tutorial as its script makes it now."""
+    command = [sys.executable, str(ROOT / "docs/tutorial_page.py"), *options, str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3000)
+    assert done.returncode == 0, done.stderr
+    return (folder / "tutorial.md").read_text()
+
+
+def test_the_tutorial_runs_small(tmp_path: Path) -> None:
+    """Its text and code are those of the page; what it prints has the same form, and every picture is drawn."""
+    page = (ROOT / "docs/tutorial.md").read_text()
+    settings = re.findall(r"(?m)^SECONDS, .*$", page)
+    found = re.sub(r"(?m)^SECONDS, .*$", "".join(settings), tutorial(tmp_path, "--small"))
+    printed = re.compile(r"(?s)(?<=```text\n).*?(?=\n```)")
+    assert len(settings) == 1 and printed.sub("", found) == printed.sub("", page)
+    lines = [[shown.count("\n") for shown in printed.findall(text)] for text in (found, page)]
+    assert lines[0] == lines[1] and len(lines[0]) == 5
+    drawn = {path.name for path in (tmp_path / "pictures").iterdir()}
+    assert drawn == {path.name for path in (ROOT / "docs/pictures").glob("tutorial-*")} and len(drawn) == 5
+
+
+@pytest.mark.slow
+def test_the_tutorial_prints_what_its_page_says(tmp_path: Path) -> None:
+    assert tutorial(tmp_path) == (ROOT / "docs/tutorial.md").read_text()
+
+
 @pytest.mark.slow
 def test_figures_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["figures.py", str(tmp_path)])

@@ -88,6 +88,7 @@ def compare(
     *,
     image_times_s: Sequence[float] | None = None,
     out: str | PathLike[str] | None = None,
+    cache: str | PathLike[str] | None = None,
     **more: Any,
 ) -> Result:
     """Compares policies on a scene at equal cost.
@@ -101,6 +102,7 @@ def compare(
         image_times_s: times of which images are kept, each at the last reference time that is not later; by default
             five, evenly spaced.
         out: folder for all that ``tsar run`` writes; by default one that is removed with the result.
+        cache: folder for references, which several comparisons may share; by default ``cache`` within ``out``.
         more: further options of a run (:class:`analysis.comparison.options.RunOptions`), and fields of
             :class:`tsar.config.TsarConfig`, such as ``resolution_px``, ``batch_size`` or ``response``.
 
@@ -119,7 +121,8 @@ def compare(
     if not named:
         raise ConfigError("policies: expected at least one, got none")
     with POLICIES.lent(**makers), METRICS.lent(**functions):
-        usual = {"film": False, "cache": folder / "cache", "metric_stride": 1}
+        references = folder / "cache" if cache is None else Path(fspath(cache))
+        usual = {"film": False, "cache": references, "metric_stride": 1}
         chosen = {"policy": named[0], "rivals": named[1:], "metrics": measured, "seconds": seconds, "out": folder}
         options = _options({"input": label, **usual, **chosen}, more)
         kept = _Kept(_numbers(options, image_times_s))

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
-MEASURED = ("provenance", "start", "machine", "stage_wall_s", "wall", "wall_s", "created", "peak_memory_bytes")
+MEASURED = (
+    *("provenance", "start", "machine", "stage_wall_s", "wall", "wall_s"),
+    *("samples_per_s", "created", "peak_memory_bytes"),
+)
 """Entries of JSON files that differ between two equal runs: where, when and how fast they were made."""
 
 _PICTURES = (".png", ".ppm", ".exr")
 _NOT_COMPARED = (".html", ".log", ".lock", ".journal")
+_TIMES = "timing.csv"
 
 
 @dataclass
@@ -50,7 +54,7 @@ def compare_folders(first: Path, second: Path, ignore: tuple[str, ...] = ()) -> 
         raise ValueError(f"{first}, {second}: expected results, found no files")
     difference = Difference()
     for name in names:
-        if name.suffix in _NOT_COMPARED or name.name in ignore:
+        if name.suffix in _NOT_COMPARED or name.name in (_TIMES, *ignore):
             difference.left_out.append(str(name))
             continue
         missing = [str(folder) for folder in (first, second) if not (folder / name).is_file()]
