@@ -6,9 +6,12 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 MEASURED = (
     *("provenance", "start", "machine", "stage_wall_s", "wall", "wall_s"),
@@ -115,9 +118,20 @@ def _of_tables(first: Path, second: Path, ignore: set[str]) -> Iterator[str]:
     for name in kept:
         if name not in b.column_names:
             yield f"column {name}: only in {first.parent}"
-        elif not a.column(name).combine_chunks().equals(b.column(name).combine_chunks()):
+        elif not _same_column(a.column(name).combine_chunks(), b.column(name).combine_chunks()):
             yield f"column {name}: other values"
     yield from (f"column {name}: only in {second.parent}" for name in b.column_names if name not in a.column_names)
+
+
+def _same_column(a: pa.Array, b: pa.Array) -> bool:
+    """Whether all values are equal, lists one by one; NaN equals NaN."""
+    import pyarrow as pa
+
+    if a.equals(b) or a.type != b.type or len(a) != len(b):
+        return a.equals(b)
+    if pa.types.is_list(a.type):
+        return a.value_lengths().equals(b.value_lengths()) and _same_column(a.flatten(), b.flatten())
+    return pa.types.is_floating(a.type) and np.array_equal(a.to_numpy(False), b.to_numpy(False), equal_nan=True)
 
 
 def _of_pictures(first: Path, second: Path) -> Iterator[str]:
