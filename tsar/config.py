@@ -47,19 +47,26 @@ class TilingConfig:
     level_min: int = 2
     """Coarsest quad level: tiles are at most 1/2^level_min of the image wide."""
     level_max: int = 0
-    """Finest quad level; 0 means one level finer than one sample per output pixel."""
+    """Finest quad level; 0 means that of rate_max."""
     tile_count_max: int = 0
     """Most tiles in a tiling; 0 means max(512, 4 * batch size), the thesis' 512 at its batch size of 128. A tiling has
     4^level_min + 3 k tiles, so that of at most 512 has 511; it must hold a batch."""
-    threshold_samples: float = 256.0
-    """A tile is split while the samples asked for in it exceed this; one framelet holds 256."""
+    threshold_samples: float = 0.0
+    """A tile is split while the samples asked for in it exceed this; 0 means as many as a framelet holds."""
+    rate_max: int = 0
+    """Most samples along a pixel's side, a power of two up to 8; 4 is the greatest rate of the thesis (sec. 5.1.2). 0
+    means 2, or less where a tile would be smaller than an element of the field. Given instead of level_max."""
 
     def __post_init__(self) -> None:
         require(1 <= self.level_min <= 9, "tiling.level_min", "between 1 and 9", self.level_min)
         require(0 <= self.level_max <= 9, "tiling.level_max", "between 0 and 9", self.level_max)
         require(self.tile_count_max >= 0, "tiling.tile_count_max", "at least 0", self.tile_count_max)
+        require(self.rate_max in (0, 1, 2, 4, 8), "tiling.rate_max", "1, 2, 4 or 8, or 0", self.rate_max)
+        only_one = not (self.rate_max and self.level_max)
+        require(only_one, "tiling.rate_max", "0 beside a level_max, which sets the rate", self.rate_max)
         threshold = self.threshold_samples
-        require(1e-6 <= threshold <= 1e12, "tiling.threshold_samples", "a number in [1e-6, 1e12]", threshold)
+        ok = threshold == 0 or 1e-6 <= threshold <= 1e12
+        require(ok, "tiling.threshold_samples", "0 or a number in [1e-6, 1e12]", threshold)
 
 
 @dataclass(frozen=True)
@@ -163,6 +170,11 @@ class TsarConfig:
         for name, most in (("cache_size", 2**20), ("warmup_cycles", 100_000), ("seed", 2**32 - 1)):
             require(0 <= getattr(self, name) <= most, name, f"between 0 and {most}", getattr(self, name))
         low, high = self.level_min, self.level_max
+        if rate := self.tiling.rate_max:
+            side = self.resolution_px * rate // self.framelet_side
+            require(2**low <= side, "tiling.rate_max", f"one that tiles of level {low} do not exceed", rate)
+            ok = side <= self.sdf_side
+            require(ok, "tiling.rate_max", f"at most {rate * self.sdf_side // side} at sdf_side {self.sdf_side}", rate)
         require(low <= high <= self.field_level, "tiling.level_max", f"between {low} and {self.field_level}", high)
         require(2**high <= self.resolution_px // 2, "tiling.level_max", "tiles of at least two output pixels", high)
         self._require_room_for_a_batch(4**low, 4**high)
@@ -197,8 +209,13 @@ class TsarConfig:
 
     @property
     def level_max(self) -> int:
-        auto = int(log2(self.resolution_px / self.framelet_side)) + 1
+        auto = int(log2(self.resolution_px * (self.tiling.rate_max or 2) / self.framelet_side))
         return self.tiling.level_max or max(self.level_min, min(auto, self.field_level))
+
+    @property
+    def threshold_samples(self) -> float:
+        """Samples asked for in a tile beyond which it is split."""
+        return self.tiling.threshold_samples or float(self.samples)
 
     @property
     def tile_count_max(self) -> int:

@@ -96,7 +96,7 @@ def split_bounds(config: TsarConfig) -> tuple[int, int]:
 def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
     """Which nodes of the levels above the finest split, as one boolean tensor a level."""
     least, most = split_bounds(config)
-    wanted = int((candidates > config.tiling.threshold_samples).sum())
+    wanted = int((candidates > config.threshold_samples).sum())
     count = min(max(wanted, least), most, candidates.numel())
     ranks = tie_order(config.level_min, config.level_max)
     order = ranks[torch.sort(candidates[ranks], descending=True, stable=True).indices]

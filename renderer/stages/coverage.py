@@ -18,7 +18,7 @@ _KNOWN: Mapping[str, Mapping[str, tuple[str, ...] | None]] = {
             *("tiling", "error", "response", "reconstruction"),
         )
     ),
-    "tiling": dict.fromkeys(("level_min", "level_max", "tile_count_max", "threshold_samples")),
+    "tiling": dict.fromkeys(("level_min", "level_max", "rate_max", "tile_count_max", "threshold_samples")),
     "error": {
         **dict.fromkeys(("spatial_offset", "spatial_slope", "temporal_offset", "temporal_slope")),
         "norm": ("l2", "linf"),

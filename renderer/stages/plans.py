@@ -81,7 +81,7 @@ def tiling_plan(config: TsarConfig, memory: Memory) -> TilingPlan:
     low, high = config.level_min, config.level_max
     plan.field_level, plan.level_low, plan.level_high = config.field_level, low, high
     plan.splits_least, plan.splits_most = split_bounds(config)
-    plan.threshold = config.tiling.threshold_samples
+    plan.threshold = config.threshold_samples
     order = tie_order(low, high) if high > low else torch.empty(0, dtype=_I64)
     plan.order = memory.keep("order", order, _I64, first_node(high) - first_node(low))
     plan.sums, plan.key = memory.room("node sums", nodes, _F64), memory.room("node keys", nodes, _F64)

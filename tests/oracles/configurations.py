@@ -34,6 +34,7 @@ def _drawn(draw: random.Random) -> TsarConfig:
     resolution = draw.choice((64, 64, 128, 128, 256))
     low = draw.choice((1, 1, 2, 2, 3, 4))
     high = draw.choice((0, low, low + 1, low + 2, low + 3))
+    rate = 0 if high else draw.choice((0, 0, 1, 2, 4, 8))
     fine = 4 ** (high or 5)
     batch = min(round(2 ** draw.uniform(0.0, 9.0)), draw.choice((fine, 8192)))
     least = tiles_at_least(batch, low)
@@ -46,7 +47,7 @@ def _drawn(draw: random.Random) -> TsarConfig:
         cache_size=batch + draw.choice((0, 1, 7, draw.randrange(2000))),
         seed=draw.randrange(2**31),
         warmup_cycles=0,
-        tiling=TilingConfig(low, high, bound, 10.0 ** draw.uniform(0.0, 4.0)),
+        tiling=TilingConfig(low, high, bound, draw.choice((0.0, 10.0 ** draw.uniform(0.0, 4.0))), rate),
         error=ErrorConfig(
             *(_one_of(draw, usual, -60.0, 60.0) for usual in (-7.0, -1.0, -9.0, -1.0)),
             norm=draw.choice(("l2", "linf")),

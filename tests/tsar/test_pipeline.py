@@ -211,8 +211,8 @@ def test_a_clock_that_stops_time_is_refused():
         (lambda: TsarConfig(resolution_px=500), r"resolution_px: expected a power of two in \[64, 8192\], got 500"),
         (lambda: TsarConfig(framelet_side=8), r"framelet_side: expected 16 or 32, got 8"),
         (
-            lambda: TilingConfig(threshold_samples=0.0),
-            r"tiling.threshold_samples: expected a number in \[1e-6, 1e12\], got 0",
+            lambda: TilingConfig(threshold_samples=1e-7),
+            r"tiling.threshold_samples: expected 0 or a number in \[1e-6, 1e12\], got 1e-07",
         ),
         (lambda: ResponseConfig(temporal_min=0.0), r"response.temporal_min: expected a density in \[1e-6, 1\], got 0"),
         (lambda: TsarConfig(batch_size=64, tiling=TilingConfig(tile_count_max=32)), r"tiling.tile_count_max: expected"),
@@ -236,6 +236,16 @@ def test_a_clock_that_stops_time_is_refused():
             r"age_support_px: .* got 65",
         ),
         (lambda: TsarConfig(tiling=TilingConfig(level_max=9)), r"tiling.level_max: expected between 2 and 7, got 9"),
+        (lambda: TilingConfig(rate_max=3), r"tiling.rate_max: expected 1, 2, 4 or 8, or 0, got 3"),
+        (lambda: TilingConfig(level_max=6, rate_max=4), r"tiling.rate_max: expected 0 beside a level_max, .* got 4"),
+        (
+            lambda: TsarConfig(resolution_px=1024, tiling=TilingConfig(rate_max=4)),
+            r"tiling.rate_max: expected at most 2 at sdf_side 128, got 4",
+        ),
+        (
+            lambda: TsarConfig(resolution_px=64, batch_size=64, tiling=TilingConfig(level_min=3, rate_max=1)),
+            r"tiling.rate_max: expected one that tiles of level 3 do not exceed, got 1",
+        ),
     ],
 )
 def test_bad_configuration_names_field_and_value(make, message):

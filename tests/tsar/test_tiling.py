@@ -76,6 +76,23 @@ def test_more_density_gives_smaller_tiles():
     assert int(tiling.level[inside].min()) > int(tiling.level[~inside].max())
 
 
+@pytest.mark.parametrize("side", [16, 32])
+def test_a_tile_is_split_where_more_is_asked_for_than_a_framelet_holds(side):
+    cfg = TsarConfig(batch_size=32, framelet_side=side)
+    asked = torch.full((16384,), 64 * side**2 / 16384, dtype=torch.float64)  # 64 framelets in all
+    assert build(asked, cfg).level.tolist() == [3] * 64
+    asked[0] *= 1.01
+    assert build(asked, cfg).level.tolist() == [4] * 4 + [3] * 63
+
+
+def test_the_greatest_rate_is_that_of_the_finest_level():
+    for rate in (1, 2, 4):
+        cfg = TsarConfig(tiling=TilingConfig(rate_max=rate))
+        assert 2**cfg.level_max * cfg.framelet_side == rate * cfg.resolution_px
+    assert TsarConfig().level_max == TsarConfig(tiling=TilingConfig(rate_max=2)).level_max
+    assert TsarConfig(resolution_px=1024, sdf_side=256, tiling=TilingConfig(rate_max=4)).level_max == 8
+
+
 def test_bad_fields_are_refused():
     for value in (float("nan"), float("inf"), -1.0):
         with pytest.raises(ValueError, match="finite, non-negative"):

@@ -34,6 +34,7 @@ CONFIGS = {
     "one level": small(tiling=TilingConfig(level_min=3, level_max=3)),
     "coarse levels": small(batch_size=16, tiling=TilingConfig(level_min=1, level_max=3)),
     "finer than pixels": small(resolution_px=64, batch_size=16, tiling=TilingConfig(level_min=1, level_max=5)),
+    "four samples along a pixel": small(tiling=TilingConfig(rate_max=4)),
     "few tiles": small(tiling=TilingConfig(tile_count_max=64, threshold_samples=64.0)),
     "no smoothing": small(reconstruction=ReconstructionConfig(1)),
     "wide smoothing": small(reconstruction=ReconstructionConfig(65)),
