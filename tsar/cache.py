@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from tsar.config import TsarConfig
-from tsar.haar import state_size
+from tsar.estimators import state_size
 from tsar.morton import node_number
 from tsar.types import FrameletBatch
 
@@ -26,7 +26,7 @@ class FrameletCache:
 
     Attributes:
         color: ``(slots, samples, 3)`` float32, Morton order.
-        coefficients: ``(slots, state)`` float32, the wavelet state left by each framelet.
+        coefficients: ``(slots, state)`` float32, what the error estimator keeps of each framelet.
         level, index: tile of each slot; level is ``EMPTY`` in an unused one.
         time_s: animation time of each slot, ``-inf`` in an unused one.
         slot_of_node: slot of the newest framelet of each quadtree node, coarser levels first; ``EMPTY`` where there is
@@ -38,7 +38,7 @@ class FrameletCache:
         slots, samples = config.cache_slots, config.samples
         self.level_max = config.level_max
         self.color = torch.zeros(slots, samples, 3)
-        self.coefficients = torch.zeros(slots, state_size(samples))
+        self.coefficients = torch.zeros(slots, state_size(samples, config.error))
         self.level = torch.full((slots,), EMPTY, dtype=torch.int64)
         self.index = torch.zeros(slots, dtype=torch.int64)
         self.time_s = torch.full((slots,), -torch.inf, dtype=torch.float64)

@@ -72,7 +72,7 @@ class TilingConfig:
 @dataclass(frozen=True)
 @closed_choices("error.")
 class ErrorConfig:
-    """The error estimate's template: log2 power = offset + slope * octave, octave 0 the coarsest (sec. 5.3.3.2)."""
+    """The error estimate and its template: log2 power = offset + slope * octave, octave 0 the coarsest (sec. 5.3.3)."""
 
     spatial_offset: float = -7.0
     """log2 of the power tolerated per coefficient at the coarsest spatial octave (compressed luminance squared)."""
@@ -86,6 +86,14 @@ class ErrorConfig:
     """Levelwise norm: l2 (total power), linf (the greatest power of one coefficient), or one that was added."""
     form: Literal["contrast", "difference"] = "contrast"
     """(S - T) / (S + T), or the difference of log2 powers, divided by 8 octaves of power and clamped to [-1, 1]."""
+    octaves: Literal["greatest", "sum"] = "sum"
+    """How octaves meet the template: each for itself, and the one that is least sampled decides; or the sums of their
+    powers, for which offset and slope are one parameter."""
+    extent: Literal["element", "tile"] = "element"
+    """The part of a tile whose power is summed before it is compared: an element of the field, or the whole tile."""
+    estimator: Literal["dwt", "variance", "fft"] = "dwt"
+    """What measures the power: the streaming wavelet transform, the variance of samples (sec. 5.2), or a windowed
+    Fourier transform of a tile's last eight updates (sec. 5.3.1); the norm is the wavelet transform's."""
 
     def __post_init__(self) -> None:
         NORMS.require(self.norm, "error.norm")
@@ -197,6 +205,10 @@ class TsarConfig:
     def field_level(self) -> int:
         """Quad level at which a tile is one field element."""
         return int(log2(self.sdf_side))
+
+    def elements_of(self, level: int) -> int:
+        """Field elements that a tile of a quad level covers, at least 1."""
+        return 4 ** max(self.field_level - level, 0)
 
     @property
     def samples(self) -> int:

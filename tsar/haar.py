@@ -6,7 +6,14 @@ every ``h`` and ``1 / sqrt 2`` for every ``g`` in their names.
 
 Octants are named in the order x, y, t: ``hgh`` is low in x, high in y, low in time.
 
-Source: Stephens 2011, sec. 5.3.4, eq. 5.15–5.16 and fig. 5.15.
+Time is dyadic as space is: octave ``o`` pairs fields that are ``2^o`` updates apart, so that it takes in ``2^(o + 1)``
+updates (fig. 5.9). At the leading edge an octave is evaluated at every update, not at every ``2^o``-th only; for that
+it keeps its last ``2^o`` fields.
+
+Deviation: sec. 5.3.1.3 keeps one field an octave, which would be right only if an octave were evaluated when both of
+its fields are complete.
+
+Source: Stephens 2011, sec. 5.3.4, eq. 5.15–5.16, fig. 5.9 and 5.15.
 """
 
 from __future__ import annotations
@@ -20,7 +27,12 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class Octave:
-    """Power-relevant detail octants of one octave, each ``(n, positions)`` in Morton order."""
+    """Detail octants of one octave, each ``(n, positions)`` in Morton order.
+
+    Attributes:
+        known: whether the tile has been updated often enough for the octave to have a past; else the temporal octants
+            are exactly zero.
+    """
 
     ghh: Float[Tensor, "n p"]
     hgh: Float[Tensor, "n p"]
@@ -29,6 +41,7 @@ class Octave:
     ghg: Float[Tensor, "n p"]
     hgg: Float[Tensor, "n p"]
     ggg: Float[Tensor, "n p"]
+    known: Bool[Tensor, " n"]
 
 
 def octave_count(samples: int) -> int:
@@ -37,8 +50,14 @@ def octave_count(samples: int) -> int:
 
 
 def state_size(samples: int) -> int:
-    """Coefficients kept per tile between transforms: one full field per octave (340 for 16 x 16)."""
-    return sum(samples >> (2 * o) for o in range(octave_count(samples)))
+    """Numbers kept per tile between updates: the last ``2^o`` fields of octave ``o``, newest first, octaves from fine
+    to coarse, and how many updates there have been (481 for 16 x 16)."""
+    return sum(samples >> o for o in range(octave_count(samples))) + 1
+
+
+def updates_needed(octave: int) -> int:
+    """Earlier updates of a tile from which on an octave has a past."""
+    return (2 << octave) - 1
 
 
 def spatial_step(field: Float[Tensor, "n samples"]) -> Float[Tensor, "n samples"]:
@@ -67,24 +86,29 @@ def transform(
 
     Args:
         signal: new tiles, a power of four values each, Morton order.
-        state: coefficients returned by the previous update of the same tile; ignored where ``has_state`` is false.
-        has_state: false for tiles without a past; their temporal details come out as exactly zero.
+        state: what the previous update of the same tile returned; ignored where ``has_state`` is false.
+        has_state: false for tiles without a past.
 
     Returns:
         Octaves from fine to coarse, and the state that replaces the cached one.
 
     Source: Stephens 2011, sec. 5.3.4 and fig. 5.9.
     """
-    octaves, kept, first = [], [], 0
-    approximation = signal
-    for _ in range(octave_count(signal.shape[1])):
+    state = torch.where(has_state[:, None], state, 0.0)
+    updates, octaves, kept, first = state[:, -1], [], [], 0
+    approximation, count = signal, octave_count(signal.shape[1])
+    for number in range(count):
         now = spatial_step(approximation)
-        width = now.shape[1]
-        before = torch.where(has_state[:, None], state[:, first : first + width], now)
+        width, lag = now.shape[1], 1 << number
+        fields = state[:, first : first + lag * width]
+        known = updates >= updates_needed(number)
+        before = torch.where(known[:, None], fields[:, -width:], now)
         low, high = temporal_step(now, before)
         hhh, hgh, ghh, ggh = low.chunk(4, dim=1)
         hhg, hgg, ghg, ggg = high.chunk(4, dim=1)
-        octaves.append(Octave(ghh, hgh, ggh, hhg, ghg, hgg, ggg))
-        kept.append(now)
-        approximation, first = hhh, first + width
+        octaves.append(Octave(ghh, hgh, ggh, hhg, ghg, hgg, ggg, known))
+        kept += [now, fields[:, :-width]]
+        approximation, first = hhh, first + lag * width
+    # once the coarsest octave has a past, no more need be counted
+    kept.append((updates + 1.0).clamp(max=updates_needed(count - 1))[:, None])
     return octaves, torch.cat(kept, dim=1)

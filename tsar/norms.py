@@ -1,8 +1,9 @@
-"""Norms of the error estimate: the power that a position gets of the wavelet coefficients that cover it.
+"""Norms of the error estimate: the power that a part of a framelet gets of the wavelet coefficients within it.
 
-A norm is a function ``(squared, repeat) -> power``. ``squared`` is ``(3, n, p)``: the squared coefficients of three
-octants, of ``n`` framelets at ``p`` positions. Each coefficient covers ``repeat`` positions of the finest octave.
-``power`` is ``(n, p)``: what each of those positions gets, at least 0, and above 0 where one of the three is.
+A norm is a function ``(squared, repeat) -> power``. ``squared`` is ``(c, n, p)``: the squared coefficients of three
+octants, of ``n`` framelets in ``p`` equal parts; a part holds ``c`` of them. Where the parts are smaller than what a
+coefficient covers, ``c`` is 3 and ``repeat`` parts share the coefficient; else ``repeat`` is 1. ``power`` is
+``(n, p)``: what each part gets, at least 0, and above 0 where one of the coefficients is.
 
 Source: Stephens 2011, sec. 5.3.2.
 """
@@ -13,11 +14,11 @@ from jaxtyping import Float
 from torch import Tensor
 
 
-def total_power(squared: Float[Tensor, "3 n p"], repeat: int) -> Float[Tensor, "n p"]:
-    """The sum over the octants, shared equally by the positions (l2)."""
+def total_power(squared: Float[Tensor, "c n p"], repeat: int) -> Float[Tensor, "n p"]:
+    """The sum, of a coefficient an equal share (l2)."""
     return squared.sum(0) / repeat
 
 
-def greatest_power(squared: Float[Tensor, "3 n p"], repeat: int) -> Float[Tensor, "n p"]:
-    """The greatest of the octants, whole at every position (l-infinity)."""
+def greatest_power(squared: Float[Tensor, "c n p"], repeat: int) -> Float[Tensor, "n p"]:
+    """The greatest, of a coefficient all (l-infinity)."""
     return squared.amax(0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from statistics import median
@@ -108,8 +109,8 @@ def stage_rows(config: TsarConfig, found: Sequence[Cycle]) -> Iterator[Row]:
 
 
 class PyWaveletsStream:
-    """The streaming transform of a batch by PyWavelets: rows and columns of the new tiles, then each coefficient with
-    that of the update before. Changes in place.
+    """The streaming transform of a batch by PyWavelets: rows and columns of the new tiles, then each coefficient of
+    octave o with that of 2^o updates before. Changes in place.
 
     Whole batches go through each call; ``zero`` is its fastest way to end a signal, and with two values all are alike.
     """
@@ -119,7 +120,10 @@ class PyWaveletsStream:
 
         self._pywt: Any = pywt
         sides = [side >> octave for octave in range(1, side.bit_length())]
-        self._before = [np.zeros((4, tiles, half, half), np.float32) for half in sides]
+        self._before = [
+            deque([np.zeros((4, tiles, half, half), np.float32)] * 2**octave, maxlen=2**octave)
+            for octave, half in enumerate(sides)
+        ]
 
     def update(self, tiles: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Low and high pass along time ``(4, n, h, w)`` of each octave; the four are LL, LH, HL, HH by rows, columns.
@@ -128,11 +132,11 @@ class PyWaveletsStream:
             tiles: ``(n, side, side)`` float32, raster order.
         """
         octaves, field = [], tiles
-        for octave, before in enumerate(self._before):
+        for before in self._before:
             now = np.stack(self._spatial(field))
-            low, high = self._pywt.dwt(np.stack([now, before], axis=-1), "haar", mode="zero", axis=-1)
+            low, high = self._pywt.dwt(np.stack([now, before[0]], axis=-1), "haar", mode="zero", axis=-1)
             octaves.append((low[..., 0], high[..., 0]))
-            self._before[octave] = now
+            before.append(now)
             # orthonormal steps along three axes, where ours are means
             field = low[0, ..., 0] * np.float32(8.0**-0.5)
         return octaves

@@ -20,9 +20,9 @@ from torch import Tensor
 from analysis.command.progress import Task
 from analysis.spectrum.ideal_density import ideal_band, octant_power, power_norm, raster, share_of_total, tile_volume
 from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
-from tsar import haar
 from tsar.config import ErrorConfig
-from tsar.error import levelwise_power, signed_error
+from tsar.error import errors_of
+from tsar.estimators import state_size
 from tsar.morton import deinterleave, interleave, morton_to_raster
 from tsar.types import Trace
 
@@ -38,34 +38,30 @@ _INTERVAL = (2.5, 97.5)
 
 
 def streaming_error(
-    volume: Float[Tensor, "n t y x"], stride_space: int, stride_time: int, config: ErrorConfig
+    volume: Float[Tensor, "n t y x"], stride_space: int, stride_time: int, config: ErrorConfig, elements: int
 ) -> Float[Tensor, "n updates 2"]:
-    """``(φ_s, φ_t)`` of tiles that are refreshed at a lower rate, by the transform and template of the pipeline.
+    """``(φ_s, φ_t)`` of tiles, of so many elements each, refreshed at a lower rate, by the pipeline's own estimate.
 
     Framelets of 16 x 16 samples are taken from the volume, several side by side where the stride is fine; their errors
-    are averaged, as are the positions within one. The first refresh has no past and gives no update. Samples lie half a
-    sample of the volume off the centres of their cells.
+    are averaged, as are those of the parts of one. The first refresh has no past and gives no update. Samples lie half
+    a sample of the volume off the centres of their cells.
     """
     taken = volume[:, ::stride_time, stride_space // 2 :: stride_space, stride_space // 2 :: stride_space]
     tiles, frames, side = taken.shape[0], taken.shape[1], taken.shape[3]
     across = side // FRAMELET_SIDE
     cut = taken.reshape(tiles, frames, across, FRAMELET_SIDE, across, FRAMELET_SIDE).permute(1, 0, 2, 4, 3, 5)
     framelets = cut.reshape(frames, -1, FRAMELET_SIDE**2)[..., morton_to_raster(FRAMELET_SIDE)]
-    _, state = haar.transform(framelets[0], *_no_past(framelets[0]))
-    known = torch.ones(framelets.shape[1], dtype=torch.bool)
+    count = framelets.shape[1]
+    state, known = (
+        framelets.new_zeros(count, state_size(FRAMELET_SIDE**2, config)),
+        torch.zeros(count, dtype=torch.bool),
+    )
     updates = []
-    for signal in framelets[1:]:
-        octaves, state = haar.transform(signal, state, known)
-        spatial, temporal = levelwise_power(octaves, config)
-        phi_s = signed_error(spatial, config.spatial_offset, config.spatial_slope, config)
-        phi_t = signed_error(temporal, config.temporal_offset, config.temporal_slope, config)
-        updates.append(torch.stack((phi_s, phi_t), dim=-1).reshape(tiles, -1, 2).mean(1))
-    return torch.stack(updates, dim=1)
-
-
-def _no_past(signal: Float[Tensor, "n samples"]) -> tuple[Tensor, Tensor]:
-    count, samples = signal.shape
-    return signal.new_zeros(count, haar.state_size(samples)), torch.zeros(count, dtype=torch.bool)
+    for signal in framelets:
+        phi, state = errors_of(signal, state, known, max(elements // across**2, 1), config)
+        updates.append(phi.reshape(2, tiles, -1).mean(2).T)
+        known = torch.ones_like(known)
+    return torch.stack(updates[1:], dim=1)
 
 
 @dataclass(frozen=True)
@@ -97,11 +93,13 @@ class Tiles:
         return torch.log2(ideal[:, None] / self.theta).numpy()
 
 
-def measure(volume: Float[Tensor, "n t samples"], rates: Rates, config: ErrorConfig) -> tuple[Tiles, Tensor]:
-    """Norms and estimates of volumes, and the power that the norms add up."""
+def measure(
+    volume: Float[Tensor, "n t samples"], rates: Rates, config: ErrorConfig, elements: int
+) -> tuple[Tiles, Tensor]:
+    """Norms and estimates of volumes, each of so many elements of the field, and the power that the norms add up."""
     planes = raster(volume)
     power = octant_power(planes)
-    updates = [streaming_error(planes, k, m, config) for k in rates.space for m in rates.time]
+    updates = [streaming_error(planes, k, m, config, elements) for k in rates.space for m in rates.time]
     phi, last = (torch.stack(found, dim=1) for found in ([u.mean(1) for u in updates], [u[:, -1] for u in updates]))
     theta = rates.densities(planes.shape[3], planes.shape[1])
     return Tiles(power_norm(power), theta, phi.to(torch.float64), last.to(torch.float64)), power
@@ -160,7 +158,7 @@ def measure_example(options: SpectrumOptions, trace: Trace, task: Task) -> Examp
     octaves = options.samples.bit_length() - FRAMELET_SIDE.bit_length() + 1
     space = tuple(1 << octave for octave in reversed(range(octaves)))
     time = tuple(1 << octave for octave in range(1, options.frames.bit_length() - 2))
-    tiles, power = measure(volume, Rates(space, time), tsar.error)
+    tiles, power = measure(volume, Rates(space, time), tsar.error, tsar.elements_of(options.tile_level))
     f_s, f_t = ideal_band(share_of_total(tiles.norm), options.tau)
     per_picture = [FRAMELET_SIDE * 2.0**bound / tsar.resolution_px for bound in (tsar.level_min, tsar.level_max)]
     refreshes = [density / options.cycle_s() for density in tsar.temporal_bounds]
@@ -181,6 +179,7 @@ def measure_input(options: SpectrumOptions, number: int, trace: Trace, duration_
     side, frames = options.agreement_samples, options.agreement_frames
     coarsest = side // FRAMELET_SIDE
     rates = Rates(tuple(coarsest >> octave for octave in range(3)), (2, 4, 8))
+    elements = options.tsar.elements_of(options.agreement_level)
     found = []
     for start_s in (np.arange(_TIMES) + 0.5) * (duration_s - options.span_s) / _TIMES:
         times_s = start_s + np.arange(frames) * options.span_s / frames
@@ -188,7 +187,7 @@ def measure_input(options: SpectrumOptions, number: int, trace: Trace, duration_
         for index in torch.from_numpy(drawn).split(_TILES_AT_ONCE):
             level = torch.full_like(index, options.agreement_level)
             volume = tile_volume(trace, level, index, side, times_s.tolist(), task)
-            found.append(measure(volume, rates, options.tsar.error)[0])
+            found.append(measure(volume, rates, options.tsar.error, elements)[0])
     return joined(found)
 
 

@@ -221,7 +221,7 @@ class Control:
     def _prepare_observation(self) -> None:
         config, batch = self.config, self.config.batch_size
         self._per_cache = PerCache(self._record)
-        self._error_plan, self._claim = plans.error_plan(config), plans.claim_memory(config, self._memory)
+        self._error_plan, self._claim = plans.error_plan(config, self._memory), plans.claim_memory(config, self._memory)
         self._pending, self._progress = np.zeros(batch, np.uint8), np.zeros(2, np.int32)
         self._times = np.zeros(batch)
         self._times_address = address("times", self._times, _F64, batch)

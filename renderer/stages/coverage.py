@@ -23,6 +23,9 @@ _KNOWN: Mapping[str, Mapping[str, tuple[str, ...] | None]] = {
         **dict.fromkeys(("spatial_offset", "spatial_slope", "temporal_offset", "temporal_slope")),
         "norm": ("l2", "linf"),
         "form": ("contrast", "difference"),
+        "octaves": ("greatest", "sum"),
+        "extent": ("tile", "element"),
+        "estimator": ("dwt",),
     },
     "response": {
         **dict.fromkeys(("gain", "bias", "surplus_max", "temporal_min")),

@@ -1,4 +1,5 @@
-"""From colours to signed errors in C++ (``native/framelets.h``); defined in ``tsar/error.py`` and ``tsar/haar.py``."""
+"""From colours to signed errors in C++ (``native/framelets.h``); defined in ``tsar/error.py``,
+``tsar/estimators.py`` and ``tsar/haar.py``."""
 
 from __future__ import annotations
 
@@ -15,8 +16,6 @@ class ErrorPlan:
     samples: wp.int32
     """Per framelet, at most 1024."""
     octaves: wp.int32
-    octave_positions: wp.int32
-    """Positions of all octaves together."""
     state: wp.int32
     """Coefficients kept per framelet."""
     field_level: wp.int32
@@ -24,9 +23,12 @@ class ErrorPlan:
     """Whether the norm is the greatest power instead of the total."""
     difference: wp.int32
     """Whether the error is a difference of logarithms instead of a contrast."""
-    template_spatial: wp.float32
-    template_temporal: wp.float32
-    """Powers that the template tolerates, summed over octaves."""
+    greatest: wp.int32
+    """Whether the octave of the greatest error decides, instead of the sums over octaves."""
+    per_tile: wp.int32
+    """Whether a tile has one error, instead of one for each element."""
+    templates: wp.uint64
+    """Powers that the template tolerates: float32, for space and time, by 4^k parts of a tile, by octave."""
     radiance_max: wp.float32
 
 

@@ -10,12 +10,13 @@ from renderer.stages.estimate import ErrorPlan
 from renderer.stages.kernels import Scratch, TilingPlan
 from renderer.stages.response import ResponsePlan
 from renderer.stages.selection import SelectionPlan
-from renderer.stages.sizes import COLUMNS
+from renderer.stages.sizes import COLUMNS, OCTAVES_MAX
 from renderer.stages.views import point_at_cache
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
-from tsar.error import RADIANCE_MAX, tolerated_power
-from tsar.haar import octave_count, state_size
+from tsar.error import RADIANCE_MAX
+from tsar.estimators import state_size, template_power
+from tsar.haar import octave_count
 from tsar.morton import deinterleave, first_node
 from tsar.selection import cell_centres
 from tsar.tiling import split_bounds, tie_order
@@ -30,16 +31,20 @@ def scratch(config: TsarConfig, memory: Memory) -> Scratch:
     return made
 
 
-def error_plan(config: TsarConfig) -> ErrorPlan:
+def error_plan(config: TsarConfig, memory: Memory) -> ErrorPlan:
     """For the estimate of errors."""
     error, plan = config.error, ErrorPlan()
     octaves = octave_count(config.samples)
-    plan.samples, plan.octaves, plan.state = config.samples, octaves, state_size(config.samples)
-    plan.octave_positions = plan.state // 4
+    plan.samples, plan.octaves, plan.state = config.samples, octaves, state_size(config.samples, error)
     plan.field_level = config.field_level
     plan.linf, plan.difference = int(error.norm == "linf"), int(error.form == "difference")
-    plan.template_spatial = tolerated_power(octaves, error.spatial_offset, error.spatial_slope, error)
-    plan.template_temporal = tolerated_power(octaves, error.temporal_offset, error.temporal_slope, error)
+    plan.greatest, plan.per_tile = int(error.octaves == "greatest"), int(error.extent == "tile")
+    templates = torch.zeros(2, OCTAVES_MAX, OCTAVES_MAX)
+    for axis, name in enumerate(("spatial", "temporal")):
+        offset, slope = (getattr(error, f"{name}_{part}") for part in ("offset", "slope"))
+        for k in range(octaves):
+            templates[axis, k, :octaves] = template_power(config.samples, 4**k, offset, slope, error)
+    plan.templates = memory.keep("templates", templates, _F32, templates.numel())
     plan.radiance_max = RADIANCE_MAX
     return plan
 
@@ -48,7 +53,7 @@ def claim_memory(config: TsarConfig, memory: Memory) -> ClaimMemory:
     """For the slots that a batch takes."""
     claim, batch, slots = ClaimMemory(), config.batch_size, config.cache_slots
     claim.slot, claim.past = memory.room("slots", batch, _I64), memory.room("pasts", batch, _I64)
-    claim.spare = memory.room("spare", batch * state_size(config.samples))
+    claim.spare = memory.room("spare", batch * state_size(config.samples, config.error))
     claim.marks = memory.zeros("marks", slots, torch.bool)
     return claim
 
@@ -56,7 +61,7 @@ def claim_memory(config: TsarConfig, memory: Memory) -> ClaimMemory:
 def cache_view(cache: FrameletCache, config: TsarConfig) -> CacheView:
     """Where a cache's tensors lie."""
     view = CacheView()
-    view.samples, view.state = config.samples, state_size(config.samples)
+    view.samples, view.state = config.samples, state_size(config.samples, config.error)
     point_at_cache(view, cache, config)
     return view
 

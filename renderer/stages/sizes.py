@@ -8,6 +8,8 @@ from tsar.types import LUMINANCE
 
 SAMPLES_MAX = 1024
 """Samples of a framelet that the estimate of errors has room for."""
+OCTAVES_MAX = 5
+"""Octaves of such a framelet."""
 COLUMNS = 8
 """Quantities of an element that the passes of the response hand on."""
 PLANES = 5
@@ -15,6 +17,7 @@ PLANES = 5
 
 GIVEN: dict[str, float] = {
     "SAMPLES_MAX": SAMPLES_MAX,
+    "OCTAVES_MAX": OCTAVES_MAX,
     "COLUMNS": COLUMNS,
     "PLANES": PLANES,
     "OCTAVES_OF_FULL_ERROR": OCTAVES_OF_FULL_ERROR,

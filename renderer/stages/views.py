@@ -13,7 +13,7 @@ from torch import Tensor
 from renderer.compute.launching import address
 from tsar.cache import FrameletCache
 from tsar.config import TsarConfig
-from tsar.haar import state_size
+from tsar.estimators import state_size
 from tsar.morton import first_node
 
 _TENSORS = "level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"
@@ -34,7 +34,7 @@ def point_at_cache(view: Any, cache: FrameletCache, config: TsarConfig) -> None:
         "time_s": (torch.float64, slots),
         "dead": (torch.bool, slots),
         "color": (torch.float32, slots * samples * 3),
-        "coefficients": (torch.float32, slots * state_size(samples)),
+        "coefficients": (torch.float32, slots * state_size(samples, config.error)),
         "slot_of_node": (torch.int64, first_node(config.level_max + 1)),
     }
     view.slots = slots

@@ -52,6 +52,9 @@ def _drawn(draw: random.Random) -> TsarConfig:
             *(_one_of(draw, usual, -60.0, 60.0) for usual in (-7.0, -1.0, -9.0, -1.0)),
             norm=draw.choice(("l2", "linf")),
             form=draw.choice(("contrast", "difference")),
+            octaves=draw.choice(("greatest", "sum")),
+            extent=draw.choice(("tile", "element")),
+            estimator=draw.choice(("dwt", "dwt", "dwt", "variance", "fft")),
         ),
         response=ResponseConfig(
             solver=draw.choice(("waterfill", "waterfill", *SOLVERS)),

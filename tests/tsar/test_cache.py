@@ -13,7 +13,7 @@ CONFIG = TsarConfig(batch_size=64, cache_size=2048)
 def insert(cache, selected, time_s, value=0.0, level=4):
     batch = make_batch(uniform(level), torch.tensor(selected), time_s, 0, CONFIG)
     n = len(selected)
-    return cache.insert(batch, torch.full((n, 256, 3), value), torch.full((n, 340), time_s))
+    return cache.insert(batch, torch.full((n, 256, 3), value), torch.full((n, 481), time_s))
 
 
 def test_previous_returns_the_newest_of_the_same_tile_only():
@@ -44,7 +44,7 @@ def test_against_a_list_of_framelets(seed):
     for cycle in range(14):
         tiles = torch.randperm(16, generator=g)[:8].sort().values.tolist()
         batch = make_batch(uniform(2), torch.tensor(tiles), float(cycle), cycle, config)
-        slots = cache.insert(batch, torch.full((8, 256, 3), float(cycle)), torch.full((8, 340), float(cycle)))
+        slots = cache.insert(batch, torch.full((8, 256, 3), float(cycle)), torch.full((8, 481), float(cycle)))
         if len(kept) + 8 > 64:
             kept.sort(key=lambda f: (not f["dead"], f["time"], f["slot"]))
             kept = kept[len(kept) + 8 - 64 :]

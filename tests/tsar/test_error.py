@@ -6,26 +6,19 @@ from tests.oracles.batches import make_batch
 from tsar import haar
 from tsar.cache import FrameletCache
 from tsar.config import ErrorConfig, TsarConfig
-from tsar.error import (
-    compressed_luminance,
-    estimate,
-    levelwise_power,
-    replace_nonfinite,
-    scatter_to_field,
-    signed_error,
-    template_power,
-)
+from tsar.error import compressed_luminance, errors_of, estimate, replace_nonfinite, signed_error
+from tsar.estimators import Bands, levelwise_power, state_size, template_power
 from tsar.morton import interleave
 from tsar.tiling import uniform
 
 CONFIG = TsarConfig(batch_size=64)
 
 
-def estimate_twice(picture, times=(0.0, 0.1), level=4, selected=range(64)):
-    cache = FrameletCache(CONFIG)
+def estimate_twice(picture, times=(0.0, 0.1), level=4, selected=range(64), config=CONFIG):
+    cache = FrameletCache(config)
     for cycle, time_s in enumerate(times):
-        batch = make_batch(uniform(level), torch.tensor(list(selected)), time_s, cycle, CONFIG)
-        result = estimate(batch, pictures.tracer(picture)(batch).color, cache, CONFIG)
+        batch = make_batch(uniform(level), torch.tensor(list(selected)), time_s, cycle, config)
+        result = estimate(batch, pictures.tracer(picture)(batch).color, cache, config)
         cache.insert(batch, result.color, result.coefficients)
     return result, batch
 
@@ -58,65 +51,125 @@ def test_a_moving_edge_is_localised_to_the_elements_it_crosses():
     assert crossed.max() > 0.5 and bool((far == -1.0).all())
 
 
-def test_the_error_lies_within_one_and_grows_with_power():
-    power = torch.logspace(-8, 3, 30)[None, :, None].repeat(4, 1, 5)
-    for form in ("contrast", "difference"):
-        error = signed_error(power, -8.0, -2.0, ErrorConfig(form=form))
-        assert error.abs().max() <= 1.0 and bool((error[1:] >= error[:-1]).all())
+def bands_of(power, offset, slope, config=None, parts=64, samples=256):
+    """Powers of all octaves, ``(octaves, n, parts)``, all known, beside a template."""
+    known = torch.ones(power.shape[:2], dtype=torch.bool)
+    return Bands(power, template_power(samples, parts, offset, slope, config or ErrorConfig()), known)
+
+
+@pytest.mark.parametrize("octaves", ["sum", "greatest"])
+@pytest.mark.parametrize("form", ["contrast", "difference"])
+def test_the_error_lies_within_one_and_grows_with_power(form, octaves):
+    config = ErrorConfig(form=form, octaves=octaves)
+    power = torch.logspace(-8, 3, 30)[None, :, None].repeat(4, 1, 64)
+    error = signed_error(bands_of(power, -8.0, -2.0), config)
+    assert error.abs().max() <= 1.0 and bool((error[1:] >= error[:-1]).all())
     # Zero where the signal is the template itself.
-    template = template_power(4, -8.0, -2.0, ErrorConfig())[:, None, None]
-    for form in ("contrast", "difference"):
-        assert abs(float(signed_error(template, -8.0, -2.0, ErrorConfig(form=form)))) < 1e-6
+    template = template_power(256, 64, -8.0, -2.0, config)[:, None, None].expand(4, 1, 64)
+    assert float(signed_error(bands_of(template, -8.0, -2.0), config).abs().max()) < 1e-6
 
 
 def test_a_steeper_template_is_more_sensitive():
-    power = torch.full((4, 1, 1), 1e-3)
-    errors = [float(signed_error(power, -8.0, slope, ErrorConfig())) for slope in (-1.0, -3.0, -6.0, -9.6)]
-    assert errors == sorted(errors) and errors[0] < errors[-1]
+    power = torch.full((4, 1, 64), 1e-3)
+    for octaves in ("sum", "greatest"):
+        config = ErrorConfig(octaves=octaves)
+        errors = [float(signed_error(bands_of(power, -8.0, slope), config)[0, 0]) for slope in (-1.0, -3.0, -6.0, -9.6)]
+        assert errors == sorted(errors) and errors[0] < errors[-1]
+
+
+def test_slope_and_offset_are_one_parameter_only_of_sums():
+    """Two templates of the same sum: signals of different shape tell them apart octave by octave."""
+    flat, steep = (
+        template_power(256, 64, offset, slope, ErrorConfig()) for offset, slope in ((-9.0, 0.0), (-5.0, -4.0))
+    )
+    steep = steep * flat.sum() / steep.sum()
+    signal = flat.to(torch.float32)[:, None, None].expand(4, 1, 64)
+    known = torch.ones(4, 1, dtype=torch.bool)
+    for octaves, alike in (("sum", True), ("greatest", False)):
+        found = [
+            float(signed_error(Bands(signal, one, known), ErrorConfig(octaves=octaves))[0, 0]) for one in (flat, steep)
+        ]
+        assert (abs(found[0] - found[1]) < 1e-6) == alike
+
+
+def test_only_octaves_that_have_been_measured_count():
+    power = torch.tensor([1.0, 1e-9, 1e-9, 1e-9])[:, None, None].expand(4, 3, 1)
+    known = torch.tensor([[True, False, False], [True, True, False], [True, True, False], [True, True, False]])
+    for octaves in ("sum", "greatest"):
+        found = signed_error(Bands(power, torch.full((4,), 1e-3), known), ErrorConfig(octaves=octaves)).flatten()
+        assert found[0] > 0.9 and found[1] < -0.9 and found[2] == 0.0
 
 
 def test_template_is_linear_in_log_power():
     config = ErrorConfig(norm="linf")
-    log = torch.log2(template_power(4, -5.0, -3.0, config))
+    log = torch.log2(template_power(256, 64, -5.0, -3.0, config))
     assert log.tolist() == [-14.0, -11.0, -8.0, -5.0]
 
 
+@pytest.mark.parametrize("parts", [1, 4, 64])
+def test_a_template_of_a_part_is_what_the_norm_makes_of_its_coefficients(parts):
+    """As many of the template's power as a part has positions of the octave, or its share of one."""
+    log = torch.log2(template_power(256, parts, -5.0, -3.0, ErrorConfig())) - torch.tensor([-14.0, -11.0, -8.0, -5.0])
+    assert torch.exp2(log).tolist() == [64 / parts, 16 / parts, 4 / parts, 1 / parts]
+
+
+@pytest.mark.parametrize("octaves", ["sum", "greatest"])
 @pytest.mark.parametrize("form", ["contrast", "difference"])
 @pytest.mark.parametrize("norm", ["l2", "linf"])
-def test_every_template_gives_finite_errors(form, norm):
+def test_every_template_gives_finite_errors(form, norm, octaves):
     """Whatever slope and offset: no power is the least error, and beyond what float32 holds all signals are alike."""
-    config = ErrorConfig(form=form, norm=norm)
+    config = ErrorConfig(form=form, norm=norm, octaves=octaves)
     power = torch.tensor([0.0, 1e-45, 1e-9, 1.0, 12.0])[None, :, None].repeat(5, 1, 1) / 5
     for offset in (-60.0, 0.0, 60.0):
         for slope in (-60.0, -45.0, 0.0, 45.0, 60.0):
-            for octaves in (4, 5):
-                error = signed_error(power[:octaves], offset, slope, config).flatten()
+            for count in (4, 5):
+                bands = bands_of(power[:count], offset, slope, config, 1, 4**count)
+                error = signed_error(bands, config).flatten()
                 assert bool(torch.isfinite(error).all()) and error.abs().max() <= 1.0
                 assert error[0] == -1.0 or (form == "difference" and offset + 4 * slope < -100)
-    assert float(signed_error(power, 60.0, 60.0, config).max()) == -1.0
-    assert float(signed_error(power, -60.0, -60.0, config)[2:].min()) > 0.99 or form == "difference"
+    assert float(signed_error(bands_of(power, 60.0, 60.0, config, 1, 1024), config).max()) == -1.0
+    assert (
+        float(signed_error(bands_of(power, -60.0, -60.0, config, 1, 1024), config)[2:].min()) > 0.99
+        or form == "difference"
+    )
 
 
 def test_levelwise_norm_uses_six_octants_and_spreads_shares():
     names = ("ghh", "hgh", "ggh", "hhg", "ghg", "hgg", "ggg")
-    fine = haar.Octave(**{name: torch.full((1, 4), float(2**i)) for i, name in enumerate(names)})
-    coarse = haar.Octave(**{name: torch.full((1, 1), 1.0) for name in names})
-    spatial, temporal = levelwise_power([fine, coarse], ErrorConfig())
+    known = torch.tensor([True])
+    fine = haar.Octave(**{name: torch.full((1, 4), float(2**i)) for i, name in enumerate(names)}, known=known)
+    coarse = haar.Octave(**{name: torch.full((1, 1), 1.0) for name in names}, known=known)
+    spatial, temporal = levelwise_power([fine, coarse], 4, ErrorConfig())
     assert spatial[0, 0].tolist() == [1 + 4 + 16] * 4 and temporal[0, 0].tolist() == [64 + 256 + 1024] * 4
     assert spatial[1, 0].tolist() == [0.75] * 4
-    spatial, _ = levelwise_power([fine, coarse], ErrorConfig(norm="linf"))
+    spatial, _ = levelwise_power([fine, coarse], 4, ErrorConfig(norm="linf"))
     assert spatial[0, 0].tolist() == [16.0] * 4 and spatial[1, 0].tolist() == [1.0] * 4
+    fine.ghh[0, 2] = 8.0
+    for norm, expected in (("l2", [4 * 21 + 63, 3.0]), ("linf", [64.0, 1.0])):
+        spatial, _ = levelwise_power([fine, coarse], 1, ErrorConfig(norm=norm))
+        assert spatial[:, 0, 0].tolist() == expected, "all coefficients of the tile"
 
 
+def test_power_is_summed_before_it_is_compared():
+    """Half a tile is full of detail and half of it plain: the error is that of the mean power, not the mean error."""
+    signal = torch.full((1, 256), 0.5)
+    signal[0, :128] += 0.2 * torch.tensor([1.0, -1.0, -1.0, 1.0]).repeat(32)
+    none, past = torch.zeros(1, state_size(256, ErrorConfig())), torch.tensor([False])
+    tile, element = (errors_of(signal, none, past, 64, ErrorConfig(extent=e))[0][0, 0] for e in ("tile", "element"))
+    assert tile.shape == (1,) and element.shape == (64,)
+    assert element[:32].min() > 0.9 and element[32:].max() == -1.0 and abs(float(element.mean())) < 0.1
+    assert tile[0] > 0.9, "of half the power"
+
+
+@pytest.mark.parametrize("extent", ["tile", "element"])
 @pytest.mark.parametrize("level", [2, 3, 4, 5, 6])
-def test_scatter_covers_exactly_the_tile_at_every_level(level):
-    batch = make_batch(uniform(level), torch.tensor([1]), 0.0, 0, CONFIG)
-    values = torch.arange(64.0)[None, None]
-    field = scatter_to_field(values + 1, batch, CONFIG)[0]
-    elements = 4 ** (7 - level)
-    assert not field[:elements].any() and bool((field[elements : 2 * elements] > 0).all())
+def test_errors_cover_exactly_the_tile_at_every_level(level, extent):
+    config = TsarConfig(batch_size=16, error=ErrorConfig(extent=extent))
+    result, _ = estimate_twice(pictures.static_stripes, times=(0.0,), level=level, selected=[1], config=config)
+    elements, field = 4 ** (7 - level), result.errors.spatial
+    assert not field[:elements].any() and bool((field[elements : 2 * elements] != 0).all())
     assert not field[2 * elements :].any()
-    assert abs(float(field[elements : 2 * elements].mean()) - 32.5) < 1e-6
+    assert (field[elements : 2 * elements].unique().numel() == 1) == (extent == "tile")
 
 
 def test_luminance_is_rec709_and_bounded():
@@ -130,9 +183,9 @@ def test_luminance_is_rec709_and_bounded():
 def test_one_firefly_does_not_saturate_a_tile():
     color = torch.full((1, 256, 3), 0.4)
     color[0, 77] = 1e6
-    octaves, _ = haar.transform(compressed_luminance(color), torch.zeros(1, 340), torch.tensor([False]))
-    spatial, _ = levelwise_power(octaves, ErrorConfig())
-    error = signed_error(spatial, -8.0, -2.0, ErrorConfig())[0]
+    config = ErrorConfig(-8.0, -2.0)
+    signal, none = compressed_luminance(color), torch.zeros(1, state_size(256, config))
+    error = errors_of(signal, none, torch.tensor([False]), 64, config)[0][0, 0]
     assert (error > 0).sum() <= 16 and error.median() < 0
 
 

@@ -14,7 +14,7 @@ from tests.oracles.batches import make_batch
 from tsar.cache import FrameletCache
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
-from tsar.haar import state_size
+from tsar.estimators import state_size
 from tsar.policies import oracle
 from tsar.policies.oracle import Oracle
 from tsar.reconstruction import reconstruct
@@ -175,7 +175,7 @@ def play_uniform(picture, cycles):
         batch = make_batch(tiling, torch.arange(tiling.tile_count), cycle * CYCLE, cycle, CONFIG)
         assert tiling.tile_count == CONFIG.batch_size
         color = pictures.tracer(picture)(batch).color
-        cache.insert(batch, color, torch.zeros(tiling.tile_count, state_size(side**2)))
+        cache.insert(batch, color, torch.zeros(tiling.tile_count, state_size(side**2, CONFIG.error)))
         shown = reconstruct(cache, CONFIG, CYCLE)
         display_s = (cycle + Oracle.latency_cycles) * CYCLE
         yield ShownImage(display_s, cycle * CYCLE, shown.image, shown.sample_map)

@@ -28,7 +28,7 @@ def fill(cache, cfg, tiling, picture, time_s, selected=None):
     selected = torch.arange(tiling.tile_count) if selected is None else torch.tensor(selected)
     batch = make_batch(tiling, selected, time_s, 0, cfg)
     color = pictures.tracer(picture)(batch).color
-    cache.insert(batch, color, torch.zeros(len(selected), 340))
+    cache.insert(batch, color, torch.zeros(len(selected), 481))
     return [(int(lv), int(ix), time_s, c) for lv, ix, c in zip(batch.level, batch.index, color, strict=True)]
 
 
@@ -149,7 +149,7 @@ def test_any_cache_gives_an_image_within_the_range_of_its_samples(seed, support,
         chosen = torch.randperm(tiling.tile_count, generator=g)[:count].sort().values
         batch = make_batch(tiling, chosen, float(torch.rand((), generator=g)), 0, cfg)
         color = 0.2 + 0.6 * torch.rand(len(chosen), 256, 3, generator=g)
-        cache.insert(batch, color, torch.zeros(len(chosen), 340))
+        cache.insert(batch, color, torch.zeros(len(chosen), 481))
         image = reconstruct(cache, cfg, cycle_s).image
         assert bool(torch.isfinite(image).all()) and 0.2 - 1e-5 <= image.min() and image.max() <= 0.8 + 1e-5
 

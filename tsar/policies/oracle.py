@@ -22,7 +22,7 @@ from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import replace_nonfinite
-from tsar.haar import state_size
+from tsar.estimators import state_size
 from tsar.morton import morton_to_raster, raster_to_morton
 from tsar.policies.scatter import double_width
 from tsar.policies.thesis import Thesis
@@ -94,7 +94,9 @@ class Oracle(Policy[Foresight]):
             for level in range(self.config.level_min, self.config.level_max + 1):
                 at = (batch.level == level).nonzero().squeeze(1)
                 part = FrameletBatch(batch.level[at], batch.index[at], batch.position[at], batch.time_s, moment.cycle)
-                state.cache.insert(part, color[at], torch.zeros(at.numel(), state_size(self.config.samples)))
+                state.cache.insert(
+                    part, color[at], torch.zeros(at.numel(), state_size(self.config.samples, self.config.error))
+                )
         return state
 
     def image(self, state: Foresight, moment: Moment) -> Picture:

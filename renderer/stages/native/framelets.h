@@ -1,6 +1,6 @@
 // Framelets: where their samples lie, and from their colours to signed errors, sixteen samples side by side: compressed
-// luminance, streaming Haar transform, levelwise norms, signed errors on the field. Definitions in `tsar/error.py` and
-// `tsar/haar.py`.
+// luminance, streaming Haar transform, levelwise norms, signed errors on the field. Definitions in `tsar/error.py`,
+// `tsar/estimators.py` and `tsar/haar.py`.
 //
 // The first-level cache holds all that lies between; colours and wavelet state go straight into the framelet cache.
 // A framelet has 4^k samples on the Morton curve, so four neighbours of any octave follow one another.
@@ -15,6 +15,7 @@ using namespace packets;
 
 constexpr int POSITIONS_MAX = SAMPLES_MAX / 4;
 constexpr int OCTAVE_POSITIONS_MAX = (SAMPLES_MAX - 1) / 3;  // of all octaves together
+constexpr int SPARE = 15;                                    // what a last block of sixteen writes beyond
 
 // sqrt(y / (1 + y)) as y / sqrt(y (1 + y)): the root's reciprocal by Newton's method, from a first guess good to 3.5 %
 // that halves the exponent; three steps reach the last digit. From 1e18 on the answer is 1.
@@ -68,7 +69,7 @@ template <class Body> inline void by_lanes(int count, Body body) {
         body(0, 0.0f);
 }
 
-// One octave at some positions: the spatial transform, and along time the mean with the last update and the change
+// One octave at some positions: the spatial transform, and along time the mean with an earlier update and the change
 // since; without a past there is none.
 template <class F, class Plan>
 inline void transform_some(const Plan& plan, const Four<F>& in, const float* past, float* kept, int count, float* field,
@@ -88,74 +89,96 @@ inline void transform_some(const Plan& plan, const Four<F>& in, const float* pas
     store(power_t, plan.linf ? vmax(vmax(t0, t1), t2) : t0 + t1 + t2);
 }
 
-// A coefficient spreads over the four below it, in equal shares or whole.
-inline void spread(const float* coarse, float* fine, int count, float share) {
-    if (count == 4)
-        store(fine, load<f4>(fine) + share * coarse[0]);
-    else
-        for (int i = 0; i < count; i += 16) {
-            const f4 four = load<f4>(coarse + i / 4);
-            const f16 below = __builtin_shufflevector(four, four, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
-            store(fine + i, load<f16>(fine + i) + share * below);
-        }
-}
-
-// All octaves: the wavelet state to keep, and in the first entries of `power_*` the sums at each finest position.
+// All octaves: the state to keep, and powers at the positions of each, octaves one after the other, fine to coarse.
+// Returns how many octaves have a past, the finest ones.
 template <class Plan>
-inline void transform(const Plan& plan, const float* luminance, const float* past, float* kept, float* power_s,
-                      float* power_t) {
-    const int positions = plan.samples / 4;
+inline int transform(const Plan& plan, const float* luminance, const float* past, float* kept, float* power_s,
+                     float* power_t) {
+    const int positions = plan.samples / 4, updates = past ? (int)past[plan.state - 1] : 0;
     float fields[2][POSITIONS_MAX];
     const float* in = luminance;
+    int known = 0;
     for (int octave = 0, begin = 0; octave < plan.octaves; ++octave) {
-        const int count = positions >> (2 * octave);
+        const int count = positions >> (2 * octave), width = 4 * count, others = ((1 << octave) - 1) * width;
+        const bool has_past = updates >= (2 << octave) - 1;
+        const float* before = has_past ? past + others : nullptr;  // the oldest of the octave's fields
         float* field = fields[octave & 1];
         by_lanes(count, [&](int i, auto lanes) {
-            transform_some(plan, fours<decltype(lanes)>(in + 4 * i), past ? past + i : nullptr, kept + i, count,
+            transform_some(plan, fours<decltype(lanes)>(in + 4 * i), before ? before + i : nullptr, kept + i, count,
                            field + i, power_s + begin + i, power_t + begin + i);
         });
-        in = field, kept += 4 * count, begin += count;
-        past = past ? past + 4 * count : nullptr;
+        if (past)
+            __builtin_memcpy(kept + width, past, sizeof(float) * others);
+        else
+            __builtin_memset(kept + width, 0, sizeof(float) * others);
+        in = field, kept += width + others, begin += count, known += has_past;
+        past = past ? past + width + others : nullptr;
     }
-    const float share = plan.linf ? 1.0f : 0.25f;
-    for (int coarse = 1, begin = plan.octave_positions - 1; coarse < positions; begin -= coarse) {
-        const int fine = 4 * coarse;
-        spread(power_s + begin, power_s + begin - fine, fine, share);
-        spread(power_t + begin, power_t + begin - fine, fine, share);
-        coarse = fine;
-    }
+    const int enough = (1 << plan.octaves) - 1;
+    kept[0] = (float)(updates < enough ? updates + 1 : enough);
+    return known;
 }
 
-// Signed errors from powers, into the elements that the tile covers: a mean over positions, or a position's value in
-// each of its elements.
+// Signal against template: a contrast, or a difference of logarithms.
+template <class Plan> inline f16 compared(const Plan& plan, f16 signal, f16 tolerated) {
+    if (!plan.difference) return (signal - tolerated) / (signal + tolerated);
+    const f16 octaves = vlog2(vmax(signal, (f16)__FLT_MIN__)) - vlog2(tolerated);
+    return clamped(octaves * (1.0f / OCTAVES_OF_FULL_ERROR), -1.0f, 1.0f);
+}
+
+// Signed errors in equal parts of a tile from the powers of its finest octaves, at least one. From coarse to fine: the
+// norm of each octave in as many parts as it has positions for, compared, and the greatest kept; or summed and compared
+// at the end.
 template <class Plan>
-inline void scatter(const Plan& plan, const float* power, float tolerated, float* out, int elements) {
-    constexpr float LEAST = __FLT_MIN__;
-    float phi[POSITIONS_MAX];
-    int count = plan.samples / 4;
-    if (plan.difference) {
-        const f16 octaves_tolerated = vlog2((f16)(tolerated > LEAST ? tolerated : LEAST));
-        for (int i = 0; i < count; i += 16) {
-            const f16 octaves = vlog2(vmax(load<f16>(power + i), (f16)LEAST)) - octaves_tolerated;
-            store(phi + i, clamped(octaves * (1.0f / OCTAVES_OF_FULL_ERROR), -1.0f, 1.0f));
+inline void compare(const Plan& plan, const float* power, int octaves, const float* tolerated, int parts, float* phi) {
+    const int positions = plan.samples / 4;
+    float norm[POSITIONS_MAX + SPARE] = {};
+    float tolerated_sum = 0.0f;
+    int begin = 0, size = 0;
+    for (int octave = 0; octave < octaves; ++octave) begin += positions >> (2 * octave);
+    for (int octave = octaves - 1; octave >= 0; --octave) {
+        int here = positions >> (2 * octave);
+        begin -= here;
+        const float* from = power + begin;
+        for (; here > parts; here /= 4, from = norm)
+            by_lanes(here / 4, [&](int i, auto lanes) {
+                const auto four = fours<decltype(lanes)>(from + 4 * i);
+                store(norm + i, plan.linf ? vmax(vmax(four.a, four.b), vmax(four.c, four.d))
+                                          : (four.a + four.b) + (four.c + four.d));
+            });
+        if (from != norm) __builtin_memcpy(norm, from, sizeof(float) * here);
+        for (int i = size - 1; i >= 0 && size < here; --i)
+            phi[4 * i] = phi[4 * i + 1] = phi[4 * i + 2] = phi[4 * i + 3] = phi[i];
+        const f16 limit = (f16)tolerated[octave];
+        const float share = plan.linf ? 1.0f : (float)here / (float)parts;
+        for (int i = 0; i < here; i += 16) {
+            const f16 value = share * load<f16>(norm + i), before = load<f16>(phi + i);
+            if (plan.greatest) {
+                const f16 error = compared(plan, value, limit);
+                store(phi + i, size ? vmax(before, error) : error);
+            } else
+                store(phi + i, size ? before + value : value);
         }
-    } else
-        for (int i = 0; i < count; i += 16) {
-            const f16 p = load<f16>(power + i);
-            store(phi + i, (p - tolerated) / (p + tolerated));
-        }
-    for (; count > elements; count /= 4)
-        by_lanes(count / 4, [&](int i, auto lanes) {
-            const auto four = fours<decltype(lanes)>(phi + 4 * i);
-            store(phi + i, ((four.a + four.b) + (four.c + four.d)) * 0.25f);
-        });
-    const int repeat = elements / count;
+        size = here, tolerated_sum += tolerated[octave];
+    }
+    for (int i = 0; i < parts && !plan.greatest; i += 16)
+        store(phi + i, compared(plan, load<f16>(phi + i), (f16)tolerated_sum));
+}
+
+// Signed errors from powers, into the elements that the tile covers.
+template <class Plan>
+inline void scatter(const Plan& plan, const float* power, int octaves, int axis, float* out, int elements) {
+    const int positions = plan.samples / 4;
+    const int parts = plan.per_tile ? 1 : (elements < positions ? elements : positions);
+    const int row = (axis * OCTAVES_MAX + __builtin_ctz(parts) / 2) * OCTAVES_MAX;
+    float phi[POSITIONS_MAX + SPARE] = {};
+    compare(plan, power, octaves, (const float*)plan.templates + row, parts, phi);
+    const int repeat = elements / parts;
     if (repeat == 1)
-        __builtin_memcpy(out, phi, sizeof(float) * count);
+        __builtin_memcpy(out, phi, sizeof(float) * parts);
     else
-        for (int i = 0; i < count; ++i) {
+        for (int i = 0; i < parts; ++i)
             for (int k = 0; k < repeat; k += 4) store(out + i * repeat + k, (f4)phi[i]);
-        }
 }
 
 // One framelet. Its past state must not be where the new one goes.
@@ -164,14 +187,14 @@ inline void scatter(const Plan& plan, const float* power, float tolerated, float
 template <class Plan>
 inline bool observe(const Plan& plan, const float* color, const float* past, float* kept_color, float* kept_state,
                     float* errors_s, float* errors_t, int elements) {
-    float luminance[SAMPLES_MAX], power_s[OCTAVE_POSITIONS_MAX + 15], power_t[OCTAVE_POSITIONS_MAX + 15];
+    float luminance[SAMPLES_MAX], power_s[OCTAVE_POSITIONS_MAX + SPARE], power_t[OCTAVE_POSITIONS_MAX + SPARE];
     i16 good = ~(i16)0;
     for (int i = 0; i < plan.samples; i += 16)
         store(luminance + i, compressed(luminance_of(color + 3 * i, kept_color + 3 * i, plan.radiance_max, good)));
     if (bits(good) != ALL) return false;
-    transform(plan, luminance, past, kept_state, power_s, power_t);
-    scatter(plan, power_s, plan.template_spatial, errors_s, elements);
-    if (past) scatter(plan, power_t, plan.template_temporal, errors_t, elements);
+    const int known = transform(plan, luminance, past, kept_state, power_s, power_t);
+    scatter(plan, power_s, plan.octaves, 0, errors_s, elements);
+    if (known) scatter(plan, power_t, known, 1, errors_t, elements);
     return true;
 }
 

@@ -22,35 +22,41 @@ from analysis.spectrum.estimate_check import (
 from analysis.spectrum.ideal_density import ideal_band, power_norm, share_of_total
 from analysis.spectrum.options import SpectrumOptions
 from tests.analysis.signals import disk, noise, separable
-from tsar import haar
-from tsar.config import ErrorConfig
-from tsar.error import levelwise_power, signed_error
+from tests.oracles.batches import make_batch
+from tsar.cache import FrameletCache
+from tsar.config import ErrorConfig, TsarConfig
+from tsar.error import estimate
 from tsar.morton import interleave, morton_to_raster
+from tsar.tiling import uniform
 
 ERROR = ErrorConfig()
 
 
-def test_estimate_is_the_pipelines_own() -> None:
-    """At a stride that leaves one framelet: two refreshes through the transform, levelwise norm and template."""
-    planes = noise(3, 5, 32, 32, seed=4).float() * 0.05
-    found = streaming_error(planes, 2, 2, ERROR)
-    assert found.shape == (3, 2, 2)
-    framelets = planes[:, ::2, 1::2, 1::2].flatten(2)[..., morton_to_raster(16)]
-    none, known = torch.zeros(3, haar.state_size(256)), torch.ones(3, dtype=torch.bool)
-    _, state = haar.transform(framelets[:, 0], none, ~known)
-    for update in range(2):
-        octaves, state = haar.transform(framelets[:, update + 1], state, known)
-        spatial, temporal = levelwise_power(octaves, ERROR)
-        phi_s = signed_error(spatial, ERROR.spatial_offset, ERROR.spatial_slope, ERROR).mean(1)
-        phi_t = signed_error(temporal, ERROR.temporal_offset, ERROR.temporal_slope, ERROR).mean(1)
-        torch.testing.assert_close(found[:, update], torch.stack((phi_s, phi_t), -1))
+@pytest.mark.parametrize("error", [ERROR, ErrorConfig(extent="tile"), ErrorConfig(estimator="fft")])
+def test_estimate_is_the_pipelines_own(error: ErrorConfig) -> None:
+    """At a stride that leaves one framelet: what the pipeline finds of a tile that is refreshed at those times."""
+    planes = (0.4 + 0.05 * noise(1, 5, 32, 32, seed=4).float()).clamp(0.1, 0.8)
+    found = streaming_error(planes, 2, 2, error, 64)
+    assert found.shape == (1, 2, 2)
+    config = TsarConfig(batch_size=1, error=error)
+    signal = planes[:, ::2, 1::2, 1::2].flatten(2)[..., morton_to_raster(16)][0, :, :, None].expand(-1, -1, 3)
+    radiance = signal.square() / (1.0 - signal.square())  # of that compressed luminance
+    cache = FrameletCache(config)
+    for refresh in range(3):
+        batch = make_batch(uniform(4), torch.tensor([7]), float(refresh), refresh, config)
+        done = estimate(batch, radiance[refresh][None], cache, config)
+        cache.insert(batch, done.color, done.coefficients)
+        covered = slice(7 * 64, 8 * 64)
+        if refresh:
+            phi = torch.stack((done.errors.spatial[covered].mean(), done.errors.temporal[covered].mean()))
+            torch.testing.assert_close(found[0, refresh - 1], phi, atol=1e-5, rtol=1e-4)
 
 
 def test_estimate_of_a_tile_is_the_mean_over_its_framelets() -> None:
     planes = noise(1, 3, 64, 64, seed=5).float() * 0.1
-    whole = streaming_error(planes, 1, 1, ERROR)
+    whole = streaming_error(planes, 1, 1, ERROR, 64)
     parts = [
-        streaming_error(planes[..., y : y + 16, x : x + 16], 1, 1, ERROR)
+        streaming_error(planes[..., y : y + 16, x : x + 16], 1, 1, ERROR, 4)
         for y in range(0, 64, 16)
         for x in range(0, 64, 16)
     ]
@@ -62,7 +68,7 @@ def test_rates_and_true_directions() -> None:
     assert rates.densities(64, 32).tolist() == [[16, 16], [16, 4], [32, 16], [32, 4]]
     volume = separable(64, 32, 8, 4)
     flat = volume.flatten(2)[..., morton_to_raster(64)].float()
-    tiles, power = measure(flat, rates, ERROR)
+    tiles, power = measure(flat, rates, ERROR, 64)
     assert power.shape == (1, 17, 33, 33)
     f_s, f_t = (int(f) for f in ideal_band(share_of_total(tiles.norm), 0.01))
     true = tiles.true(share_of_total(tiles.norm), 0.01)
@@ -180,7 +186,7 @@ def test_tiles_of_an_input_and_the_check() -> None:
 
 def test_the_check_knows_a_good_estimate() -> None:
     """Estimates that are the truth itself agree with it, whatever the tiles show."""
-    base = measure(noise(6, 16, 64 * 64, seed=7).float(), Rates((4,), (2, 4)), ERROR)[0]
+    base = measure(noise(6, 16, 64 * 64, seed=7).float(), Rates((4,), (2, 4)), ERROR, 64)[0]
     norm = power_norm(
         torch.rand(6, 9, 33, 33, dtype=torch.float64) / (1 + torch.arange(33)) ** torch.arange(6)[:, None, None, None]
     )

@@ -29,6 +29,11 @@ CONFIGS = {
     "greatest power": small(error=ErrorConfig(norm="linf")),
     "difference": small(error=ErrorConfig(form="difference")),
     "difference of greatest power": small(error=ErrorConfig(norm="linf", form="difference", temporal_offset=-7.0)),
+    "octave by octave": small(error=ErrorConfig(octaves="greatest")),
+    "tile by tile": small(error=ErrorConfig(extent="tile")),
+    "tile by tile, octave by octave, greatest power": small(
+        error=ErrorConfig(norm="linf", octaves="greatest", extent="tile", form="difference")
+    ),
     "slow and biased": small(response=ResponseConfig(gain=0.3, bias=0.7, surplus_max=0.1)),
     "biased to time": small(response=ResponseConfig(bias=-1.0, temporal_min=0.25)),
     "one level": small(tiling=TilingConfig(level_min=3, level_max=3)),

@@ -83,8 +83,8 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Adds to the reference the norm ``l1``, the form ``ratio``, the solver ``half``, and negatives of its images."""
     error = tsar.error.signed_error
 
-    def signed_error(signal, offset, slope, config):
-        return -error(signal, offset, slope, config) if config.form == "ratio" else error(signal, offset, slope, config)
+    def signed_error(bands, config):
+        return -error(bands, config) if config.form == "ratio" else error(bands, config)
 
     def rooted(squared, repeat):
         return total_power(squared, repeat).sqrt()
@@ -101,7 +101,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("error", [{"norm": "l1"}, {"form": "ratio"}], ids=["norm", "form"])
+@pytest.mark.parametrize("error", [{"norm": "l1"}, {"form": "ratio"}, {"estimator": "variance"}, {"estimator": "fft"}])
 def test_an_error_that_is_not_compiled_is_estimated_by_the_reference(error: dict) -> None:
     assert_handed_over(small(error=MoreErrors(**error)), small(), "observe")
 

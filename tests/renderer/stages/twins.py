@@ -18,8 +18,7 @@ from tests.oracles import pictures, runs
 from tests.oracles.configurations import legal_configuration
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
-from tsar.error import tolerated_power
-from tsar.haar import octave_count
+from tsar.estimators import template_power
 from tsar.policies.thesis import State
 from tsar.selection import request
 from tsar.stages import REFERENCE
@@ -40,7 +39,7 @@ def differences(config: TsarConfig, number: int, cycles: int) -> Iterator[str]:
         wanted = REFERENCE.observe(batch, color, theirs, config, StageTimer())
         for name in ("spatial", "temporal"):
             pair = getattr(found.errors, name), getattr(wanted.errors, name)
-            yield from _near(f"{name} error", *pair, 0.0, _tolerance(config, name))
+            yield from _near(f"{name} error", *pair, 0.0, tolerance(config, name))
         yield from _same("non-finite samples", found.nonfinite, wanted.nonfinite)
         for name in ("level", "index", "time_s", "dead", "color", "slot_of_node"):
             yield from _same(f"cache.{name}", getattr(state.cache, name), getattr(theirs, name))
@@ -70,13 +69,15 @@ def differences(config: TsarConfig, number: int, cycles: int) -> Iterator[str]:
         state = State(ours.densities, ours.tiling, ours.due, state.cache)
 
 
-def _tolerance(config: TsarConfig, axis: str) -> float:
+def tolerance(config: TsarConfig, axis: str) -> float:
     """How far errors may lie apart. Luminance is compressed to within 2^-22, and an error changes by at most about
     eight times that over the root of the tolerated power: a template below what luminance rounds by sees the rounding.
     """
     slope, offset = (getattr(config.error, f"{axis}_{name}") for name in ("slope", "offset"))
-    tolerated = tolerated_power(octave_count(config.samples), offset, slope, config.error)
-    return 2e-5 + 8.0 * 2.0**-22 / tolerated**0.5
+    parts = 1 if config.error.extent == "tile" else config.samples // 4
+    tolerated = template_power(config.samples, parts, offset, slope, config.error) / (config.samples // 4 // parts)
+    least = tolerated.min() if config.error.octaves == "greatest" else tolerated.sum()
+    return 2e-5 + 8.0 * 2.0**-22 / float(least) ** 0.5
 
 
 def _color(batch: FrameletBatch, number: int) -> torch.Tensor:
