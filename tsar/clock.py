@@ -13,11 +13,6 @@ CycleSeconds = Callable[[Mapping[str, int], float], float]
 """``(counters, wall_s) -> seconds``: what one cycle or frame costs on the chosen clock."""
 
 
-def wall_clock(counters: Mapping[str, int], wall_s: float) -> float:
-    """The measured time: wall-clock mode."""
-    return wall_s
-
-
 def fixed_clock(seconds: float) -> CycleSeconds:
     """Every cycle takes the same simulated time."""
     return lambda counters, wall_s: seconds

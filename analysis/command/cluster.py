@@ -9,6 +9,7 @@ import contextlib
 import logging
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 WAIT_S = 30
 """How long a scheduler, or a worker, is waited for, seconds."""
 LOOPBACK = "127.0.0.1"
+_QUIET = "ignore:resource_tracker:UserWarning"
+"""An option of Python by which the process that tracks semaphores does not report those of workers that were killed: it
+removes them."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,8 @@ def _interrupts_blocked() -> Iterator[None]:
     A thread that was there before can still take the signal, and Python would then raise KeyboardInterrupt here, within
     libraries that may lose it; so it is noted meanwhile.
     """
+    if _QUIET not in sys.warnoptions:
+        sys.warnoptions.append(_QUIET)
     resource_tracker.ensure_running()  # it unblocks interrupts where it is started, so it must not be started within
     heard = list[int]()
     handlers = {number: signal.signal(number, lambda number, frame: heard.append(number)) for number in SIGNALS}

@@ -1,4 +1,4 @@
-"""Options of the cost report: table 7.1 as numbers, what may be admitted, what is measured."""
+"""Options of the cost report: the parameters of table 7.1, what may be admitted, what is measured."""
 
 from __future__ import annotations
 
@@ -13,53 +13,6 @@ from analysis.metrics.cost_model import CostParameters
 from tsar.config import TsarConfig, closed_choices, require
 
 _FEWEST_BATCHES, _FEWEST_RESOLUTIONS = 3, 3
-
-
-@dataclass(frozen=True)
-class TableParameters:
-    """Table 7.1: the cost model's parameters as numbers."""
-
-    batch_size: float = 128
-    """Framelets rendered per pipeline cycle."""
-    sdf_size: float = 128**2
-    """Elements of the density and error fields."""
-    framelet_size: float = 16**2
-    """Samples in a framelet."""
-    recon_res: float = 512**2
-    """Output resolution, pixels."""
-    cache_size: float = 2048
-    """Framelets in the cache."""
-    recon_age_support: float = 128
-    """Width of the age smoothing operator, pixels."""
-    recon_spa_support: float = 3**2
-    """Size of the spatial reconstruction filter, pixels."""
-    trace_segments: float = 5
-    """Ray segments per sample."""
-    tiling_size: float = 512
-    """Framelets in the tiling."""
-    dwt_coeffs: float = 448
-    """Coefficients of one framelet that contribute to the localised levelwise norm."""
-    tree_size: float = 1024
-    """Nodes of the spatial structure that rays traverse."""
-    avg_recon_overdraw: float | None = None
-    """Framelets drawn per output pixel; not printed in the thesis. None means cache_size / tiling_size."""
-    per_bvh_node: float = 16
-    """FLOPs per node visited."""
-    per_triangle: float = 64
-    """FLOPs per triangle test."""
-    per_shader: float = 96
-    """FLOPs per shading of a ray's end point."""
-
-    def __post_init__(self) -> None:
-        bounds = dict.fromkeys((item.name for item in dataclasses.fields(self)), (1e-6, 1e15))
-        limits.within(self, **{**bounds, "trace_segments": (0.0, limits.SEGMENTS[1])})
-        for name in ("tree_size", "tiling_size"):
-            require(getattr(self, name) > 1, name, "more than 1, for its logarithm counts", getattr(self, name))
-        _ = self.model
-
-    @property
-    def model(self) -> CostParameters:
-        return CostParameters(**dataclasses.asdict(self))
 
 
 @dataclass(frozen=True)
@@ -142,8 +95,8 @@ class MeasurementOptions:
 class CostReportOptions:
     """Cost of an adaptive cycle and of a framed image: the model under every ledger, and this machine."""
 
-    parameters: Unprefixed[TableParameters] = field(default_factory=TableParameters)
-    """The model's parameters."""
+    parameters: Unprefixed[CostParameters] = field(default_factory=CostParameters)
+    """The model's parameters, table 7.1."""
     measurement: Unprefixed[MeasurementOptions] = field(default_factory=MeasurementOptions)
     """What is measured."""
     ledger: Literal["thesis", "printed", "summed"] = "thesis"
@@ -164,10 +117,15 @@ class CostReportOptions:
             values = getattr(self, name)
             require(len(values) > 0, name, "at least one number", values)
         segments = (0.0, limits.SEGMENTS[1])
+        bounds = dict.fromkeys((item.name for item in dataclasses.fields(CostParameters)), (1e-6, 1e15))
+        limits.within(self.parameters, **{**bounds, "trace_segments": segments})
+        for name in ("tree_size", "tiling_size"):
+            value = getattr(self.parameters, name)
+            require(value > 1, name, "more than 1, for its logarithm counts", value)
         limits.within(self, batches=(1, 1 << 20), resolutions=limits.SIDES_PX, admitted_segments=segments)
         _ = self.admitting
 
     @property
     def admitting(self) -> CostParameters:
         """The parameters with the segments at which combinations are admitted."""
-        return dataclasses.replace(self.parameters.model, trace_segments=self.admitted_segments)
+        return dataclasses.replace(self.parameters, trace_segments=self.admitted_segments)

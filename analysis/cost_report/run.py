@@ -59,7 +59,7 @@ def _ledger_entry(cost: Mapping[str, Any], pixels: float, unit: str) -> dict[str
 
 def modelled_ledgers(options: CostReportOptions) -> dict[str, dict[str, Any]]:
     """Costs, admitted set and crossing under every modelled ledger."""
-    p, found = options.parameters.model, {}
+    p, found = options.parameters, {}
     single = dataclasses.replace(p, avg_recon_overdraw=1)
     for ledger in MODELLED:
         found[ledger] = {
@@ -116,7 +116,7 @@ def sweeps(options: CostReportOptions) -> dict[str, Sweep]:
         "batch_size": line(1, SURFACE_BATCHES[1]),
         "trace_segments": line(0, 16),
     }
-    p = options.parameters.model
+    p = options.parameters
     return {name: sweep(p, name, values, options.ledger) for name, values in axes.items()}
 
 
@@ -125,7 +125,7 @@ def advantages_by_batch(options: CostReportOptions) -> tuple[Tensor, dict[str, T
     import torch
 
     batch = torch.exp2(torch.linspace(4, 11, 281, dtype=torch.float64))
-    p = dataclasses.replace(options.parameters.model, batch_size=batch)
+    p = dataclasses.replace(options.parameters, batch_size=batch)
     return batch, {ledger: torch.as_tensor(advantage(p, ledger)) for ledger in MODELLED}
 
 
@@ -139,7 +139,7 @@ def equal_cost_surface(options: CostReportOptions, steps: int = 61) -> PolyData:
     import pyvista
     import torch
 
-    p, ledger = options.parameters.model, options.ledger
+    p, ledger = options.parameters, options.ledger
 
     def at(batch: Tensor, segments: Tensor, side: Tensor) -> CostParameters:
         return dataclasses.replace(p, batch_size=batch, trace_segments=segments, recon_res=side**2)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     Value = float | Tensor
 else:
-    Value = Any
+    # what the command line reads
+    Value = float
 
 Ledger = Literal["thesis", "printed", "summed", "work", "wall"]
 """How cost is counted.

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
 from analysis.command.console import Table
 from analysis.page import player as played
-from analysis.page.pictures import Pixels
 from analysis.page.player import Player
 from analysis.storage.files import atomic
 
@@ -85,13 +81,6 @@ def _policy(script: str) -> str:
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     run = f"'sha256-{digest}'" if script else "'none'"
     return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {run}; base-uri 'none'"
-
-
-def png_bytes(pixels: Pixels) -> bytes:
-    """An array ``(h, w, 3)`` uint8 as PNG."""
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
 
 
 def _figure(caption: str, png: bytes) -> str:

@@ -11,7 +11,6 @@ import contextlib
 import errno
 import hashlib
 import json
-import os
 import secrets
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
@@ -19,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.command.cli import InputError
-from analysis.storage.files import atomic
+from analysis.storage.files import atomic, sync
 
 _TABLES = """
 create table session (id integer primary key, identity text not null, token text not null,
@@ -162,7 +161,7 @@ def _create(file: Path, identity: str, earlier: Iterable[Mapping[str, Any]]) -> 
                 values = identity, token, len(bodies), seal
                 connection.execute("insert into session values (1, ?, ?, ?, ?)", values)
                 connection.execute("commit")
-        _sync_folder(file.parent)
+        sync(file.parent)
     except sqlite3.Error as error:
         raise OSError(errno.EIO, str(error), str(file)) from error
 
@@ -173,15 +172,6 @@ def _insert(connection: sqlite3.Connection, number: int, body: str) -> None:
 
 def _sealed(before: str, text: str) -> str:
     return hashlib.sha256(f"{before}\n{text}".encode()).hexdigest()
-
-
-def _sync_folder(folder: Path) -> None:
-    """Writes the names of a folder's files to disk."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def answers_of_lines(file: Path) -> list[dict[str, Any]]:

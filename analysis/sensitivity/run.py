@@ -8,17 +8,14 @@ from typing import Any
 import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.ownership import writable_folder
-from analysis.command.progress import bars
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.plots import write_all
 from analysis.sensitivity.runs import runs, sweeps
 from analysis.sensitivity.tables import optimum_table, setting_table
 from analysis.storage.files import write_table
-from analysis.storage.results import own_results
 from analysis.storage.summary import write_summary
-from analysis.study.evaluation import Place, broken, finished, times_of
-from analysis.study.farm import describe_failures, run_cases
+from analysis.study.evaluation import broken, finished, times_of
+from analysis.study.farm import describe_failures, run_study
 
 
 def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
@@ -32,14 +29,8 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
     """
     with bad_input():
         planned = runs(options)
-        own_results(options.out, ("tables/*.csv", "figures/*.png"))
-        writable_folder(options.cache, "cache")
+    place, keys, failures = run_study(options, [run.case for run in planned], ("tables/*.csv", "figures/*.png"))
     out = options.out.resolve()
-    place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
-    (out / "summary.json").unlink(missing_ok=True)
-    with full_disk(out), bars() as show:
-        place.results.mkdir(exist_ok=True)
-        keys, failures = run_cases([run.case for run in planned], place, options.farm, show.task("runs", len(planned)))
     summaries = {run: finished(keys[run.case], place) for run in planned}
     done = {run: keys[run.case] for run, found in summaries.items() if found}
     missing = [run for run in planned if run not in done]

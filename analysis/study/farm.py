@@ -9,17 +9,61 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
+from analysis.command.cli import bad_input, full_disk
 from analysis.command.cluster import WAIT_S, ClusterOptions, connected
-from analysis.command.progress import Task
+from analysis.command.ownership import writable_folder
+from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
+from analysis.storage.results import own_results
 from analysis.study.cases import Case, Scale
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
     from analysis.study.evaluation import Place
+
+
+class StudyOptions(Protocol):
+    """What the options of every study have."""
+
+    @property
+    def out(self) -> Path: ...
+    @property
+    def cache(self) -> Path: ...
+    @property
+    def farm(self) -> ClusterOptions: ...
+
+
+def run_study(
+    options: StudyOptions, cases: Sequence[Case], written: Sequence[str]
+) -> tuple[Place, dict[Case, str], dict[Case, str]]:
+    """Takes over the folder of a study and runs its cases, with a bar.
+
+    Args:
+        options: of the study.
+        cases: what to run.
+        written: names and patterns of what the study will write, within its folder.
+
+    Returns:
+        Where the results are, the key of every case's result, and the reason of every failure.
+
+    Raises:
+        InputError: a folder cannot be had, or nothing answers at the scheduler's address.
+    """
+    from analysis.study.evaluation import Place
+
+    with bad_input():
+        own_results(options.out, tuple(written))
+        writable_folder(options.cache, "cache")
+    out = options.out.resolve()
+    (out / "summary.json").unlink(missing_ok=True)  # one that is killed leaves no older summary
+    place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
+    with full_disk(out), bars() as shown:
+        place.results.mkdir(exist_ok=True)
+        return place, *run_cases(cases, place, options.farm, shown.task("runs", len(set(cases))))
 
 
 def run_cases(

@@ -10,14 +10,11 @@ from typing import Any
 import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.ownership import writable_folder
-from analysis.command.progress import bars
 from analysis.storage.files import write_json, write_table
-from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 from analysis.study.cases import ROWS, SCALES, Case
 from analysis.study.evaluation import Place, broken, finished, times_of
-from analysis.study.farm import describe_failures, run_cases
+from analysis.study.farm import describe_failures, run_study
 from analysis.suitability import plots
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.page import write_page
@@ -51,15 +48,9 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     """
     with bad_input():
         planned = runs(options)
-        own_results(options.out, ("report.html", "timing.csv", "tables/*.csv", "figures/*.png"))
-        writable_folder(options.cache, "cache")
+    written = ("report.html", "timing.csv", "tables/*.csv", "figures/*.png")
+    place, keys, failures = run_study(options, [run.case for run in planned], written)
     out = options.out.resolve()
-    place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
-    place.results.mkdir(exist_ok=True)
-    with full_disk(out), bars() as shown:
-        keys, failures = run_cases(
-            [run.case for run in planned], place, options.farm, shown.task("runs", len({run.case for run in planned}))
-        )
     # said at once: what follows may fail for the same reasons, such as a full disk
     for line in describe_failures({keys[case]: reason for case, reason in failures.items()}):
         print(line, file=sys.stderr)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import numpy as np
 import torch
+from PIL import Image
 
 from analysis.metrics.quality import View
+from analysis.page.pictures import Pixels
 from analysis.page.video import Scales
 from analysis.storage.records import RecordLimits
 from tsar.types import Densities, Errors, SampleMap, ShownImage, StepRecord, Tiling
@@ -76,6 +79,13 @@ def view(time_s: float = 0.0, reference: float = 0.0, own: float = 1.0, framed: 
     displays = ShownImage(time_s, time_s, grey(own), ages), ShownImage(time_s, 0.0, grey(framed))
     shown = {"own": (record, displays[0]), "framed": (None, displays[1])}
     return View(number, time_s, grey(reference), shown, {"own": 0.1, "framed": 0.2})
+
+
+def png_bytes(pixels: Pixels) -> bytes:
+    """An array ``(h, w, 3)`` uint8 as PNG."""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()
 
 
 class Sink:

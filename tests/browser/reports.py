@@ -10,9 +10,9 @@ from PIL import Image
 from playwright.sync_api import Page, expect
 
 from analysis.page.player import Curve, Player, Step
-from analysis.page.report import Report, Table, png_bytes
+from analysis.page.report import Report, Table
 from analysis.page.video import maps, photographs
-from tests.analysis.builders import SCALES, view
+from tests.analysis.builders import SCALES, png_bytes, view
 
 LABELS = [*photographs(view(), 96), *maps(view(), "own", SCALES, 96)]
 STEPS, TIMES = 7, 13

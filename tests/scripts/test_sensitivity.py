@@ -117,7 +117,7 @@ def test_failures_are_listed_and_the_rest_is_shown(
     def no_workers(asked: Any, *rest: Any) -> tuple[dict[Any, str], dict[Any, str]]:
         return {case: case.key(source) for case in asked}, {failed[0].case: "RuntimeError: out of luck"}
 
-    monkeypatch.setattr(study, "run_cases", no_workers)
+    monkeypatch.setattr("analysis.study.farm.run_cases", no_workers)
     status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
     assert status == 1
     shown = capsys.readouterr()

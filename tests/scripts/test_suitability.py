@@ -82,7 +82,8 @@ def let_fail(policies: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None
 
     times = pd.DataFrame({"time_s": [0.0, 0.1], "refresh": [1, 2]} | {name: [0.5, 0.75] for name in METRICS})
     times = times.assign(flicker=0.0, causes_known=0.0, aliasing=0.0)
-    for name, made in (("run_cases", run_cases), ("finished", finished), ("times_of", lambda *_: times)):
+    monkeypatch.setattr("analysis.study.farm.run_cases", run_cases)
+    for name, made in (("finished", finished), ("times_of", lambda *_: times)):
         monkeypatch.setattr(f"analysis.suitability.run.{name}", made)
 
 

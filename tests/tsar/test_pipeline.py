@@ -5,7 +5,7 @@ import torch
 
 from tests.oracles import pictures, runs
 from tsar.choices import SOLVERS
-from tsar.clock import StageTimer, fixed_clock, wall_clock
+from tsar.clock import StageTimer, fixed_clock
 from tsar.config import ConfigError, ReconstructionConfig, ResponseConfig, TilingConfig, TsarConfig
 from tsar.morton import raster_to_morton
 from tsar.types import SampleBatch
@@ -160,7 +160,8 @@ def test_radiance_at_the_end_of_float32_reaches_neither_image_nor_densities():
 
 
 def test_wall_clock_time_advances_by_what_a_cycle_took():
-    run_ = runs.play("thesis", small(warmup_cycles=2), pictures.tracer(pictures.constant), wall_clock, 0.0, 1e9)
+    trace = pictures.tracer(pictures.constant)
+    run_ = runs.play("thesis", small(warmup_cycles=2), trace, lambda counters, wall_s: wall_s, 0.0, 1e9)
     records = [next(run_)[0] for _ in range(5)]
     for now, after in pairwise(records):
         assert after.sim_time_s == pytest.approx(now.sim_time_s + now.cost_s)

@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles.batches import make_batch
+from tests.oracles.curves import prefix_sum, tile_integral
 from tsar.config import TilingConfig, TsarConfig
-from tsar.morton import interleave, prefix_sum, tile_integral
+from tsar.morton import interleave
 from tsar.selection import initial_history, sample_positions, select
 from tsar.tiling import build, tile_of_element, uniform
 

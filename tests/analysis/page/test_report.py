@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from analysis.page.player import SCRIPT, Curve, Player, Step
-from analysis.page.report import Report, Table, flat, png_bytes, render, write_report
+from analysis.page.report import Report, Table, flat, render, write_report
+from tests.analysis.builders import png_bytes
 
 EVIL = "<script src='http://evil.example/x.js'>alert(1)</script>&amp;\"'"
 
