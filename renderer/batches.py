@@ -53,10 +53,8 @@ def bounds(values: Tensor) -> tuple[float, float]:
 
 def empty_hits(groups: int, group_size: int, device: torch.device) -> Hits:
     """Hits to be filled in."""
-    return Hits(
-        torch.empty(groups, group_size, dtype=torch.int32, device=device),
-        torch.empty(groups, group_size, 3, device=device),
-    )
+    instance, occluder = (torch.empty(groups, group_size, dtype=torch.int32, device=device) for _ in range(2))
+    return Hits(instance, torch.empty(groups, group_size, 3, device=device), occluder)
 
 
 class PacketBatches:
@@ -95,13 +93,14 @@ class PacketBatches:
         hits = empty_hits(groups, group_size, color.device) if batch.hits else None
         places = address("position", position, torch.float32, 2 * count)
         colors = address("color", color, torch.float32, 3 * count)
-        scales = instances = points = 0
+        scales = instances = points = occluders = 0
         if scale is not None:
             scale = _plain(scale)
             scales = address("footprint", scale, torch.float32, count)
         if hits is not None:
             instances = address("instance", hits.instance, torch.int32, count)
             points = address("point", hits.point, torch.float32, 3 * count)
+            occluders = address("occluder", hits.occluder, torch.int32, count)
         with self._lock:
             self._taken[:], self._rays[:] = 0, 0
             command, times = self._moving, 0
@@ -112,7 +111,7 @@ class PacketBatches:
                 command = self._still
                 self._pose(time_s)
             taken, rays = self._counters
-            command.set(taken, count, places, times, scales, colors, instances, points, rays)
+            command.set(taken, count, places, times, scales, colors, instances, points, occluders, rays)
             TEAM.run([command] * self._threads)
             return color, self._rays.tolist(), hits
 

@@ -29,17 +29,14 @@ class SingleSamples:
         if not isinstance(time_s, Tensor):
             time_s = torch.full((count,), time_s, dtype=torch.float64)
         place, times = batch.position.to(device, torch.float32), time_s.to(device, torch.float64)
-        none = (
-            wp.empty(0, wp.float32, str(device)),
-            wp.empty(0, wp.int32, str(device)),
-            wp.empty(0, wp.vec3, str(device)),
-        )
-        scales, instance, point = none
+        scales, point = (wp.empty(0, kind, str(device)) for kind in (wp.float32, wp.vec3))
+        instance, occluder = (wp.empty(0, wp.int32, str(device)) for _ in range(2))
         if scale is not None:
             scales = wp.from_torch(scale.to(device, torch.float32).reshape(-1).contiguous(), dtype=wp.float32)
         if self.hits is not None:
             instance = wp.from_torch(self.hits.instance.view(-1), dtype=wp.int32)
             point = wp.from_torch(self.hits.point.view(-1, 3), dtype=wp.vec3)
+            occluder = wp.from_torch(self.hits.occluder.view(-1), dtype=wp.int32)
         self.arguments = (
             group_size,
             wp.from_torch(place.reshape(-1, 2).contiguous(), dtype=wp.vec2),
@@ -48,6 +45,7 @@ class SingleSamples:
             wp.from_torch(self.color.view(-1, 3), dtype=wp.vec3),
             instance,
             point,
+            occluder,
             wp.from_torch(self._rays, dtype=wp.vec3i),
         )
 

@@ -225,7 +225,7 @@ class Renderer:
             counters |= dict(zip(("node_visits", "triangle_tests"), self._work.tolist(), strict=True))
             self._work[:] = 0
         if hits is not None:
-            hits = Hits(hits.instance.to(home), hits.point.to(home))
+            hits = Hits(hits.instance.to(home), hits.point.to(home), hits.occluder.to(home))
         return SampleBatch(color if color.device == home else color.to(home), counters, hits)
 
     def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:

@@ -79,10 +79,15 @@ class Hits:
         point: on the camera ray, in the space of the instance's track, in scene units: the space that the rigid motion
             acts on, or the world for what stands still. For what is seen at infinity, the unit direction of the ray in
             the world. :func:`tsar.projection.project` takes both back to the image.
+        occluder: instance that keeps the first light from the point, -1 where that light is seen, -2 where it is not
+            asked: it lies behind the surface, the surface reflects none of it, or nothing was hit. Of several instances
+            it is one that stands still, if any does. Lamps that are instances come before other lights; of a lamp with
+            an extent it is what the first shadow ray meets.
     """
 
     instance: Int32[Tensor, "n samples"]
     point: Float32[Tensor, "n samples 3"]
+    occluder: Int32[Tensor, "n samples"]
 
 
 @dataclass(frozen=True)

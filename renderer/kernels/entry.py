@@ -83,11 +83,12 @@ def specialised(features: Feature) -> ShadingKernels:
         color: wp.array(dtype=wp.vec3),
         instance: wp.array(dtype=wp.int32),
         point: wp.array(dtype=wp.vec3),
+        occluder: wp.array(dtype=wp.int32),
         rays: wp.array(dtype=wp.vec3i),
     ):
         """Shades the samples from ``first`` on; ``rays`` receives the shadow, reflected and refracted rays of each.
 
-        ``footprint_scale`` of footprints, and ``instance`` and ``point`` of first hits, may be empty.
+        ``footprint_scale``, and the three arrays of first hits, may be empty.
         """
         i = first + wp.tid()
         leader = (i / group_size) * group_size
@@ -103,6 +104,7 @@ def specialised(features: Feature) -> ShadingKernels:
         if instance.shape[0] > 0:
             instance[i] = hit.instance
             point[i] = hit.point
+            occluder[i] = hit.occluder
         rays[i] = counts
 
     @wp.kernel(enable_backward=False, module=name)

@@ -9,6 +9,7 @@ from renderer.kernels.heightfield import relief_distance
 from renderer.kernels.shapes import cube_distance, meets_box, misses_sphere, plane_distance, reciprocal, sphere_distance
 from renderer.layout.features import Feature
 from renderer.layout.kinds import Shape
+from renderer.layout.sizes import LIT
 from renderer.layout.structs import Hit, InstanceRecord, SceneData, ViewData
 
 # On a GPU no mesh comes without a tree of Warp's, so that this is never called there.
@@ -159,7 +160,7 @@ def closest_hit(
 
 
 @wp.func
-def occluded(
+def occluder(
     features: wp.int32,
     scene: SceneData,
     view: ViewData,
@@ -167,8 +168,9 @@ def occluded(
     origin: wp.vec3,
     direction: wp.vec3,
     t_max: wp.float32,
-) -> wp.bool:
-    """Whether anything lies along a world ray before ``t_max``."""
+) -> wp.int32:
+    """An instance that lies along a world ray before ``t_max``, the first in the order of the groups and their nodes;
+    ``LIT`` for none."""
     for g in range(scene.group_count):
         group = scene.groups[g]
         start = wp.vec3(origin[0], origin[1], origin[2])
@@ -191,5 +193,5 @@ def occluded(
                     index = node.skip
                 elif node.instance >= 0:
                     if instance_blocks(features, scene, view, scene.instances[node.instance], start, towards, t_max):
-                        return True
-    return False
+                        return node.instance
+    return LIT

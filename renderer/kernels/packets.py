@@ -68,7 +68,7 @@ def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
     """
     packets::shade_samples(scene, view, (int*)taken,
                            {count, (const float*)position, (const double*)time_s, (const float*)footprint_scale,
-                            (float*)color, (int*)instance, (float*)point},
+                            (float*)color, (int*)instance, (float*)point, (int*)occluder},
                            (long long*)rays);
     """
 )
@@ -83,6 +83,7 @@ def native_shade_samples(
     color: Address,
     instance: Address,
     point: Address,
+    occluder: Address,
     rays: Address,
 ): ...
 
@@ -136,6 +137,7 @@ def shade_samples(
     color: Address,
     instance: Address,
     point: Address,
+    occluder: Address,
     rays: Address,
 ):
     """As the kernel of the same name in ``entry.py``, for all samples that no other launch has taken.
@@ -144,7 +146,9 @@ def shade_samples(
     receives the totals. Arrays come as addresses, for a launch that is recorded once; zero stands for those that are
     not given or not asked for.
     """
-    native_shade_samples(scene, view, taken, count, position, time_s, footprint_scale, color, instance, point, rays)
+    native_shade_samples(
+        scene, view, taken, count, position, time_s, footprint_scale, color, instance, point, occluder, rays
+    )
 
 
 @wp.kernel(enable_backward=False)

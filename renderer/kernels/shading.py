@@ -11,13 +11,13 @@ import warp as wp
 
 from renderer.kernels.bundles import bundle_size, leave_waiting, mirror_direction, sent_on
 from renderer.kernels.glass import Sent, sent_by_glass
-from renderer.kernels.intersect import closest_hit, occluded
+from renderer.kernels.intersect import closest_hit, occluder
 from renderer.kernels.lights import arriving_light, environment_radiance, has_extent
 from renderer.kernels.randomness import PURPOSE_LIGHT, PURPOSE_REFLECT, PURPOSE_REFRACT, cell_2d, draw_2d
 from renderer.kernels.surface import surface_at
 from renderer.kernels.textures import texture_color
 from renderer.layout.features import Feature
-from renderer.layout.sizes import FAR, SLANT_LEAST
+from renderer.layout.sizes import FAR, LIT, SLANT_LEAST, UNLIT
 from renderer.layout.structs import Draw, FirstHit, MaterialRecord, Ray, SceneData, Surface, ViewData
 
 _EXTENDED = wp.constant(int(Feature.SUN_DISC | Feature.QUAD | Feature.SPHERE_LIGHT | Feature.ENVIRONMENT))
@@ -35,12 +35,14 @@ def direct_light(
     albedo: wp.vec3,
     direction: wp.vec3,
 ):
-    """Radiance reflected from the lights towards the viewer, and the shadow rays it took.
+    """Radiance reflected from the lights towards the viewer, the shadow rays it took, and what the first of these meets
+    on its way to the first light.
 
     ``albedo`` is the diffuse colour, scaled by what the mirrored part leaves; ``direction`` is the viewing ray's.
     """
     total = wp.vec3(0.0, 0.0, 0.0)
     rays = wp.int32(0)
+    first = wp.int32(UNLIT)
     start = surface.position + surface.offset * surface.geometric_normal
     mirrored = direction - 2.0 * wp.dot(direction, surface.normal) * surface.normal
     for light in range(scene.light_count):
@@ -69,9 +71,12 @@ def direct_light(
                     gloss = wp.pow(lobe, material.exponent) * (material.exponent + 2.0) * (0.5 / wp.pi)
                     reflected = reflected + material.specular * gloss
                 rays = rays + 1
-                if not occluded(features, scene, view, time_s, start, towards, arriving.reach):
+                between = occluder(features, scene, view, time_s, start, towards, arriving.reach)
+                if between == LIT:
                     total = total + wp.cw_mul(reflected, arriving.irradiance) * share
-    return total, rays
+                if light == 0 and first == UNLIT:
+                    first = between
+    return total, rays, first
 
 
 @wp.func
@@ -115,19 +120,22 @@ def left_by(
     cosine: wp.float32,
     footprint: wp.float32,
 ):
-    """Radiance that leaves a surface against a ray, but for what it mirrors or lets through; and its shadow rays."""
+    """Radiance that leaves a surface against a ray, but for what it mirrors or lets through; its shadow rays, and the
+    occluder of the first light."""
     glow = material.emission
     shadow_rays = wp.int32(0)
+    between = wp.int32(UNLIT)
     if not surface.inside:
         glow = glow + surface.emission
     if material.diffuse >= 0:
         albedo = texture_color(features, scene, material.diffuse, surface.uv, footprint)
         if (features & Feature.MIRROR) != 0:
             albedo = albedo * (1.0 - fresnel(material, cosine))
-        lit, rays = direct_light(features, scene, view, time_s, ray.draw, surface, material, albedo, ray.towards)
+        lit, rays, first = direct_light(features, scene, view, time_s, ray.draw, surface, material, albedo, ray.towards)
         shadow_rays = rays
+        between = first
         glow = glow + wp.cw_mul(albedo, scene.ambient) * material.ambient + lit
-    return glow, shadow_rays
+    return glow, shadow_rays, between
 
 
 @wp.func
@@ -153,6 +161,7 @@ def radiance(
     first = FirstHit()
     first.instance = -1
     first.point = direction
+    first.occluder = UNLIT
     waiting = wp.int32(0)
     ray = Ray()
     ray.start = origin
@@ -168,15 +177,16 @@ def radiance(
         else:
             surface = surface_at(features, scene, view, time_s, hit, ray.start, ray.towards)
             material = scene.materials[surface.material]
-            if ray.bounces == 0:
-                first.instance = hit.instance
-                first.point = surface.in_track
             ray.travelled = ray.travelled + hit.t
             cosine = -wp.dot(surface.normal, ray.towards)
             slant = wp.max(wp.abs(wp.dot(surface.geometric_normal, ray.towards)), SLANT_LEAST)
             footprint = footprint_scale * (view.width + view.spread * ray.travelled) / slant * surface.uv_density
-            glow, rays = left_by(features, scene, view, time_s, surface, material, ray, cosine, footprint)
+            glow, rays, between = left_by(features, scene, view, time_s, surface, material, ray, cosine, footprint)
             counts[0] = counts[0] + rays
+            if ray.bounces == 0:
+                first.instance = hit.instance
+                first.point = surface.in_track
+                first.occluder = between
             total = total + wp.cw_mul(ray.weight, glow)
             if (features & Feature.MIRROR) != 0 and ray.bounces < scene.depth:
                 sent = sent_by(features, scene, surface, material, cosine, footprint, ray.towards)

@@ -25,6 +25,11 @@ KD_LEAF = 3
 KD_DEPTH_MAX = 20
 """Depth of a kd-tree's deepest leaf, the root's being 0."""
 
+LIT = -1
+"""Stands for the occluder of a light that is seen."""
+UNLIT = -2
+"""Stands for the occluder of a light that is not asked: it lies behind the surface, or the surface reflects none."""
+
 FAR = 1.0e30
 """How far a ray reaches that has no end of its own."""
 TINY = 1.0e-20

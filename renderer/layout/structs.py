@@ -266,11 +266,13 @@ class Surface:
 class FirstHit:
     """What a camera ray meets first: the instance, and the point in the space of its track.
 
-    For a miss ``instance`` is negative, and ``point`` the direction of the ray in world space.
+    For a miss ``instance`` is negative, and ``point`` the direction of the ray in world space. ``occluder`` is the
+    instance in the way of the first light, ``LIT`` for none, ``UNLIT`` where the light is not asked.
     """
 
     instance: wp.int32
     point: wp.vec3
+    occluder: wp.int32
 
 
 @wp.struct

@@ -39,6 +39,10 @@ def hits_of(renderer: Renderer, wanted: FrameletBatch, aspect: float = 1.0) -> H
     return hits
 
 
+def parts(hits: Hits) -> tuple[Tensor, ...]:
+    return hits.instance, hits.point, hits.occluder
+
+
 def distance_px(view: Viewpoint, instance: Tensor, point: Tensor, position: Tensor) -> Tensor:
     """How far from their samples hits land, pixels; one that is behind the camera is infinitely far."""
     found, depth = project(view, instance, point)
@@ -115,11 +119,12 @@ def test_threads_and_company_do_not_change_a_bit(packets: bool) -> None:
     wanted = asked(side, np.linspace(0.0, 1.0, side * side), 1)
     first, *others = (Renderer(driving_scene(), threads=n, packets=packets).trace(wanted).hits for n in (1, 2, 3))
     for hits in others:
-        assert torch.equal(hits.instance, first.instance) and torch.equal(hits.point, first.point)
+        assert all(torch.equal(*pair) for pair in zip(parts(hits), parts(first), strict=True))
     order = torch.from_numpy(np.random.default_rng(0).permutation(side * side))
     times = wanted.times[order].contiguous()
     shuffled = hits_of(renderer_of("driving", packets), replace(wanted, position=wanted.position[order], time_s=times))
-    assert torch.equal(shuffled.instance, first.instance[order]) and torch.equal(shuffled.point, first.point[order])
+    for other, part in zip(parts(shuffled), parts(first), strict=True):
+        assert torch.equal(other, part[order])
 
 
 def test_a_scene_far_from_the_origin_has_hits_and_poses_in_one_space() -> None:

@@ -61,7 +61,7 @@ template <class F> inline F load(const float* from) {
     __builtin_memcpy(&value, from, sizeof(F));
     return value;
 }
-template <class F> inline void store(float* to, F value) { __builtin_memcpy(to, &value, sizeof(F)); }
+template <class F, class T> inline void store(T* to, F value) { __builtin_memcpy(to, &value, sizeof(F)); }
 
 // Over all lanes, by halves.
 inline float least(f16 a) {
@@ -87,6 +87,11 @@ inline f8 least_of_each(const f16* a) {
     }
     return vmin((f8)__builtin_shufflevector(eighths[0], eighths[1], 0, 2, 4, 6, 8, 10, 12, 14),
                 (f8)__builtin_shufflevector(eighths[0], eighths[1], 1, 3, 5, 7, 9, 11, 13, 15));
+}
+inline int added(i16 a) {
+    i8 b = a.lo + a.hi;
+    i4 c = b.lo + b.hi;
+    return (c.x + c.y) + (c.z + c.w);
 }
 inline float added(f16 a) {
     f8 b = a.lo + a.hi;
@@ -139,6 +144,15 @@ inline Vec16 separated(const float* xyz) {
     return {__builtin_shufflevector(pq_x, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29),
             __builtin_shufflevector(pq_y, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30),
             __builtin_shufflevector(pq_z, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31)};
+}
+// Puts sixteen vectors one after the other.
+inline void store_joined(float* xyz, const Vec16& v) {
+    const f16 p = __builtin_shufflevector(v.x, v.y, 0, 16, -1, 1, 17, -1, 2, 18, -1, 3, 19, -1, 4, 20, -1, 5);
+    const f16 q = __builtin_shufflevector(v.x, v.y, 21, -1, 6, 22, -1, 7, 23, -1, 8, 24, -1, 9, 25, -1, 10, 26);
+    const f16 w = __builtin_shufflevector(v.x, v.y, -1, 11, 27, -1, 12, 28, -1, 13, 29, -1, 14, 30, -1, 15, 31, -1);
+    store<f16>(xyz, __builtin_shufflevector(p, v.z, 0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15));
+    store<f16>(xyz + 16, __builtin_shufflevector(q, v.z, 0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15));
+    store<f16>(xyz + 32, __builtin_shufflevector(w, v.z, 26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31));
 }
 // Elements of an array of vectors at lane-wise places, each read together with the float that follows it.
 inline Vec16 gather3(const float* base, i16 index) {

@@ -109,7 +109,7 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
 }
 
 // A batch: what is read of each sample, and where its answer goes. Times are read only where samples differ in them;
-// `footprint_scale` of footprints, and `instance` and `point` of first hits, may be null.
+// `footprint_scale`, and the three arrays of first hits, may be null.
 struct Samples {
     int count;
     const float* position;
@@ -118,7 +118,20 @@ struct Samples {
     float* color;
     int* instance;
     float* point;
+    int* occluder;
 };
+
+// Puts the first `used` of sixteen vectors, or numbers, one after the other.
+inline void put_first(float* to, const Vec16& value, int used) {
+    if (used == LANES) return store_joined(to, value);
+    float all[3 * LANES];
+    store_joined(all, value);
+    __builtin_memcpy(to, all, 3 * sizeof(float) * used);
+}
+inline void put_first(int* to, const i16& value, int used) {
+    if (used == LANES) return store(to, value);
+    __builtin_memcpy(to, &value, sizeof(int) * used);
+}
 
 // Shades samples `first` to `first + 15`, as far as there are so many. Adds the shadow rays and reflections it took to
 // `rays`.
@@ -127,7 +140,15 @@ inline void shade_packet(const Scene& scene, const View& view, int first, const 
     Stage<Scene, View> stage = {scene, view, {}, (f16)1.0f};
     const int left = samples.count - first, used = left < LANES ? left : LANES;
     f16 x, y;
-    for (int lane = 0; lane < LANES; ++lane) {
+    if (used == LANES) {
+        const float* place = samples.position + 2ll * first;
+        const f16 p = load<f16>(place), q = load<f16>(place + LANES);
+        x = __builtin_shufflevector(p, q, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+        y = __builtin_shufflevector(p, q, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+        if (!view.single_time) __builtin_memcpy(stage.time_s, samples.time_s + first, sizeof stage.time_s);
+        if (samples.footprint_scale) stage.footprint_scale = load<f16>(samples.footprint_scale + first);
+    }
+    for (int lane = 0; lane < LANES && used < LANES; ++lane) {
         const long long sample = first + (lane < used ? lane : used - 1);
         x[lane] = samples.position[2 * sample], y[lane] = samples.position[2 * sample + 1];
         if (!view.single_time) stage.time_s[lane] = samples.time_s[sample];
@@ -139,17 +160,12 @@ inline void shade_packet(const Scene& scene, const View& view, int first, const 
     FirstHit hit;
     const Vec16 result = radiance(stage, origin, direction, ALL >> (LANES - used), shadow_rays, bounces,
                                   samples.instance ? &hit : nullptr);
-    for (int lane = 0; lane < used; ++lane) {
-        float* to = samples.color + 3ll * (first + lane);
-        to[0] = result.x[lane], to[1] = result.y[lane], to[2] = result.z[lane];
-        rays[0] += shadow_rays[lane], rays[1] += bounces[lane];
-    }
+    rays[0] += added(shadow_rays), rays[1] += added(bounces);
+    put_first(samples.color + 3ll * first, result, used);
     if (!samples.instance) return;
-    for (int lane = 0; lane < used; ++lane) {
-        float* to = samples.point + 3ll * (first + lane);
-        to[0] = hit.point.x[lane], to[1] = hit.point.y[lane], to[2] = hit.point.z[lane];
-        samples.instance[first + lane] = hit.instance[lane];
-    }
+    put_first(samples.instance + first, hit.instance, used);
+    put_first(samples.point + 3ll * first, hit.point, used);
+    put_first(samples.occluder + first, hit.occluder, used);
 }
 
 // Calls `work(item)` for items below `count` that no other caller has taken; `taken` counts them for all callers.

@@ -5,6 +5,13 @@
 
 namespace packets {
 
+// What camera rays meet first: the instance, -1 for none; the point in the space of its track, for none the direction
+// of the ray; and the instance in the way of the first light, LIT for none, UNLIT where the light is not asked.
+struct FirstHit {
+    Vec16 point;
+    i16 instance, occluder;
+};
+
 // What the lights meet at each lane.
 struct Reflection {
     Vec16 emission, albedo, specular, mirror;  // `mirror` is what the mirrored ray is weighed with
@@ -40,10 +47,11 @@ inline Reflection reflection_of(const Scene& scene, const Surface& surface, unsi
     return result;
 }
 
-// Radiance that the lights send towards the viewer; counts the shadow rays it took.
+// Radiance that the lights send towards the viewer; counts the shadow rays it took. `first` receives the occluder, unless
+// it is null.
 template <class Scene, class View>
 inline Vec16 direct_light(const Stage<Scene, View>& stage, const Surface& surface, const Reflection& material,
-                          const Vec16& direction, i16& shadow_rays) {
+                          const Vec16& direction, i16& shadow_rays, FirstHit* first) {
     const Scene& scene = stage.scene;
     Vec16 total = {(f16)0.0f, (f16)0.0f, (f16)0.0f};
     const Vec16 start = surface.position + surface.geometric_normal * surface.offset;
@@ -66,6 +74,8 @@ inline Vec16 direct_light(const Stage<Scene, View>& stage, const Surface& surfac
         if (!facing) continue;
         shadow_rays -= lanes_of(facing);
         const unsigned blocked = meet_scene<true>(stage, start, towards, facing, shadow);
+        if (first && light == 0)
+            first->occluder = lanes_of(blocked) ? shadow.instance : lanes_of(facing) ? (i16)LIT : (i16)UNLIT;
         const unsigned seen = facing & ~blocked;
         if (!seen) continue;
         Vec16 reflected = material.albedo * (cosine * (1.0f / PI));
@@ -86,13 +96,6 @@ inline Vec16 mirror_direction(const Surface& surface, const Vec16& direction) {
     return unit(mirrored);
 }
 
-// What camera rays meet first: the instance, negative for none, and the point in the space of its track; for none the
-// direction of the ray.
-struct FirstHit {
-    Vec16 point;
-    i16 instance;
-};
-
 // Radiance along rays, and how many shadow rays and reflections it took; `first` receives what they meet first, unless
 // it is null.
 template <class Scene, class View>
@@ -109,7 +112,10 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
         hit.at.face = hit.instance = 0;
         const unsigned met = meet_scene<false>(stage, start, towards, busy, hit);
         const unsigned gone = busy & ~met;
-        if (first) first->point = towards, first->instance = lanes_of(met) ? hit.instance : (i16)-1;
+        if (first) {
+            first->point = towards, first->occluder = UNLIT;
+            first->instance = lanes_of(met) ? hit.instance : (i16)-1;
+        }
         if (gone) total = pick(lanes_of(gone), total + weight * environment_radiance(scene, towards), total);
         if (!met) break;
         Surface surface = {};
@@ -117,7 +123,6 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
             Vec16* in_track = first ? &first->point : nullptr;
             take(surface, surface_of(stage, instance, same, hit.at, start, towards, in_track), same);
         });
-        first = nullptr;
         const i16 on_surface = lanes_of(met);
         travelled += on_surface ? hit.at.t : (f16)0.0f;
         const f16 cosine = -dot(surface.normal, towards);
@@ -127,14 +132,14 @@ inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 toward
         Vec16 leaving = material.emission;
         if (material.lit) {
             const Vec16 glow = material.albedo * spread(scene.ambient) * material.ambient;
-            leaving = leaving + glow + direct_light(stage, surface, material, towards, shadow_rays);
+            leaving = leaving + glow + direct_light(stage, surface, material, towards, shadow_rays, first);
         }
         total = pick(on_surface, total + weight * leaving, total);
         weight = pick(on_surface, weight * material.mirror, weight);
         const i16 bright = vmax(vmax(weight.x, weight.y), weight.z) > scene.throughput_cutoff;
         busy = met & bits((bounces < scene.depth) & bright);
         if (!busy) break;
-        bounces -= lanes_of(busy);
+        bounces -= lanes_of(busy), first = nullptr;
         start = surface.position + surface.geometric_normal * surface.offset;
         towards = mirror_direction(surface, towards);
     }
