@@ -16,7 +16,7 @@ def play(name, picture, cycles=4, config=CONFIG):
     return list(runs.images(name, config, pictures.tracer(picture), fixed_clock(0.02), 0.0, cycles * 0.02))
 
 
-@pytest.mark.parametrize("name", ["frameless", "afr"])
+@pytest.mark.parametrize("name", ["frameless", "afr", "interruptible"])
 def test_constant_picture_is_shown_exactly_and_runs_repeat(name):
     shown = play(name, pictures.constant)[-1]
     assert torch.allclose(shown.image, torch.full((128, 128, 3), 0.4), atol=1e-5)
@@ -25,7 +25,7 @@ def test_constant_picture_is_shown_exactly_and_runs_repeat(name):
     assert torch.equal(*again) and bool(torch.isfinite(again[0]).all())
 
 
-@pytest.mark.parametrize("name", ["frameless", "afr", "framed"])
+@pytest.mark.parametrize("name", ["frameless", "afr", "framed", "interruptible"])
 def test_baselines_do_not_depend_on_the_thread_count(name):
     config = TsarConfig(batch_size=128, warmup_cycles=1)
     before, runs = torch.get_num_threads(), []

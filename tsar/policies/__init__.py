@@ -24,10 +24,11 @@ POLICIES: Named[Make] = Named(
         "framed-quarter": "tsar.policies.framed:quartered",
         "frameless": "tsar.policies.frameless:Frameless",
         "afr": "tsar.policies.afr:Afr",
+        "interruptible": "tsar.policies.interruptible:Interruptible",
         "oracle": "tsar.policies.oracle:Oracle",
     },
 )
 
-RIVALS = ("framed-1", "framed-super", "framed-half", "framed-quarter", "frameless", "afr")
+RIVALS = ("framed-1", "framed-super", "framed-half", "framed-quarter", "frameless", "afr", "interruptible")
 """Rivals beside ``framed`` that look at no truth: a policy is compared with all of them, and with the best at each
 moment."""

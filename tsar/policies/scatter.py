@@ -71,7 +71,7 @@ def write(
     buffer.time_s[hit] = time_s
 
 
-def pull_push(color: Float[Tensor, "3 h w"], weight: Float[Tensor, "1 h w"]) -> Float[Tensor, "3 h w"]:
+def pull_push(color: Float[Tensor, "c h w"], weight: Float[Tensor, "1 h w"]) -> Float[Tensor, "c h w"]:
     """Fill by pyramid: a pixel of weight 1 keeps its colour, one of less is blended with the coarser level, whose
     weights are the sums of its children's, at most 1."""
     if color.shape[1] == 1:
