@@ -56,7 +56,8 @@ class Screen:
             place = torch.stack((u, v, torch.full_like(u, -1.0 - number)), dim=-1)
             point = torch.where(there[..., None], place, point)
             instance = torch.where(there, number, instance)
-        hits = Hits(instance.to(torch.int32), point.to(torch.float32)) if batch.hits else None
+        seen = torch.full(instance.shape, -1, dtype=torch.int32)
+        hits = Hits(instance.to(torch.int32), point.to(torch.float32), seen) if batch.hits else None
         return SampleBatch(color.to(torch.float32), {"primary_rays": x.numel()}, hits)
 
     def view(self, time_s: float) -> Viewpoint:

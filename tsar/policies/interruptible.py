@@ -27,18 +27,16 @@ from dataclasses import dataclass, replace
 from math import inf, log2
 
 import torch
-import torch.nn.functional as F
 from jaxtyping import Float, Int32, Int64
 from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
-from tsar.policies import refinement
+from tsar.policies import displacement, refinement
 from tsar.policies.refinement import Level, encoded, mean
 from tsar.policies.scatter import generator, pixel_colors, pull_push
 from tsar.policy import Moment, Picture, Policy, Price, Setting
-from tsar.projection import project
-from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
+from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 SAMPLES_PER_PIXEL = 16
 """A frame is complete when it has this many, whatever moves."""
@@ -70,6 +68,10 @@ class Frame:
     point: Float[Tensor, "pixels 3"]
     grid: Int64[Tensor, " grid"]
     grid_color: Float[Tensor, "grid 3"]
+
+    @property
+    def hits(self) -> displacement.FirstHits:
+        return displacement.FirstHits(self.count > 0, self.position, self.instance, self.point)
 
     @staticmethod
     def empty(config: TsarConfig, time_s: float, grid: Int64[Tensor, " grid"]) -> Frame:
@@ -143,10 +145,14 @@ class Interruptible(Policy[Buffers]):
     @property
     def price(self) -> Price:
         """Beside refinement, per pixel: image 75 (pyramid up 20 and down 26, of three channels, and means 3, times
-        4/3); twice per cycle, for back and front, a quarter of projection 62, displacements 45 and comparison 60.
-        Per sample: order along the curve 15, replacement of what is not finite 6, sums 8, encoding and calibration 20.
+        4/3); and displacement, for back and front. Per sample: replacement of what is not finite 6, sums 8, encoding
+        and calibration 20.
         """
-        return Price(int(self.config.budget), pixel_flops=refinement.PIXEL_FLOPS + 75 + 2 * 42, sample_flops=49)
+        return Price(
+            int(self.config.budget),
+            pixel_flops=refinement.PIXEL_FLOPS + 75 + 2 * displacement.PIXEL_FLOPS,
+            sample_flops=34,
+        )
 
     def start(self) -> Buffers:
         return Buffers()
@@ -200,7 +206,8 @@ class Interruptible(Policy[Buffers]):
         probes (their mean and its standard error) tell, from them."""
         moved, age_s = 0.0, moment.time_s - view.frame.time_s
         if self._view is not None:
-            moved = _moved(view, self._view(moment.time_s), self._view(moment.time_s - moment.cycle_s), self.config)
+            now, before = self._view(moment.time_s), self._view(moment.time_s - moment.cycle_s)
+            moved = displacement.change(view.image, view.frame.hits, now, before)
         if probes is None or age_s <= 0.0 or probes[0] - _SURE * probes[1] <= moved:
             return moved
         return probes[0] * (age_s + moment.cycle_s) / age_s
@@ -282,37 +289,3 @@ def _probed(frame: Frame, asked: Asked, color: Float[Tensor, "probes 3"]) -> tup
     squared = change.square().to(torch.float64).sum(1) / 3.0
     average = mean(squared)
     return average, (mean((squared - average).square()) / (squared.numel() - 1)) ** 0.5
-
-
-def _moved(view: View, now: Viewpoint, before: Viewpoint, config: TsarConfig) -> float:
-    """Mean squared change of a picture whose pixels move as the first hits do, up to a cycle from now."""
-    side, frame = config.resolution_px, view.frame
-    half = side // 2
-    pixel = torch.where(frame.count > 0, torch.arange(side * side), -1)
-    pixel = pixel.reshape(half, 2, half, 2).amax((1, 3)).reshape(-1)  # one for each four
-    known = (pixel >= 0).nonzero().squeeze(1)
-    some = pixel[known]
-    here, there = (project(at, frame.instance[some], frame.point[some])[0] for at in (now, before))
-    moved = (2.0 * here - there - frame.position[some]) * side
-    gone = 0.0 if now.kind == "parallel" else float(side)  # at infinity; behind the camera
-    field = torch.zeros(half * half, 3)
-    field[known] = F.pad(moved.to(torch.float32).nan_to_num(gone, side, -side), (0, 1), value=1.0)
-    planes = field.T.reshape(3, half, half).clamp(-side, side)
-    shift = pull_push(planes[:2].contiguous(), planes[2:])
-    place = torch.arange(0, side, 2).to(torch.float32)
-    picture = encoded(view.image)
-    difference = _bilinear(picture, place[None, :] - shift[0], place[:, None] - shift[1]) - picture[::2, ::2]
-    return mean(difference.square())
-
-
-def _bilinear(
-    picture: Float[Tensor, "h w 3"], x: Float[Tensor, "rows columns"], y: Float[Tensor, "rows columns"]
-) -> Float[Tensor, "rows columns 3"]:
-    """The picture between its pixels, whose centres are at whole numbers; its border goes on outside."""
-    height, width, _ = picture.shape
-    left, top = x.floor(), y.floor()
-    across, down = (x - left)[..., None], (y - top)[..., None]
-    columns = [(left.to(torch.int64) + k).clamp(0, width - 1) for k in (0, 1)]
-    rows = [(top.to(torch.int64) + k).clamp(0, height - 1) for k in (0, 1)]
-    above, below = ((1.0 - across) * picture[row, columns[0]] + across * picture[row, columns[1]] for row in rows)
-    return (1.0 - down) * above + down * below

@@ -11,7 +11,6 @@ Source: adaptive refinement of Painter and Sloan 1989, by levels of a quadtree.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import torch
 import torch.nn.functional as F
@@ -83,7 +82,7 @@ def worthiest(tree: list[Level], count: int, random: torch.Generator) -> Int64[T
     """
     side = tree[-1].count.shape[0]
     cells = [level.count.numel() for level in tree]
-    score, cost = zip(*(_offer(level, finer) for level, finer in pairwise([*tree, None])), strict=True)
+    score, cost = zip(*map(_offer, tree, [*tree[1:], None]), strict=True)
     worth = torch.cat([part.reshape(-1) for part in score])
     order = torch.argsort(worth, descending=True, stable=True)
     order = order[worth[order] > 0.0]
