@@ -11,10 +11,22 @@ import tyro
 from analysis.command import limits
 from tsar.config import closed_choices, require
 
-GROUPS = ("coherent", "incoherent", "shaded", "cores", "order", "features", "overhead", "growth", "conversion", "start")
+GROUPS = (
+    "coherent",
+    "incoherent",
+    "shaded",
+    "cores",
+    "order",
+    "hits",
+    "features",
+    "overhead",
+    "growth",
+    "conversion",
+    "start",
+)
 """Groups of rows, in the order of the table."""
 
-ON_CPU_ONLY = ("coherent", "incoherent", "cores", "conversion", "start")
+ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "conversion", "start")
 """Groups of what does not run on a GPU."""
 
 FRAMELET_SIDE = 16
@@ -30,7 +42,7 @@ class BenchOptions:
     """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
-    cores, order, features, overhead, growth, conversion, start."""
+    cores, order, hits, features, overhead, growth, conversion, start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of ours are compared; runs nothing."""
     device: Literal["cpu", "cuda:0"] = "cpu"

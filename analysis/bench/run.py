@@ -16,7 +16,7 @@ from analysis.bench.rows import SPREAD, Group, Row
 from analysis.bench.scenes import driving_scenes
 from analysis.bench.shading import shaded
 from analysis.bench.start import start_rows
-from analysis.bench.threads import cores, order
+from analysis.bench.threads import cores, hits, order
 from analysis.command import progress
 from analysis.command.cli import bad_input, full_disk
 from analysis.storage.files import write_json
@@ -29,6 +29,7 @@ MEASURED_BY: Mapping[str, Group] = {
     "shaded": shaded,
     "cores": cores,
     "order": order,
+    "hits": hits,
     "features": features,
     "overhead": overhead,
     "growth": growth,

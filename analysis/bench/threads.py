@@ -1,8 +1,11 @@
-"""Groups cores and order: two threads against one, and Morton order against reading order, of framelet batches."""
+"""Groups cores, order and hits: framelet batches on two threads against one, in Morton order against reading order, and
+with first hits against without."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.bench.options import BenchOptions
@@ -67,3 +70,20 @@ def order(options: BenchOptions, bars: Bars) -> Iterator[Row]:
         renderer.close()
         row = Row("order", f"{name}, Morton order", "M samples/s", 0.0, "row order")
         yield rate_row(row, _samples(batches), seconds["Morton"], seconds["rows"])
+
+
+def hits(options: BenchOptions, bars: Bars) -> Iterator[Row]:
+    """The same batches with first hits and without, in CPU seconds of one thread."""
+    scenes = _scenes(options)
+    task = bars.task("hits", len(scenes) * options.repetitions)
+    for name, scene in scenes.items():
+        batches = morton_batches(options, scene.duration_s)
+        renderer = renderer_of(scene, options, 1)
+        cases = {
+            "with": _tracing(renderer.trace, [replace(batch, hits=True) for batch in batches]),
+            "without": _tracing(renderer.trace, batches),
+        }
+        seconds = take_turns(cases, options.repetitions, task, clock=time.process_time)
+        renderer.close()
+        row = Row("hits", f"{name}, with first hits", "M samples/s", 0.0, "without")
+        yield rate_row(row, _samples(batches), seconds["with"], seconds["without"])

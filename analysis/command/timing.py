@@ -1,4 +1,4 @@
-"""Wall seconds of cases that take turns, so that changes of the machine's speed affect all cases alike."""
+"""Seconds of cases that take turns, so that changes of the machine's speed affect all cases alike."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ def take_turns(
     task: Task | None = None,
     rest_s: float = 0.0,
     lead_in: bool = False,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, list[float]]:
-    """Wall seconds of every case, ``repetitions`` times each, after one run that is not counted.
+    """Seconds of every case, ``repetitions`` times each, after one run that is not counted.
 
     Cases take turns, forwards and backwards, so that neither drift nor their order favours one of them.
 
@@ -28,6 +29,7 @@ def take_turns(
         rest_s: pause before each turn. Threads of the previous case may go on spinning for milliseconds.
         lead_in: each turn runs twice and the second run counts. A core that another case left idle is slow at first,
             and a renderer in use does not leave cores idle.
+        clock: seconds so far; by default those on the wall.
     """
     for run in cases.values():
         run()
@@ -37,9 +39,9 @@ def take_turns(
             time.sleep(rest_s)
             if lead_in:
                 cases[name]()
-            start = time.perf_counter()
+            start = clock()
             cases[name]()
-            seconds[name].append(time.perf_counter() - start)
+            seconds[name].append(clock() - start)
         if task is not None:
             task.advance()
     return seconds

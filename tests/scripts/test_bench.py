@@ -13,21 +13,24 @@ SMALL = ("--resolution-px", "64", "--batch-size", "8", "--scenes", "fly-by", "--
 def test_a_part_is_run_and_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    arguments = ("--only", "order", "--only", "cores", *SMALL, "--out", str(tmp_path))
+    arguments = ("--only", "order,hits", "--only", "cores", *SMALL, "--out", str(tmp_path))
     assert call_script("bench.py", monkeypatch, *arguments) == 0
     shown = capsys.readouterr().out
     found = json.loads((tmp_path / "bench.json").read_text())
     rows = {(row["group"], row["name"]): row for row in found["rows"]}
-    names = {("order", "fly-by, Morton order"), ("order", "bumpy sphere, Morton order")}
-    assert names <= set(rows) and {group for group, _ in rows} <= {"order", "cores"}
-    for key in names:
+    peers = {"Morton order": ("order", "row order"), "with first hits": ("hits", "without")}
+    names = {
+        (peers[what][0], f"{scene}, {what}"): peers[what][1] for scene in ("fly-by", "bumpy sphere") for what in peers
+    }
+    assert set(names) <= set(rows) and {group for group, _ in rows} <= {"order", "hits", "cores"}
+    for key, peer in names.items():
         row = rows[key]
-        assert row["peer_name"] == "row order" and row["met"] is None and row["repetitions"] == 7
+        assert row["peer_name"] == peer and row["met"] is None and row["repetitions"] == 7
         low, high = row["spread"]
         assert 0.0 < low <= row["ratio"] <= high
     assert found["machine"]["cpu"] in shown and "row order" in shown
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["rows"] == len(rows) and summary["config"]["only"] == ["order", "cores"]
+    assert summary["rows"] == len(rows) and summary["config"]["only"] == ["order,hits", "cores"]
     assert set(summary["provenance"]) >= {"commit", "config_hash", "versions"}
 
     same = str(tmp_path / "bench.json")

@@ -19,6 +19,16 @@ def test_cases_take_turns_both_ways() -> None:
     assert rounds == [1, 2, 3] and all(len(values) == 3 for values in seconds.values())
 
 
+def test_turns_are_timed_by_the_clock_that_is_given() -> None:
+    now = [0.0]
+
+    def work(seconds: float) -> None:
+        now[0] += seconds
+
+    seconds = take_turns({"a": lambda: work(1.0), "b": lambda: work(3.0)}, 2, clock=lambda: now[0])
+    assert seconds == {"a": [1.0, 1.0], "b": [3.0, 3.0]}
+
+
 def test_rates_and_the_median_of_the_ratios_of_the_rounds() -> None:
     row = rate_row(ROW, 12.0, [1.0, 2.0, 4.0], [2.0, 2.0, 40.0], target=2.0)
     assert (row.ours, row.peer, row.repetitions, row.note) == (6.0, 6.0, 3, "kept")
