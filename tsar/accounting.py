@@ -13,6 +13,8 @@ from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton, total
 from tsar.types import Densities, Errors
 
+_AT_BOUND = 1e-6  # of a bound, relative
+
 FAST_REFRESH = 0.5
 """Elements refreshed at least this often per cycle count as moving when the spread of ages is measured."""
 
@@ -48,3 +50,31 @@ def _age_spread(newest_s: Float64[Tensor, "side side"], densities: Densities, co
     fast = densities.temporal[raster_to_morton(side)] >= FAST_REFRESH
     shown = field[fast & torch.isfinite(field)]
     return float(shown.max() - shown.min()) if shown.numel() else 0.0
+
+
+@dataclass(frozen=True)
+class Movement:
+    """What a decision did to the elements of the field.
+
+    Attributes:
+        elements: whose densities changed.
+        saturated: that came to lie at a bound of a density at which they did not lie before: one decision drove them as
+            far as they can go.
+    """
+
+    elements: int
+    saturated: int
+
+
+def movement(before: Densities, after: Densities, config: TsarConfig) -> Movement:
+    """How many elements a decision moved, and how many of them it drove to a bound."""
+    moved = torch.zeros_like(before.spatial, dtype=torch.bool)
+    struck = torch.zeros_like(moved)
+    bounds = config.spatial_bounds, config.temporal_bounds
+    pairs = (before.spatial, after.spatial), (before.temporal, after.temporal)
+    for (low, high), (old, new) in zip(bounds, pairs, strict=True):
+        changed = old != new
+        at_bound = (new <= low * (1 + _AT_BOUND)) | (new >= high * (1 - _AT_BOUND))
+        moved |= changed
+        struck |= changed & at_bound & (old > low * (1 + _AT_BOUND)) & (old < high * (1 - _AT_BOUND))
+    return Movement(int(moved.sum()), int(struck.sum()))

@@ -134,7 +134,7 @@ class ReconstructionConfig:
     """Image reconstruction (sec. 4.2)."""
 
     age_support_px: int = 9
-    """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off."""
+    """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off. The thesis has 128."""
     method: str = "blend"
     """How cached framelets become an image: blend, or one that was added."""
 

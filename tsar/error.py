@@ -116,6 +116,8 @@ def compressed_luminance(color: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n"]:
 
     The shoulder keeps one very bright sample from saturating a whole tile; the root spreads dark tones about as a
     display's encoding does. Negative luminance counts as black.
+
+    Deviation: the thesis transforms luminance itself (sec. 5.3.4), of pictures without high dynamic range.
     """
     # no matrix product: some libraries round it differently by the number of threads
     red, green, blue = (share * part for share, part in zip(LUMINANCE, color.unbind(-1), strict=True))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Generic, TypeVar
 
 from jaxtyping import Float
@@ -83,10 +83,12 @@ class Picture:
     Attributes:
         image: ``(height, width, 3)`` float32 linear RGB.
         sample_map: age and density of its samples; None where the policy cannot tell.
+        counters: work done for it, by name; ``framelet_pixels`` are the pixels of all framelets that were accumulated.
     """
 
     image: Float[Tensor, "h w 3"]
     sample_map: SampleMap | None = None
+    counters: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,11 @@ class Cycle(Generic[State]):
     samples: SampleBatch
     shown: Picture
     timer: StageTimer
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Work done, by name: by the renderer, and for the image."""
+        return {**self.samples.counters, **self.shown.counters}
 
 
 class Policy(ABC, Generic[State]):
@@ -164,7 +171,7 @@ class Policy(ABC, Generic[State]):
         for cycle in range(self.probe_cycles):
             done = step(self, state, trace, Moment(time_s, cycle, 1.0))
             state = done.after
-        return done.samples.counters, done.timer.total
+        return done.counters, done.timer.total
 
     def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord | None:
         """What is kept of a cycle; None where there is nothing to keep."""
@@ -194,7 +201,7 @@ def run(
     while time_s < end_s:
         moment = Moment(time_s, cycle, cycle_s)
         done = step(policy, state, trace, moment)
-        cycle_s = checked(cycle_seconds, done.samples.counters, done.timer.total)
+        cycle_s = checked(cycle_seconds, done.counters, done.timer.total)
         record = policy.record(done, moment, cycle_s)
         shown = done.shown
         yield record, ShownImage(time_s + policy.latency_cycles * cycle_s, time_s, shown.image, shown.sample_map)

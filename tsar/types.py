@@ -212,6 +212,7 @@ class StepRecord:
         nonfinite: non-finite samples replaced.
         nonfinite_fields: densities and errors that are not finite; there should be none.
         age_spread_s: newest minus oldest sample time shown inside regions of fast refresh, seconds.
+        moved, saturated: elements whose densities the response changed, and those of them that it drove to a bound.
     """
 
     cycle: int
@@ -228,3 +229,5 @@ class StepRecord:
     nonfinite: int
     nonfinite_fields: int = 0
     age_spread_s: float = 0.0
+    moved: int = 0
+    saturated: int = 0

@@ -17,7 +17,7 @@ from analysis.bench.options import FRAMELET_SIDE, BenchOptions
 from analysis.bench.rows import NOT_INSTALLED, Row, limit_row, rate_row
 from analysis.bench.scenes import driving_scenes, morton_batches, renderer_of
 from analysis.command.timing import take_turns
-from analysis.metrics.cost_model import RAYS, parameters_of, stage_flops
+from analysis.metrics.cost_model import RAYS, measured_parameters, parameters_of, stage_flops
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
@@ -90,7 +90,8 @@ def stage_rows(config: TsarConfig, found: Sequence[Cycle]) -> Iterator[Row]:
     """Each stage's share of a cycle, over all scenes, beside the share that the cost model gives it."""
     rays = sum(cycle.counters.get(name, 0) for cycle in found for name in RAYS)
     segments = rays / sum(cycle.counters["primary_rays"] for cycle in found)
-    flops = stage_flops(parameters_of(config, segments))
+    drawn = {"framelet_pixels": sum(cycle.counters.get("framelet_pixels", 0) for cycle in found) / len(found)}
+    flops = stage_flops(measured_parameters(parameters_of(config, segments), drawn))
     modelled = {name: float(value) / float(sum(flops.values())) for name, value in flops.items()}
     for name in found[0].stage_s:
         measured = [cycle.stage_s[name] / sum(cycle.stage_s.values()) for cycle in found]

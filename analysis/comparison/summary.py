@@ -65,6 +65,11 @@ class Measured:
         """Sums over the cycles of the run's own."""
         return self.runs[self.own].totals
 
+    @property
+    def own_cost(self) -> CostParameters:
+        """Parameters of the cost model with what the mean cycle of the run's own drew."""
+        return self.totals.of_a_cycle(self.cost)
+
     @cached_property
     def invariants(self) -> dict[str, Any] | None:
         """What was checked in every recorded cycle of the run, and whether all hold in every run; None where no run
@@ -97,15 +102,16 @@ def ledger_costs(measured: Measured) -> dict[str, dict[str, float]]:
     """Cost of a cycle of every run under every ledger; FLOPs, except under ``wall``, which is seconds."""
     costs: dict[str, dict[str, float]] = {ledger: {} for ledger in LEDGERS}
     for name, run in measured.runs.items():
+        cost = run.totals.of_a_cycle(measured.cost)
         for ledger in MODELLED:
-            costs[ledger][name] = float(policy_flops(measured.cost, run.price, ledger))
+            costs[ledger][name] = float(policy_flops(cost, run.price, ledger))
         totals, meter = run.totals, run.meter
         # the cycles of the span where they are recorded, all that were traced elsewhere
         counters, cycles = (totals.counters, totals.cycles) if totals.cycles else (meter.counters, max(meter.calls, 1))
         if counters:
-            control = float(control_flops(measured.cost, run.price))
+            control = float(control_flops(cost, run.price))
             # means of counts are not whole, which the price does not mind
-            costs["work"][name] = work_flops(measured.cost, counters) / cycles + control
+            costs["work"][name] = work_flops(cost, counters) / cycles + control
         costs["wall"][name] = (sum(totals.stage_s.values()) if totals.cycles else meter.wall_s) / cycles
     return {ledger: found for ledger, found in costs.items() if found}
 
@@ -149,7 +155,9 @@ def summarise(measured: Measured) -> dict[str, Any]:
         "segments_counted": segments(totals.counters),
         "segments_modelled": measured.cost.trace_segments,
         "stage_wall_s": dict(totals.stage_s),
-        "stage_flops": {name: float(v) * totals.cycles for name, v in stage_flops(measured.cost).items()},
+        "stage_flops": {name: float(v) * totals.cycles for name, v in stage_flops(measured.own_cost).items()},
+        "overdraw": float(measured.own_cost.overdraw),
+        "saturation": totals.saturation,
         "ledgers": ledger_costs(measured),
         "cycles_per_image": cycles_per_image(measured),
         "conclusion_changes_with_ledger": len({n >= 1 for n in cycles_per_image(measured).values()}) > 1,
@@ -203,6 +211,8 @@ def key_table(measured: Measured) -> Table:
         ("non-finite samples replaced", str(totals.nonfinite)),
         ("non-finite densities and errors", str(totals.nonfinite_fields)),
         ("invariants hold in every cycle", holds),
+        ("framelets drawn per pixel", f"{float(measured.own_cost.overdraw):.2f}"),
+        ("moved elements that one decision drove to a bound", f"{100 * totals.saturation:.0f} %"),
         ("spread of ages in moving regions", f"{1e3 * totals.age_spread_s / max(totals.cycles, 1):.0f} ms"),
     ]
     for name in measured.rivals:
@@ -234,7 +244,7 @@ def metric_table(measured: Measured) -> Table | None:
 
 def stage_table(measured: Measured) -> Table:
     """Per stage: share by the model beside what was measured."""
-    flops, wall, cycles = stage_flops(measured.cost), measured.totals.stage_s, max(measured.totals.cycles, 1)
+    flops, wall, cycles = stage_flops(measured.own_cost), measured.totals.stage_s, max(measured.totals.cycles, 1)
     total, total_s = sum(float(v) for v in flops.values()), sum(wall.values()) or 1.0
     rows = []
     for name in dict.fromkeys((*flops, *wall)):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from analysis.command.cli import bad_input, require_memory
 from analysis.cost_report.options import MeasurementOptions
 from analysis.cost_report.refit import Cell, MemoryTrace
-from analysis.metrics.cost_model import RAYS
+from analysis.metrics.cost_model import RAYS, measured_parameters
 from tsar.config import TsarConfig
 
 if TYPE_CHECKING:
@@ -185,13 +185,15 @@ def _cell(setting: tuple[int, int], adaptive: _Adaptive, framed: _Framed) -> Cel
     from analysis.comparison.experiment import RunOptions
 
     skip = adaptive.options.cycles_per_turn
-    stages, segments = adaptive.stage_s[skip:], _segments(adaptive.counters[skip:])
+    stages, counters = adaptive.stage_s[skip:], adaptive.counters[skip:]
+    segments, drawn = _segments(counters), sum(one["framelet_pixels"] for one in counters) / len(counters)
+    cost = RunOptions(adaptive.options.input, adaptive.config, trace_segments=segments).cost
     return Cell(
         *setting,
         stage_s={name: median(found[name] for found in stages) for name in stages[0]},
         cycle_s=median(sum(found.values()) for found in stages),
         segments=segments,
-        parameters=RunOptions(adaptive.options.input, adaptive.config, trace_segments=segments).cost,
+        parameters=measured_parameters(cost, {"framelet_pixels": drawn}),
         image_s=median(framed.image_s[1:]),
         image_trace_s=median(framed.trace_s[1:]),
         image_segments=_segments(framed.counters[1:]),

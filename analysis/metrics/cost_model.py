@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 if TYPE_CHECKING:
@@ -202,6 +202,17 @@ def control_flops(p: CostParameters, price: Price, ledger: Ledger = "thesis") ->
     return control + price.pixel_flops * p.recon_res + price.sample_flops * price.samples
 
 
+def measured_parameters(p: CostParameters, counters: Mapping[str, float]) -> CostParameters:
+    """Parameters with what a cycle drew: the framelets that were accumulated at each pixel, where that was counted.
+
+    Args:
+        p: scalars.
+        counters: work of one cycle, by name; ``framelet_pixels`` are those of all framelets that were accumulated.
+    """
+    drawn = counters.get("framelet_pixels", 0)
+    return replace(p, avg_recon_overdraw=drawn / p.recon_res) if drawn > 0 else p
+
+
 Seconds = Callable[[Mapping[str, int], float], float]
 
 
@@ -210,7 +221,7 @@ def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters, price: Pri
 
     Args:
         ledger: how cost is counted; ``wall`` returns the measured seconds, ``work`` the counted rays and what is
-            modelled beside them.
+            modelled beside them. Reconstruction is charged for the framelets that were drawn, where they are counted.
         capacity: FLOP/s of the simulated machine.
         p: scalars.
         price: of a cycle of the policy.
@@ -225,10 +236,10 @@ def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters, price: Pri
     if ledger == "wall":
         return lambda counters, wall_s: wall_s
     if ledger == "work":
-        control = float(control_flops(p, price))
-        return lambda counters, wall_s: (work_flops(p, counters) + control) / capacity
-    modelled = float(policy_flops(p, price, ledger))
-    return lambda counters, wall_s: modelled / capacity
+        return lambda counters, wall_s: (
+            (work_flops(p, counters) + float(control_flops(measured_parameters(p, counters), price))) / capacity
+        )
+    return lambda counters, wall_s: float(policy_flops(measured_parameters(p, counters), price, ledger)) / capacity
 
 
 def expected_ledger(ledger: Ledger) -> Ledger:
@@ -237,14 +248,16 @@ def expected_ledger(ledger: Ledger) -> Ledger:
 
 
 def parameters_of(config: TsarConfig, trace_segments: float) -> CostParameters:
-    """Parameters for a configuration of the pipeline. Parameters that it does not set keep the values of table 7.1."""
+    """Parameters for a configuration of the pipeline. Parameters that it does not set keep the values of table 7.1; how
+    much reconstruction draws is known of a run only: see :func:`measured_parameters`."""
     return CostParameters(
         batch_size=config.batch_size,
         sdf_size=config.sdf_side**2,
         framelet_size=config.samples,
         recon_res=config.resolution_px**2,
         cache_size=config.cache_slots,
+        recon_age_support=config.reconstruction.age_support_px,
         trace_segments=trace_segments,
         tiling_size=config.tile_count_max,
-        dwt_coeffs=448 * config.samples / 256,
+        dwt_coeffs=6 * (config.samples - 1) // 3,
     )

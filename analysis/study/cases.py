@@ -153,8 +153,10 @@ class Case:
 
     @property
     def cost(self) -> CostParameters:
-        """Parameters of the cost model."""
-        return parameters_of(self.tsar, self.trace_segments)
+        """Parameters of the cost model. A pixel is charged the age support of the full size, which a small one covers
+        in fewer pixels."""
+        own = parameters_of(self.tsar, self.trace_segments)
+        return dataclasses.replace(own, recon_age_support=own.recon_age_support * self.scale.divisor)
 
     @property
     def capacity(self) -> float:

@@ -223,7 +223,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "jod": _score(case, seen),
         "regions": seen.regions(),
         "stills": stills,
-        **(_cycles(totals) if totals.cycles else {}),
+        **(_cycles(totals, case) if totals.cycles else {}),
         "machine": {
             "reference_s": began_run - began,
             "run_s": scored - began_run,
@@ -236,11 +236,13 @@ def _run(case: Case, key: str, place: Place) -> None:
     store.write_json(place.files(key)["summary"].name, found)
 
 
-def _cycles(totals: Totals) -> dict[str, Any]:
+def _cycles(totals: Totals, case: Case) -> dict[str, Any]:
     return {
         "cycles": totals.cycles,
         "cycle_s": totals.simulated_s / totals.cycles,
         "age_spread_s": totals.age_spread_s / totals.cycles,
+        "overdraw": totals.counters["framelet_pixels"] / totals.cycles / case.tsar.resolution_px**2,
+        "saturation": totals.saturation,
         "invariants": totals.invariants,
     }
 

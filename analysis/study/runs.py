@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds
+from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds, measured_parameters
 from analysis.metrics.quality import Shown
 from analysis.storage.invariants import InvariantCheck
 from analysis.storage.records import RecordLimits
@@ -53,6 +53,7 @@ class Totals:
         limits = RecordLimits(config.batch_size, config.budget, config.spatial_bounds, config.temporal_bounds)
         self._check = InvariantCheck(limits)
         self.cycles = self.warmup_cycles = self.nonfinite = self.nonfinite_fields = 0
+        self.moved = self.saturated = 0
         self.simulated_s = self.age_spread_s = 0.0
         self.stage_s: Counter[str] = Counter()
         self.counters: Counter[str] = Counter()
@@ -68,6 +69,8 @@ class Totals:
         self.nonfinite += record.nonfinite
         self.nonfinite_fields += record.nonfinite_fields
         self.age_spread_s += record.age_spread_s
+        self.moved += record.moved
+        self.saturated += record.saturated
         self.stage_s.update(record.stage_s)
         self.counters.update(record.counters)
 
@@ -75,6 +78,18 @@ class Totals:
     def recorded(self) -> bool:
         """Whether the policy records its cycles."""
         return self.cycles + self.warmup_cycles > 0
+
+    @property
+    def saturation(self) -> float:
+        """Share of the elements that a decision moved, over all cycles, that it drove to a bound; NaN where none
+        moved."""
+        return self.saturated / self.moved if self.moved else float("nan")
+
+    def of_a_cycle(self, p: CostParameters) -> CostParameters:
+        """Parameters of the cost model with what the mean cycle drew, where cycles are recorded."""
+        if not self.cycles:
+            return p
+        return measured_parameters(p, {name: count / self.cycles for name, count in self.counters.items()})
 
     @property
     def invariants(self) -> dict[str, Any]:

@@ -101,7 +101,7 @@ class Oracle(Policy[Foresight]):
 
     def image(self, state: Foresight, moment: Moment) -> Picture:
         made = reconstruct(state.cache, self.config, moment.cycle_s)
-        return Picture(made.image, made.sample_map)
+        return Picture(made.image, made.sample_map, made.counters)
 
     def _spread(self, count: int, moment: Moment) -> FrameletBatch:
         """At most so many tiles of the finest level, evenly spread."""

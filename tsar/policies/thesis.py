@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tsar.accounting import movement
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.policy import Cycle, Moment, Picture, Policy, Setting
@@ -66,14 +67,14 @@ class Thesis(Policy[State]):
 
     def image(self, state: State, moment: Moment) -> Picture:
         made = self._stages.reconstruct(state.cache, self.config, moment.cycle_s)
-        return Picture(made.image, made.sample_map)
+        return Picture(made.image, made.sample_map, made.counters)
 
     def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord:
         before, after, config = cycle.before, cycle.after, self.config
         assert after.errors is not None and cycle.shown.sample_map is not None
         newest_s = cycle.shown.sample_map.newest_s
         account = self._stages.account(after.densities, after.errors, newest_s, config)
-        surplus = after.densities.surplus
+        surplus, moved = after.densities.surplus, movement(before.densities, after.densities, config)
         return StepRecord(
             cycle=moment.cycle,
             sim_time_s=moment.time_s,
@@ -85,8 +86,10 @@ class Thesis(Policy[State]):
             surplus=surplus,
             conservation_residual=abs(account.combined + surplus - config.budget) / config.budget,
             stage_s=dict(cycle.timer.seconds),
-            counters=dict(cycle.samples.counters),
+            counters=cycle.counters,
             nonfinite=after.nonfinite,
             nonfinite_fields=account.nonfinite,
             age_spread_s=account.age_spread_s,
+            moved=moved.elements,
+            saturated=moved.saturated,
         )

@@ -17,10 +17,12 @@ from analysis.metrics.cost_model import (
     error_per_framelet,
     naive_per_pixel,
     nonadaptive_flops,
+    parameters_of,
     per_segment,
     policy_flops,
     stage_flops,
 )
+from tsar.config import ReconstructionConfig, TsarConfig
 from tsar.policy import Price
 
 DEFAULT = CostParameters()
@@ -123,6 +125,23 @@ def test_clocks() -> None:
     assert cycle_seconds("work", 1e6, p, frame(p))(rays, 9.0) == pytest.approx(150 * per_segment(p) / 1e6)
     control = adaptive_flops(p) - stage_flops(p)["tracing"]
     assert cycle_seconds("work", 1e6, p, CYCLE)(rays, 9.0) == pytest.approx((150 * per_segment(p) + control) / 1e6)
+
+
+def test_reconstruction_is_charged_for_what_was_drawn() -> None:
+    """By every ledger that models it; without a count, for what is assumed."""
+    p, drawn = CostParameters(), {"framelet_pixels": 2 * 512**2, "primary_rays": 100}
+    saved = (16 * 9 + 6) * (p.overdraw - 2) * 512**2
+    for ledger in ("thesis", "printed", "summed", "work"):
+        found, assumed = (cycle_seconds(ledger, 1.0, p, CYCLE)(c, 9.0) for c in (drawn, {"primary_rays": 100}))
+        assert assumed - found == pytest.approx(saved)
+    assert cycle_seconds("thesis", 1.0, p, frame(p))(drawn, 9.0) == nonadaptive_flops(p), "a framed image draws none"
+
+
+def test_a_run_is_charged_for_its_own_age_support_and_coefficients() -> None:
+    for side, coefficients in ((16, 6 * (64 + 16 + 4 + 1)), (32, 6 * (256 + 64 + 16 + 4 + 1))):
+        config = TsarConfig(framelet_side=side, batch_size=32, reconstruction=ReconstructionConfig(33))
+        p = parameters_of(config, 4.0)
+        assert p.dwt_coeffs == coefficients and p.recon_age_support == 33
 
 
 def test_bad_values_name_the_field() -> None:

