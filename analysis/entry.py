@@ -10,7 +10,7 @@ import importlib
 import importlib.metadata
 import sys
 
-from analysis.command.cli import InputError, run_cli
+from analysis.command.cli import InputError, command, run_cli
 from analysis.command.extras import DISTRIBUTION
 
 COMMANDS = {
@@ -62,9 +62,9 @@ def _dispatch() -> None:
         for table in rest or TABLES:
             _print_table(table)
     else:
-        module = importlib.import_module(_known(name, {**COMMANDS, "list": ""}, "command"))
+        called = command(_known(name, {**COMMANDS, "list": ""}, "command"))
         sys.argv = [f"tsar {name}", *rest]
-        module.main()
+        called()
 
 
 def _print_table(name: str) -> None:

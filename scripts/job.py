@@ -5,8 +5,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.command.cli import run_cli
-from analysis.tracer.job_command import main
+from analysis.command.cli import command, run_cli
+
+main = command("analysis.tracer.job_command")
 
 if __name__ == "__main__":
     run_cli(main)

@@ -19,8 +19,9 @@ SIGNALS = (signal.SIGINT, signal.SIGALRM)
 def heeded() -> Iterator[None]:
     """Has Ctrl-C raise KeyboardInterrupt in the block, again every half second unless that is being handled.
 
-    What is cleaned up meanwhile is not disturbed. Outside the main thread, or where Ctrl-C does something else already,
-    nothing changes.
+    What is cleaned up meanwhile is not disturbed. An error that follows a lost one, such as that of a module that could
+    not be loaded, counts as the KeyboardInterrupt. Outside the main thread, or where Ctrl-C does something else
+    already, nothing changes.
     """
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -29,6 +30,10 @@ def heeded() -> Iterator[None]:
     before = {number: signal.signal(number, _interrupt) for number in SIGNALS}
     try:
         yield
+    except Exception as error:
+        if signal.getitimer(signal.ITIMER_REAL)[0]:
+            raise KeyboardInterrupt from error
+        raise
     finally:
         settled()
         for number, handler in before.items():

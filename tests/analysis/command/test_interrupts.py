@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -12,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from analysis.command import interrupts
-from analysis.command.cli import run_cli
+from analysis.command.cli import command, run_cli
 from analysis.command.interrupts import heeded, settled
+from tests.scripts.commands import ROOT
 
 
 @pytest.fixture(autouse=True)
@@ -36,6 +38,35 @@ def test_one_that_is_lost_comes_again(capsys: pytest.CaptureFixture) -> None:
         run_cli(main)
     assert stop.value.code == 130 and capsys.readouterr().err.count("\n") == 1
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_error_that_follows_a_lost_one_is_the_interrupt(capsys: pytest.CaptureFixture) -> None:
+    """As of a module whose own code turns it into an ImportError."""
+
+    def main() -> None:
+        lost()
+        raise ImportError("half a library")
+
+    with pytest.raises(SystemExit) as stop:
+        run_cli(main)
+    assert stop.value.code == 130 and capsys.readouterr().err.startswith("interrupted")
+
+
+def test_a_command_is_interrupted_while_it_loads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "slow_to_load.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        run_cli(command("slow_to_load"))
+    assert stop.value.code == 130 and capsys.readouterr().err.count("\n") == 1
+
+
+def test_no_script_loads_its_command_before_it_runs() -> None:
+    """All of it lies within the block that heeds Ctrl-C."""
+    scripts = sorted((ROOT / "scripts").glob("*.py"))
+    loads = [re.findall(r"(?m)^ *(?:from|import) (\S+)", script.read_text()) for script in scripts]
+    assert len(scripts) > 15 and all(names == ["sys", "pathlib", "analysis.command.cli"] for names in loads)
 
 
 def test_what_is_cleaned_up_is_not_disturbed() -> None:
@@ -71,7 +102,7 @@ def test_one_that_comes_while_workers_start_is_heard_afterwards() -> None:
     """Also where another thread takes it, so that Python would raise it in this one."""
     program = """
 import os, signal, threading, time
-from analysis.command.cli import run_cli
+from analysis.command.cli import command, run_cli
 from analysis.command.cluster import _interrupts_blocked
 taker = threading.Thread(target=time.sleep, args=(60,), daemon=True)
 taker.start()
