@@ -10,7 +10,7 @@ import importlib
 import importlib.metadata
 import sys
 
-from analysis.command.cli import InputError, command, run_cli
+from analysis.command.cli import InputError, command, run_process
 from analysis.command.extras import DISTRIBUTION
 
 COMMANDS = {
@@ -49,7 +49,7 @@ TABLES = {
 
 def main() -> None:
     """Runs the command that the command line names, and ends the process."""
-    run_cli(_dispatch)
+    run_process(_dispatch)
 
 
 def _dispatch() -> None:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.command.cli import command, run_cli
+from analysis.command.cli import command, run_process
 
 main = command("analysis.comparison.inputs_command")
 
 if __name__ == "__main__":
-    run_cli(main)
+    run_process(main)

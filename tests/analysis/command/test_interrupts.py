@@ -62,6 +62,29 @@ def test_a_command_is_interrupted_while_it_loads(
     assert stop.value.code == 130 and capsys.readouterr().err.count("\n") == 1
 
 
+LITTER = """
+import atexit, signal, sys
+from analysis.command.cli import run_process
+
+class Litter:
+    def __del__(self):
+        print("collected", file=sys.stderr)
+
+def main():
+    sys.litter = Litter()
+    atexit.register(print, "ended")
+    signal.raise_signal(signal.SIGINT)
+
+run_process(main)
+"""
+
+
+def test_an_interrupted_process_collects_no_garbage() -> None:
+    command = [sys.executable, "-c", LITTER]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 130 and done.stderr.count("\n") == 1 and done.stdout == "ended\n"
+
+
 def test_no_script_loads_its_command_before_it_runs() -> None:
     """All of it lies within the block that heeds Ctrl-C."""
     scripts = sorted((ROOT / "scripts").glob("*.py"))
