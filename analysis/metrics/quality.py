@@ -125,7 +125,10 @@ class PixelErrors:
 def pixel_errors(
     image: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"], encoded: Float[Tensor, "h w 3"] | None = None
 ) -> tuple[PixelErrors, Float[Tensor, "h w 3"]]:
-    """Mean squared errors of an image against the reference, both linear. Source: Stephens 2011, eq. 7.1.
+    """Mean squared errors of an image against the reference, both linear.
+
+    ``mse = Σ (encode(image) - encode(reference))² / (3 h w)``, and the same with ``log(1 + x)`` in place of the
+    encoding. Source: Stephens 2011, eq. 7.1.
 
     Deviation: the mean runs over pixels and channels; the printed ``1 / N`` before ``N²`` terms would scale with size.
 
@@ -152,7 +155,7 @@ def pixel_errors(
 
 
 def ratio(adaptive: Floats, framed: Floats) -> Floats:
-    """Error of the adaptive over that of the framed renderer; 1 where both are 0, inf where only the framed one is.
+    """``mse_adaptive / mse_framed``; 1 where both are 0, inf where only the framed one is.
 
     Source: Stephens 2011, eq. 7.2.
     """

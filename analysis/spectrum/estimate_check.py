@@ -127,7 +127,7 @@ class Example:
     realizable: tuple[tuple[float, float], tuple[float, float]]
 
     def summary(self) -> dict[str, Any]:
-        """The ideal density (eq. 5.4), and how the estimates on the grid of rates point at it."""
+        """The ideal density ``(2 f_s, 2 f_t)`` (eq. 5.4), and how the estimates on the grid of rates point at it."""
         bands = {tau: [int(f) for f in ideal_band(share_of_total(self.tiles.norm), tau)] for tau in _SHARES}
         return {
             "tile": {"level": self.level, "index": self.index},

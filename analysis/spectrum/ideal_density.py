@@ -45,7 +45,7 @@ def raster(volume: Float[Tensor, "n t samples"]) -> Float[Tensor, "n t y x"]:
 
 
 def octant_power(volume: Float[Tensor, "n t y x"], windowed: bool = True) -> Float[Tensor, "n ft fy fx"]:
-    """Power of the 3-D Fourier transform, positive and negative frequencies added, for frequencies 0 to N/2.
+    """Power of the 3-D Fourier transform ``F``, for frequencies 0 to N/2: ``F̄²(f) = Σ |F(±f_t, ±f_y, ±f_x)|²``.
 
     Power sums to the (weighted) variance of the volume. The mean is taken off and a Hann window laid over all three
     axes: neither a tile nor a span of time is periodic, and the jump between its ends would leak power that falls only
@@ -77,7 +77,8 @@ def _fold(power: Tensor, dim: int) -> Tensor:
 
 
 def power_norm(power: Float[Tensor, "n ft fy fx"]) -> Float[Tensor, "n t s"]:
-    """``Norm_ps``: power in the bands up to ``s`` along x and y and up to ``t`` along time, ``[t - 1, s - 1]``.
+    """Power in the bands up to ``s`` along x and y and up to ``t`` along time, at ``[t - 1, s - 1]``:
+    ``Norm_ps(s, t) = Σ F̄²(f_t, f_y, f_x)`` over ``f_x <= s``, ``f_y <= s``, ``f_t <= t``.
 
     Source: Stephens 2011, eq. 5.2.
     """
@@ -94,7 +95,8 @@ def share_of_total(norm: Float[Tensor, "n t s"]) -> Float[Tensor, "n t s"]:
 
 
 def octave_gain(norm: Float[Tensor, "n t s"]) -> Float[Tensor, "n t s"]:
-    """Magnitude of the norm's gradient on octave axes: what one more octave of either rate would bring.
+    """Magnitude of the norm's gradient on octave axes: what one more octave of either rate would bring,
+    ``hypot(Norm_ps(2 s, t) - Norm_ps(s, t), Norm_ps(s, 2 t) - Norm_ps(s, t))``.
 
     Differences are taken to the band twice as wide, or to the edge of what was measured. On octaves a threshold means
     the same at every rate, size and length of the volume. Source: Stephens 2011, eq. 5.3.
@@ -105,9 +107,9 @@ def octave_gain(norm: Float[Tensor, "n t s"]) -> Float[Tensor, "n t s"]:
 
 def ideal_band(norm: Float[Tensor, "n t s"], tau: float) -> tuple[Int64[Tensor, " n"], Int64[Tensor, " n"]]:
     """``(f_s, f_t)``, in cycles per tile and per span: the cheapest band (least ``f_s² f_t``) from which on no wider
-    band gains more than ``tau`` an octave. The ideal density is twice as many samples (eq. 5.4).
+    band gains more than ``tau`` an octave. The ideal density is ``Θ* = (2 f_s, 2 f_t)`` samples.
 
-    Source: Stephens 2011, eq. 5.3.
+    Source: Stephens 2011, eq. 5.3–5.4.
 
     Deviation: eq. 5.3 asks where the gradient's magnitude passes ``tau``, which is a curve, and below which it may also
     lie in an empty band before the signal's power begins. Scale and ``tau`` are not printed.

@@ -77,7 +77,7 @@ class Results:
 
 
 def ratios(pair: tuple[Result, Result]) -> Floats:
-    """Error ratio at the reference times. Source: Stephens 2011, eq. 7.2."""
+    """``mse_adaptive / mse_framed`` at the reference times. Source: Stephens 2011, eq. 7.2."""
     return ratio(pair[0].times["mse"].to_numpy(), pair[1].times["mse"].to_numpy())
 
 

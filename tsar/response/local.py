@@ -62,7 +62,10 @@ class LocalConstraints:
 
 
 def area_change(a_s: Field, a_t: Field, m_s: Field, m_t: Field, k: Field) -> Field:
-    """``Area(a + k m) - Area(a)`` without subtracting the areas (eq. 6.16, 6.18)."""
+    """``Area(a + k m) - Area(a) = k (a_s m_t + a_t m_s + k m_s m_t)``, in which no areas are subtracted.
+
+    Source: Stephens 2011, eq. 6.16, 6.18.
+    """
     return k * (a_s * m_t + a_t * m_s + m_s * m_t * k)
 
 
@@ -79,7 +82,16 @@ def _drop_outward(a: Field, phi: Field, low: float) -> Field:
 
 
 def constrain(a_s: Field, a_t: Field, errors: Errors, box: Box, gain: float) -> LocalConstraints:
-    """Desired and greatest change (eq. 6.8–6.22) for normalised densities inside the box."""
+    """Desired and greatest change of combined density, for normalised densities ``a`` inside the box.
+
+    An element moves along ``a + k m``, ``m = phi / |phi|``; what points out of the box from its wall is dropped from
+    the error ``phi`` first. ``k_max`` is where it leaves the box, and ``k_min = min(k_max, gain |phi|)`` is as far as
+    it wants to go, which gives the desired change. The greatest one is that at ``k_max``, or at the extremum
+    ``k = -(a_s m_t + a_t m_s) / (2 m_s m_t)`` where ``m_s m_t < 0``, the extremum comes before ``k_max``, and the
+    element does not want to go twice as far as it, where the change has the other sign.
+
+    Source: Stephens 2011, eq. 6.8–6.22.
+    """
     phi_s = _drop_outward(a_s, errors.spatial.to(a_s.dtype), box.spatial_min)
     phi_t = _drop_outward(a_t, errors.temporal.to(a_t.dtype), box.temporal_min)
     # Not hypot: its vectorised and its scalar form differ in the last bit, and which one runs depends on the threads.

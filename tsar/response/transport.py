@@ -66,7 +66,7 @@ def _sides(desired: Field, bound: Field) -> tuple[Field, Field, Field, Field]:
 
 
 def _max_weight(desired: Field, bound: Field) -> float:
-    """The greatest common weight of one side: the least ``bound / desired`` over it (eq. 6.40–6.41)."""
+    """The greatest common weight of one side: ``min(bound / desired)`` over it (eq. 6.40–6.41)."""
     active = desired > 0
     return float((bound[active] / desired[active]).min()) if bool(active.any()) else 0.0
 
