@@ -45,8 +45,8 @@ def shown_tables(tables: Tables) -> list[Table]:
 def _rivalry(tables: Tables) -> list[Table]:
     """Policies beside the framed renderer and the best rival; of the rivals, all rows together."""
     rivals = tables["rivals"]
-    if len(rivals) and (rivals["row"] == ALL).any():
-        rivals = rivals[rivals["row"] == ALL]
+    if len(rivals) and ALL in set(rivals["row"]):
+        rivals = rivals.query("row == @ALL")
     return [
         _beside(tables["judged"], f"Error of policies beside framed (F) and the {BEST} (B)"),
         _beside(rivals, f"Error of rivals beside framed (F) and the {BEST} (B)"),
