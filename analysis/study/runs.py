@@ -165,7 +165,7 @@ def begin(
         lambda config: stages_of(config, stages, threads),
         truth,
         lambda batch: renderer_of(1).trace(batch),
-        lambda time_s: renderer_of(policy.footprint).viewpoint(time_s),
+        lambda time_s: renderer_of(1).viewpoint(time_s),
     )
     policy = POLICIES[name](setting)
     meter, totals = Meter(renderer_of(policy.footprint).trace), Totals(config)

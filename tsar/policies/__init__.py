@@ -22,6 +22,9 @@ POLICIES: Named[Make] = Named(
         "framed-super": "tsar.policies.framed:supersampled",
         "framed-half": "tsar.policies.framed:halved",
         "framed-quarter": "tsar.policies.framed:quartered",
+        "framed-taa": "tsar.policies.reprojected:accumulating",
+        "framed-late": "tsar.policies.reprojected:late",
+        "framed-taa-late": "tsar.policies.reprojected:accumulating_late",
         "frameless": "tsar.policies.frameless:Frameless",
         "afr": "tsar.policies.afr:Afr",
         "interruptible": "tsar.policies.interruptible:Interruptible",
@@ -29,6 +32,9 @@ POLICIES: Named[Make] = Named(
     },
 )
 
-RIVALS = ("framed-1", "framed-super", "framed-half", "framed-quarter", "frameless", "afr", "interruptible")
+RIVALS = (
+    *("framed-1", "framed-super", "framed-half", "framed-quarter", "framed-taa", "framed-late", "framed-taa-late"),
+    *("frameless", "afr", "interruptible"),
+)
 """Rivals beside ``framed`` that look at no truth: a policy is compared with all of them, and with the best at each
 moment."""

@@ -1,0 +1,112 @@
+"""A finished image, warped to the poses of a later time.
+
+Every pixel is taken to where its surface is seen then. Of those that arrive in the same place the nearest counts; the
+image is read between its pixels there. A gap of a pixel takes what lies deepest beside it. Of wider ones, those that
+lay outside the image before repeat its border, and those that were hidden are filled from around, from what does not
+move by itself if there is any: what comes into view from behind something is the background.
+
+Source: McMillan and Bishop 1995 (forward warping); Mark, McMillan and Bishop 1997 (of a frame to the newest poses).
+"""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Float64, Int64
+from torch import Tensor
+
+from tsar.policies.resampling import BILINEAR_FLOPS, bilinear, nearest
+from tsar.policies.scatter import double_width, pull_push
+from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen
+from tsar.types import Viewpoint
+
+NEARER = 0.93
+"""What is nearer than this share of a depth lies before it, not on the same surface."""
+
+WARP_FLOPS = PROJECT_FLOPS + 4.0 + 17.0 + 4.0 + 2.0 + BILINEAR_FLOPS + 4.0 / 3.0 * (64.0 + 52.0)
+"""Of a warp for a pixel: its projection; rounding and comparing; the deepest of eight neighbours, for gaps; the place
+to read from; whether something covers it; the reading; and two pyramids, of motion and of colours, whose levels have a
+third more pixels than the image. In each: shares times channels and their sums, a division, two enlargements and a
+blend; colours are chosen where motion is blended, and ranks are compared."""
+
+
+def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpoint) -> Float[Tensor, "side side 3"]:
+    """The image as another view sees its surfaces.
+
+    Args:
+        image: what is shown of the surfaces.
+        surfaces: first hits of the same pixels.
+        view: the poses to warp to.
+    """
+    side = image.shape[0]
+    centre = centres(side)
+    landing, deep = seen(surfaces, view)
+    depth = deep.clamp(min=0.0).to(torch.float32)
+    arrived = _winners(landing, depth)
+    source = torch.where(arrived < 0, _deepest_beside(arrived, depth), arrived)
+    known, place = source >= 0, source.clamp(min=0)
+    back = torch.where(known[..., None], (centre - landing).reshape(-1, 2)[place], 0.0)
+    at_depth = torch.where(known, depth.reshape(-1)[place], 0.0)
+    # a narrow gap may lie on the same surface, or beside what is nearer, which must not be read
+    read_at = centre + back
+    covered = (arrived < 0) & (nearest(depth, read_at) < NEARER * at_depth)
+    read_at = torch.where(covered[..., None], centre.reshape(-1, 2)[place], read_at)
+    if not bool(known.all()):
+        read_at = torch.where(known[..., None], read_at, centre + _spread(back, known))
+    shown = bilinear(image, read_at)
+    hidden = ~known & ((read_at >= -0.5) & (read_at < side - 0.5)).all(-1)
+    if not bool(hidden.any()):
+        return shown
+    moves = (surfaces.instance >= 0) & (view.track_of_instance[surfaces.instance.clamp(min=0).to(torch.int64)] > 0)
+    rank = torch.where(known, torch.where(moves.reshape(-1)[place], 1.0, 2.0), 0.0)
+    filled = _filled(shown.permute(2, 0, 1), rank[None]).permute(1, 2, 0)
+    return torch.where(hidden[..., None], filled, shown)
+
+
+def _winners(landing: Float64[Tensor, "side side 2"], depth: Float[Tensor, "side side"]) -> Int64[Tensor, "side side"]:
+    """Number of the nearest pixel that arrives in each place, -1 where none does; of equals the first."""
+    side = landing.shape[0]
+    target = (landing + 0.5).nan_to_num(nan=-1.0, posinf=-1.0, neginf=-1.0).floor()
+    inside = ((target >= 0) & (target < side)).all(-1) & (depth > 0)
+    cell = torch.where(inside, target[..., 1] * side + target[..., 0], side * side).to(torch.int64).reshape(-1)
+    # the bits of positive floats rise as the floats do
+    key = (depth.view(torch.int32).to(torch.int64).reshape(-1) << 32) | torch.arange(side * side)
+    none = torch.iinfo(torch.int64).max
+    best = torch.full((side * side + 1,), none).scatter_reduce(0, cell, key, "amin")[:-1]
+    return torch.where(best == none, -1, best & 0xFFFFFFFF).reshape(side, side)
+
+
+def _deepest_beside(
+    arrived: Int64[Tensor, "side side"], depth: Float[Tensor, "side side"]
+) -> Int64[Tensor, "side side"]:
+    """Of what arrived in the eight places around, the deepest pixel; -1 where nothing did; of equals the first."""
+    side = arrived.shape[0]
+    sources = F.pad(arrived, (1, 1, 1, 1), value=-1)
+    depths = torch.where(sources >= 0, depth.reshape(-1)[sources.clamp(min=0)], -1.0)
+    deepest, found = torch.full_like(depth, -1.0), torch.full_like(arrived, -1)
+    for row in range(3):
+        for column in range(3):
+            there = depths[row : row + side, column : column + side]
+            deeper = there > deepest
+            deepest = torch.where(deeper, there, deepest)
+            found = torch.where(deeper, sources[row : row + side, column : column + side], found)
+    return found
+
+
+def _spread(back: Float64[Tensor, "side side 2"], known: Bool[Tensor, "side side"]) -> Float64[Tensor, "side side 2"]:
+    """The motion of what is known around, where nothing is."""
+    planes = F.pad(back.permute(2, 0, 1), (0, 0, 0, 0, 0, 1)).to(torch.float32)
+    return pull_push(planes, known[None].to(torch.float32))[:2].permute(1, 2, 0).to(torch.float64)
+
+
+def _filled(color: Float[Tensor, "3 h w"], rank: Float[Tensor, "1 h w"]) -> Float[Tensor, "3 h w"]:
+    """Fills what is of rank 0 by a pyramid: a coarser pixel is the mean of those of highest rank among its four."""
+    if color.shape[1] == 1 or bool((rank > 0).all()):
+        return color
+    highest = F.max_pool2d(rank[None], 2)[0]
+    share = ((rank == highest.repeat_interleave(2, 1).repeat_interleave(2, 2)) & (rank > 0)).to(color.dtype)
+    total = 4.0 * F.avg_pool2d(share[None], 2)[0]
+    mean = 4.0 * F.avg_pool2d((color * share)[None], 2)[0] / total.clamp(min=1.0)
+    coarse = _filled(mean, highest)
+    fine = double_width(double_width(coarse).transpose(1, 2)).transpose(1, 2)
+    return torch.where(rank > 0, color, fine)
