@@ -80,5 +80,5 @@ class Planes:
         color, square = self.color(x, y, batch.times)
         along = torch.where(square, (self.square or 0.0) * batch.times, 0.0)
         point = torch.stack([x + self.pan * batch.times - along, 1.0 - y, torch.zeros_like(x)], dim=-1)
-        hits = Hits(square.to(torch.int32), point.to(torch.float32))
+        hits = Hits(square.to(torch.int32), point.to(torch.float32), torch.full_like(square, -1, dtype=torch.int32))
         return SampleBatch(color, {"primary_rays": x.numel()}, hits if batch.hits else None)

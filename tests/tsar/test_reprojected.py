@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+import torch.nn.functional as F
 
 from tests.oracles.planes import Planes, fine
 from tsar.clock import StageTimer, fixed_clock
@@ -108,7 +109,7 @@ def test_a_pan_is_followed(name: str, pan: float) -> None:
         late = scene.image(64, shown.sample_time_s - FRAME_S, 4)
         # what comes into view within two frames is not known
         found, wrong = (error(shown.image, truth, border=8) for truth in (right, late))
-        assert found < 1e-4 < 1e-2 < wrong
+        assert found < 2e-4 < 1e-2 < wrong
 
 
 def test_accumulation_follows_a_pan() -> None:
@@ -124,8 +125,10 @@ def test_a_square_is_shown_where_it_is_and_leaves_the_background() -> None:
     scene = Planes(lambda x, y: torch.full_like(x, 0.25), square=0.1875 / FRAME_S)
     for shown in play("framed-late", scene, seconds=0.2)[-8:]:
         truth = scene.image(64, shown.sample_time_s)
-        off = ((shown.image - truth).abs() > 0.05).any(-1)
-        assert int(off.sum()) <= 2 * 17 * 2, "but for its edges"
+        off = (shown.image - truth).abs().amax(-1) > 0.05
+        planes = truth.permute(2, 0, 1)[None, :1]
+        edge = F.max_pool2d(planes, 3, 1, 1) + F.max_pool2d(-planes, 3, 1, 1) > 0
+        assert not bool((off & ~edge[0, 0]).any()), "but for its edges"
         assert float(shown.image.min()) > 0.24
 
 
@@ -162,11 +165,13 @@ def test_what_it_cannot_work_with_is_refused() -> None:
     panorama = replace(scene.view(0.0), kind="panorama")
     with pytest.raises(ConfigError, match="policy: expected a perspective or parallel camera.*'panorama'"):
         Reprojected(Setting(CONFIG, view=lambda time_s: panorama))
-    silent = run(
-        made("framed-late", scene), lambda batch: replace(scene.trace(batch), hits=None), fixed_clock(0.1), 0, 1
-    )
+
+    def silent(batch):
+        return replace(scene.trace(batch), hits=None)
+
     with pytest.raises(ConfigError, match="policy: expected a renderer that tells first hits"):
-        next(run(made("framed-late", scene), silent, fixed_clock(0.1), 0.0, 1.0))
+        for _ in run(made("framed-late", scene), silent, fixed_clock(0.1), 0.0, 1.0):
+            pass
 
 
 def test_a_small_frame_has_as_many_parts_as_framelets() -> None:

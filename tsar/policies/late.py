@@ -16,18 +16,18 @@ from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from tsar.policies.resampling import BILINEAR_FLOPS, bilinear, nearest
-from tsar.policies.scatter import double_width, pull_push
+from tsar.policies.scatter import pull_push
 from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen
 from tsar.types import Viewpoint
 
 NEARER = 0.93
 """What is nearer than this share of a depth lies before it, not on the same surface."""
 
-WARP_FLOPS = PROJECT_FLOPS + 4.0 + 17.0 + 4.0 + 2.0 + BILINEAR_FLOPS + 4.0 / 3.0 * (64.0 + 52.0)
+WARP_FLOPS = PROJECT_FLOPS + 4.0 + 17.0 + 4.0 + 2.0 + BILINEAR_FLOPS + 4.0 / 3.0 * 2.0 * 64.0
 """Of a warp for a pixel: its projection; rounding and comparing; the deepest of eight neighbours, for gaps; the place
 to read from; whether something covers it; the reading; and two pyramids, of motion and of colours, whose levels have a
 third more pixels than the image. In each: shares times channels and their sums, a division, two enlargements and a
-blend; colours are chosen where motion is blended, and ranks are compared."""
+blend."""
 
 
 def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpoint) -> Float[Tensor, "side side 3"]:
@@ -58,8 +58,9 @@ def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpo
     if not bool(hidden.any()):
         return shown
     moves = (surfaces.instance >= 0) & (view.track_of_instance[surfaces.instance.clamp(min=0).to(torch.int64)] > 0)
-    rank = torch.where(known, torch.where(moves.reshape(-1)[place], 1.0, 2.0), 0.0)
-    filled = _filled(shown.permute(2, 0, 1), rank[None]).permute(1, 2, 0)
+    still = known & ~moves.reshape(-1)[place]
+    around = (still if bool(still.any()) else known).to(torch.float32)
+    filled = pull_push(shown.permute(2, 0, 1), around[None]).permute(1, 2, 0)
     return torch.where(hidden[..., None], filled, shown)
 
 
@@ -97,16 +98,3 @@ def _spread(back: Float64[Tensor, "side side 2"], known: Bool[Tensor, "side side
     """The motion of what is known around, where nothing is."""
     planes = F.pad(back.permute(2, 0, 1), (0, 0, 0, 0, 0, 1)).to(torch.float32)
     return pull_push(planes, known[None].to(torch.float32))[:2].permute(1, 2, 0).to(torch.float64)
-
-
-def _filled(color: Float[Tensor, "3 h w"], rank: Float[Tensor, "1 h w"]) -> Float[Tensor, "3 h w"]:
-    """Fills what is of rank 0 by a pyramid: a coarser pixel is the mean of those of highest rank among its four."""
-    if color.shape[1] == 1 or bool((rank > 0).all()):
-        return color
-    highest = F.max_pool2d(rank[None], 2)[0]
-    share = ((rank == highest.repeat_interleave(2, 1).repeat_interleave(2, 2)) & (rank > 0)).to(color.dtype)
-    total = 4.0 * F.avg_pool2d(share[None], 2)[0]
-    mean = 4.0 * F.avg_pool2d((color * share)[None], 2)[0] / total.clamp(min=1.0)
-    coarse = _filled(mean, highest)
-    fine = double_width(double_width(coarse).transpose(1, 2)).transpose(1, 2)
-    return torch.where(rank > 0, color, fine)

@@ -68,7 +68,9 @@ def test_a_result_holds_every_reference_time(place: Place) -> None:
     assert not list(place.results.glob("*.lock")) and not list(place.results.glob("*.partial*"))
 
 
-@pytest.mark.parametrize("policy", ["framed", "framed-super", "frameless", "afr", "oracle"])
+@pytest.mark.parametrize(
+    "policy", ["framed", "framed-super", "framed-quarter", "framed-taa-late", "frameless", "afr", "oracle"]
+)
 def test_every_policy_runs(policy: str, place: Place) -> None:
     one = case(policy)
     table = pd.read_parquet(place.files(evaluate(one, key(one), place))["times"])
