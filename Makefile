@@ -7,7 +7,7 @@ BASE := $(VENV)/.base
 STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 
-.PHONY: demo test test-slow lint bench study-quick docs constraints clean
+.PHONY: demo test test-slow lint bench study-quick solvers docs constraints clean
 
 # the base alone, which is all that the demo needs
 $(BASE): pyproject.toml constraints.txt
@@ -40,6 +40,11 @@ test-slow: $(STAMP)
 
 study-quick: $(STAMP)
 	$(PY) scripts/suitability.py --scale quick --out out/study-quick
+
+# every transport solver on every input, at row 7; what is on disk is not run again
+solvers: $(STAMP)
+	$(PY) scripts/suitability.py --scale quick --rows 7 --policies framed --jod-repetitions 0 --out out/solvers \
+		--solvers trivial slow_greater scale_lesser square descend diffusion
 
 bench: $(STAMP)
 	$(PY) scripts/bench.py --out out/bench
