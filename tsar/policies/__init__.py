@@ -27,6 +27,7 @@ POLICIES: Named[Make] = Named(
         "framed-taa-late": "tsar.policies.reprojected:accumulating_late",
         "frameless": "tsar.policies.frameless:Frameless",
         "afr": "tsar.policies.afr:Afr",
+        "afr-simple": "tsar.policies.afr_simple:AfrSimple",
         "interruptible": "tsar.policies.interruptible:Interruptible",
         "oracle": "tsar.policies.oracle:Oracle",
     },
@@ -34,7 +35,7 @@ POLICIES: Named[Make] = Named(
 
 RIVALS = (
     *("framed-1", "framed-super", "framed-half", "framed-quarter", "framed-taa", "framed-late", "framed-taa-late"),
-    *("frameless", "afr", "interruptible"),
+    *("frameless", "afr", "afr-simple", "interruptible"),
 )
 """Rivals beside ``framed`` that look at no truth: a policy is compared with all of them, and with the best at each
 moment."""

@@ -1,171 +1,210 @@
-"""Adaptive frameless rendering: single samples drawn from tiles of equal probability whose size follows variance.
+"""Adaptive frameless rendering: crosshairs of samples in tiles of equal sampling, whose size follows variance, and a
+filter over space and time that follows the gradients in each tile.
 
-A kd-tree cut of a fixed number of leaves is kept. Every leaf receives the same number of samples a cycle, so a small
-leaf is sampled densely. Each keeps age-weighted moments of luminance; the leaves of greatest error (variance times
-area) are split, and sibling leaves whose merger would have the least are merged, as many as were split.
+A cycle samples *crosshairs*: a random place in a tile and the four places one pixel beside it. Their differences give
+the tile's spatial gradient. A deep buffer keeps all recent samples with their first hits, and takes them to the newest
+poses (reprojection); what it holds in a pixel, compared with a new sample there, gives the temporal gradient, which is
+of what reprojection does not explain. The tiles are split and merged by :mod:`tsar.policies.tiles`.
 
-Source: Dayal et al. 2005, as described in Stephens 2011, sec. 2.5 and 7.3.2.
+The filter has a volume in which one sample is expected, ``e_x e_y e_t = 1 / R`` at a sampling rate of ``R`` samples per
+pixel and second, and extents along which colour changes alike, ``G_s e_x = G_s e_y = G_t e_t``: so
+``e_t = (G_s² / (R G_t²))^⅓``. Where the picture stands old samples count, and the picture becomes sharp and
+antialiased; where it changes new ones from farther away do. Samples in a pixel are weighted by ``exp(-age / e_t)``, and
+summed; pixels whose sum is below one take the rest from coarser levels of a pyramid, which is the extent in space.
 
-Deviation: the original splits and merges one pair at a time from priority queues and reconstructs with per-tile
-gradient filters. Here all splits and mergers of a cycle are picked at once, and an image is filled from the newest
-samples, each weighted down with its age in units of its leaf's refresh interval, by pull and push over a pyramid.
+Source: Dayal, Woolley, Watson and Luebke 2005, *Adaptive frameless rendering*, as described in its abstract and in
+Stephens 2011, sec. 2.5 and 7.3.2.
+
+Deviation: all samples of a crosshair are traced in one cycle, and the temporal gradient comes from the buffer, not from
+a sample that is traced again. A pyramid stands for the splats of the original.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp
+from math import inf, log2
 
 import torch
-from jaxtyping import Bool, Float, Int64
+from jaxtyping import Float, Float64, Int64
 from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
-from tsar.morton import floor_log2, morton_to_raster
-from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
-from tsar.policy import Moment, Picture, Policy
-from tsar.types import FrameletBatch, SampleBatch
+from tsar.morton import morton_to_raster
+from tsar.policies import deep_buffer, tiles
+from tsar.policies.deep_buffer import DeepBuffer, Placed
+from tsar.policies.scatter import generator, pixel_colors, pull_push
+from tsar.policies.tiles import Tree
+from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
-LEAVES = 1024
-CHANGES_PER_CYCLE = 64
-_MEMORY_CYCLES = 8.0
-
-
-@dataclass(frozen=True)
-class Tree:
-    """A cut through a kd-tree, by kd index.
-
-    Attributes:
-        leaf: which nodes are in the cut.
-        moments: per node, age-weighted sum of weight, luminance and squared luminance; only leaves' are in use.
-    """
-
-    leaf: Bool[Tensor, " nodes"]
-    moments: Float[Tensor, "3 nodes"]
+LEAVES = 256
+SAMPLES_KEPT_PER_PIXEL = 2
+COLOR_MAX = 1.5
+"""Radiance beyond which samples are clipped before they are averaged: a glint would spread."""
+_CROSSHAIR = torch.tensor([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+_MEMORY_CYCLES = 4.0
+_GOLDEN = 0.6180339887498949
+_WITHIN = 0.35  # squared difference of two samples of a still pixel, over the squared gradient of the crosshair
+_LEAST_GRADIENT = 1e-6, 1e-9  # squared, per pixel and per second
+_EXTENT_S = 4.0  # greatest
+_LEAST_INTERVALS = 0.5  # least extent, in refresh intervals of a pixel
 
 
 @dataclass(frozen=True)
-class Scattered:
-    """The tree, the newest sample of each pixel, and the leaves and pixels that were asked for.
+class Crosshairs:
+    """What was asked for: the tile of each crosshair, and places, centres first, then each arm's; then single ones."""
 
-    Frozen, but the buffer within changes in place.
-    """
+    node: Int64[Tensor, " crosshairs"]
+    place: Float[Tensor, "samples 2"]
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """The tiles, the buffer, which changes in place, where its samples are now, and what was asked for."""
 
     tree: Tree
-    buffer: PixelBuffer
-    node: Int64[Tensor, " samples"] | None = None
-    pixel: Int64[Tensor, " samples"] | None = None
+    buffer: DeepBuffer
+    placed: Placed | None = None
+    asked: Crosshairs | None = None
 
 
-class Afr(Policy[Scattered]):
-    """Cycles of ``batch_size * s²`` samples, as many in every leaf."""
+class Afr(Policy[Sampled]):
+    """Cycles of ``batch_size * s²`` samples, in crosshairs of five."""
+
+    def __init__(self, setting: Setting) -> None:
+        super().__init__(setting)
+        self._view = setting.view
+
+    @property
+    def footprint(self) -> float:
+        """Samples of a pixel are averaged."""
+        return 2.0
+
+    @property
+    def price(self) -> Price:
+        """Per pixel: what the buffer holds, placed and summed (weight 3, sums 7), and the pyramid: up 20, down 26,
+        times 4/3, with means 4. Per sample: replacement of what is not finite 6, luminance 10,
+        gradients 14, sums of tiles 12, comparison 8."""
+        stored = SAMPLES_KEPT_PER_PIXEL * (deep_buffer.SAMPLE_FLOPS + 10)
+        return Price(int(self.config.budget), pixel_flops=stored + 65, sample_flops=50)
 
     @property
     def _depth(self) -> int:
         return 2 * (self.config.resolution_px.bit_length() - 1)
 
-    def start(self) -> Scattered:
-        return Scattered(_initial(self._depth), PixelBuffer.empty(self.config))
+    def start(self) -> Sampled:
+        room = SAMPLES_KEPT_PER_PIXEL * self.config.resolution_px**2
+        return Sampled(tiles.initial(self._depth, LEAVES, 6), DeepBuffer.empty(room))
 
-    def request(self, state: Scattered, moment: Moment) -> tuple[Scattered, FrameletBatch]:
-        node, pixel = draw(state.tree, int(self.config.budget), self._depth, self.config, moment.cycle)
-        return replace(state, node=node, pixel=pixel), pixel_batch(pixel, self.config, moment)
+    def request(self, state: Sampled, moment: Moment) -> tuple[Sampled, FrameletBatch]:
+        """Crosshairs in tiles in turn, and at random places of the picture as many as are left over."""
+        config = self.config
+        node, place = draw(state.tree, self._depth, config, moment.cycle)
+        nothing = torch.zeros(config.batch_size, dtype=torch.int64)
+        batch = FrameletBatch(
+            nothing,
+            nothing,
+            place.reshape(-1, config.samples, 2),
+            moment.time_s,
+            cycle=moment.cycle,
+            seed=config.seed,
+            hits=self._view is not None,
+        )
+        return replace(state, asked=Crosshairs(node, place)), batch
 
     def observe(
-        self, state: Scattered, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
-    ) -> Scattered:
-        assert state.node is not None and state.pixel is not None
-        color = pixel_colors(samples, self.config)
+        self, state: Sampled, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
+    ) -> Sampled:
+        assert state.asked is not None
+        side, buffer = self.config.resolution_px, state.buffer
+        view = self._view(moment.time_s) if self._view is not None else None
+        color = pixel_colors(samples, self.config).clamp(max=COLOR_MAX)
         with timer("cache"):
-            write(state.buffer, state.pixel, color, moment.time_s)
+            buffer.add(color, moment.time_s, state.asked.place, samples.hits)
+            placed = buffer.seen(view, side)
+        with timer("error"):
+            values = _values(buffer, placed, state.asked, color, moment.time_s, side)
         with timer("response"):
-            gathered = gather(state.tree, state.node, compressed_luminance(color))
-            return replace(state, tree=adapt(gathered, self._depth))
+            node = state.asked.node.repeat(len(_CROSSHAIR))
+            tree = tiles.adapt(tiles.gather(state.tree, node, values, _MEMORY_CYCLES), self._depth)
+        return Sampled(tree, buffer, placed)
 
-    def image(self, state: Scattered, moment: Moment) -> Picture:
-        image = _image(state.tree, state.buffer, self.config, self._depth, moment.time_s, moment.cycle_s)
-        return Picture(image, sample_map(state.buffer, self.config))
-
-
-def _initial(depth: int) -> Tree:
-    nodes = 2 ** (depth + 1)
-    leaf = torch.zeros(nodes, dtype=torch.bool)
-    leaf[LEAVES : 2 * LEAVES] = True
-    return Tree(leaf, torch.zeros(3, nodes))
+    def image(self, state: Sampled, moment: Moment) -> Picture:
+        assert state.placed is not None
+        config, side = self.config, self.config.resolution_px
+        extent_s = tiles.per_pixel(extents(state.tree, self._depth, config, moment.cycle_s), state.tree, self._depth)
+        sample, pixel = state.placed.sample, state.placed.pixel
+        time_s = state.buffer.time_s[sample]
+        weight = torch.exp((time_s - moment.time_s) / extent_s[pixel]).to(torch.float32)
+        total = torch.zeros(side * side).index_add_(0, pixel, weight)
+        color = torch.zeros(side * side, 3).index_add_(0, pixel, state.buffer.color[sample] * weight[:, None])
+        color = (color / total.clamp(min=1e-12)[:, None]).T.reshape(3, side, side).contiguous()
+        image = pull_push(color, total.clamp(max=1.0).reshape(1, side, side)).permute(1, 2, 0).contiguous()
+        newest_s = torch.full((side * side,), -inf, dtype=torch.float64).scatter_reduce(0, pixel, time_s, "amax")
+        level = torch.full((side, side), int(log2(side / config.framelet_side)))
+        return Picture(image, SampleMap(newest_s.reshape(side, side), level))
 
 
 def draw(
-    tree: Tree, count: int, depth: int, config: TsarConfig, cycle: int
-) -> tuple[Int64[Tensor, " samples"], Int64[Tensor, " samples"]]:
-    """Leaf and raster pixel of each sample: leaves in turn, a uniformly random pixel within each."""
-    leaves = tree.leaf.nonzero().squeeze(1)
-    node = leaves[torch.arange(count) % leaves.numel()]
-    shift = depth - floor_log2(node)
-    first = (node << shift) - 2**depth
-    uniform = torch.rand(count, generator=generator(config, cycle), dtype=torch.float64)
-    cell = first + (uniform * (torch.ones_like(shift) << shift)).to(torch.int64)
-    return node, morton_to_raster(config.resolution_px)[cell]
+    tree: Tree, depth: int, config: TsarConfig, cycle: int
+) -> tuple[Int64[Tensor, " crosshairs"], Float[Tensor, "samples 2"]]:
+    """Tile of each crosshair, and all places, of a cycle.
 
-
-def gather(tree: Tree, node: Int64[Tensor, " samples"], luminance: Float[Tensor, " samples"]) -> Tree:
-    """Fade the moments of all leaves by one cycle and add the new samples."""
-    moments = tree.moments * exp(-1.0 / _MEMORY_CYCLES)
-    for row, value in enumerate((torch.ones_like(luminance), luminance, luminance.square())):
-        moments[row].index_add_(0, node, value)
-    return replace(tree, moments=moments)
-
-
-def error(moments: Float[Tensor, "3 n"], node: Int64[Tensor, " n"]) -> Float[Tensor, " n"]:
-    """Variance times area; area in units of the image."""
-    weight = moments[0].clamp(min=1e-12)
-    variance = (moments[2] / weight - (moments[1] / weight).square()).clamp(min=0.0)
-    return variance * torch.exp2(-floor_log2(node).to(torch.float32))
-
-
-def adapt(tree: Tree, depth: int) -> Tree:
-    """Split the worst leaves and merge as many of the best sibling pairs, while a split gains more than a merger costs.
-
-    Children take half their parent's moments each; a merged leaf takes the sum. The number of leaves stays the same.
+    Tiles come in turn by the golden ratio along the curve, so that those of a cycle are spread. Arms that leave the
+    picture are turned round.
     """
-    leaves = tree.leaf.nonzero().squeeze(1)
-    leaf_error = error(tree.moments[:, leaves], leaves)
-    left = leaves[(leaves & 1) == 0]
-    left = left[tree.leaf[left + 1] & (left > 3)]
-    merged_moments = tree.moments[:, left] + tree.moments[:, left + 1]
-    merged_error, merge_order = torch.sort(error(merged_moments, left >> 1), stable=True)
-    splittable = torch.where(leaves < 2**depth, leaf_error, -1.0)
-    split_error, split_order = torch.sort(splittable, descending=True, stable=True)
-    changes = min(CHANGES_PER_CYCLE, left.numel(), leaves.numel())
-    worth = split_error[:changes] > merged_error[:changes]
-    split, pair = leaves[split_order[:changes]][worth], left[merge_order[:changes]][worth]
-    # A leaf may not be split and merged in one cycle.
-    clash = torch.isin(split, torch.cat((pair, pair + 1))) | torch.isin(pair >> 1, split >> 1)
-    split, pair = split[~clash], pair[~clash]
-    leaf, moments = tree.leaf.clone(), tree.moments.clone()
-    moments[:, pair >> 1] = moments[:, pair] + moments[:, pair + 1]
-    for child in (2 * split, 2 * split + 1):
-        moments[:, child] = tree.moments[:, split] / 2
-        leaf[child] = True
-    leaf[split] = leaf[pair] = leaf[pair + 1] = False
-    leaf[pair >> 1] = True
-    return Tree(leaf, moments)
+    side, count = config.resolution_px, int(config.budget)
+    crosshairs, random = count // len(_CROSSHAIR), generator(config, cycle)
+    leaves = tree.leaves
+    turn = cycle * crosshairs + torch.arange(crosshairs, dtype=torch.float64)
+    node = leaves[((turn * _GOLDEN) % 1.0 * leaves.numel()).to(torch.int64)]
+    area = tiles.area_px(node, depth)
+    within = (torch.rand(crosshairs, generator=random, dtype=torch.float64) * area).to(torch.int64)
+    pixel = morton_to_raster(side)[tiles.first_cell(node, depth) + within]
+    centre = torch.stack((pixel % side, pixel // side), dim=1) + torch.rand(crosshairs, 2, generator=random)
+    arms = (centre + _CROSSHAIR[:, None]).reshape(-1, 2)
+    arms = torch.where(arms < 0.0, arms + 2.0, torch.where(arms >= side, arms - 2.0, arms))
+    single = torch.rand(count - len(arms), 2, generator=random) * side
+    return node, (torch.cat((arms, single)) * (65536 // side)).floor() / 65536.0
 
 
-def _image(
-    tree: Tree, buffer: PixelBuffer, config: TsarConfig, depth: int, now_s: float, cycle_s: float
-) -> Float[Tensor, "h w 3"]:
-    """Newest samples weighted by ``exp(-age / refresh interval of the leaf)``, filled by pull and push."""
-    leaves = tree.leaf.nonzero().squeeze(1)
-    area = 2.0 ** (depth - floor_log2(leaves).to(torch.float64))
-    start = (leaves << (depth - floor_log2(leaves))) - 2**depth
-    order = torch.argsort(start)
-    interval_s = area * leaves.numel() / config.budget * cycle_s
-    per_cell = interval_s[order].repeat_interleave(area[order].to(torch.int64))
-    per_pixel = torch.empty_like(per_cell)
-    per_pixel[morton_to_raster(config.resolution_px)] = per_cell
-    weight = torch.exp((buffer.time_s - now_s) / per_pixel).to(torch.float32)
-    side = config.resolution_px
-    color = buffer.color.reshape(side, side, 3).permute(2, 0, 1)
-    return pull_push(color, weight.reshape(1, side, side)).permute(1, 2, 0).contiguous()
+def extents(tree: Tree, depth: int, config: TsarConfig, cycle_s: float) -> Float64[Tensor, " leaves"]:
+    """How far back in time, seconds, the filter of each tile reaches."""
+    leaves = tree.leaves
+    sums = tree.sums[:, leaves].to(torch.float64)
+    spatial = sums[3] / sums[0].clamp(min=1e-9) + _LEAST_GRADIENT[0]
+    temporal = torch.where(sums[5] > 0.0, sums[4].clamp(min=0.0) / sums[5].clamp(min=1e-12), 1.0) + _LEAST_GRADIENT[1]
+    interval_s = tiles.area_px(leaves, depth).to(torch.float64) * leaves.numel() / config.budget * cycle_s
+    least = _LEAST_INTERVALS * interval_s.clamp(min=cycle_s)
+    return (spatial / temporal * interval_s).pow(1.0 / 3.0).clamp(max=_EXTENT_S).maximum(least)
+
+
+def _values(
+    buffer: DeepBuffer,
+    placed: Placed,
+    asked: Crosshairs,
+    color: Float[Tensor, "samples 3"],
+    now_s: float,
+    side: int,
+) -> Float[Tensor, "6 arms"]:
+    """What tiles gather of the samples of crosshairs: weight, luminance and its square; squared spatial gradient; and
+    squared change since the newest sample that the buffer held in the pixel, without what the place within the pixel
+    explains, and the square of that sample's age."""
+    arms = len(_CROSSHAIR) * asked.node.numel()
+    luminance = compressed_luminance(color)[:arms]
+    centre, right, left, below, above = luminance.reshape(len(_CROSSHAIR), -1)
+    across = torch.maximum((right - centre).abs(), (left - centre).abs())
+    down = torch.maximum((below - centre).abs(), (above - centre).abs())
+    spatial = (0.5 * (across.square() + down.square())).repeat(len(_CROSSHAIR))
+    column, row = (asked.place[:arms] * side).to(torch.int64).unbind(1)
+    rank = (buffer.time_s[placed.sample] < now_s).nonzero().squeeze(1)
+    newest = torch.full((side * side,), -1).scatter_reduce(0, placed.pixel[rank], rank, "amax")[row * side + column]
+    held = newest >= 0
+    change, age_s = torch.zeros(arms), torch.zeros(arms)
+    before = placed.sample[newest[held]]
+    old = compressed_luminance(buffer.color[before])
+    change[held] = (luminance[held] - old).square() - _WITHIN * spatial[held]
+    age_s[held] = (now_s - buffer.time_s[before]).to(torch.float32)
+    return torch.stack((torch.ones(arms), luminance, luminance.square(), spatial, change, age_s.square()))

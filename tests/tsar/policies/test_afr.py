@@ -1,0 +1,103 @@
+"""Adaptive frameless rendering: crosshairs, tiles, the deep buffer and the filter over space and time."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from tests.oracles import pictures
+from tests.oracles.screens import Layer, Screen
+from tsar.clock import fixed_clock
+from tsar.config import TilingConfig, TsarConfig
+from tsar.morton import floor_log2
+from tsar.policies import POLICIES, afr, tiles
+from tsar.policies.deep_buffer import DeepBuffer
+from tsar.policy import Setting, run
+from tsar.types import FrameletBatch, Hits
+
+CONFIG = TsarConfig(batch_size=4, resolution_px=64, warmup_cycles=24, tiling=TilingConfig(level_min=1))
+CYCLE_S, DEPTH = 1.0 / 64.0, 12
+
+
+def checkers(u, v, t):
+    value = 0.5 + 0.3 * torch.sin(40.0 * u) * torch.sin(30.0 * v)
+    return value[..., None].expand(*u.shape, 3)
+
+
+def moving(speed: float) -> Screen:
+    return Screen((Layer(checkers, pose=lambda t: (torch.zeros_like(t), speed * t, torch.zeros_like(t))),))
+
+
+def error(screen: Screen, poses: bool) -> float:
+    """Mean squared error of the last picture at the time of its samples."""
+    policy = POLICIES["afr"](Setting(CONFIG, view=screen.view if poses else None))
+    *_, (_, last) = run(policy, screen.trace, fixed_clock(CYCLE_S), 0.0, 2 * CYCLE_S)
+    return float((last.image - screen.picture(last.sample_time_s, 64)).square().mean())
+
+
+def test_crosshairs_are_a_place_in_their_tile_and_four_beside_it() -> None:
+    node, place = afr.draw(tiles.initial(DEPTH, 64, 6), DEPTH, CONFIG, 5)
+    assert node.numel() == 204 and place.shape == (1024, 2) and 0.0 <= float(place.min()) <= float(place.max()) < 1.0
+    centre, *beside = (place[: 5 * 204] * 64).reshape(5, 204, 2)
+    assert all(bool(((arm - centre).abs().sum(1) - 1.0).abs().max() < 0.01) for arm in beside)
+    x, y = (centre / 8).to(torch.int64).unbind(1)
+    assert 64 * 3 >= (y * 8 + x).unique().numel() == 64, "every tile has its turn"
+
+
+def test_tiles_keep_their_number_and_cover_the_picture() -> None:
+    tree = tiles.initial(DEPTH, 64, 6)
+    for cycle in range(20):
+        node, place = afr.draw(tree, DEPTH, CONFIG, cycle)
+        x, y = place[:204].unbind(1)
+        luminance = pictures.moving_edge(0.0, 0.3)(x, y, torch.zeros(204))[:, 0]
+        values = torch.stack((torch.ones(204), luminance, luminance.square(), *torch.zeros(3, 204)))
+        tree = tiles.adapt(tiles.gather(tree, node, values, 4.0), DEPTH)
+        assert tree.leaves.numel() == 64
+        assert float(torch.exp2(-floor_log2(tree.leaves).double()).sum()) == 1.0
+    # Small tiles gather on the edge at x = 0.3.
+    _, place = afr.draw(tree, DEPTH, CONFIG, 99)
+    assert float(((place[:204, 0] - 0.3).abs() < 0.05).float().mean()) > 0.25
+
+
+def test_extents_follow_the_gradients() -> None:
+    """Eight times the squared gradient in space, or an eighth of that in time, is twice the extent."""
+    base = torch.tensor([1.0, 0.5, 0.3, 1e-3, 1e-2, 1.0])
+    found = []
+    for factor in ((1.0, 1.0), (8.0, 1.0), (1.0, 0.125)):
+        tree = tiles.initial(DEPTH, 64, 6)
+        tree.sums[:, 64:128] = (base * torch.tensor([1.0, 1.0, 1.0, factor[0], factor[1], 1.0]))[:, None]
+        found.append(float(afr.extents(tree, DEPTH, CONFIG, CYCLE_S)[0]))
+    assert found[1] == pytest.approx(2.0 * found[0], rel=0.01) and found[2] == pytest.approx(2.0 * found[0], rel=0.01)
+
+
+def test_reprojection_takes_what_moves_along() -> None:
+    """A picture that moves by a pixel a cycle is shown as well as one that stands, and far better than without it."""
+    moved, stale, still = error(moving(1.0), True), error(moving(1.0), False), error(moving(0.0), True)
+    assert moved < 4.0 * still and moved < stale / 4.0, (moved, stale, still)
+
+
+def test_the_buffer_drops_what_is_hidden_and_outside_and_the_oldest() -> None:
+    card = Layer(
+        lambda u, v, t: torch.ones(*u.shape, 3),
+        lambda u, v, t: (u.abs() < 0.1) & (v.abs() < 0.1),
+        lambda t: (torch.zeros_like(t), t, torch.zeros_like(t)),
+    )
+    floor = Layer(
+        lambda u, v, t: torch.zeros(*u.shape, 3), pose=lambda t: (torch.zeros_like(t), t * 0, 0.6 * (t > 0.5))
+    )
+    screen = Screen((card, floor))
+    place = torch.tensor([[0.5, 0.5], [0.7, 0.5], [0.7, 0.51], [0.2, 0.3]])
+    nothing = torch.zeros(1, dtype=torch.int64)
+    answer = screen.trace(FrameletBatch(nothing, nothing, place[None], 0.0, hits=True))
+    assert answer.hits is not None
+    buffer = DeepBuffer.empty(4)
+    buffer.add(answer.color[0], 0.0, place, answer.hits)
+    assert buffer.seen(screen.view(0.0), 8).sample.tolist() == [0, 1, 2, 3]
+    # the card at (0.5, 0.5) moves over the floor at (0.7, 0.5)
+    assert buffer.seen(screen.view(0.2), 8).sample.tolist() == [0, 3]
+    # the floor has left the picture at its top
+    assert buffer.seen(screen.view(0.51), 8).sample.tolist() == []
+    assert buffer.seen(None, 8).sample.tolist() == [0, 1, 2, 3]
+    hits = Hits(*(values[:, :1] for values in vars(answer.hits).values()))
+    buffer.add(torch.full((1, 3), 0.5), 0.1, place[:1], hits)
+    assert buffer.seen(None, 8).sample.tolist() == [1, 2, 3, 0] and buffer.time_s.tolist() == [0.1, 0.0, 0.0, 0.0]

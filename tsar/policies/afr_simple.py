@@ -1,0 +1,104 @@
+"""Adaptive frameless rendering in its simplest form: single samples, no reprojection, one age for all of a tile.
+
+Samples are drawn from tiles of equal probability whose size follows variance (:mod:`tsar.policies.tiles`). An image is
+filled from the newest samples, each weighted down with its age in units of its tile's refresh interval, by pull and
+push over a pyramid. :mod:`tsar.policies.afr` has what Dayal et al. describe beside that.
+
+Source: Dayal et al. 2005, as described in Stephens 2011, sec. 2.5 and 7.3.2.
+
+Deviation: the original samples crosshairs, reprojects them, and reconstructs with per-tile gradient filters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from tsar.clock import StageTimer
+from tsar.config import TsarConfig
+from tsar.error import compressed_luminance
+from tsar.morton import morton_to_raster
+from tsar.policies import tiles
+from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
+from tsar.policies.tiles import Tree
+from tsar.policy import Moment, Picture, Policy
+from tsar.types import FrameletBatch, SampleBatch
+
+LEAVES = 1024
+_MEMORY_CYCLES = 8.0
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """The tree, the newest sample of each pixel, and the leaves and pixels that were asked for.
+
+    Frozen, but the buffer within changes in place.
+    """
+
+    tree: Tree
+    buffer: PixelBuffer
+    node: Int64[Tensor, " samples"] | None = None
+    pixel: Int64[Tensor, " samples"] | None = None
+
+
+class AfrSimple(Policy[Scattered]):
+    """Cycles of ``batch_size * s²`` samples, as many in every leaf."""
+
+    @property
+    def footprint(self) -> float:
+        """2 had less error than 1 on three of the five inputs, and 3 % more on the others."""
+        return 2.0
+
+    @property
+    def _depth(self) -> int:
+        return 2 * (self.config.resolution_px.bit_length() - 1)
+
+    def start(self) -> Scattered:
+        return Scattered(tiles.initial(self._depth, LEAVES, 3), PixelBuffer.empty(self.config))
+
+    def request(self, state: Scattered, moment: Moment) -> tuple[Scattered, FrameletBatch]:
+        node, pixel = draw(state.tree, int(self.config.budget), self._depth, self.config, moment.cycle)
+        return replace(state, node=node, pixel=pixel), pixel_batch(pixel, self.config, moment)
+
+    def observe(
+        self, state: Scattered, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
+    ) -> Scattered:
+        assert state.node is not None and state.pixel is not None
+        color = pixel_colors(samples, self.config)
+        with timer("cache"):
+            write(state.buffer, state.pixel, color, moment.time_s)
+        with timer("response"):
+            luminance = compressed_luminance(color)
+            values = torch.stack((torch.ones_like(luminance), luminance, luminance.square()))
+            gathered = tiles.gather(state.tree, state.node, values, _MEMORY_CYCLES)
+            return replace(state, tree=tiles.adapt(gathered, self._depth))
+
+    def image(self, state: Scattered, moment: Moment) -> Picture:
+        image = _image(state.tree, state.buffer, self.config, self._depth, moment.time_s, moment.cycle_s)
+        return Picture(image, sample_map(state.buffer, self.config))
+
+
+def draw(
+    tree: Tree, count: int, depth: int, config: TsarConfig, cycle: int
+) -> tuple[Int64[Tensor, " samples"], Int64[Tensor, " samples"]]:
+    """Leaf and raster pixel of each sample: leaves in turn, a uniformly random pixel within each."""
+    leaves = tree.leaves
+    node = leaves[torch.arange(count) % leaves.numel()]
+    uniform = torch.rand(count, generator=generator(config, cycle), dtype=torch.float64)
+    cell = tiles.first_cell(node, depth) + (uniform * tiles.area_px(node, depth)).to(torch.int64)
+    return node, morton_to_raster(config.resolution_px)[cell]
+
+
+def _image(
+    tree: Tree, buffer: PixelBuffer, config: TsarConfig, depth: int, now_s: float, cycle_s: float
+) -> Float[Tensor, "h w 3"]:
+    """Newest samples weighted by ``exp(-age / refresh interval of the leaf)``, filled by pull and push."""
+    leaves = tree.leaves
+    interval_s = tiles.area_px(leaves, depth).to(torch.float64) * leaves.numel() / config.budget * cycle_s
+    weight = torch.exp((buffer.time_s - now_s) / tiles.per_pixel(interval_s, tree, depth)).to(torch.float32)
+    side = config.resolution_px
+    color = buffer.color.reshape(side, side, 3).permute(2, 0, 1)
+    return pull_push(color, weight.reshape(1, side, side)).permute(1, 2, 0).contiguous()

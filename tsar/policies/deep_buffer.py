@@ -1,0 +1,110 @@
+"""A buffer of all recent samples, which are taken to the newest poses: their colours, times and first hits.
+
+Source: the temporally deep buffer of Dayal et al. 2005.
+
+Deviation: the buffer has one queue for the whole picture, not one per tile. A sample is hidden where another in its
+pixel is nearer by 5 %, or six of the eight pixels around it hold one that is nearer by 7 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Float64, Int32, Int64
+from torch import Tensor
+
+from tsar.projection import project
+from tsar.types import Hits, Viewpoint
+
+SAMPLE_FLOPS = 75
+"""Operations per stored sample of :meth:`DeepBuffer.seen`: projection 31, pixel 8, nearest depth 2, and the comparison
+with nine depths 34."""
+_NEARER, _NEARER_AROUND, _AROUND = 1.05, 1.07, 6
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Where the samples of a buffer are, from the oldest to the newest.
+
+    Attributes:
+        sample: which of the buffer; those that are outside the picture or hidden are left out.
+        pixel: raster index.
+    """
+
+    sample: Int64[Tensor, " n"]
+    pixel: Int64[Tensor, " n"]
+
+
+@dataclass(frozen=True)
+class DeepBuffer:
+    """The newest samples, as many as fit, in the order of a ring. Changes in place.
+
+    Attributes:
+        color: linear RGB.
+        time_s: animation time; ``-inf`` where nothing has been stored yet.
+        position: on the image plane, where they were sampled.
+        instance, point: first hits, where there are any.
+        head: place of the next sample, in one element.
+    """
+
+    color: Float[Tensor, "room 3"]
+    time_s: Float64[Tensor, " room"]
+    position: Float64[Tensor, "room 2"]
+    instance: Int32[Tensor, " room"]
+    point: Float[Tensor, "room 3"]
+    head: Int64[Tensor, " 1"]
+
+    @staticmethod
+    def empty(room: int) -> DeepBuffer:
+        return DeepBuffer(
+            torch.zeros(room, 3),
+            torch.full((room,), -torch.inf, dtype=torch.float64),
+            torch.zeros(room, 2, dtype=torch.float64),
+            torch.full((room,), -1, dtype=torch.int32),
+            torch.zeros(room, 3),
+            torch.zeros(1, dtype=torch.int64),
+        )
+
+    def add(
+        self, color: Float[Tensor, "n 3"], time_s: float, position: Float[Tensor, "n 2"], hits: Hits | None
+    ) -> None:
+        """Stores samples in the place of the oldest; of more than there is room for, the last."""
+        room = self.time_s.numel()
+        keep = slice(max(0, color.shape[0] - room), None)
+        place = (self.head + torch.arange(min(room, color.shape[0]))) % room
+        self.color[place], self.time_s[place] = color[keep], time_s
+        self.position[place] = position[keep].to(torch.float64)
+        if hits is not None:
+            self.instance[place] = hits.instance.reshape(-1)[keep]
+            self.point[place] = hits.point.reshape(-1, 3)[keep]
+        self.head[0] = (self.head + place.numel()) % room
+
+    def seen(self, view: Viewpoint | None, side: int) -> Placed:
+        """Samples that are seen, by newest poses, in a picture of ``side²`` pixels; without poses, all that are stored,
+        where they were sampled."""
+        room = self.time_s.numel()
+        order = (self.head + torch.arange(room)) % room
+        order = order[self.time_s[order].isfinite()]
+        place, depth = self.position[order], None
+        if view is not None:
+            found, depth = project(view, self.instance[order], self.point[order])
+            place = torch.where(found.isnan(), place, found) if view.kind == "parallel" else found
+        inside = ((place >= 0.0) & (place < 1.0)).all(1)
+        order, place = order[inside], place[inside]
+        column, row = (place * side).to(torch.int64).unbind(1)
+        pixel = row * side + column
+        if depth is None:
+            return Placed(order, pixel)
+        seen = ~_hidden(depth[inside], pixel, side)
+        return Placed(order[seen], pixel[seen])
+
+
+def _hidden(depth: Float64[Tensor, " n"], pixel: Int64[Tensor, " n"], side: int) -> Bool[Tensor, " n"]:
+    nearest = torch.full((side * side,), torch.inf, dtype=torch.float64).scatter_reduce(0, pixel, depth, "amin")
+    around = F.pad(nearest.reshape(side, side), (1, 1, 1, 1), value=torch.inf).reshape(-1)
+    centre = (pixel // side + 1) * (side + 2) + pixel % side + 1
+    steps = [row * (side + 2) + column for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column]
+    nearer = sum((around[centre + step] * _NEARER_AROUND < depth).to(torch.int64) for step in steps)
+    return (nearest[pixel] * _NEARER < depth) | (nearer >= _AROUND)

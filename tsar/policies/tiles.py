@@ -1,0 +1,117 @@
+"""A cut through a kd-tree over the picture, of a fixed number of leaves, that follows the error.
+
+Every leaf is sampled alike, so a small leaf is sampled densely. Each keeps sums over its samples that fade with age;
+the leaves of greatest error (variance times area) are split, and sibling leaves whose merger would have the least are
+merged, as many as were split.
+
+Source: Dayal et al. 2005, as described in Stephens 2011, sec. 2.5 and 7.3.2.
+
+Deviation: the original splits and merges one pair at a time from priority queues. Here all splits and mergers of a
+cycle are picked at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp
+
+import torch
+from jaxtyping import Bool, Float, Float64, Int64
+from torch import Tensor
+
+from tsar.morton import floor_log2, morton_to_raster
+
+CHANGES_PER_CYCLE = 64
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A cut through a kd-tree, by kd index.
+
+    Attributes:
+        leaf: which nodes are in the cut.
+        sums: per node, over its samples, weights that fade with age, and these times luminance, squared luminance, and
+            whatever else is gathered; only leaves' are in use.
+    """
+
+    leaf: Bool[Tensor, " nodes"]
+    sums: Float[Tensor, "rows nodes"]
+
+    @property
+    def leaves(self) -> Int64[Tensor, " leaves"]:
+        return self.leaf.nonzero().squeeze(1)
+
+
+def initial(depth: int, leaves: int, rows: int) -> Tree:
+    """The uniform cut of a power of two of leaves through a tree whose pixels are nodes of ``depth``."""
+    nodes = 2 ** (depth + 1)
+    leaf = torch.zeros(nodes, dtype=torch.bool)
+    leaf[leaves : 2 * leaves] = True
+    return Tree(leaf, torch.zeros(rows, nodes))
+
+
+def area_px(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
+    """Pixels of nodes."""
+    return torch.ones_like(node) << (depth - floor_log2(node))
+
+
+def first_cell(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
+    """Morton index of the first pixel of nodes; the others follow it."""
+    return (node << (depth - floor_log2(node))) - 2**depth
+
+
+def per_pixel(values: Float64[Tensor, " leaves"], tree: Tree, depth: int) -> Float64[Tensor, " pixels"]:
+    """Values of the leaves as a raster."""
+    leaves = tree.leaves
+    order = torch.argsort(first_cell(leaves, depth))
+    along = values[order].repeat_interleave(area_px(leaves, depth)[order])
+    raster = torch.empty_like(along)
+    raster[morton_to_raster(2 ** (depth // 2))] = along
+    return raster
+
+
+def gather(
+    tree: Tree, node: Int64[Tensor, " samples"], values: Float[Tensor, "rows samples"], memory_cycles: float
+) -> Tree:
+    """Fades the sums of all leaves by one cycle, to 1/e in ``memory_cycles``, and adds new samples."""
+    sums = tree.sums * exp(-1.0 / memory_cycles)
+    for row, value in enumerate(values):
+        sums[row].index_add_(0, node, value)
+    return replace(tree, sums=sums)
+
+
+def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"]) -> Float[Tensor, " n"]:
+    """Variance times area; area in units of the image."""
+    weight = sums[0].clamp(min=1e-12)
+    variance = (sums[2] / weight - (sums[1] / weight).square()).clamp(min=0.0)
+    return variance * torch.exp2(-floor_log2(node).to(torch.float32))
+
+
+def adapt(tree: Tree, depth: int) -> Tree:
+    """Splits the worst leaves and merges as many of the best sibling pairs, while a split gains more than a merger
+    costs.
+
+    Children take half their parent's sums each; a merged leaf takes those of both. The number of leaves stays the same.
+    """
+    leaves = tree.leaves
+    leaf_error = error(tree.sums[:, leaves], leaves)
+    left = leaves[(leaves & 1) == 0]
+    left = left[tree.leaf[left + 1] & (left > 3)]
+    merged_sums = tree.sums[:, left] + tree.sums[:, left + 1]
+    merged_error, merge_order = torch.sort(error(merged_sums, left >> 1), stable=True)
+    splittable = torch.where(leaves < 2**depth, leaf_error, -1.0)
+    split_error, split_order = torch.sort(splittable, descending=True, stable=True)
+    changes = min(CHANGES_PER_CYCLE, left.numel(), leaves.numel())
+    worth = split_error[:changes] > merged_error[:changes]
+    split, pair = leaves[split_order[:changes]][worth], left[merge_order[:changes]][worth]
+    # A leaf may not be split and merged in one cycle.
+    clash = torch.isin(split, torch.cat((pair, pair + 1))) | torch.isin(pair >> 1, split >> 1)
+    split, pair = split[~clash], pair[~clash]
+    leaf, sums = tree.leaf.clone(), tree.sums.clone()
+    sums[:, pair >> 1] = sums[:, pair] + sums[:, pair + 1]
+    for child in (2 * split, 2 * split + 1):
+        sums[:, child] = tree.sums[:, split] / 2
+        leaf[child] = True
+    leaf[split] = leaf[pair] = leaf[pair + 1] = False
+    leaf[pair >> 1] = True
+    return Tree(leaf, sums)
