@@ -15,7 +15,6 @@ from analysis.command.console import Table
 from analysis.command.options import Unprefixed
 from analysis.comparison.options import RunOptions
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, Ledger
-from analysis.metrics.rivals import BEST
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 
@@ -83,6 +82,8 @@ def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
     names = ("ratio_median", "ratio_quartiles", "share_suitable", "suitable_percentile", "cycles", "age_spread_s")
     beside = dict(summary["ratio_statistics"])
     if "best_rival" in summary:
+        from analysis.metrics.rivals import BEST  # here, for it brings torch, which options do without
+
         beside[BEST] = summary["best_rival"]["ratio_statistics"]
     return {
         "run": run.out.name,
