@@ -16,6 +16,8 @@ POLICIES: Named[Make] = Named(
     "policy",
     "tsar.policies",
     {
+        "tsar": "tsar.policies.filter:Filter",
+        "filter": "tsar.policies.filter:unmoved",
         "thesis": "tsar.policies.thesis:Thesis",
         "framed": "tsar.policies.framed:Framed",
         "framed-1": "tsar.policies.framed:PromptlyFramed",

@@ -1,0 +1,1 @@
+"""Estimates of every pixel, filtered over time and space, for policies that accumulate samples."""

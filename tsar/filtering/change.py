@@ -1,0 +1,71 @@
+"""How fast the picture changes, from what new samples say of estimates that time alone had left as they were."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Float64
+from torch import Tensor
+
+from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates, FilterOptions, encoded
+
+_TOLERANCE = 4.0  # variances that a squared residual may have before it speaks of change
+_SURE = 4.0  # expected residuals beyond which what was remembered is dropped
+_DROPPED = 0.1
+_RATE_MIN = 1e-5
+_SPAN_MIN_S = 1e-3
+
+
+def observed(
+    before: Change,
+    estimates: Estimates,
+    color: Float[Tensor, "3 h w"],
+    count: Float[Tensor, "1 h w"],
+    time_s: Float64[Tensor, "1 h w"],
+    compared: Bool[Tensor, "1 h w"],
+    now_s: float,
+    cycle_s: float,
+    options: FilterOptions,
+) -> Change:
+    """The rates after a batch.
+
+    A pixel with ``k`` new samples has the residual ``d²``, the mean over the channels of the squared difference of
+    encoded colours, and ``4 (P + 0.8 g / k)`` is expected at most. Per element ``N <- f N + sum(d² - expected)`` and
+    ``D <- f D + sum(time between the samples)``; the rate is ``max(N, 0) / D``, at least half of the greatest in the
+    3 x 3 elements around and a quarter of that in 5 x 5. What is remembered fades with ``f``, and at once where the
+    residuals are far beyond what was expected.
+
+    Deviation: ``f = 1 / (1 + x + x²/2)`` with ``x`` the time since the element was seen over the memory, in place of
+    ``exp(-x)``, whose last bit is the processor's.
+
+    Args:
+        before: as it was.
+        estimates: before the batch.
+        color, count, time_s: mean, number and mean time of the new samples of each pixel.
+        compared: pixels that have both.
+        now_s, cycle_s: start of the cycle and length of the one before, seconds.
+        options: of the filter.
+    """
+    residual = (encoded(color) - encoded(estimates.color)).square().mean(0, keepdim=True)
+    expected = _TOLERANCE * (estimates.observed + 0.8 * estimates.roughness / count.clamp(min=1.0))
+    nothing = torch.zeros_like(residual)
+    excess = _summed(torch.where(compared, residual - expected, nothing))
+    usual = _summed(torch.where(compared, expected, nothing))
+    span_s = _summed(torch.where(compared, (time_s - estimates.time_s).to(torch.float32), nothing))
+    looked = F.max_pool2d(compared.to(torch.float32)[None], ELEMENT_PX)[0] > 0.0
+    gap = (now_s - before.seen_s).clamp(0.0, 1e3).to(torch.float32) / options.memory_s
+    fade = 1.0 / (1.0 + gap + 0.5 * gap * gap)
+    fade = torch.where(excess > _SURE * usual, fade.clamp(max=_DROPPED), fade)
+    total = torch.where(looked, fade * before.excess + excess, before.excess)
+    span = torch.where(looked, fade * before.span_s + span_s, before.span_s)
+    seen_s = torch.where(looked, torch.full_like(before.seen_s, now_s), before.seen_s)
+    own = total.clamp(min=0.0) / span.clamp(min=_SPAN_MIN_S)
+    rate = own
+    if options.spread:
+        rate = torch.maximum(rate, 0.5 * F.max_pool2d(own[None], 3, 1, 1)[0])
+        rate = torch.maximum(rate, 0.25 * F.max_pool2d(own[None], 5, 1, 2)[0])
+    return Change(total, span, seen_s, rate.clamp(_RATE_MIN, VARIANCE_MAX / cycle_s))
+
+
+def _summed(pixels: Float[Tensor, "1 h w"]) -> Float[Tensor, "1 e e"]:
+    return F.avg_pool2d(pixels[None], ELEMENT_PX)[0] * ELEMENT_PX**2

@@ -1,0 +1,46 @@
+"""Estimates as a picture: what is uncertain takes the colours of its surroundings."""
+
+from __future__ import annotations
+
+import torch.nn.functional as F
+from jaxtyping import Float
+from torch import Tensor
+
+from tsar.policies.scatter import double_width
+
+
+def smoothed(
+    color: Float[Tensor, "3 h w"], variance: Float[Tensor, "1 h w"], roughness: Float[Tensor, "1 h w"]
+) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
+    """Picture and variance of its errors, over a pyramid of means.
+
+    With ``s_l = g 2^l / 2`` at level ``l``, up: a parent is the mean of its children, weighted with
+    ``w = 1 / (P_l + s_l)``, and ``P_(l+1) = 1 / sum(w)``. Down: with ``J = P_l / (P_l + s_l)`` and the coarser level
+    enlarged bilinearly to ``x', V'``, ``x = m_l + J (x' - m_l)`` and ``V = P_l + J² (V' - P_l - s_l)``.
+    """
+    levels = [(color, variance, roughness)]
+    while levels[-1][0].shape[-1] > 1:
+        color, variance, roughness = levels[-1]
+        weight = 1.0 / (variance + _between(roughness, len(levels) - 1))
+        total = 4.0 * _halved(weight)
+        levels.append((4.0 * _halved(color * weight) / total, 1.0 / total, _halved(roughness)))
+    shown, remaining, _ = levels[-1]
+    for level in range(len(levels) - 2, -1, -1):
+        color, variance, roughness = levels[level]
+        between = _between(roughness, level)
+        share = variance / (variance + between)
+        shown = color + share * (_doubled(shown) - color)
+        remaining = variance + share * share * (_doubled(remaining) - variance - between)
+    return shown, remaining
+
+
+def _between(roughness: Float[Tensor, "1 h w"], level: int) -> Float[Tensor, "1 h w"]:
+    return 0.5 * 2.0**level * roughness
+
+
+def _halved(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h2 w2"]:
+    return F.avg_pool2d(plane[None], 2)[0]
+
+
+def _doubled(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h2 w2"]:
+    return double_width(double_width(plane).transpose(1, 2)).transpose(1, 2)

@@ -1,0 +1,217 @@
+"""What a batch says of every pixel, and estimates that take it in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Float64, Int64
+from torch import Tensor
+
+from tsar.filtering.records import TILE_SIDE, VARIANCE_MAX, Estimates, FilterOptions, Surfels, encoded
+from tsar.morton import morton_to_raster, raster_to_morton
+from tsar.projection import project
+from tsar.types import Hits, Viewpoint
+
+_ROUGHNESS_MIN = 1e-6
+_MOVES_PX = 0.02
+"""Pixels a cycle beyond which a surface moves against another."""
+_SHARE_MOVING = 1.0 / 17.0
+"""Least share of new samples in the estimate of a surfel that moves."""
+COLOR_MAX = 1.5
+"""Samples are clipped here before they are averaged: a brighter glint would spread over its neighbours."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A batch by pixels.
+
+    Attributes:
+        color, time_s: means of each pixel's samples.
+        count: how many there are.
+        newest: number of the pixel's last sample in the batch, -1 where there is none.
+        roughness: as :class:`tsar.filtering.records.Estimates` has it, with the batch taken in.
+    """
+
+    color: Float[Tensor, "3 h w"]
+    time_s: Float64[Tensor, "1 h w"]
+    count: Float[Tensor, "1 h w"]
+    newest: Int64[Tensor, " pixels"]
+    roughness: Float[Tensor, "1 h w"]
+
+    @property
+    def hit(self) -> Bool[Tensor, "1 h w"]:
+        return self.count > 0.0
+
+
+def pixels_of(position: Float[Tensor, "samples 2"], side: int) -> Int64[Tensor, " samples"]:
+    """Raster index of the pixel under positions in pixels; ``side²`` outside the image."""
+    inside = (position >= 0.0).all(1) & (position < side).all(1)
+    cell = torch.where(inside[:, None], position, 0.0).floor().to(torch.int64)
+    return torch.where(inside, cell[:, 1] * side + cell[:, 0], side * side)
+
+
+def gathered(
+    color: Float[Tensor, "n samples 3"],
+    time_s: Float64[Tensor, "n samples"],
+    spacing: Float[Tensor, " n"],
+    pixel: Int64[Tensor, " flat"],
+    now_s: float,
+    roughness: Float[Tensor, "1 h w"],
+) -> Seen:
+    """Sums the samples of a batch up by pixels.
+
+    The roughness of a sample is half the mean squared difference from its four neighbours in the tile, per pixel of
+    their distance. Those of a coarse tile bound it: a semivariance ``v`` at ``h`` pixels says that the roughness lies
+    between ``v / sqrt(h)``, for surfaces between smooth and random ones, and ``v``. The mean over 3 x 3 pixels is mixed
+    half and half with what was known.
+    """
+    side = roughness.shape[-1]
+
+    def summed(values: Tensor) -> Tensor:
+        return values.new_zeros(side * side + 1).index_add_(0, pixel, values)[:-1].reshape(1, side, side)
+
+    flat = color.reshape(-1, 3)
+    count = summed(torch.ones_like(flat[:, 0]))
+    many = count.clamp(min=1.0)
+    newest = torch.full((side * side + 1,), -1).scatter_reduce(0, pixel, torch.arange(pixel.numel()), "amax")[:-1]
+    semivariance = _semivariance(encoded(color))
+    wide = spacing.clamp(min=1.0)[:, None]
+    least = summed((semivariance / (spacing[:, None] / wide) / wide.sqrt()).reshape(-1))
+    most = summed((semivariance / (spacing[:, None] / wide)).reshape(-1))
+    near = _box(count)
+    bounded = torch.minimum(
+        torch.maximum(roughness, _box(least) / near.clamp(min=1e-9)), _box(most) / near.clamp(min=1e-9)
+    )
+    mixed = torch.where(near > 0.0, 0.5 * (roughness + bounded), roughness).clamp(min=_ROUGHNESS_MIN)
+    return Seen(
+        color=torch.cat([summed(flat[:, channel].contiguous()) for channel in range(3)]) / many,
+        time_s=summed(time_s.reshape(-1) - now_s) / many.to(torch.float64) + now_s,
+        count=count,
+        newest=newest,
+        roughness=mixed,
+    )
+
+
+def updated(
+    estimates: Estimates,
+    seen: Seen,
+    rate: Float[Tensor, "1 h w"],
+    now_s: float,
+    replaced: Bool[Tensor, "1 h w"],
+    least_share: Float[Tensor, "1 h w"],
+    options: FilterOptions,
+) -> tuple[Estimates, Float[Tensor, "1 h w"]]:
+    """Estimates with a batch taken in, and the share that new samples have in each pixel.
+
+    A pixel with ``k`` new samples of mean ``c`` takes the share ``K = P / (P + g / 2k)``, as the Kalman filter does:
+    ``m <- m + K (c - m)``. Of its variance ``P = a + g i / 2`` the part by change becomes ``a <- (1 - K)² a`` and one
+    over the samples ``i <- (1 - K)² i + K² / k``, which holds for any ``K``. The first samples of a pixel, and those
+    that replace what was there, have ``K = 1``.
+
+    Deviation: the Kalman filter keeps ``P`` alone. Here what is learnt later of the roughness corrects the trust in
+    earlier samples.
+
+    Args:
+        estimates: aged to the start of the cycle, ``now_s``.
+        seen: the batch.
+        rate: variance per second by which they age until the samples' time.
+        now_s: seconds.
+        replaced: pixels whose estimates are of no use any more.
+        least_share: the least ``K`` of each pixel.
+        options: of the filter.
+    """
+    hit, known = seen.hit, estimates.known
+    elapsed_s = (seen.time_s - now_s).to(torch.float32)
+    many = seen.count.clamp(min=1.0)
+    aged = estimates.aged + rate * elapsed_s
+    variance = (aged + 0.5 * seen.roughness * estimates.inverse).clamp(max=VARIANCE_MAX)
+    share = torch.maximum(variance / (variance + 0.5 * seen.roughness / many), least_share)
+    if not options.accumulation:
+        share = torch.ones_like(share)
+    share = torch.where(known & ~replaced, share, 1.0)
+    kept = (1.0 - share) * (1.0 - share)
+    return Estimates(
+        color=torch.where(hit, estimates.color + share * (seen.color - estimates.color), estimates.color),
+        aged=torch.where(hit, (kept * aged).clamp(max=VARIANCE_MAX), estimates.aged),
+        inverse=torch.where(hit, kept * estimates.inverse + share * share / many, estimates.inverse),
+        time_s=torch.where(hit, seen.time_s, estimates.time_s),
+        roughness=seen.roughness,
+    ), share
+
+
+@dataclass(frozen=True)
+class Met:
+    """Surfels of the newest samples of a batch, and how they relate to those that were there.
+
+    Attributes:
+        surfels: of the samples.
+        same: pixels in which both are of one instance.
+        replaced: pixels in which another surface is seen, and moves against the one that was there.
+        least_share: the least share of new samples.
+    """
+
+    surfels: Surfels
+    same: Bool[Tensor, "1 h w"]
+    replaced: Bool[Tensor, "1 h w"]
+    least_share: Float[Tensor, "1 h w"]
+
+
+def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewpoint | None) -> Met:
+    """The surfels of a batch, by the poses of a view and those of the cycle before."""
+    side = before.depth.shape[-1]
+    newest = seen.newest.clamp(min=0)
+    instance = hits.instance.reshape(-1)[newest].to(torch.int64)
+    point = hits.point.reshape(-1, 3)[newest]
+    position, depth = _image(view, instance, point, side)
+    step = torch.zeros_like(position)
+    if earlier is not None:
+        step = position - _image(earlier, instance, point, side)[0]
+    found = Surfels(instance.reshape(1, side, side), point.T.reshape(3, side, side), position, depth, step)
+    same = seen.hit & (found.instance == before.instance)
+    moves = (step - before.step).abs().amax(0, keepdim=True) > _MOVES_PX
+    fast = before.step.abs().amax(0, keepdim=True) > _MOVES_PX
+    share = torch.where(fast, _SHARE_MOVING, 0.0)
+    return Met(found, same, seen.hit & ~same & moves, share)
+
+
+def joined(before: Surfels, found: Met, hit: Bool[Tensor, "1 h w"], share: Float[Tensor, "1 h w"]) -> Surfels:
+    """Surfels after a batch: at the mean place of the samples of one instance, or at that of the newest."""
+    new = found.surfels
+    weight = torch.where(found.same, share, 1.0)
+    other = hit & ~found.same
+
+    def mean(old: Tensor, fresh: Tensor) -> Tensor:
+        return torch.where(hit, old + weight * (fresh - old), old)
+
+    return Surfels(
+        instance=torch.where(other, new.instance, before.instance),
+        point=mean(before.point, new.point),
+        position=mean(before.position, new.position),
+        depth=torch.where(hit, new.depth, before.depth),
+        step=torch.where(other, new.step, before.step),
+    )
+
+
+def _image(
+    view: Viewpoint, instance: Int64[Tensor, " pixels"], point: Float[Tensor, "pixels 3"], side: int
+) -> tuple[Float[Tensor, "2 h w"], Float[Tensor, "1 h w"]]:
+    position, depth = project(view, instance, point)
+    flat = (position * side).nan_to_num(0.0).to(torch.float32).T.reshape(2, side, side)
+    return flat.contiguous(), depth.to(torch.float32).reshape(1, side, side)
+
+
+def _semivariance(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:
+    """Half the mean squared difference of each sample from its neighbours in the tile, Morton order."""
+    plane = color[:, raster_to_morton(TILE_SIDE)].reshape(-1, TILE_SIDE, TILE_SIDE, 3)
+    across = 0.5 * (plane[:, :, 1:] - plane[:, :, :-1]).square().mean(-1)
+    down = 0.5 * (plane[:, 1:] - plane[:, :-1]).square().mean(-1)
+    total = F.pad(across, (1, 0)) + F.pad(across, (0, 1)) + F.pad(down, (0, 0, 1, 0)) + F.pad(down, (0, 0, 0, 1))
+    row = torch.full((TILE_SIDE,), 2.0)
+    row[0] = row[-1] = 1.0
+    return (total / (row + row[:, None])).reshape(len(color), -1)[:, morton_to_raster(TILE_SIDE)]
+
+
+def _box(plane: Float[Tensor, "1 h w"]) -> Float[Tensor, "1 h w"]:
+    return F.avg_pool2d(F.pad(plane[None], (1, 1, 1, 1), mode="replicate"), 3, 1)[0]

@@ -1,0 +1,132 @@
+"""Which tiles to sample: the best disjoint ones of the quadtree, by what they gain."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Float64, Int64
+from torch import Tensor
+
+from tsar.filtering.records import ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX, FilterOptions
+
+_BISECTIONS = 30
+_PRICES = 1e-14  # of the greatest gain: the least price
+
+
+def spacings(side: int) -> tuple[float, ...]:
+    """Those of :data:`tsar.filtering.records.SPACINGS` whose tiles fit into the image."""
+    return tuple(spacing for spacing in SPACINGS if side >= TILE_SIDE * spacing)
+
+
+def gains(
+    variance: Float[Tensor, "1 h w"],
+    roughness: Float[Tensor, "1 h w"],
+    rate: Float[Tensor, "1 h w"],
+    speed: Float[Tensor, "1 h w"],
+    cycle_s: float,
+    options: FilterOptions,
+) -> list[Float64[Tensor, "_ _"]]:
+    """What sampling a tile gains, for the tiles of every spacing: variance removed times how long that lasts, summed.
+
+    With ``P = min(V + q cycle, 0.1)`` a pixel gains ``P² / (P + g h²/2)`` at a spacing of ``h <= 1``, and beyond that
+    ``P² (c / (P + g/2) + (1 - c) P / ((P + g (0.5 + 0.35 (h - 1))) (P + g h/2)))`` with ``c = 1/h²``, the share of
+    pixels that are hit. It lasts ``gain / q``, at least ``life_min_s``, at most ``life_max_s``, and at most until the
+    surface has crossed the share ``reach`` of the image.
+
+    Args:
+        variance: of what was last shown, ``V``.
+        roughness: semivariance per pixel, ``g``.
+        rate: of change, variance per second, ``q``.
+        speed: of surfaces over the image, pixels per second.
+        cycle_s: length of a cycle, seconds.
+        options: of the filter.
+    """
+    p = (variance + rate * cycle_s).clamp(max=VARIANCE_MAX)
+    crossed_s = options.reach * variance.shape[-1] / speed.clamp(min=1e-9)
+    longest_s = crossed_s.clamp(options.life_min_s, options.life_max_s)
+    found = []
+    for spacing in spacings(variance.shape[-1]):
+        if spacing <= 1.0:
+            gain = p * p / (p + 0.5 * spacing**2 * roughness)
+        else:
+            hit = 1.0 / spacing**2
+            beside = (p + (0.5 + 0.35 * (spacing - 1.0)) * roughness) * (p + 0.5 * spacing * roughness)
+            gain = p * p * (hit / (p + 0.5 * roughness) + (1.0 - hit) * p / beside)
+        gain = gain * torch.minimum((gain / rate).clamp(min=options.life_min_s), longest_s)
+        width = int(TILE_SIDE * spacing)
+        found.append((F.avg_pool2d(gain[None], width)[0, 0] * width**2).to(torch.float64))
+    return found
+
+
+def best(gain: list[Float64[Tensor, "_ _"]], count: int) -> list[Bool[Tensor, "_ _"]]:
+    """The disjoint tiles, at most ``count``, whose gains sum to most.
+
+    A price on every tile is found by bisection at which the best tiles, those that gain more than they cost and more
+    than the tiles within them, are at most as many.
+    """
+    high = max(float(level.max()) for level in gain) + 1e-12
+    low = high * _PRICES
+    for _ in range(_BISECTIONS):
+        price = sqrt(low * high)
+        if sum(int(level.sum()) for level in _worth(gain, price)) > count:
+            low = price
+        else:
+            high = price
+    return _worth(gain, high)
+
+
+def filled_up(
+    chosen: list[Bool[Tensor, "_ _"]], gain: list[Float64[Tensor, "_ _"]], spacing: int, count: int
+) -> list[Bool[Tensor, "_ _"]]:
+    """Adds the best tiles of one spacing, by number, that overlap none of those chosen, until there are ``count``."""
+    missing = count - sum(int(level.sum()) for level in chosen)
+    above = torch.zeros_like(chosen[0])
+    for level in chosen[:spacing]:
+        above = _halved(above | level)
+    below = torch.zeros_like(chosen[-1])
+    for level in reversed(chosen[spacing + 1 :]):
+        below = F.max_pool2d((below | level).to(torch.float32)[None], 2)[0] > 0.0
+    free = ~(above | below | chosen[spacing])
+    value = torch.where(free, gain[spacing], -1.0).reshape(-1)
+    order = torch.argsort(value, descending=True, stable=True)[: max(missing, 0)]
+    more = chosen[spacing].reshape(-1).clone()
+    more[order[value[order] >= 0.0]] = True
+    return [more.reshape(level.shape) if number == spacing else level for number, level in enumerate(chosen)]
+
+
+def covered(
+    x: Float64[Tensor, " n"], y: Float64[Tensor, " n"], spacing: Float64[Tensor, " n"], side: int
+) -> Int64[Tensor, "1 e e"]:
+    """How many tiles, at most one of a spacing, lie on each element; ``x`` and ``y`` are their edges, pixels."""
+    total = torch.zeros(1, side // ELEMENT_PX, side // ELEMENT_PX, dtype=torch.int64)
+    for kind in spacings(side):
+        width = int(TILE_SIDE * kind)
+        of = spacing == kind
+        tile = torch.zeros(1, side // width, side // width, dtype=torch.int64)
+        tile[0, (y[of] / width).to(torch.int64), (x[of] / width).to(torch.int64)] = 1
+        total += tile.repeat_interleave(width // ELEMENT_PX, 1).repeat_interleave(width // ELEMENT_PX, 2)
+    return total
+
+
+def _worth(gain: list[Float64[Tensor, "_ _"]], price: float) -> list[Bool[Tensor, "_ _"]]:
+    value = (gain[-1] - price).clamp(min=0.0)
+    taken = [gain[-1] > price]
+    for level in reversed(gain[:-1]):
+        within = 4.0 * F.avg_pool2d(value[None, None], 2)[0, 0]
+        own = level - price
+        take = (own > within) & (own > 0.0)
+        taken.append(take)
+        value = torch.where(take, own, within)
+    free, found = torch.ones_like(taken[-1]), []
+    for number, level in enumerate(reversed(taken)):
+        if number:
+            free = _halved(free)
+        found.append(level & free)
+        free = free & ~level
+    return found
+
+
+def _halved(tiles: Bool[Tensor, "rows columns"]) -> Bool[Tensor, "rows2 columns2"]:
+    return tiles.repeat_interleave(2, 0).repeat_interleave(2, 1)

@@ -1,0 +1,246 @@
+"""The project's own policies: estimates of every pixel, filtered over time and space, moving with their surfaces.
+
+Every pixel has an estimate of its colour and of the variance of its error. A cycle moves the estimates with the
+surfaces that they belong to, by the poses known at its start; chooses the tiles whose samples remove most of the error
+for longest; averages the new samples into the estimates; learns from the residuals how fast the picture changes; and
+shows the estimates, blended with their surroundings where they are uncertain. ``filter`` leaves the moving out.
+
+The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is sampled in
+several cycles, so that the picture is late by little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import torch
+from jaxtyping import Float, Float64, Int64
+from torch import Tensor
+
+from tsar.clock import StageTimer
+from tsar.error import replace_nonfinite
+from tsar.filtering import change, motion, samples, tiles
+from tsar.filtering.display import smoothed
+from tsar.filtering.records import (
+    DEFAULT,
+    ELEMENT_PX,
+    TILE_SIDE,
+    VARIANCE_MAX,
+    Change,
+    Estimates,
+    FilterOptions,
+    Surfels,
+)
+from tsar.morton import morton_to_raster
+from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
+
+PIXEL_FLOPS = {True: 560.0, False: 290.0}
+"""Operations per output pixel and cycle, with and without reprojection, as a test counts them in the code."""
+SAMPLE_FLOPS = 200.0
+"""Operations per sample."""
+_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # golden ratio of two dimensions
+_GRID = 65536
+_WARMUP_FRAMES = 8
+_TILES_A_PROBE = 16
+_FIRST_CYCLE = 1 << 20  # cycles before the start have numbers down to its negative
+
+
+@dataclass(frozen=True)
+class State:
+    """What one cycle hands to the next.
+
+    Attributes:
+        estimates: of all pixels, aged to ``now_s``.
+        surfels: in all pixels.
+        change: observed so far.
+        now_s: start of the newest cycle; None before the first.
+        view: poses at that time; None where nothing is reprojected.
+        spacing: of the tiles that were asked for, pixels.
+        visits: cycles that sampled each element.
+        shown, remaining: the picture, and the variance of its errors.
+    """
+
+    estimates: Estimates
+    surfels: Surfels
+    change: Change
+    now_s: float | None
+    view: Viewpoint | None
+    earlier: Viewpoint | None
+    spacing: Float[Tensor, " n"]
+    visits: Int64[Tensor, "1 e e"]
+    shown: Float[Tensor, "3 h w"]
+    remaining: Float[Tensor, "1 h w"]
+
+
+class Filter(Policy[State]):
+    """Samples accumulated in pixels, or on surfaces."""
+
+    latency_cycles = 1
+
+    def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
+        super().__init__(setting)
+        self._options, self._side = options, self.config.resolution_px
+        self._view = setting.view if options.reprojection else None
+        most = int(options.share_max * self._side**2) // TILE_SIDE**2
+        asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
+        self._tiles = max(1, min(asked, most))
+
+    @property
+    def footprint(self) -> int:
+        return self._options.footprint
+
+    @property
+    def warmup_cycles(self) -> int:
+        """Enough to sample every pixel eight times: a second at the usual rate, however short the cycles are."""
+        return max(self.config.warmup_cycles, _WARMUP_FRAMES * self._side**2 // (self._tiles * TILE_SIDE**2))
+
+    @property
+    def price(self) -> Price:
+        return Price(
+            self._tiles * TILE_SIDE**2, pixel_flops=PIXEL_FLOPS[self._options.reprojection], sample_flops=SAMPLE_FLOPS
+        )
+
+    def start(self) -> State:
+        side = self._side
+        nothing, observed = Estimates.empty(side), Change.empty(side)
+        visits = torch.zeros_like(observed.rate, dtype=torch.int64)
+        return State(nothing, Surfels.empty(side), observed, None, None, None, torch.ones(self._tiles), visits,
+                     nothing.color, nothing.variance)  # fmt: skip
+
+    def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
+        """Moves the estimates to the start of the cycle and asks for what they need."""
+        state = self._advanced(state, moment.time_s)
+        x, y, spacing = self._chosen(state, moment)
+        within = morton_to_raster(TILE_SIDE)
+        cell = torch.stack((within % TILE_SIDE, within // TILE_SIDE), dim=1).to(torch.float64)
+        place = torch.stack((x, y), dim=1)
+        offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
+        if self._options.jitter:
+            # the next point of the sequence for each tile, so that a pixel sees consecutive ones
+            middle = ((place + 0.5 * TILE_SIDE * spacing[:, None]) / ELEMENT_PX).to(torch.int64)
+            offset = ((state.visits[0][middle[:, 1], middle[:, 0]][:, None] + 1) * _STEP) % 1.0
+        position = place[:, None] + (cell + offset[:, None]) * spacing[:, None, None]
+        position = (position / self._side * _GRID).floor() / _GRID
+        at = torch.arange(self._tiles, dtype=torch.float64) / self._tiles * moment.cycle_s
+        times = (moment.time_s + at)[:, None].expand(-1, TILE_SIDE**2).contiguous()
+        none = torch.zeros(self._tiles, dtype=torch.int64)
+        batch = FrameletBatch(
+            none, none, position.to(torch.float32), times, cycle=moment.cycle, seed=self.config.seed,
+            hits=state.view is not None,
+        )  # fmt: skip
+        visits = state.visits + tiles.covered(x, y, spacing, self._side)
+        return replace(state, spacing=spacing.to(torch.float32), visits=visits), batch
+
+    def observe(
+        self, state: State, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
+    ) -> State:
+        with timer("response"):
+            state = self._updated(state, batch, samples, moment)
+        with timer("reconstruction"):
+            return self._displayed(state, moment)
+
+    def image(self, state: State, moment: Moment) -> Picture:
+        level = torch.full((self._side, self._side), max(0, (self._side // self.config.framelet_side).bit_length() - 1))
+        newest = SampleMap(state.estimates.time_s[0].clone(), level)
+        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest)
+
+    def _advanced(self, state: State, now_s: float) -> State:
+        estimates, surfels = state.estimates, state.surfels
+        if state.now_s is not None:
+            estimates = _aged(estimates, state.change, now_s - state.now_s)
+        view = self._view(now_s) if self._view is not None else None
+        if view is not None and view.kind == "panorama":
+            view = None
+        if view is not None:
+            estimates, surfels = motion.moved(estimates, surfels, view)
+        return replace(state, estimates=estimates, surfels=surfels, now_s=now_s, view=view, earlier=state.view)
+
+    def _chosen(
+        self, state: State, moment: Moment
+    ) -> tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]:
+        """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
+        kinds = tiles.spacings(self._side)
+        if self._options.by_gain:
+            rate = state.change.rate_px
+            speed = state.surfels.step.abs().amax(0, keepdim=True) / moment.cycle_s
+            gain = tiles.gains(state.remaining, state.estimates.roughness, rate, speed, moment.cycle_s, self._options)
+            chosen = tiles.filled_up(tiles.best(gain, self._tiles), gain, kinds.index(1.0), self._tiles)
+        else:
+            chosen = self._in_turn(kinds, moment.cycle)
+        found = [
+            torch.cat((level.nonzero() * TILE_SIDE * kind, torch.full((int(level.sum()), 1), kind)), dim=1)
+            for kind, level in zip(kinds, chosen, strict=True)
+        ]
+        tile = torch.cat(found).to(torch.float64)
+        tile = tile[torch.arange(self._tiles) % len(tile)]
+        middle = ((tile[:, :2] + 0.5 * TILE_SIDE * tile[:, 2:]) / ELEMENT_PX).to(torch.int64)
+        order = torch.argsort(state.change.rate[0][middle[:, 0], middle[:, 1]], stable=True)
+        y, x, spacing = tile[order].unbind(1)
+        every = max(1, _TILES_A_PROBE // self._tiles)
+        if self._options.probes and self._options.by_gain and moment.cycle % every == 0:
+            width = TILE_SIDE * kinds[0]
+            across = int(self._side / width)
+            number = moment.cycle // every % across**2
+            x[0], y[0], spacing[0] = number % across * width, number // across * width, kinds[0]
+        return x, y, spacing
+
+    def _in_turn(self, kinds: tuple[float, ...], cycle: int) -> list[Tensor]:
+        """Tiles of one sample a pixel, in Morton order."""
+        chosen = [torch.zeros(2 * (int(self._side / (TILE_SIDE * kind)),), dtype=torch.bool) for kind in kinds]
+        fine = chosen[kinds.index(1.0)]
+        turn = (torch.arange(self._tiles) + (cycle + _FIRST_CYCLE) * self._tiles) % fine.numel()
+        fine.reshape(-1)[morton_to_raster(fine.shape[0])[turn]] = True
+        return chosen
+
+    def _updated(self, state: State, batch: FrameletBatch, traced: SampleBatch, moment: Moment) -> State:
+        now_s, side, before = moment.time_s, self._side, state.estimates
+        color = replace_nonfinite(traced.color, TILE_SIDE)[0].clamp(0.0, samples.COLOR_MAX)
+        position = batch.position.reshape(-1, 2) * side
+        if state.view is not None and traced.hits is not None:
+            hits = traced.hits
+            place, depth = motion.project(state.view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
+            position = torch.where((depth > 0.0)[:, None], place * side, -1.0)
+        pixel = samples.pixels_of(position, side)
+        seen = samples.gathered(color, batch.times, state.spacing, pixel, now_s, before.roughness)
+        compared = seen.hit & before.known
+        judged = replace(before, roughness=seen.roughness)
+        changed = change.observed(
+            state.change, judged, seen.color, seen.count, seen.time_s, compared, now_s, moment.cycle_s, self._options
+        )
+        rate, surfels = changed.rate_px, state.surfels
+        if state.view is None or traced.hits is None:
+            none = torch.zeros_like(before.variance)
+            after, _ = samples.updated(before, seen, rate, now_s, none > 0.0, none, self._options)
+        else:
+            found = samples.met(traced.hits, seen, surfels, state.view, state.earlier)
+            beside = _uncertain(before, surfels)
+            after, share = samples.updated(beside, seen, rate, now_s, found.replaced, found.least_share, self._options)
+            after = replace(after, aged=torch.where(seen.hit, after.aged, before.aged))
+            surfels = samples.joined(surfels, found, seen.hit, share)
+        return replace(state, estimates=after, surfels=surfels, change=changed)
+
+    def _displayed(self, state: State, moment: Moment) -> State:
+        aged = _aged(state.estimates, state.change, moment.cycle_s)
+        if state.view is not None:
+            aged = _uncertain(aged, state.surfels)
+        if not self._options.smoothing:
+            return replace(state, shown=aged.color, remaining=aged.variance)
+        shown, remaining = smoothed(aged.color, aged.variance, aged.roughness)
+        return replace(state, shown=shown, remaining=remaining)
+
+
+def _aged(estimates: Estimates, observed: Change, seconds: float) -> Estimates:
+    """Estimates some seconds later."""
+    aged = (estimates.aged + observed.rate_px * seconds).clamp(max=VARIANCE_MAX)
+    return replace(estimates, aged=aged)
+
+
+def _uncertain(estimates: Estimates, surfels: Surfels) -> Estimates:
+    """With the variance of surfels that lie beside their pixels."""
+    return replace(estimates, aged=estimates.aged + estimates.roughness * surfels.outside_px)
+
+
+unmoved = partial(Filter, options=FilterOptions(reprojection=False, probes=False, share_max=1.0))
+"""The filter without reprojection."""
