@@ -43,6 +43,7 @@ SAMPLES_PER_PIXEL = 16
 PROBE_SHARE = 1.0 / 32.0
 """Share of the samples of a cycle that look for changes without motion."""
 _SURE = 3.0  # standard errors by which probes must exceed what motion explains
+_STILL = 0.1  # or motion explains less than this share of what they tell
 _CALIBRATION = 0.5  # of a frame of which nothing has been predicted yet
 _CALIBRATION_RANGE = 0.1, 3.0
 _STEP = torch.tensor([0.7548776662466927, 0.5698402909980532])  # golden ratio of two dimensions
@@ -208,7 +209,9 @@ class Interruptible(Policy[Buffers]):
         if self._view is not None:
             now, before = self._view(moment.time_s), self._view(moment.time_s - moment.cycle_s)
             moved = displacement.change(view.image, view.frame.hits, now, before)
-        if probes is None or age_s <= 0.0 or probes[0] - _SURE * probes[1] <= moved:
+        if probes is None or age_s <= 0.0:
+            return moved
+        if probes[0] - _SURE * probes[1] <= moved and _STILL * probes[0] <= moved:
             return moved
         return probes[0] * (age_s + moment.cycle_s) / age_s
 
