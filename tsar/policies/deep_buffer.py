@@ -3,7 +3,8 @@
 Source: the temporally deep buffer of Dayal et al. 2005.
 
 Deviation: the buffer has one queue for the whole picture, not one per tile. A sample is hidden where another in its
-pixel is nearer by 5 %, or six of the eight pixels around it hold one that is nearer by 7 %.
+pixel is nearer by 30 % (ground that is seen from low down differs by less), or six of the eight pixels around it hold
+one that is nearer by 7 %.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from tsar.types import Hits, Viewpoint
 SAMPLE_FLOPS = 75
 """Operations per stored sample of :meth:`DeepBuffer.seen`: projection 31, pixel 8, nearest depth 2, and the comparison
 with nine depths 34."""
-_NEARER, _NEARER_AROUND, _AROUND = 1.05, 1.07, 6
+_NEARER, _NEARER_AROUND, _AROUND = 1.3, 1.07, 6
 
 
 @dataclass(frozen=True)

