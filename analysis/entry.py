@@ -10,8 +10,9 @@ import importlib
 import importlib.metadata
 import sys
 
-from analysis.command.cli import InputError, command, run_process
+from analysis.command.cli import InputError, run_process
 from analysis.command.extras import DISTRIBUTION
+from analysis.command.later import command
 
 COMMANDS = {
     "run": "analysis.comparison.run_command",

@@ -5,7 +5,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from analysis.command.cli import command, run_process
+from analysis.command.cli import run_process
+from analysis.command.later import command
 
 main = command("analysis.tracer.job_command")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import errno
-import importlib
 import io
 import os
 import re
@@ -140,15 +139,6 @@ def _one_line(box: str) -> str:
     lines = [re.sub(r"\s+", " ", _FRAME.sub(" ", line)).strip() for line in inside]
     text = " ".join(line for line in lines if line)
     return text.partition(" For full helptext")[0] or "the command line cannot be parsed"
-
-
-def command(module: str) -> Callable[[], None]:
-    """The function ``main`` of a module that is imported when it is called: Ctrl-C ends that, too, with one line."""
-
-    def main() -> None:
-        importlib.import_module(module).main()
-
-    return main
 
 
 def run_cli(main: Callable[[], None]) -> None:

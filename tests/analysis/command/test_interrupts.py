@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from analysis.command import interrupts
-from analysis.command.cli import command, run_cli
+from analysis.command.cli import run_cli
 from analysis.command.interrupts import heeded, settled
+from analysis.command.later import command
 from tests.scripts.commands import ROOT
 
 
@@ -89,7 +90,9 @@ def test_no_script_loads_its_command_before_it_runs() -> None:
     """All of it lies within the block that heeds Ctrl-C."""
     scripts = sorted((ROOT / "scripts").glob("*.py"))
     loads = [re.findall(r"(?m)^ *(?:from|import) (\S+)", script.read_text()) for script in scripts]
-    assert len(scripts) > 15 and all(names == ["sys", "pathlib", "analysis.command.cli"] for names in loads)
+    assert len(scripts) > 15 and all(
+        names == ["sys", "pathlib", "analysis.command.cli", "analysis.command.later"] for names in loads
+    )
 
 
 def test_what_is_cleaned_up_is_not_disturbed() -> None:
@@ -125,7 +128,8 @@ def test_one_that_comes_while_workers_start_is_heard_afterwards() -> None:
     """Also where another thread takes it, so that Python would raise it in this one."""
     program = """
 import os, signal, threading, time
-from analysis.command.cli import command, run_cli
+from analysis.command.cli import run_cli
+from analysis.command.later import command
 from analysis.command.cluster import _interrupts_blocked
 taker = threading.Thread(target=time.sleep, args=(60,), daemon=True)
 taker.start()

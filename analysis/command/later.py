@@ -1,0 +1,15 @@
+"""Commands that are imported when they are called. No module that decides a result may import this one."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+
+
+def command(module: str) -> Callable[[], None]:
+    """The function ``main`` of a module that is imported when it is called: Ctrl-C ends that, too, with one line."""
+
+    def main() -> None:
+        importlib.import_module(module).main()
+
+    return main
