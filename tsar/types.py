@@ -14,6 +14,8 @@ import torch
 from jaxtyping import Float, Float32, Float64, Int32, Int64
 from torch import Tensor
 
+from tsar.checks import closed_choices
+
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Shares of linear red, green and blue in luminance, by Rec. 709."""
 
@@ -91,6 +93,7 @@ class Hits:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class Viewpoint:
     """Where the camera and all instances are at one time, in the world of the renderer that made it.
 

@@ -46,7 +46,7 @@ def test_a_command_gets_its_options_and_is_called_by_its_name(monkeypatch, capsy
     [
         (("rnder",), ("command: expected one of run, ", "got 'rnder' (nearest: render)")),
         (("list", "policy"), ("list: expected one of policies, ", "nearest: policies")),
-        (("run", "fly-by", "--policy", "thesys"), ("policy: expected one of thesis, ", "nearest: thesis")),
+        (("run", "fly-by", "--policy", "thesys"), ("policy: expected one of tsar, ", "nearest: thesis")),
     ],
 )
 def test_bad_input_is_one_line(arguments, parts, monkeypatch, capsys) -> None:

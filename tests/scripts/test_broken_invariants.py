@@ -52,7 +52,7 @@ def test_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     whole = {
         **dict.fromkeys((*names, "cycles", "age_spread_s"), 1.0),
         "ratio_quartiles": [1.0, 1.0],
-        "ratio_statistics": {},
+        "ratio_statistics": {"framed": {"median": 1.0}},
         "stage_wall_s": {},
     }
     kinds = iter([{"ok": True}, BROKEN])

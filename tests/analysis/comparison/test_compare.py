@@ -139,7 +139,7 @@ def test_a_folder_of_its_own_goes_with_the_result() -> None:
     ("arguments", "message"),
     [
         ({"resolution": 64}, "^resolution: expected an option of a run, such as resolution_px$"),
-        ({"policies": ["thesys"]}, "expected one of thesis, framed, .*, got 'thesys' \\(nearest: thesis\\)"),
+        ({"policies": ["thesys"]}, "expected one of tsar, .*, framed, .*, got 'thesys' \\(nearest: thesis\\)"),
         ({"policies": []}, "policies: expected at least one"),
         ({"metrics": ["flp"]}, "metrics: expected one of flip, .*'flp'"),
         ({"scene": "flyby"}, "nearest: fly-by"),
