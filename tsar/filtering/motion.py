@@ -47,7 +47,6 @@ def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Esti
         instance=taken(surfels.instance, UNSEEN),
         point=taken(surfels.point, 0.0),
         position=at,
-        depth=taken(depth.to(torch.float32).reshape(1, side, side), inf),
         step=torch.where(kept, at - taken(surfels.position, 0.0), 0.0),
     )
     return Estimates(

@@ -106,21 +106,18 @@ class Surfels:
         instance: of the first hit, -1 at infinity, :data:`UNSEEN` where there is none.
         point: in the space of the instance's track, or a direction.
         position: on the image, pixels.
-        depth: along the axis of the camera.
         step: how far it moved on the image in the last cycle, pixels.
     """
 
     instance: Int64[Tensor, "1 h w"]
     point: Float[Tensor, "3 h w"]
     position: Float[Tensor, "2 h w"]
-    depth: Float[Tensor, "1 h w"]
     step: Float[Tensor, "2 h w"]
 
     @staticmethod
     def empty(side: int) -> Surfels:
         unseen = torch.full((1, side, side), UNSEEN, dtype=torch.int64)
-        far, none = torch.full((1, side, side), inf), torch.zeros(2, side, side)
-        return Surfels(unseen, torch.zeros(3, side, side), centres(side), far, none)
+        return Surfels(unseen, torch.zeros(3, side, side), centres(side), torch.zeros(2, side, side))
 
     @property
     def outside_px(self) -> Float[Tensor, "1 h w"]:

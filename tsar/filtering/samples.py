@@ -160,15 +160,15 @@ class Met:
 
 def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewpoint | None) -> Met:
     """The surfels of a batch, by the poses of a view and those of the cycle before."""
-    side = before.depth.shape[-1]
+    side = before.step.shape[-1]
     newest = seen.newest.clamp(min=0)
     instance = hits.instance.reshape(-1)[newest].to(torch.int64)
     point = hits.point.reshape(-1, 3)[newest]
-    position, depth = _image(view, instance, point, side)
+    position = _image(view, instance, point, side)
     step = torch.zeros_like(position)
     if earlier is not None:
-        step = position - _image(earlier, instance, point, side)[0]
-    found = Surfels(instance.reshape(1, side, side), point.T.reshape(3, side, side), position, depth, step)
+        step = position - _image(earlier, instance, point, side)
+    found = Surfels(instance.reshape(1, side, side), point.T.reshape(3, side, side), position, step)
     same = seen.hit & (found.instance == before.instance)
     moves = (step - before.step).abs().amax(0, keepdim=True) > _MOVES_PX
     fast = before.step.abs().amax(0, keepdim=True) > _MOVES_PX
@@ -189,17 +189,15 @@ def joined(before: Surfels, found: Met, hit: Bool[Tensor, "1 h w"], share: Float
         instance=torch.where(other, new.instance, before.instance),
         point=mean(before.point, new.point),
         position=mean(before.position, new.position),
-        depth=torch.where(hit, new.depth, before.depth),
         step=torch.where(other, new.step, before.step),
     )
 
 
 def _image(
     view: Viewpoint, instance: Int64[Tensor, " pixels"], point: Float[Tensor, "pixels 3"], side: int
-) -> tuple[Float[Tensor, "2 h w"], Float[Tensor, "1 h w"]]:
-    position, depth = project(view, instance, point)
-    flat = (position * side).nan_to_num(0.0).to(torch.float32).T.reshape(2, side, side)
-    return flat.contiguous(), depth.to(torch.float32).reshape(1, side, side)
+) -> Float[Tensor, "2 h w"]:
+    position, _ = project(view, instance, point)
+    return (position * side).nan_to_num(0.0).to(torch.float32).T.reshape(2, side, side).contiguous()
 
 
 def _semivariance(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:

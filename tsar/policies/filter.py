@@ -39,7 +39,7 @@ from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
 PIXEL_FLOPS = {True: 560.0, False: 290.0}
 """Operations per output pixel and cycle, with and without reprojection, as a test counts them in the code."""
 SAMPLE_FLOPS = 200.0
-"""Operations per sample."""
+"""Operations per sample, an upper bound: replacing 6, encoding 6, roughness 24, sums 16, projection 40."""
 _STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # golden ratio of two dimensions
 _GRID = 65536
 _WARMUP_FRAMES = 8
