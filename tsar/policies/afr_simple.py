@@ -54,8 +54,8 @@ class AfrSimple(Policy[Scattered]):
 
     @property
     def price(self) -> Price:
-        """Per pixel: weight 3, and the pyramid: up 20, down 26, times 4/3, with means 4. Per sample: replacement of what
-        is not finite 6, luminance 10, moments 6, place 4."""
+        """Per pixel: weight 3, and the pyramid: up 20, down 26, times 4/3, with means 4. Per sample: replacement of
+        what is not finite 6, luminance 10, moments 6, place 4."""
         return Price(int(self.config.budget), pixel_flops=68.0, sample_flops=26.0)
 
     @property
