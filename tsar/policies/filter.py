@@ -57,6 +57,7 @@ class State:
         change: observed so far.
         now_s: start of the newest cycle; None before the first.
         view: poses at that time; None where nothing is reprojected.
+        earlier: poses at the start of the cycle before; None where there was none.
         spacing: of the tiles that were asked for, pixels.
         visits: cycles that sampled each element.
         shown, remaining: the picture, and the variance of its errors.
