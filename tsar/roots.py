@@ -16,3 +16,8 @@ def square_root(value: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
     """
     with np.errstate(invalid="ignore"):
         return torch.as_tensor(np.sqrt(value.numpy()))
+
+
+def encoded(color: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
+    """Linear radiance to a scale on which equal differences look about equal: the root of what is clipped to [0, 1]."""
+    return square_root(color.clamp(0.0, 1.0))

@@ -7,7 +7,8 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64
 from torch import Tensor
 
-from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates, FilterOptions, encoded
+from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates, FilterOptions
+from tsar.roots import encoded
 
 _TOLERANCE = 4.0  # variances that a squared residual may have before it speaks of change
 _SURE = 4.0  # expected residuals beyond which what was remembered is dropped

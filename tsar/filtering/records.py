@@ -164,8 +164,3 @@ def centres(side: int) -> Float[Tensor, "2 h w"]:
     """Centres of the pixels, ``(x, y)``."""
     at = torch.arange(side) + 0.5
     return torch.stack((at.expand(side, side), at[:, None].expand(side, side)))
-
-
-def encoded(color: Tensor) -> Tensor:
-    """Colour as variances measure it: ``sqrt(clip(color, 0, 1))``."""
-    return color.clamp(0.0, 1.0).sqrt()

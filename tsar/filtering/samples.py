@@ -9,9 +9,10 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from tsar.filtering.records import TILE_SIDE, VARIANCE_MAX, Estimates, FilterOptions, Surfels, encoded
+from tsar.filtering.records import TILE_SIDE, VARIANCE_MAX, Estimates, FilterOptions, Surfels
 from tsar.morton import morton_to_raster, raster_to_morton
 from tsar.projection import project
+from tsar.roots import encoded, square_root
 from tsar.types import Hits, Viewpoint
 
 _ROUGHNESS_MIN = 1e-6
@@ -78,7 +79,7 @@ def gathered(
     newest = torch.full((side * side + 1,), -1).scatter_reduce(0, pixel, torch.arange(pixel.numel()), "amax")[:-1]
     semivariance = _semivariance(encoded(color))
     wide = spacing.clamp(min=1.0)[:, None]
-    least = summed((semivariance / (spacing[:, None] / wide) / wide.sqrt()).reshape(-1))
+    least = summed((semivariance / (spacing[:, None] / wide) / square_root(wide)).reshape(-1))
     most = summed((semivariance / (spacing[:, None] / wide)).reshape(-1))
     near = _box(count)
     bounded = torch.minimum(

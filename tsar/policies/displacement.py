@@ -9,9 +9,11 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int32
 from torch import Tensor
 
-from tsar.policies.refinement import encoded, mean
+from tsar.policies.refinement import mean
+from tsar.policies.resampling import bilinear
 from tsar.policies.scatter import pull_push
 from tsar.projection import project
+from tsar.roots import encoded
 from tsar.types import Viewpoint
 
 PIXEL_FLOPS = 42
@@ -55,18 +57,6 @@ def change(image: Float[Tensor, "side side 3"], hits: FirstHits, now: Viewpoint,
     shift = pull_push(planes[:2].contiguous(), planes[2:])
     place = torch.arange(0, side, 2).to(torch.float32)
     picture = encoded(image)
-    difference = _bilinear(picture, place[None, :] - shift[0], place[:, None] - shift[1]) - picture[::2, ::2]
+    read_at = torch.stack((place[None, :] - shift[0], place[:, None] - shift[1]), dim=-1).to(torch.float64)
+    difference = bilinear(picture, read_at) - picture[::2, ::2]
     return mean(difference.square())
-
-
-def _bilinear(
-    picture: Float[Tensor, "h w 3"], x: Float[Tensor, "rows columns"], y: Float[Tensor, "rows columns"]
-) -> Float[Tensor, "rows columns 3"]:
-    """The picture between its pixels, whose centres are at whole numbers; its border goes on outside."""
-    height, width, _ = picture.shape
-    left, top = x.floor(), y.floor()
-    across, down = (x - left)[..., None], (y - top)[..., None]
-    columns = [(left.to(torch.int64) + k).clamp(0, width - 1) for k in (0, 1)]
-    rows = [(top.to(torch.int64) + k).clamp(0, height - 1) for k in (0, 1)]
-    above, below = ((1.0 - across) * picture[row, columns[0]] + across * picture[row, columns[1]] for row in rows)
-    return (1.0 - down) * above + down * below

@@ -33,9 +33,10 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.policies import displacement, refinement
-from tsar.policies.refinement import Level, encoded, mean
+from tsar.policies.refinement import Level, mean
 from tsar.policies.scatter import generator, pixel_colors, pull_push
 from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.roots import encoded
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 SAMPLES_PER_PIXEL = 16

@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from tsar.morton import total
-from tsar.roots import square_root
+from tsar.roots import encoded
 
 WITHIN_PIXEL = 0.5
 """Squared error of a pixel's only sample, as a share of the pixel's contrast with its neighbours."""
@@ -45,11 +45,6 @@ class Level:
     @property
     def known(self) -> Bool[Tensor, "side side"]:
         return self.count > 0
-
-
-def encoded(color: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
-    """Linear radiance to a scale on which equal differences look about equal: the root of what is clipped to [0, 1]."""
-    return square_root(color.clamp(0.0, 1.0))
 
 
 def levels(color: Float[Tensor, "3 side side"], count: Float[Tensor, "side side"]) -> list[Level]:

@@ -16,8 +16,8 @@ from tests.oracles.screens import Layer, Screen
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
 from tsar.policies import POLICIES
-from tsar.policies.refinement import encoded
 from tsar.policy import Setting, run
+from tsar.roots import encoded
 from tsar.types import ShownImage
 
 CYCLE_S = 1.0 / 64.0
