@@ -1,4 +1,4 @@
-"""Compare the policy of the dissertation with the framed renderer on several inputs, repeated over seeds or phases."""
+"""Compare a policy, by default the best of the project's own, on several inputs, repeated over seeds or phases."""
 
 import sys
 from pathlib import Path

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         Densities as Densities,
         Errors as Errors,
         FrameletBatch as FrameletBatch,
+        MapShown as MapShown,
         SampleBatch as SampleBatch,
         SampleMap as SampleMap,
         ShownImage as ShownImage,
@@ -53,6 +54,6 @@ __getattr__, __dir__ = lazily(
         "tsar.policy": "Moment Picture Policy Price Setting run step",
         "tsar.reconstruction": "Reconstruction",
         "tsar.stages": "REFERENCE Stages",
-        "tsar.types": "Densities Errors FrameletBatch SampleBatch SampleMap ShownImage StepRecord Tiling",
+        "tsar.types": "Densities Errors FrameletBatch MapShown SampleBatch SampleMap ShownImage StepRecord Tiling",
     },
 )

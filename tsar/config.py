@@ -42,7 +42,7 @@ def tiles_at_least(count: int, level_min: int) -> int:
 @dataclass(frozen=True)
 @closed_choices("tiling.")
 class TilingConfig:
-    """Bounds of the tiling (Stephens 2011, sec. 4.1.6)."""
+    """Bounds of the tiling of the policy thesis (Stephens 2011, sec. 4.1.6)."""
 
     level_min: int = 2
     """Coarsest quad level: tiles are at most 1/2^level_min of the image wide."""
@@ -72,7 +72,8 @@ class TilingConfig:
 @dataclass(frozen=True)
 @closed_choices("error.")
 class ErrorConfig:
-    """The error estimate and its template: log2 power = offset + slope * octave, octave 0 the coarsest (sec. 5.3.3)."""
+    """The error estimate of the policy thesis and its template: log2 power = offset + slope * octave, octave 0 the
+    coarsest (sec. 5.3.3)."""
 
     spatial_offset: float = -7.0
     """log2 of the power tolerated per coefficient at the coarsest spatial octave (compressed luminance squared)."""
@@ -105,7 +106,7 @@ class ErrorConfig:
 @dataclass(frozen=True)
 @closed_choices("response.")
 class ResponseConfig:
-    """The control decision (chapter 6)."""
+    """The control decision of the policy thesis (chapter 6)."""
 
     solver: str = "waterfill"
     """Density transport, how freed density is handed out: waterfill, slow_greater, scale_lesser, square, descend,
@@ -131,7 +132,7 @@ class ResponseConfig:
 @dataclass(frozen=True)
 @closed_choices("reconstruction.")
 class ReconstructionConfig:
-    """Image reconstruction (sec. 4.2)."""
+    """Image reconstruction of the policy thesis (sec. 4.2)."""
 
     age_support_px: int = 9
     """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off. The thesis has 128."""
@@ -156,9 +157,10 @@ class TsarConfig:
     framelet_side: int = 16
     """Samples along a framelet's side, 16 or 32."""
     sdf_side: int = 128
-    """Elements along a side of the density and error fields, a power of two."""
+    """Elements along a side of the density and error fields of the policy thesis, a power of two."""
     cache_size: int = 2048
-    """Framelets kept in the cache (scaled up with the batch when that is larger than a quarter of it)."""
+    """Framelets kept in the cache of the policy thesis (scaled up with the batch when that is larger than a quarter of
+    it)."""
     seed: int = 0
     """Seed of every random number, and of the phase in which tiles first fall due."""
     warmup_cycles: int = 48

@@ -17,7 +17,7 @@ from torch import Tensor
 from tsar.clock import CycleSeconds, StageTimer, checked
 from tsar.config import TsarConfig
 from tsar.stages import REFERENCE, Stages
-from tsar.types import FrameletBatch, SampleBatch, SampleMap, ShownImage, StepRecord, Trace, Viewpoint
+from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, ShownImage, Spent, StepRecord, Trace, Viewpoint
 
 State = TypeVar("State")
 
@@ -84,11 +84,13 @@ class Picture:
         image: ``(height, width, 3)`` float32 linear RGB.
         sample_map: age and density of its samples; None where the policy cannot tell.
         counters: work done for it, by name; ``framelet_pixels`` are the pixels of all framelets that were accumulated.
+        maps: what else the policy knows of every place, by name, for a page.
     """
 
     image: Float[Tensor, "h w 3"]
     sample_map: SampleMap | None = None
     counters: Mapping[str, int] = field(default_factory=dict)
+    maps: Mapping[str, MapShown] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,9 @@ def run(
         cycle_s = checked(cycle_seconds, done.counters, done.timer.total)
         record = policy.record(done, moment, cycle_s)
         shown = done.shown
-        yield record, ShownImage(time_s + policy.latency_cycles * cycle_s, time_s, shown.image, shown.sample_map)
+        spent = Spent(cycle, cycle_s, dict(done.timer.seconds), done.counters)
+        display_s = time_s + policy.latency_cycles * cycle_s
+        yield record, ShownImage(display_s, time_s, shown.image, shown.sample_map, shown.maps, spent)
         state, cycle, time_s = done.after, cycle + 1, time_s + cycle_s
 
 

@@ -6,7 +6,7 @@ elements (``sdf * sdf``), ``c`` cached framelets. Fields over elements and sampl
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -180,6 +180,39 @@ class SampleMap:
 
 
 @dataclass(frozen=True)
+class MapShown:
+    """What a policy knows of every place of its image, for a page: positive values that are drawn on a logarithmic
+    scale.
+
+    Attributes:
+        values: raster order; the parts are equal squares.
+        bounds: least and greatest value of the colour scale.
+        unit: of the values, in words.
+    """
+
+    values: Float[Tensor, "side side"]
+    bounds: tuple[float, float]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What one cycle took.
+
+    Attributes:
+        cycle: its number, negative during warm-up.
+        cost_s: duration on the chosen clock.
+        stage_s: measured wall seconds per stage.
+        counters: rays and other counts.
+    """
+
+    cycle: int
+    cost_s: float
+    stage_s: Mapping[str, float]
+    counters: Mapping[str, int]
+
+
+@dataclass(frozen=True)
 class ShownImage:
     """An image as it goes onto the display.
 
@@ -188,12 +221,16 @@ class ShownImage:
         sample_time_s: animation time of its newest samples.
         image: ``(height, width, 3)`` float32 linear RGB.
         sample_map: of what age and density its samples are.
+        maps: what else the policy knows of every place, by name.
+        spent: what the cycle that made it took; None where that was not counted.
     """
 
     display_time_s: float
     sample_time_s: float
     image: Float[Tensor, "h w 3"]
     sample_map: SampleMap | None = None
+    maps: Mapping[str, MapShown] = field(default_factory=dict)
+    spent: Spent | None = None
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import xarray as xr
 
 from analysis.command.ownership import release_folder
 from analysis.comparison.experiment import measure
-from analysis.comparison.options import RunOptions
+from analysis.comparison.options import DEFAULT_POLICY, RunOptions
 from analysis.metrics import METRICS, Metric
 from analysis.metrics.quality import View, reference_times
 from tsar.config import ConfigError, TsarConfig
@@ -82,7 +82,7 @@ class Result:
 
 def compare(
     scene: str | PathLike[str] | Scene,
-    policies: Sequence[str | Make] = ("thesis", "framed"),
+    policies: Sequence[str | Make] = (DEFAULT_POLICY, "framed", "thesis"),
     metrics: Sequence[str | Callable[[Tensor, Tensor], float]] = (),
     seconds: float = 2.0,
     *,

@@ -17,7 +17,7 @@ from analysis.command.cli import InputError, bad_input, full_disk, require_memor
 from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
-from analysis.comparison.stored import FILES, SUMMARY, added_by, content_of, write_summary
+from analysis.comparison.stored import FILES, SUMMARY, Recording, added_by, content_of, write_summary
 from analysis.storage.results import own_results
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from analysis.comparison.summary import Measured
     from analysis.metrics.causes import Truths
     from analysis.metrics.quality import Floats, View
-    from analysis.storage.records import RecordLimits, StepWriter
+    from analysis.storage.records import RecordLimits
     from analysis.storage.reference import Reference
     from analysis.study.displays import Seen
     from analysis.study.runs import PolicyRun
@@ -123,11 +123,13 @@ def measure(
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
     with progress.bars() as bars, full_disk(options.out, FilmError):
         with StepWriter(options.out / "steps.parquet", _limits(options)) as writer:
-            runs = _runs(options, setup, writer)
+            recording = Recording(writer)
+            runs = _runs(options, setup, recording)
             own, first_cycle_s = first_made(runs[options.policy].images, began_s, bars.say)
             runs[options.policy] = dataclasses.replace(runs[options.policy], images=own)
             reference = _reference(options, setup, len(times_s), bars)
             measured = _compare(options, times_s, reference, runs, bars, viewers)
+            measured = dataclasses.replace(measured, recorded=recording.name)
     if measured.seen[options.policy].images == 0 or (measured.totals.recorded and measured.totals.cycles == 0):
         (options.out / "steps.parquet").unlink(missing_ok=True)
         (options.out / "comparison.mp4").unlink(missing_ok=True)
@@ -163,8 +165,8 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
         return obtain(options.cache, spec, lambda t: renderer.render_frame(t, side, side, axis), task)
 
 
-def _runs(options: RunOptions, setup: Setup, writer: StepWriter) -> dict[str, PolicyRun]:
-    """All runs, not started yet; the cycles of the run's own are written."""
+def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, PolicyRun]:
+    """All runs, not started yet."""
     with first_imports():
         from analysis.study.runs import Machine, begin
 
@@ -180,7 +182,7 @@ def _runs(options: RunOptions, setup: Setup, writer: StepWriter) -> dict[str, Po
                 span_s,
                 stages=options.stages,
                 threads=setup.renderer_of(1).threads,
-                on_record=writer.add if name == options.policy else lambda record: None,
+                on_record=recording.of(name),
             )
             for name in (options.policy, *options.rivals)
         }
@@ -194,19 +196,19 @@ def _compare(
     bars: Bars,
     further: Sequence[Callable[[View], None]],
 ) -> Measured:
-    from contextlib import nullcontext
-
+    from analysis.comparison.rivalry import Panels
     from analysis.comparison.summary import Measured
     from analysis.comparison.viewers import Filming, Steps
     from analysis.metrics import METRICS
-    from analysis.page.video import ComparisonFilm, Scales
+    from analysis.page.video import Scales
     from analysis.study.displays import Measuring, watch
     from renderer.film.files import Mp4Writer, write_exr
 
     scales = Scales(options.tsar.spatial_bounds, options.tsar.temporal_bounds)
     stride = max(1, round(options.reference_rate_hz / 60.0))
     span_s = options.start_s, options.start_s + options.seconds
-    film = ComparisonFilm(min(options.tsar.resolution_px, 512), scales, span_s, list(runs), options.policy)
+    side_px = min(options.tsar.resolution_px, 512)
+    filming = [Filming(options.policy, scales, side_px, options.out, stride)] if options.film else []
     steps, task = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
 
     def on_view(view: View) -> None:
@@ -214,16 +216,22 @@ def _compare(
         if options.frames:
             write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
 
-    place, fps = options.out / "comparison.mp4", options.reference_rate_hz / stride
-    with Mp4Writer(place, fps, film.width_px, film.height_px) if options.film else nullcontext() as sink:
-        viewers = [on_view, steps, *further, *([Filming(film, sink, stride)] if sink else [])]
-        images = {name: run.images for name, run in runs.items()}
-        of_images = tuple(name for name in options.metrics if METRICS[name].image)
-        kept = (0, len(times_s)) if len(of_images) < len(options.metrics) else (0, 0)
-        measuring = Measuring(metrics=of_images, stride=options.metric_stride, kept=kept)
-        seen = watch(images, _truths(options, reference), times_s, measuring, viewers)
+    viewers = [on_view, steps, *further, *filming]
+    images = {name: run.images for name, run in runs.items()}
+    of_images = tuple(name for name in options.metrics if METRICS[name].image)
+    kept = (0, len(times_s)) if len(of_images) < len(options.metrics) else (0, 0)
+    measuring = Measuring(metrics=of_images, stride=options.metric_stride, kept=kept)
+    seen = watch(images, _truths(options, reference), times_s, measuring, viewers)
+    panels = Panels.of({name: one.column("mse") for name, one in seen.items()}, options.policy)
+    for one in filming:
+        made, drawn = one.film(panels, span_s), bars.task("film", one.frames)
+        fps = options.reference_rate_hz / stride
+        with Mp4Writer(options.out / "comparison.mp4", fps, made.width_px, made.height_px) as sink:
+            one.write(panels, made, sink, drawn.advance)
     sequences = {name: _scored(options, name, seen) for name in options.metrics if METRICS[name].sequence}
-    return Measured(options.policy, times_s, seen, runs, steps.made, reference.nonfinite, options.cost, sequences)
+    return Measured(
+        options.policy, times_s, seen, runs, steps.chosen(panels), reference.nonfinite, options.cost, sequences
+    )
 
 
 def _scored(options: RunOptions, metric: str, seen: dict[str, Seen]) -> dict[str, float]:

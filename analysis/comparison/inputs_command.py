@@ -1,7 +1,7 @@
-"""Compare the policy of the dissertation with the framed renderer on several inputs, repeated over seeds or phases.
+"""Compare a policy, by default the best of the project's own, on several inputs, repeated over seeds or phases.
 
 Examples: python scripts/inputs.py --out out/inputs
-          python scripts/inputs.py fly-by --vary phase --out out/phases
+          python scripts/inputs.py fly-by --policy thesis --vary phase --out out/phases
 """
 
 from __future__ import annotations

@@ -25,10 +25,12 @@ def load(folder: str | PathLike[str]) -> xr.Dataset:
         folder: of a finished run.
 
     Returns:
-        ``mse`` and ``log_mse`` over ``run`` and ``time_s``, the reference times in seconds. Of a policy that records
-        its cycles, over ``cycle``: its animation time ``cycle_time_s`` and its numbers; and over ``cycle``, ``row`` and
-        ``column``, rows from the top of the image, the densities and errors as float32 (16 bytes an element and cycle).
-        Attributes are the input, the policy, the ledger, and configuration and provenance as JSON.
+        ``mse`` and ``log_mse`` over ``run`` and ``time_s``, the reference times in seconds. Of the policy whose
+        cycles are on disk, the run's own or else the first rival that records them, over ``cycle``: its animation time
+        ``cycle_time_s`` and its numbers; and over ``cycle``, ``row`` and ``column``, rows from the top of the image,
+        the densities and errors as float32 (16 bytes an element and cycle). Attributes are the input, the policy, the
+        ledger, the policy whose cycles these are (``recorded``; empty where there is none), and configuration and
+        provenance as JSON.
 
     Raises:
         FileNotFoundError: no finished run lies there.
@@ -46,7 +48,7 @@ def load(folder: str | PathLike[str]) -> xr.Dataset:
         found = found.merge(_cycles(place / "steps.parquet"))
     known = {name: summary[name] for name in ("policy", "ledger")}
     records = {name: json.dumps(summary[name]) for name in ("config", "provenance")}
-    return found.assign_attrs(input=summary["config"]["input"], **known, **records)
+    return found.assign_attrs(input=summary["config"]["input"], recorded=summary["recorded"] or "", **known, **records)
 
 
 def _cycles(path: Path) -> xr.Dataset:

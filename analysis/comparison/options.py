@@ -24,6 +24,12 @@ from analysis.metrics.display_model import DisplayModel
 from tsar.config import StagesName, TsarConfig, closed_choices, require
 from tsar.policies import POLICIES
 
+DEFAULT_POLICY = "tsar"
+"""The best of the project's own (docs/results/rivals.md)."""
+DEFAULT_RIVALS = ("framed", "thesis", "framed-super", "framed-quarter", "framed-taa-late")
+"""The plain framed renderer, the policy of the dissertation, and framed renderers that are the best of their kind
+somewhere and take little time."""
+
 
 @dataclass(frozen=True)
 @closed_choices()
@@ -33,7 +39,7 @@ class RunOptions:
     input: Annotated[str, tyro.conf.Positional]
     """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
-    """The adaptive pipeline."""
+    """Size, batch and seed of all policies, and the pipeline of the policy thesis."""
     seconds: float = 2.0
     """Simulated time to measure, seconds."""
     start_s: float = 0.0
@@ -50,10 +56,11 @@ class RunOptions:
     """Speed of the simulated machine, FLOP/s. The default shows 8 framed images a second at 512²."""
     trace_segments: float = 4.0
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
-    policy: str = "thesis"
+    policy: str = DEFAULT_POLICY
     """Who decides what is sampled: a policy by name."""
-    rivals: tuple[str, ...] = ("framed", "framed-super")
-    """Policies that it is compared with at equal cost; ratios are to the first."""
+    rivals: tuple[str, ...] = DEFAULT_RIVALS
+    """Policies that it is compared with at equal cost; ratios are to the first. The policy itself is left out of the
+    default."""
     metrics: tuple[str, ...] = ()
     """Metrics beside the squared errors, such as flip, ssim or jod."""
     display: DisplayModel = field(default_factory=DisplayModel)
@@ -69,7 +76,7 @@ class RunOptions:
     stages: StagesName = "compiled"
     """What runs the stages around tracing: kernels, or the tensor operations that they are checked against."""
     frames: bool = False
-    """Also write what the adaptive display shows at every reference time to frames/, as EXR."""
+    """Also write what the display of the policy shows at every reference time to frames/, as EXR."""
     film: bool = True
     """Write comparison.mp4."""
     out: Path = Path("out/run")
@@ -89,6 +96,8 @@ class RunOptions:
             metric_stride=(1, 10**6),
             threads=limits.THREADS,
         )
+        if self.rivals == DEFAULT_RIVALS:
+            object.__setattr__(self, "rivals", tuple(name for name in DEFAULT_RIVALS if name != self.policy))
         runs = self.policy, *self.rivals
         for name in runs:
             POLICIES.require(name, "policy" if name == self.policy else "rivals")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +12,8 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from analysis.page.figures import ADAPTIVE, FRAMED, Floats, inks, new_figure
+
+_TITLE_CHARACTERS = 105  # of a line above the figure
 
 
 def error_figure(
@@ -39,11 +42,11 @@ def error_figure(
         axis.vlines(refresh_s, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
     for name, ink in inks(list(errors), own).items():
         values = errors[name]
-        width = 1.2 if name == own else 1.8
-        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, linewidth=width, label=name)
+        style = {"linewidth": 2.0, "zorder": 3} if name == own else {"linewidth": 1.3}
+        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, label=name, **style)
     upper.set_yscale("log")
     upper.set_ylabel("mean squared error")
-    upper.set_title(title, fontsize=10, loc="left", parse_math=False)
+    upper.set_title(textwrap.fill(title, _TITLE_CHARACTERS), fontsize=10, loc="left", parse_math=False)
     upper.margins(y=0.15)
     upper.legend(frameon=False, fontsize=8, ncols=min(len(errors), 5), loc="upper left")
     if rivals:

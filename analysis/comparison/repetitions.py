@@ -13,7 +13,7 @@ import tyro
 from analysis.command import limits
 from analysis.command.console import Table
 from analysis.command.options import Unprefixed
-from analysis.comparison.options import RunOptions
+from analysis.comparison.options import DEFAULT_POLICY, RunOptions
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, Ledger
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
@@ -31,7 +31,10 @@ class InputsOptions:
     repetitions: int = 3
     """Runs of each input."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
-    """The adaptive pipeline; its seed is set here where seeds vary."""
+    """Size, batch and seed of all policies, and the pipeline of the policy thesis; the seed is set here where seeds
+    vary."""
+    policy: str = DEFAULT_POLICY
+    """Who decides what is sampled: a policy by name."""
     rivals: tuple[str, ...] = ("framed", "framed-1", "framed-super")
     """Policies that it is compared with at equal cost; ratios are to the first."""
     seconds: float = 2.0
@@ -65,6 +68,7 @@ class InputsOptions:
                         input=name,
                         tsar=self.tsar if by_phase else dataclasses.replace(self.tsar, seed=number),
                         phase=number / self.repetitions if by_phase else 0.0,
+                        policy=self.policy,
                         rivals=self.rivals,
                         seconds=self.seconds,
                         ledger=self.ledger,
@@ -92,7 +96,7 @@ def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
         "phase": run.phase,
         **{name: summary[name] for name in names},
         "ratio_medians": {name: statistics["median"] for name, statistics in beside.items()},
-        "invariants_ok": summary["invariants"]["ok"],
+        "invariants_ok": summary["invariants"] is None or summary["invariants"]["ok"],
         "stage_wall_s": summary["stage_wall_s"],
     }
 

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from analysis.comparison import plots
 from analysis.comparison.rivalry import best_rival_table
-from analysis.comparison.summary import Measured, key_table, ledger_table, metric_table, stage_table
-from analysis.metrics.cost_model import stage_flops
+from analysis.comparison.summary import Measured, measured_stages, modelled_stages
+from analysis.comparison.tables import key_table, ledger_table, metric_table, stage_table
 from analysis.page import figures
 from analysis.page.player import Curve, Player
 from analysis.page.report import Report, write_report
@@ -53,8 +53,8 @@ def _player(measured: Measured) -> Player:
         marks_s=measured.seen[rival].refresh_s if rival else [],
         readings={f"{measured.own} / {rival}": [f"{value:.3f}" for value in measured.ratio()]} if rival else {},
         note="Every view shows what stands on the display at that time, latency included. Move the slider, also by "
-        f"the arrow keys, or click into the curves.{marks} Ages are of the newest sample in each place of the image of "
-        f"{measured.own}.",
+        f"the arrow keys, or click into the curves.{marks} Of the framed rivals the one of the lowest median error has "
+        f"a view. Maps that name no run are of {measured.own}; ages are of the newest sample in each place.",
     )
 
 
@@ -62,12 +62,13 @@ def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> Non
     """Writes ``report.html``."""
     drawn = {"Error over time": _error_figure(summary, measured)}
     tables = [ledger_table(measured)]
-    if measured.totals.recorded:
+    if measured.recorded is not None:
         limits = read_limits(out / "steps.parquet")
         bounds = {"density_spatial": limits.density_spatial, "density_temporal": limits.density_temporal}
-        flops = {name: float(value) for name, value in stage_flops(measured.cost).items()}
-        drawn["Densities over time"] = plots.density_figure(density_quantiles(out / "steps.parquet"), bounds)
-        drawn["Stages"] = plots.stage_figure(flops, measured.totals.stage_s)
+        caption = f"Densities of {measured.recorded} over time"
+        drawn[caption] = plots.density_figure(density_quantiles(out / "steps.parquet"), bounds)
+    if measured.totals.cycles:
+        drawn[f"Stages of {measured.own}"] = plots.stage_figure(modelled_stages(measured), measured_stages(measured))
         tables.insert(0, stage_table(measured))
     further = [metric_table(measured), best_rival_table(measured)]
     write_report(

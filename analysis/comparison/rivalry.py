@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,50 @@ from analysis.comparison.summary import Measured, metrics_of
 from analysis.metrics import METRICS
 from analysis.metrics.quality import Floats, ratio_statistics
 from analysis.metrics.rivals import BEST, Standing, best_of, best_shares, standing
+from analysis.page.video import REFERENCE
+
+Picture = TypeVar("Picture")
+
+
+FRAMED = "framed"
+"""Names of framed renderers are this, or begin with it and a hyphen."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Panels:
+    """Which runs are seen beside the reference: of the framed rivals the one of the lowest median error, all other
+    rivals, and the run's own.
+
+    Attributes:
+        own: name of the run that the others are rivals of.
+        best_framed: the framed rival that is seen; None where there is none.
+        hidden: the framed rivals that are not.
+        runs: that are seen, in order.
+    """
+
+    own: str
+    best_framed: str | None
+    hidden: tuple[str, ...]
+    runs: tuple[str, ...]
+
+    @classmethod
+    def of(cls, mse: Mapping[str, Floats], own: str) -> Panels:
+        """From the errors of all runs."""
+        framed = [name for name in mse if name != own and (name == FRAMED or name.startswith(f"{FRAMED}-"))]
+        best = min(framed, key=lambda name: float(np.median(mse[name])), default=None)
+        others = [name for name in mse if name != own and name not in framed]
+        hidden = tuple(name for name in framed if name != best)
+        return cls(own, best, hidden, (*([best] if best else []), *others, own))
+
+    def arranged(self, pictures: Mapping[str, Picture]) -> dict[str, Picture]:
+        """Pictures by label: the reference, the runs that are seen, and all that are of no run. The label of a framed
+        rival that was chosen out of several says so."""
+        shown = {name: pictures[name] for name in (REFERENCE, *self.runs) if name in pictures}
+        rest = {label: one for label, one in pictures.items() if label not in (*shown, *self.hidden)}
+        return {self._label(name): one for name, one in shown.items()} | rest
+
+    def _label(self, name: str) -> str:
+        return f"{name} (best framed rival)" if name == self.best_framed and self.hidden else name
 
 
 def best_rival(measured: Measured) -> dict[str, Any]:

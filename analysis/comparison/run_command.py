@@ -1,4 +1,4 @@
-"""Compare a policy, by default temporally and spatially adaptive rendering, with its rivals at equal cost.
+"""Compare a policy, by default the best of the project's own, with its rivals at equal cost.
 
 Example: python scripts/run.py fly-by --seconds 2 --out out/fly-by
 """
@@ -17,6 +17,7 @@ def main() -> None:
     summary = run_experiment(options, process_began_s())
 
     from analysis.command.console import Table, show
+    from analysis.comparison.tables import said_of
 
     title = f"{options.input}: {summary['policy']}, ledger {summary['ledger']}"
     rows = {}
@@ -32,11 +33,11 @@ def main() -> None:
     for metric, values in summary["metrics"].items():
         rows[metric] = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
     checked = summary["invariants"]
-    holds = {True: "hold in every cycle", False: f"BROKEN: {checked}", None: "not recorded by these policies"}
+    of = "" if checked is None or checked["runs"] == [summary["policy"]] else f" of {', '.join(checked['runs'])}"
     rows |= {
         "cycles": f"{summary['cycles']}, {1e3 * summary['cycle_s']:.2f} ms each",
         "samples traced": f"{summary['samples_traced']:,}",
-        "invariants": holds[checked and checked["ok"]],
+        f"invariants{of}": said_of(checked, "hold in every cycle"),
         "non-finite values": str(sum(summary["nonfinite"].values())),
     }
     files = ", ".join(["summary.json", *summary["files"]])

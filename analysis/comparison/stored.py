@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from analysis.command.cli import bad_input
@@ -12,11 +14,37 @@ from tsar.choices import chosen
 from tsar.policies import POLICIES
 
 if TYPE_CHECKING:
+    from analysis.storage.records import StepWriter
     from analysis.storage.source import Brought
     from scenes.canonical import Scene
+    from tsar.types import StepRecord
 
 SUMMARY = "summary.json"
 FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
+
+
+@dataclass
+class Recording:
+    """Writes the cycles of the first run that records any: the run's own, which is the first to begin, or else the
+    first of its rivals. Changes in place.
+
+    Attributes:
+        writer: where they go.
+        name: of that run; None where none records.
+    """
+
+    writer: StepWriter
+    name: str | None = None
+
+    def of(self, run: str) -> Callable[[StepRecord], None]:
+        """What a run tells of its cycles."""
+
+        def add(record: StepRecord) -> None:
+            self.name = self.name or run
+            if self.name == run:
+                self.writer.add(record)
+
+        return add
 
 
 def finished(options: RunOptions) -> dict[str, Any] | None:

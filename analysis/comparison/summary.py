@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from analysis.command.console import Table
 from analysis.metrics.cost_model import (
     LEDGERS,
     MODELLED,
     CostParameters,
     control_flops,
-    per_segment,
     policy_flops,
     stage_flops,
     work_flops,
@@ -24,6 +22,9 @@ from analysis.metrics.quality import Floats, RatioStatistics, ratio, ratio_stati
 from analysis.page.player import Step
 from analysis.study.displays import Seen
 from analysis.study.runs import PolicyRun, Totals
+
+AROUND = "all others"
+"""Name of the stages around tracing where they have one price."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Measured:
         reference_nonfinite: non-finite values in the reference.
         cost: parameters of the cost model, scalars.
         sequences: values of metrics of sequences, by metric and run.
+        recorded: the run whose cycles are on disk; None where none records them.
     """
 
     own: str
@@ -49,6 +51,7 @@ class Measured:
     reference_nonfinite: int
     cost: CostParameters
     sequences: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    recorded: str | None = None
 
     @property
     def rivals(self) -> list[str]:
@@ -72,12 +75,12 @@ class Measured:
 
     @cached_property
     def invariants(self) -> dict[str, Any] | None:
-        """What was checked in every recorded cycle of the run, and whether all hold in every run; None where no run
-        records its cycles."""
+        """What was checked in every recorded cycle of the run whose cycles are on disk, whether all hold in every run
+        that records, and which those are (``runs``); None where none does."""
         found = {name: run.totals.invariants for name, run in self.runs.items() if run.totals.recorded}
-        if not found:
+        if self.recorded is None or not found:
             return None
-        return {**found.get(self.own, {}), "ok": all(one["ok"] for one in found.values())}
+        return {**found[self.recorded], "ok": all(one["ok"] for one in found.values()), "runs": list(found)}
 
     @cached_property
     def mse(self) -> dict[str, Floats]:
@@ -106,7 +109,7 @@ def ledger_costs(measured: Measured) -> dict[str, dict[str, float]]:
         for ledger in MODELLED:
             costs[ledger][name] = float(policy_flops(cost, run.price, ledger))
         totals, meter = run.totals, run.meter
-        # the cycles of the span where they are recorded, all that were traced elsewhere
+        # the cycles of the span, or all where it has none
         counters, cycles = (totals.counters, totals.cycles) if totals.cycles else (meter.counters, max(meter.calls, 1))
         if counters:
             control = float(control_flops(cost, run.price))
@@ -148,15 +151,16 @@ def summarise(measured: Measured) -> dict[str, Any]:
         "cycles": totals.cycles,
         "warmup_cycles": totals.warmup_cycles,
         "cycle_s": totals.simulated_s / max(totals.cycles, 1),
-        "age_spread_s": totals.age_spread_s / max(totals.cycles, 1),
+        "recorded": measured.recorded,
+        "age_spread_s": totals.age_spread_s / max(totals.cycles, 1) if totals.recorded else float("nan"),
         "samples_traced": totals.counters.get("primary_rays", 0),
         "samples_per_s": totals.counters.get("primary_rays", 0) / totals.simulated_s if totals.simulated_s else 0.0,
         "counters": dict(totals.counters),
         "segments_counted": segments(totals.counters),
         "segments_modelled": measured.cost.trace_segments,
         "stage_wall_s": dict(totals.stage_s),
-        "stage_flops": {name: float(v) * totals.cycles for name, v in stage_flops(measured.own_cost).items()},
-        "overdraw": float(measured.own_cost.overdraw),
+        "stage_flops": {name: flops * totals.cycles for name, flops in modelled_stages(measured).items()},
+        "overdraw": overdraw(measured, own),
         "saturation": totals.saturation,
         "ledgers": ledger_costs(measured),
         "cycles_per_image": cycles_per_image(measured),
@@ -199,75 +203,25 @@ def _ratios(measured: Measured) -> dict[str, Any]:
     }
 
 
-def key_table(measured: Measured) -> Table:
-    """The numbers to look at first."""
-    totals, own = measured.totals, measured.own
-    checked = measured.invariants or {"ok": None}
-    holds = {True: "yes", False: f"NO: {checked}", None: "not recorded"}[checked["ok"]]
-    rows = [
-        (f"median MSE, {own}", f"{np.median(measured.mse[own]):.3e}"),
-        (f"cycles of {own}", f"{totals.cycles}, {1e3 * totals.simulated_s / max(totals.cycles, 1):.2f} ms each"),
-        (f"samples per cycle of {own}", f"{totals.counters.get('primary_rays', 0) / max(totals.cycles, 1):,.0f}"),
-        ("non-finite samples replaced", str(totals.nonfinite)),
-        ("non-finite densities and errors", str(totals.nonfinite_fields)),
-        ("invariants hold in every cycle", holds),
-        ("framelets drawn per pixel", f"{float(measured.own_cost.overdraw):.2f}"),
-        ("moved elements that one decision drove to a bound", f"{100 * totals.saturation:.0f} %"),
-        ("spread of ages in moving regions", f"{1e3 * totals.age_spread_s / max(totals.cycles, 1):.0f} ms"),
-    ]
-    for name in measured.rivals:
-        s = measured.statistics(name)
-        rows += [
-            (f"median MSE, {name}", f"{np.median(measured.mse[name]):.3e}"),
-            (f"period of {name}", f"{1e3 * measured.period_s(name):.1f} ms"),
-            (f"ratio to {name}: median", f"{s.median:.3f}"),
-            (f"ratio to {name}: quartiles", f"{s.quartile_low:.3f} – {s.quartile_high:.3f}"),
-            (f"ratio to {name}: at most 1", f"{100 * s.share_suitable:.0f} % of the time"),
-            (f"ratio to {name}: greatest suitable percentile", f"{s.suitable_percentile:.0f}"),
-            (f"ratio to {name}: outliers, infinite", f"{s.outliers}, {s.infinite}"),
-        ]
-    note = ""
-    if measured.rival is not None:
-        log, plain = (measured.statistics(measured.rival, column).median for column in ("log_mse", "mse"))
-        rows.append((f"ratio of log-compressed MSE to {measured.rival}: median", f"{log:.3f}"))
-        if (log > 1) != (plain > 1):
-            note = "The two measures disagree on which run is better."
-    return Table("Key numbers", ("", "value"), rows, note)
+def overdraw(measured: Measured, name: str) -> float:
+    """Framelets that the mean cycle of a run accumulated at each pixel; NaN where it has none."""
+    totals = measured.runs[name].totals
+    drawn = totals.counters.get("framelet_pixels", 0)
+    return float(totals.of_a_cycle(measured.cost).overdraw) if drawn else float("nan")
 
 
-def metric_table(measured: Measured) -> Table | None:
-    """Metrics of every run; None where none was asked for."""
-    found = metrics_of(measured)
-    rows = [(name, *(f"{found[metric][name]:.4f}" for metric in found)) for name in measured.seen]
-    return Table("Metrics, mean over the times", ("run", *found), rows) if found else None
+def modelled_stages(measured: Measured) -> dict[str, float]:
+    """FLOPs of a cycle of the run's own by stage; those around tracing together where they are priced together."""
+    cost, price = measured.own_cost, measured.runs[measured.own].price
+    if price.adaptive_stages:
+        return {name: float(flops) for name, flops in stage_flops(cost).items()}
+    control = float(control_flops(cost, price))
+    return {"tracing": float(policy_flops(cost, price)) - control, AROUND: control}
 
 
-def stage_table(measured: Measured) -> Table:
-    """Per stage: share by the model beside what was measured."""
-    flops, wall, cycles = stage_flops(measured.own_cost), measured.totals.stage_s, max(measured.totals.cycles, 1)
-    total, total_s = sum(float(v) for v in flops.values()), sum(wall.values()) or 1.0
-    rows = []
-    for name in dict.fromkeys((*flops, *wall)):
-        cost, seconds = float(flops.get(name, 0.0)), wall.get(name, 0.0)
-        shares = (f"{100 * cost / total:.1f} %", f"{1e3 * seconds / cycles:.2f}", f"{100 * seconds / total_s:.1f} %")
-        rows.append((name, f"{cost / 1e6:,.2f}", *shares))
-    header = ("stage", "modelled, MFLOP a cycle", "modelled share", "measured, ms a cycle", "measured share")
-    counted = segments(measured.totals.counters)
-    note = f"Segments per sample: {counted:.2f} counted, {measured.cost.trace_segments} modelled."
-    return Table(f"Stages of {measured.own}: model against measurement", header, rows, note)
-
-
-def ledger_table(measured: Measured) -> Table:
-    """Cost of a cycle of every run under every ledger."""
-    rows, per_image = [], cycles_per_image(measured)
-    for ledger, costs in ledger_costs(measured).items():
-        scale, unit = (1e3, "ms") if ledger == "wall" else (1e-9, "GFLOP")
-        values = (f"{costs[name] * scale:,.3f} {unit}" if name in costs else "—" for name in measured.runs)
-        rows.append((ledger, *values, f"{per_image[ledger]:.2f}" if ledger in per_image else "—"))
-    header = ("ledger", *measured.runs, f"{measured.rival} / {measured.own}")
-    note = (
-        "Equal cost depends on how cost is counted. Where the last column is below 1, a cycle costs more than a whole "
-        "image of the rival, and the comparison does not favour the run. The ledger work prices every counted ray at "
-        f"{per_segment(measured.cost):,.0f} FLOP."
-    )
-    return Table("Cost of a cycle by ledger", header, rows, note)
+def measured_stages(measured: Measured) -> dict[str, float]:
+    """Wall seconds of the run's own by the stages of :func:`modelled_stages`."""
+    seconds: dict[str, float] = dict(measured.totals.stage_s)
+    if measured.runs[measured.own].price.adaptive_stages or not seconds:
+        return seconds
+    return {"tracing": seconds.pop("tracing", 0.0), AROUND: sum(seconds.values())}

@@ -1,4 +1,4 @@
-"""The comparison film: the reference and all runs side by side, with what one of them decided."""
+"""The comparison film: the reference and runs side by side, with what they decided."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from analysis.page.pictures import (
     RATE_MAP,
     Pixels,
     age_image,
+    colour,
     density_image,
     enlarge,
     font,
@@ -26,10 +27,12 @@ from analysis.page.pictures import (
     with_scale,
 )
 
+REFERENCE = "reference"
 INK, PAPER = (235, 235, 235), (24, 24, 24)
 OWN = (255, 176, 64)
 RIVALS = ((96, 176, 255), (140, 205, 95), (225, 130, 215), (240, 225, 90), (110, 220, 210), (235, 115, 105))
-_MAPS = ("tiling by refresh rate", "spatial density", "temporal density", "age of samples")
+_COLUMNS = 4, 6
+"""Panels side by side at least and at most; within that, as many as there are photographs."""
 
 
 def inks(runs: Sequence[str], own: str) -> list[tuple[int, int, int]]:
@@ -60,67 +63,79 @@ def to_pixels(image: Tensor) -> Pixels:
 
 
 def photographs(view: View, side_px: int) -> dict[str, Pixels]:
-    """The reference and what every display shows, by label."""
-    images = {"reference": view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
+    """The reference and what every display shows, by name."""
+    images = {REFERENCE: view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
     return {label: enlarge(to_pixels(image), side_px) for label, image in images.items()}
 
 
-def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels | None]:
-    """What the run ``own`` decided and how old its samples are, by label; None where it does not say."""
-    record, display = view.shown[own]
-    tiling = spatial = temporal = age = None
-    if record is not None:
-        rates, densities = record.densities.temporal, record.densities
-        tiling = tiling_image(record.tiling, rates, side_px, scales.temporal)
-        tiling = with_scale(tiling, scales.temporal, "refreshes per cycle", RATE_MAP)
-        spatial = density_image(densities.spatial, scales.spatial, side_px)
-        spatial = with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP)
-        temporal = density_image(rates, scales.temporal, side_px, RATE_MAP)
-        temporal = with_scale(temporal, scales.temporal, "refreshes per cycle", RATE_MAP)
-    if display.sample_map is not None:
-        age = age_image(display.sample_map.newest_s, view.time_s, scales.age_s, side_px)
-        age = with_scale(age, (1e3 * scales.age_s[0], 1e3 * scales.age_s[1]), "ms", AGE_MAP)
-    return {
-        "tiling by refresh rate": tiling,
-        "spatial density": spatial,
-        "temporal density": temporal,
-        "age of samples": age,
-    }
+def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels]:
+    """What runs say of their decisions, by label: what the run ``own`` knows of every place, how old its samples are,
+    and tiling and densities of every run that records its cycles. The labels of other runs begin with their names."""
+    found: dict[str, Pixels] = {}
+    for name in (own, *(name for name in view.shown if name != own)):
+        record, display = view.shown[name]
+        before = "" if name == own else f"{name}: "
+        if record is not None:
+            rates, densities = record.densities.temporal, record.densities
+            tiling = tiling_image(record.tiling, rates, side_px, scales.temporal)
+            spatial = density_image(densities.spatial, scales.spatial, side_px)
+            temporal = density_image(rates, scales.temporal, side_px, RATE_MAP)
+            rate = scales.temporal, "refreshes per cycle", RATE_MAP
+            found[f"{before}tiling by refresh rate"] = with_scale(tiling, *rate)
+            found[f"{before}spatial density"] = with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP)
+            found[f"{before}temporal density"] = with_scale(temporal, *rate)
+        if name == own:
+            for label, one in display.maps.items():
+                drawn = enlarge(colour(one.values.numpy().astype(np.float64), one.bounds, RATE_MAP), side_px)
+                found[label] = with_scale(drawn, one.bounds, one.unit, RATE_MAP)
+            if display.sample_map is not None:
+                age = age_image(display.sample_map.newest_s, view.time_s, scales.age_s, side_px)
+                bounds_ms = 1e3 * scales.age_s[0], 1e3 * scales.age_s[1]
+                found["age of samples"] = with_scale(age, bounds_ms, "ms", AGE_MAP)
+    return found
 
 
 class ComparisonFilm:
-    """Composes frames of two rows of panels: the reference, every run, what the run ``own`` decided, and last the
-    errors so far, which take two panels where the number of runs is odd. Keeps no images.
+    """Composes frames of rows of panels: photographs first, then maps, and last the errors so far, which take what is
+    left of the last row. Keeps no images.
 
     Attributes:
         width_px, height_px: size of a frame, even.
     """
 
     def __init__(
-        self, side_px: int, scales: Scales, span_s: tuple[float, float], runs: Sequence[str], own: str
+        self, side_px: int, span_s: tuple[float, float], runs: Sequence[str], own: str, labels: Sequence[str], row: int
     ) -> None:
-        """Takes the width of a panel, the colour scales, the span of time on the error panel's axis, and the runs."""
-        self._side = max(96, side_px - side_px % 2)
+        """Takes the width of a panel, the span of time on the error panel's axis, the runs whose errors are drawn, the
+        labels of all panels but that of the errors, and how many panels are best seen side by side."""
+        self._side = side_of(side_px)
         self._strip = 2 * max(9, self._side // 24)
-        self._scales, self._span, self._own = scales, span_s, own
+        self._span, self._labels = span_s, list(labels)
         self._inks = dict(zip(runs, inks(runs, own), strict=True))
-        pictures = 1 + len(runs) + len(_MAPS)
-        self._columns = pictures // 2 + 1
-        self._errors = (2 * self._columns - pictures) * self._side
-        self.width_px, self.height_px = self._columns * self._side, 2 * (self._side + self._strip)
+        self._columns = min(max(row, _COLUMNS[0]), _COLUMNS[1])
+        rows = len(self._labels) // self._columns + 1
+        self._errors = (rows * self._columns - len(self._labels)) * self._side
+        self.width_px, self.height_px = self._columns * self._side, rows * (self._side + self._strip)
 
-    def frame(self, view: View, times_s: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Pixels:
-        """One frame; ``errors`` of each run up to now, at ``times_s``."""
+    def frame(
+        self,
+        time_s: float,
+        pictures: Mapping[str, Pixels],
+        times_s: Sequence[float],
+        errors: Mapping[str, Sequence[float]],
+    ) -> Pixels:
+        """One frame; ``errors`` of each run up to now, at ``times_s``. Pictures by label; those that lack leave their
+        place empty."""
         canvas = Image.new("RGB", (self.width_px, self.height_px), PAPER)
         draw = ImageDraw.Draw(canvas)
-        shown = photographs(view, self._side) | maps(view, self._own, self._scales, self._side)
-        for slot, (label, pixels) in enumerate(shown.items()):
+        for slot, label in enumerate(self._labels):
             left, top = self._corner(slot)
+            pixels = pictures.get(label)
             if pixels is not None:
                 canvas.paste(Image.fromarray(pixels), (left, top + self._strip))
             self._label(draw, left, top, label if pixels is not None else f"{label}: missing")
-        left, top = self._corner(len(shown))
-        self._label(draw, left, top, f"squared error, t = {view.time_s:.3f} s")
+        left, top = self._corner(len(self._labels))
+        self._label(draw, left, top, f"squared error, t = {time_s:.3f} s")
         box = (left, top + self._strip, left + self._errors, top + self._strip + self._side)
         draw_errors(draw, box, self._span, times_s, {name: (errors[name], ink) for name, ink in self._inks.items()})
         return np.asarray(canvas)
@@ -135,6 +150,11 @@ class ComparisonFilm:
         draw.text((left + size // 2, top + self._strip // 2), text, font=fitting, fill=INK, anchor="lm")
 
 
+def side_of(side_px: int) -> int:
+    """The width of a panel that is asked to be so wide: even, and wide enough for its label."""
+    return max(96, side_px - side_px % 2)
+
+
 def draw_errors(
     draw: ImageDraw.ImageDraw,
     box: tuple[int, int, int, int],
@@ -145,6 +165,8 @@ def draw_errors(
     """Curves on a logarithmic axis of whole decades that covers what there is so far, drawn into ``box``."""
     size = max(9, (box[3] - box[1]) // 24)
     left, top, right, bottom = box[0] + 4 * size, box[1] + size, box[2] - size, box[3] - 2 * size
+    beside = box[2] - box[0] > 1.5 * (box[3] - box[1])  # the values stand where there is room for them
+    right -= 15 * size if beside else 0
     values = [value for series, _ in curves.values() for value in series if value > 0]
     low = math.floor(math.log10(min(values))) if values else -4
     high = max(low + 1, math.ceil(math.log10(max(values)))) if values else -1
@@ -163,5 +185,5 @@ def draw_errors(
         share = (np.log10(np.maximum(series, 10.0**low)) - low) / (high - low)
         points = np.stack((x, bottom - np.clip(share, 0, 1) * (bottom - top)), 1)
         draw.line([tuple(point) for point in points.tolist()], fill=ink, width=max(1, size // 7))
-        place = (left + size, top + (row + 0.7) * 1.5 * size)
+        place = ((right if beside else left) + size, top + (row + 0.7) * 1.5 * size)
         draw.text(place, f"{name}  {series[-1]:.2e}", font=font(size), fill=ink, anchor="lm")

@@ -223,7 +223,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "jod": _score(case, seen),
         "regions": seen.regions(),
         "stills": stills,
-        **(_cycles(totals, case) if totals.cycles else {}),
+        **(_cycles(totals, case) if totals.recorded and totals.cycles else {}),
         "machine": {
             "reference_s": began_run - began,
             "run_s": scored - began_run,

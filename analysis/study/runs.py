@@ -16,7 +16,7 @@ from tsar.config import StagesName, TsarConfig, closed_choices
 from tsar.error import count_nonfinite
 from tsar.policies import POLICIES
 from tsar.policy import Policy, Price, Setting, run
-from tsar.types import FrameletBatch, SampleBatch, StepRecord, Trace
+from tsar.types import FrameletBatch, SampleBatch, Spent, StepRecord, Trace
 
 if TYPE_CHECKING:
     from renderer.trace import Renderer
@@ -44,9 +44,13 @@ class Meter:
 
 
 class Totals:
-    """Sums over the recorded cycles of a run that lie within the span, and its invariants. Changes in place.
+    """Sums over the cycles of a run that lie within the span, and invariants of those that are recorded. Changes in
+    place.
 
     Warm-up is left out of the sums, not of the invariants.
+
+    Attributes:
+        recorded: whether the policy records its cycles.
     """
 
     def __init__(self, config: TsarConfig) -> None:
@@ -54,30 +58,32 @@ class Totals:
         self._check = InvariantCheck(limits)
         self.cycles = self.warmup_cycles = self.nonfinite = self.nonfinite_fields = 0
         self.moved = self.saturated = 0
+        self.recorded = False
         self.simulated_s = self.age_spread_s = 0.0
         self.stage_s: Counter[str] = Counter()
         self.counters: Counter[str] = Counter()
 
-    def add(self, record: StepRecord) -> None:
-        """Takes in one cycle."""
-        self._check.add(record)
-        if record.cycle < 0:
+    def count(self, spent: Spent) -> None:
+        """Takes in what one cycle took."""
+        if spent.cycle < 0:
             self.warmup_cycles += 1
             return
         self.cycles += 1
-        self.simulated_s += record.cost_s
+        self.simulated_s += spent.cost_s
+        self.stage_s.update(spent.stage_s)
+        self.counters.update(spent.counters)
+
+    def add(self, record: StepRecord) -> None:
+        """Takes in the record of one cycle."""
+        self._check.add(record)
+        self.recorded = True
+        if record.cycle < 0:
+            return
         self.nonfinite += record.nonfinite
         self.nonfinite_fields += record.nonfinite_fields
         self.age_spread_s += record.age_spread_s
         self.moved += record.moved
         self.saturated += record.saturated
-        self.stage_s.update(record.stage_s)
-        self.counters.update(record.counters)
-
-    @property
-    def recorded(self) -> bool:
-        """Whether the policy records its cycles."""
-        return self.cycles + self.warmup_cycles > 0
 
     @property
     def saturation(self) -> float:
@@ -86,7 +92,7 @@ class Totals:
         return self.saturated / self.moved if self.moved else float("nan")
 
     def of_a_cycle(self, p: CostParameters) -> CostParameters:
-        """Parameters of the cost model with what the mean cycle drew, where cycles are recorded."""
+        """Parameters of the cost model with what the mean cycle drew."""
         if not self.cycles:
             return p
         return measured_parameters(p, {name: count / self.cycles for name, count in self.counters.items()})
@@ -115,7 +121,7 @@ class PolicyRun:
         price: of a cycle.
         latency_cycles: cycles between sampling and display.
         meter: what it asked of the renderer.
-        totals: of its recorded cycles.
+        totals: of its cycles.
         images: records, where it makes any, and images.
     """
 
@@ -186,4 +192,6 @@ def _noted(
         if record is not None:
             on_record(record)
             totals.add(record)
+        if display.spent is not None:
+            totals.count(display.spent)
         yield record, display

@@ -28,6 +28,7 @@ from tsar.config import TsarConfig
 BATCH, SIDE, IMAGES = 16, 64, 5
 SIZE = ("--resolution-px", str(SIDE), "--batch-size", str(BATCH), "--warmup-cycles", "8", "--capacity", "3e10")
 SPAN = ("--seconds", "0.25", "--reference-samples-per-axis", "1", "--reference-rate-hz", "20")
+THESIS = ("--policy", "thesis", "--rivals", "framed", "framed-super")
 
 
 def options(folder: Path, out: str, threads: int) -> RunOptions:
@@ -36,6 +37,8 @@ def options(folder: Path, out: str, threads: int) -> RunOptions:
         input="fly-by",
         tsar=TsarConfig(batch_size=BATCH, resolution_px=SIDE, warmup_cycles=8),
         capacity=3e10,
+        policy="thesis",
+        rivals=("framed", "framed-super"),
         seconds=0.25,
         reference_samples_per_axis=1,
         reference_rate_hz=20.0,
@@ -55,7 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def done(folder: Path) -> subprocess.CompletedProcess[str]:
     """A run in a process of its own; its results lie in ``out``."""
     where = ("--threads", "2", "--frames", "--out", "out", "--cache", "cache")
-    done = run_script("run.py", folder, "fly-by", *SIZE, *SPAN, *where)
+    done = run_script("run.py", folder, "fly-by", *SIZE, *SPAN, *THESIS, *where)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     return done
@@ -263,6 +266,6 @@ def test_help_names_the_options(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["planescene", "spheresscene", "quad-light"])
 def test_other_built_in_scenes_run_too(name: str, tmp_path: Path, monkeypatch, capsys) -> None:
     """Block scenes of the motion-blur study, and one with lamps, whose samples draw random numbers."""
-    where = ("--no-film", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    where = (*THESIS, "--no-film", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     assert call_script("run.py", monkeypatch, name, *SIZE, *SPAN, *where) == 0, capsys.readouterr().err
     assert "hold in every cycle" in capsys.readouterr().out

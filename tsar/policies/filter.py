@@ -34,7 +34,7 @@ from tsar.filtering.records import (
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting
-from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
+from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 
 PIXEL_FLOPS = {True: 560.0, False: 290.0}
 """Operations per output pixel and cycle, with and without reprojection, as a test counts them in the code."""
@@ -145,7 +145,12 @@ class Filter(Policy[State]):
     def image(self, state: State, moment: Moment) -> Picture:
         level = torch.full((self._side, self._side), max(0, (self._side // self.config.framelet_side).bit_length() - 1))
         newest = SampleMap(state.estimates.time_s[0].clone(), level)
-        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest)
+        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=self._maps(state))
+
+    def _maps(self, state: State) -> dict[str, MapShown]:
+        """How fast the picture is taken to change, and how far off each pixel is taken to be."""
+        rate = MapShown(state.change.rate[0].clone(), (1e-4, 1.0), "variance per second")
+        return {"rate of change": rate, "expected error": MapShown(state.remaining[0].sqrt(), (0.003, 0.3), "RMS")}
 
     def _advanced(self, state: State, now_s: float) -> State:
         estimates, surfels = state.estimates, state.surfels

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from analysis.metrics.quality import View
-from analysis.page.pictures import AGE_MAP, palette
+from analysis.page.pictures import AGE_MAP, RATE_MAP, Pixels, palette
 from analysis.page.video import OWN, PAPER, RIVALS, ComparisonFilm, draw_errors, inks, maps, photographs, to_pixels
 from renderer.film.files import Mp4Writer
 from tests.analysis.builders import SCALES, grey, view
-from tsar.types import SampleMap
+from tsar.types import MapShown, SampleMap
 
 SIDE = 96
 MAPS = ["tiling by refresh rate", "spatial density", "temporal density", "age of samples"]
@@ -26,12 +26,19 @@ LABELS = ["reference", "own", "framed", *MAPS]
 FRAMED, ERRORS = RIVALS[0], {"own": [0.1], "framed": [0.2]}
 
 
-def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> ComparisonFilm:
-    return ComparisonFilm(side, SCALES, span, ["own", "framed"], "own")
+class Film(ComparisonFilm):
+    """Of two runs, drawn from what they show."""
+
+    def of(self, view: View, times_s: list[float], errors: dict) -> Pixels:
+        return self.frame(view.time_s, panels(view, self.width_px // 4), times_s, errors)
 
 
-def panels(view: View) -> dict:
-    return photographs(view, SIDE) | maps(view, "own", SCALES, SIDE)
+def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> Film:
+    return Film(side, span, ["own", "framed"], "own", LABELS, 3)
+
+
+def panels(view: View, side: int = SIDE) -> dict:
+    return photographs(view, side) | maps(view, "own", SCALES, side)
 
 
 def of_age(view: View, newest_s: torch.Tensor | None) -> View:
@@ -57,7 +64,7 @@ def test_a_frame_has_the_size_it_says_and_that_is_even(side: int) -> None:
     made = film(side)
     assert made.width_px % 2 == 0 and made.height_px % 2 == 0
     assert made.width_px // 4 == max(96, side // 2 * 2)
-    frame = made.frame(view(), [0.0], ERRORS)
+    frame = made.of(view(), [0.0], ERRORS)
     assert frame.shape == (made.height_px, made.width_px, 3) and frame.dtype == np.uint8
 
 
@@ -65,7 +72,7 @@ def test_every_picture_has_its_place_and_its_label() -> None:
     """Reference and displays first, then tiling, fields and ages; the last slot holds the errors."""
     made = film()
     strip = made.height_px // 2 - SIDE
-    frame, shown = made.frame(view(), [0.0], ERRORS), panels(view())
+    frame, shown = made.of(view(), [0.0], ERRORS), panels(view())
     assert list(shown) == LABELS
     for slot, pixels in enumerate(shown.values()):
         assert pixels is not None and np.array_equal(panel(frame, slot, strip), pixels), LABELS[slot]
@@ -86,8 +93,8 @@ def test_ages_are_of_the_time_shown() -> None:
 
 def test_unknown_ages_leave_their_place_empty() -> None:
     lacking, made = of_age(view(), None), film()
-    assert panels(lacking)["age of samples"] is None
-    known, unknown = (made.frame(shown, [0.0], ERRORS) for shown in (view(), lacking))
+    assert "age of samples" not in panels(lacking)
+    known, unknown = (made.of(shown, [0.0], ERRORS) for shown in (view(), lacking))
     strip = made.height_px // 2 - SIDE
     assert (panel(unknown, 6, strip) == PAPER).all() and not (panel(known, 6, strip) == PAPER).all()
     label = slice(SIDE + strip, SIDE + 2 * strip), slice(2 * SIDE, 3 * SIDE)
@@ -97,7 +104,7 @@ def test_unknown_ages_leave_their_place_empty() -> None:
 @pytest.mark.parametrize("side", [96, 256, 512])
 def test_labels_do_not_run_into_the_next_panel(side: int) -> None:
     made = film(side)
-    frame, width, strip = made.frame(view(), [0.0], ERRORS), made.width_px // 4, made.height_px // 2 - side
+    frame, width, strip = made.of(view(), [0.0], ERRORS), made.width_px // 4, made.height_px // 2 - side
     for slot in range(8):
         top, left = slot // 4 * (side + strip), slot % 4 * width
         label = frame[top : top + strip, left : left + width]
@@ -105,7 +112,7 @@ def test_labels_do_not_run_into_the_next_panel(side: int) -> None:
 
 
 def test_the_time_is_shown() -> None:
-    early, late = (film().frame(view(time), [0.0], ERRORS) for time in (0.1, 0.9))
+    early, late = (film().of(view(time), [0.0], ERRORS) for time in (0.1, 0.9))
     changed = (early != late).any(-1).nonzero()
     assert len(changed[0]) and changed[1].min() >= 3 * SIDE and changed[0].min() >= film().height_px // 2
 
@@ -115,7 +122,7 @@ def test_curves_lie_where_their_values_are() -> None:
     side, text = 256, 170  # pixels: of a panel, and how far its legend reaches
     made = film(side)
     top, times = made.height_px - side, np.linspace(0.0, 0.75, 30).tolist()
-    box = made.frame(view(0.75), times, {"own": [1e-3] * 30, "framed": [1e-1] * 30})[top:, 3 * side :]
+    box = made.of(view(0.75), times, {"own": [1e-3] * 30, "framed": [1e-1] * 30})[top:, 3 * side :]
     drawn = {ink: has(box, ink)[:, text:] for ink in (OWN, FRAMED)}
     rows = {ink: np.median(mask.nonzero()[0]) for ink, mask in drawn.items()}
     assert rows[FRAMED] < rows[OWN] - side / 4
@@ -146,7 +153,7 @@ def test_a_film_reads_back(tmp_path: Path) -> None:
     strip, values = made.height_px // 2 - SIDE, [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9]
     with Mp4Writer(path, 30.0, made.width_px, made.height_px) as writer:
         for number, value in enumerate(values):
-            writer.add(made.frame(view(number / 30, framed=value), [0.0], ERRORS))
+            writer.add(made.of(view(number / 30, framed=value), [0.0], ERRORS))
         assert not path.exists()
     assert writer.frames == len(values) and [p.name for p in path.parent.iterdir()] == ["comparison.mp4"]
     with av.open(str(path)) as container:
@@ -165,22 +172,39 @@ def test_a_film_reads_back(tmp_path: Path) -> None:
 def test_an_exception_leaves_no_film(tmp_path: Path, error: type[BaseException]) -> None:
     made = film()
     with pytest.raises(error), Mp4Writer(tmp_path / "a.mp4", 30.0, made.width_px, made.height_px) as writer:
-        writer.add(made.frame(view(), [0.0], ERRORS))
+        writer.add(made.of(view(), [0.0], ERRORS))
         raise error
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 6, 9])
-def test_no_run_is_left_out(count: int) -> None:
-    """Every run has a panel, and the errors take what two rows leave: a panel, or two where the runs are odd."""
+@pytest.mark.parametrize(("count", "columns", "rows"), [(1, 4, 2), (2, 4, 2), (3, 4, 3), (4, 5, 2), (9, 6, 3)])
+def test_no_run_is_left_out(count: int, columns: int, rows: int) -> None:
+    """Photographs stand side by side, four to six a row, and the errors take what the last row leaves."""
     one, names = view(), [f"run {number}" for number in range(count)]
-    many = replace(one, shown={name: one.shown["own"] for name in names}, mse=dict.fromkeys(names, 0.1))
-    made = ComparisonFilm(SIDE, SCALES, (0.0, 1.0), names, "run 0")
-    frame = made.frame(many, [0.0], {name: [0.1] for name in names})
-    columns, strip = made.width_px // SIDE, made.height_px // 2 - SIDE
-    filled = 1 + count + len(MAPS)
-    assert 2 * columns - filled == 1 + count % 2
-    for slot in range(2 * columns):
+    many = replace(one, shown={name: one.shown["framed"] for name in names}, mse=dict.fromkeys(names, 0.1))
+    many = replace(many, shown={**many.shown, "run 0": one.shown["own"]})
+    shown = photographs(many, SIDE) | maps(many, "run 0", SCALES, SIDE)
+    made = ComparisonFilm(SIDE, (0.0, 1.0), names, "run 0", list(shown), 1 + count)
+    frame = made.frame(0.0, shown, [0.0], {name: [0.1] for name in names})
+    strip = made.height_px // rows - SIDE
+    assert (made.width_px, made.height_px) == (columns * SIDE, rows * (SIDE + strip))
+    assert 1 <= rows * columns - len(shown) <= columns
+    for slot in range(rows * columns):
         top, left = slot // columns * (SIDE + strip) + strip, slot % columns * SIDE
         assert not has(frame[top : top + SIDE, left : left + SIDE], PAPER).all(), slot
     assert len(set(inks(names, "run 0")[:7])) == min(count, 7)
+
+
+def test_maps_of_a_rival_bear_its_name_and_a_policy_shows_what_it_knows() -> None:
+    """A run that records is shown whoever it is; the named maps and the ages are of the run's own."""
+    one = view()
+    (record, display), (_, framed) = one.shown["own"], one.shown["framed"]
+    known = MapShown(torch.tensor([[1.0, 2.0], [4.0, 8.0]]), (1.0, 8.0), "volts")
+    own = replace(framed, maps={"tension": known}, sample_map=display.sample_map)
+    both = replace(one, shown={"own": (None, own), "thesis": (record, replace(display, maps={"heat": known}))})
+    found = maps(both, "own", SCALES, SIDE)
+    fields = ["thesis: tiling by refresh rate", "thesis: spatial density", "thesis: temporal density"]
+    assert list(found) == ["tension", "age of samples", *fields]
+    assert found["tension"][0, 0].tolist() == palette(RATE_MAP)[0].tolist()
+    assert found["tension"][0, -1].tolist() == palette(RATE_MAP)[85].tolist(), "a third of the way from 1 to 8"
+    assert np.array_equal(found[fields[1]], maps(one, "own", SCALES, SIDE)["spatial density"])

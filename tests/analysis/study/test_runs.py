@@ -8,7 +8,7 @@ import torch
 from analysis.study.runs import Meter, Totals
 from tests.analysis.builders import good_record
 from tsar.config import TsarConfig
-from tsar.types import FrameletBatch, SampleBatch
+from tsar.types import FrameletBatch, SampleBatch, Spent
 
 
 def test_meter_counts_and_changes_nothing() -> None:
@@ -31,7 +31,10 @@ def test_totals_leave_out_warm_up() -> None:
     totals = Totals(TsarConfig())
     assert not totals.recorded
     for cycle in (-2, -1, 0, 1, 2):
-        totals.add(good_record(1, cycle=cycle, nonfinite=abs(cycle), nonfinite_fields=2 * abs(cycle), cost_s=0.02))
+        record = good_record(1, cycle=cycle, nonfinite=abs(cycle), nonfinite_fields=2 * abs(cycle))
+        totals.count(Spent(cycle, 0.02, record.stage_s, record.counters))
+        assert totals.recorded == (cycle > -2), "counting is not recording"
+        totals.add(record)
     assert (totals.cycles, totals.warmup_cycles, totals.nonfinite) == (3, 2, 3) and totals.recorded
     assert totals.nonfinite_fields == 6
     assert totals.simulated_s == pytest.approx(0.06) and totals.age_spread_s == pytest.approx(0.375)

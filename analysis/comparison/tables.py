@@ -1,0 +1,115 @@
+"""Tables of what a comparison measured, for the terminal and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from analysis.command.console import Table
+from analysis.comparison.summary import (
+    Measured,
+    cycles_per_image,
+    ledger_costs,
+    measured_stages,
+    metrics_of,
+    modelled_stages,
+    overdraw,
+    segments,
+)
+from analysis.metrics.cost_model import per_segment
+
+
+def key_table(measured: Measured) -> Table:
+    """The numbers to look at first."""
+    totals, own = measured.totals, measured.own
+    holds = said_of(measured.invariants, "yes")
+    rows = [
+        (f"median MSE, {own}", f"{np.median(measured.mse[own]):.3e}"),
+        (f"cycles of {own}", f"{totals.cycles}, {1e3 * totals.simulated_s / max(totals.cycles, 1):.2f} ms each"),
+        (f"samples per cycle of {own}", f"{totals.counters.get('primary_rays', 0) / max(totals.cycles, 1):,.0f}"),
+        ("non-finite samples replaced", str(measured.runs[own].nonfinite_samples)),
+        *_recorded_rows(measured, holds),
+    ]
+    for name in measured.rivals:
+        s = measured.statistics(name)
+        rows += [
+            (f"median MSE, {name}", f"{np.median(measured.mse[name]):.3e}"),
+            (f"period of {name}", f"{1e3 * measured.period_s(name):.1f} ms"),
+            (f"ratio to {name}: median", f"{s.median:.3f}"),
+            (f"ratio to {name}: quartiles", f"{s.quartile_low:.3f} – {s.quartile_high:.3f}"),
+            (f"ratio to {name}: at most 1", f"{100 * s.share_suitable:.0f} % of the time"),
+            (f"ratio to {name}: greatest suitable percentile", f"{s.suitable_percentile:.0f}"),
+            (f"ratio to {name}: outliers, infinite", f"{s.outliers}, {s.infinite}"),
+        ]
+    note = ""
+    if measured.rival is not None:
+        log, plain = (measured.statistics(measured.rival, column).median for column in ("log_mse", "mse"))
+        rows.append((f"ratio of log-compressed MSE to {measured.rival}: median", f"{log:.3f}"))
+        if (log > 1) != (plain > 1):
+            note = "The two measures disagree on which run is better."
+    return Table("Key numbers", ("", "value"), rows, note)
+
+
+def _recorded_rows(measured: Measured, holds: str) -> list[tuple[str, str]]:
+    """Of the run whose cycles are on disk."""
+    if measured.recorded is None:
+        return []
+    name = measured.recorded
+    totals = measured.runs[name].totals
+    return [
+        (f"non-finite densities and errors of {name}", str(totals.nonfinite_fields)),
+        (f"invariants of {name} hold in every cycle", holds),
+        (f"framelets drawn per pixel by {name}", f"{overdraw(measured, name):.2f}"),
+        (f"moved elements of {name} that one decision drove to a bound", f"{100 * totals.saturation:.0f} %"),
+        (
+            f"spread of ages in moving regions of {name}",
+            f"{1e3 * totals.age_spread_s / max(totals.cycles, 1):.0f} ms",
+        ),
+    ]
+
+
+def said_of(invariants: Mapping[str, Any] | None, hold: str) -> str:
+    """In words, whether invariants were checked and hold."""
+    if invariants is None:
+        return "not recorded by these policies"
+    return hold if invariants["ok"] else f"BROKEN: {dict(invariants)}"
+
+
+def metric_table(measured: Measured) -> Table | None:
+    """Metrics of every run; None where none was asked for."""
+    found = metrics_of(measured)
+    rows = [(name, *(f"{found[metric][name]:.4f}" for metric in found)) for name in measured.seen]
+    return Table("Metrics, mean over the times", ("run", *found), rows) if found else None
+
+
+def stage_table(measured: Measured) -> Table:
+    """Per stage: share by the model beside what was measured."""
+    flops, wall, cycles = modelled_stages(measured), measured_stages(measured), max(measured.totals.cycles, 1)
+    total, total_s = sum(flops.values()), sum(wall.values()) or 1.0
+    rows = []
+    for name in dict.fromkeys((*flops, *wall)):
+        cost, seconds = float(flops.get(name, 0.0)), wall.get(name, 0.0)
+        shares = (f"{100 * cost / total:.1f} %", f"{1e3 * seconds / cycles:.2f}", f"{100 * seconds / total_s:.1f} %")
+        rows.append((name, f"{cost / 1e6:,.2f}", *shares))
+    header = ("stage", "modelled, MFLOP a cycle", "modelled share", "measured, ms a cycle", "measured share")
+    counted = segments(measured.totals.counters)
+    note = f"Segments per sample: {counted:.2f} counted, {measured.cost.trace_segments} modelled."
+    return Table(f"Stages of {measured.own}: model against measurement", header, rows, note)
+
+
+def ledger_table(measured: Measured) -> Table:
+    """Cost of a cycle of every run under every ledger."""
+    rows, per_image = [], cycles_per_image(measured)
+    for ledger, costs in ledger_costs(measured).items():
+        scale, unit = (1e3, "ms") if ledger == "wall" else (1e-9, "GFLOP")
+        values = (f"{costs[name] * scale:,.3f} {unit}" if name in costs else "—" for name in measured.runs)
+        rows.append((ledger, *values, f"{per_image[ledger]:.2f}" if ledger in per_image else "—"))
+    header = ("ledger", *measured.runs, f"{measured.rival} / {measured.own}")
+    note = (
+        "Equal cost depends on how cost is counted. Where the last column is below 1, a cycle costs more than a whole "
+        "image of the rival, and the comparison does not favour the run. The ledger work prices every counted ray at "
+        f"{per_segment(measured.cost):,.0f} FLOP."
+    )
+    return Table("Cost of a cycle by ledger", header, rows, note)
