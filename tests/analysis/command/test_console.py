@@ -38,7 +38,7 @@ def test_a_run_prints_its_folder_as_it_is(
     statistics.suitable_percentile = 50.0
     summary: dict[str, Any] = {"ratio_statistics": {"framed": statistics}, "policy": "thesis", "metrics": {}}
     summary |= {"files": [], "ledger": "thesis", "cycles": 1, "cycle_s": 0.1}
-    summary |= {"samples_traced": 1, "invariants": {"ok": True}, "nonfinite": {"samples": 0}}
+    summary |= {"samples_traced": 1, "invariants": {"ok": True, "runs": ["thesis"]}, "nonfinite": {"samples": 0}}
     monkeypatch.setattr(run_command, "run_experiment", lambda options, began_s: summary)
     monkeypatch.chdir(tmp_path)
     assert call_script("run.py", monkeypatch, "fly-by", "--out", ODD) == 0

@@ -113,7 +113,7 @@ def test_labels_do_not_run_into_the_next_panel(side: int) -> None:
 
 def test_the_time_is_shown() -> None:
     early, late = (film().of(view(time), [0.0], ERRORS) for time in (0.1, 0.9))
-    changed = (early != late).any(-1).nonzero()
+    changed = np.not_equal(early, late).any(-1).nonzero()
     assert len(changed[0]) and changed[1].min() >= 3 * SIDE and changed[0].min() >= film().height_px // 2
 
 
