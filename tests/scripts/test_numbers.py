@@ -213,7 +213,7 @@ def test_a_run_that_shows_no_cycle_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     size = ("--resolution-px", "64", "--batch-size", "16", "--reference-samples-per-axis", "1", "--threads", "1")
-    span = ("--seconds", "0.01", "--reference-rate-hz", "20", "--capacity", "3e10")
+    span = ("--seconds", "0.01", "--reference-rate-hz", "20", "--capacity", "3e10", "--policy", "thesis")
     places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     assert call_script("run.py", monkeypatch, "fly-by", *size, *span, *places) == 2
     shown = capsys.readouterr()
