@@ -38,7 +38,7 @@ def project(
     """
     if view.kind == "panorama":
         raise ValueError("project: expected a perspective or parallel camera, got a panorama")
-    matrix, offset = _to_camera(view)
+    matrix, offset = to_camera(view)
     infinite = instance < 0
     row = torch.where(infinite, len(view.track_of_instance), instance).reshape(-1).to(torch.int64)
     x, y, z = (component.to(torch.float64).reshape(-1) for component in point.unbind(-1))
@@ -57,7 +57,7 @@ def project(
     return position.reshape((*point.shape[:-1], 2)), depth.reshape(point.shape[:-1])
 
 
-def _to_camera(view: Viewpoint) -> tuple[Float64[Tensor, "rows 3 3"], Float64[Tensor, "rows 3"]]:
+def to_camera(view: Viewpoint) -> tuple[Float64[Tensor, "rows 3 3"], Float64[Tensor, "rows 3"]]:
     """Matrix and offset from each instance's track to the camera; the last row is for directions in the world."""
     # by rows and columns: a matrix product's bits may depend on the library
     camera = view.to_camera

@@ -17,6 +17,8 @@ from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.decision import Decision, decide
+from tsar.filtering.stages import REFERENCE as FILTERING
+from tsar.filtering.stages import FilterStages
 from tsar.observation import Observation, observe
 from tsar.reconstruction import Reconstruction, reconstruct
 from tsar.types import Densities, Errors, FrameletBatch
@@ -33,12 +35,14 @@ class Stages:
         decide: new densities, their tiling, and what is due in it.
         reconstruct: image; flags dead framelets in the cache, in place.
         account: sums for the record of the cycle.
+        filtering: those of the policies ``filter`` and ``tsar``.
     """
 
     observe: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig, StageTimer], Observation] = observe
     decide: Callable[[Densities, Errors, Field, TsarConfig, StageTimer], Decision] = decide
     reconstruct: Callable[[FrameletCache, TsarConfig, float], Reconstruction] = reconstruct
     account: Callable[[Densities, Errors, Tensor, TsarConfig], Account] = account
+    filtering: FilterStages = FILTERING
 
 
 REFERENCE = Stages()

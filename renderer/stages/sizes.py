@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tsar.error import OCTAVES_OF_FULL_ERROR
+from tsar.filtering import motion, records, tiles
 from tsar.reconstruction import AGE_MOST, AGE_STEPS, SHIFT_CYCLES
 from tsar.types import LUMINANCE
 
@@ -27,3 +28,18 @@ GIVEN: dict[str, float] = {
     **dict(zip(("LUMINANCE_RED", "LUMINANCE_GREEN", "LUMINANCE_BLUE"), LUMINANCE, strict=True)),
 }
 """As in :mod:`renderer.compute.sizes`."""
+
+FILTERING: dict[str, float] = {
+    "VARIANCE_MAX": records.VARIANCE_MAX,
+    "UNSEEN": records.UNSEEN,
+    "NEARER": motion.NEARER,
+    "NEARER_COUNT": motion.NEARER_COUNT,
+    "DEPTH_SHIFT": motion.DEPTH_SHIFT,
+    "DEPTHS": motion.DEPTHS,
+    "SCORES": motion.SCORES,
+    "SCORE_SCALE": motion.SCORE_SCALE,
+    "BESIDE": motion.BESIDE,
+    "BISECTIONS": tiles.BISECTIONS,
+    "PRICE_LEAST": tiles.PRICE_LEAST,
+}
+"""The same for the filter's stages."""

@@ -6,7 +6,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 
-from tsar.policies.scatter import double_width
+from tsar.policies.resampling import double_width
 
 
 def smoothed(

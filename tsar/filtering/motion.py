@@ -13,13 +13,13 @@ from tsar.filtering.records import UNSEEN, VARIANCE_MAX, Estimates, Surfels, cen
 from tsar.projection import project
 from tsar.types import Viewpoint
 
-_NEARER = 1.07  # a surface in front is nearer by this factor
-_NEARER_COUNT = 6
-_DEPTH_SHIFT = 18  # of the bits of a float32: steps of 1/32
-_DEPTHS = 1 << 13
-_SCORES = 1 << 14
-_SCORE_SCALE = 8e4  # scores of variances up to 0.2
-_BESIDE = 0.5  # variance per roughness and pixel of distance
+NEARER = 1.0625  # a surface in front is nearer by this factor
+NEARER_COUNT = 6
+DEPTH_SHIFT = 18  # of the bits of a float32: steps of 1/32
+DEPTHS = 1 << 13
+SCORES = 1 << 14
+SCORE_SCALE = 8e4  # scores of variances up to 0.2
+BESIDE = 0.5  # variance per roughness and pixel of distance
 
 
 def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:
@@ -29,7 +29,7 @@ def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Esti
     to the camera first, and among those at the same depth the one of least ``P + g d / 2`` at a distance of ``d``
     pixels from its centre; then those beside it, the farthest from the camera first, so that surfaces do not grow.
     Every pixel keeps its surfel's true place, so nothing is blurred however often it moves. Then surfels go that show
-    through gaps of a surface in front: six of their eight neighbours are nearer to the camera by 7 %.
+    through gaps of a surface in front: six of their eight neighbours are nearer to the camera by 6 %.
     """
     side = estimates.color.shape[-1]
     position, depth = _projected(surfels, view, side)
@@ -74,7 +74,7 @@ def _sources(
     side, count = estimates.color.shape[-1], depth.numel()
     seen = (depth > 0.0) & (position > -1.0).all(1) & (position < side + 1.0).all(1)
     at = torch.where(seen[:, None], position, -9.0)
-    near = depth.to(torch.float32).clamp(min=0.0).contiguous().view(torch.int32).to(torch.int64) >> _DEPTH_SHIFT
+    near = depth.to(torch.float32).clamp(min=0.0).contiguous().view(torch.int32).to(torch.int64) >> DEPTH_SHIFT
     first = (at - 0.5).floor()
     none = torch.iinfo(torch.int64).max
     least = torch.full((count,), none, dtype=torch.int64)
@@ -86,9 +86,9 @@ def _sources(
             away = (cell + 0.5 - at).abs().amax(1).to(torch.float32)
             beside = (away > 0.5).to(torch.int64)
             inside = seen & (cell >= 0.0).all(1) & (cell < side).all(1)
-            score = ((variance + _BESIDE * roughness * away) * _SCORE_SCALE).to(torch.int64).clamp(0, _SCORES - 1)
-            order = torch.where(beside > 0, _DEPTHS - 1 - near, near)
-            key = ((beside * _DEPTHS + order) * _SCORES + score) * count + number
+            score = ((variance + BESIDE * roughness * away) * SCORE_SCALE).to(torch.int64).clamp(0, SCORES - 1)
+            order = torch.where(beside > 0, DEPTHS - 1 - near, near)
+            key = ((beside * DEPTHS + order) * SCORES + score) * count + number
             pixel = torch.where(inside, cell[:, 1] * side + cell[:, 0], 0.0).to(torch.int64)
             least = least.scatter_reduce(0, pixel, torch.where(inside, key, none), "amin")
     return torch.where(least < none, least % count, -1)
@@ -103,5 +103,5 @@ def _behind(depth: Float64[Tensor, " pixels"]) -> Bool[Tensor, " pixels"]:
     for down in range(3):
         for right in range(3):
             if (down, right) != (1, 1):
-                nearer += around[down : down + side, right : right + side] < plane / _NEARER
-    return ((nearer >= _NEARER_COUNT) & (plane > 0.0)).reshape(-1)
+                nearer += around[down : down + side, right : right + side] < plane / NEARER
+    return ((nearer >= NEARER_COUNT) & (plane > 0.0)).reshape(-1)

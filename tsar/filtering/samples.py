@@ -162,16 +162,23 @@ class Met:
 def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewpoint | None) -> Met:
     """The surfels of a batch, by the poses of a view and those of the cycle before."""
     side = before.step.shape[-1]
-    newest = seen.newest.clamp(min=0)
+    pixel = (seen.newest >= 0).nonzero().squeeze(1)
+    newest = seen.newest[pixel]
     instance = hits.instance.reshape(-1)[newest].to(torch.int64)
     point = hits.point.reshape(-1, 3)[newest]
     position = _image(view, instance, point, side)
     step = torch.zeros_like(position)
     if earlier is not None:
         step = position - _image(earlier, instance, point, side)
-    found = Surfels(instance.reshape(1, side, side), point.T.reshape(3, side, side), position, step)
+
+    def spread(values: Tensor) -> Tensor:
+        plane = values.new_zeros(values.shape[0], side * side)
+        plane[:, pixel] = values
+        return plane.reshape(-1, side, side)
+
+    found = Surfels(spread(instance[None]), spread(point.T), spread(position), spread(step))
     same = seen.hit & (found.instance == before.instance)
-    moves = (step - before.step).abs().amax(0, keepdim=True) > _MOVES_PX
+    moves = (found.step - before.step).abs().amax(0, keepdim=True) > _MOVES_PX
     fast = before.step.abs().amax(0, keepdim=True) > _MOVES_PX
     share = torch.where(fast, _SHARE_MOVING, 0.0)
     return Met(found, same, seen.hit & ~same & moves, share)
@@ -195,10 +202,10 @@ def joined(before: Surfels, found: Met, hit: Bool[Tensor, "1 h w"], share: Float
 
 
 def _image(
-    view: Viewpoint, instance: Int64[Tensor, " pixels"], point: Float[Tensor, "pixels 3"], side: int
-) -> Float[Tensor, "2 h w"]:
+    view: Viewpoint, instance: Int64[Tensor, " hit"], point: Float[Tensor, "hit 3"], side: int
+) -> Float[Tensor, "2 hit"]:
     position, _ = project(view, instance, point)
-    return (position * side).nan_to_num(0.0).to(torch.float32).T.reshape(2, side, side).contiguous()
+    return (position * side).nan_to_num(0.0).to(torch.float32).T.contiguous()
 
 
 def _semivariance(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:

@@ -11,8 +11,8 @@ from torch import Tensor
 
 from tsar.filtering.records import ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX, FilterOptions
 
-_BISECTIONS = 30
-_PRICES = 1e-14  # of the greatest gain: the least price
+BISECTIONS = 30
+PRICE_LEAST = 2.0**-46  # of the greatest gain
 
 
 def spacings(side: int) -> tuple[float, ...]:
@@ -55,9 +55,27 @@ def gains(
             beside = (p + (0.5 + 0.35 * (spacing - 1.0)) * roughness) * (p + 0.5 * spacing * roughness)
             gain = p * p * (hit / (p + 0.5 * roughness) + (1.0 - hit) * p / beside)
         gain = gain * torch.minimum((gain / rate).clamp(min=options.life_min_s), longest_s)
-        width = int(TILE_SIDE * spacing)
-        found.append((F.avg_pool2d(gain[None], width)[0, 0] * width**2).to(torch.float64))
+        while gain.shape[-1] * TILE_SIDE * spacing > variance.shape[-1]:
+            gain = 4.0 * F.avg_pool2d(gain[None], 2)[0]
+        found.append(gain[0].to(torch.float64))
     return found
+
+
+def chosen(
+    variance: Float[Tensor, "1 h w"],
+    roughness: Float[Tensor, "1 h w"],
+    rate: Float[Tensor, "1 h w"],
+    speed: Float[Tensor, "1 h w"],
+    cycle_s: float,
+    count: int,
+    options: FilterOptions,
+) -> list[Bool[Tensor, "_ _"]]:
+    """The ``count`` tiles that gain most, for every spacing whether each is one of them; fewer where none is free.
+
+    Arguments are those of :func:`gains`.
+    """
+    gain = gains(variance, roughness, rate, speed, cycle_s, options)
+    return filled_up(best(gain, count), gain, spacings(variance.shape[-1]).index(1.0), count)
 
 
 def best(gain: list[Float64[Tensor, "_ _"]], count: int) -> list[Bool[Tensor, "_ _"]]:
@@ -67,8 +85,8 @@ def best(gain: list[Float64[Tensor, "_ _"]], count: int) -> list[Bool[Tensor, "_
     than the tiles within them, are at most as many.
     """
     high = max(float(level.max()) for level in gain) + 1e-12
-    low = high * _PRICES
-    for _ in range(_BISECTIONS):
+    low = high * PRICE_LEAST
+    for _ in range(BISECTIONS):
         price = sqrt(low * high)
         if sum(int(level.sum()) for level in _worth(gain, price)) > count:
             low = price

@@ -20,8 +20,7 @@ from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
-from tsar.filtering import change, motion, samples, tiles
-from tsar.filtering.display import smoothed
+from tsar.filtering import change, samples, tiles
 from tsar.filtering.records import (
     DEFAULT,
     ELEMENT_PX,
@@ -34,6 +33,7 @@ from tsar.filtering.records import (
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.projection import project
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 
 PIXEL_FLOPS = {True: 560.0, False: 290.0}
@@ -83,6 +83,7 @@ class Filter(Policy[State]):
     def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
         super().__init__(setting)
         self._options, self._side = options, self.config.resolution_px
+        self._stages = setting.stages_of(self.config).filtering
         self._view = setting.view if options.reprojection else None
         most = int(options.share_max * self._side**2) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
@@ -160,7 +161,7 @@ class Filter(Policy[State]):
         if view is not None and view.kind == "panorama":
             view = None
         if view is not None:
-            estimates, surfels = motion.moved(estimates, surfels, view)
+            estimates, surfels = self._stages.moved(estimates, surfels, view)
         return replace(state, estimates=estimates, surfels=surfels, now_s=now_s, view=view, earlier=state.view)
 
     def _chosen(
@@ -171,8 +172,9 @@ class Filter(Policy[State]):
         if self._options.by_gain:
             rate = state.change.rate_px
             speed = state.surfels.step.abs().amax(0, keepdim=True) / moment.cycle_s
-            gain = tiles.gains(state.remaining, state.estimates.roughness, rate, speed, moment.cycle_s, self._options)
-            chosen = tiles.filled_up(tiles.best(gain, self._tiles), gain, kinds.index(1.0), self._tiles)
+            chosen = self._stages.chosen(
+                state.remaining, state.estimates.roughness, rate, speed, moment.cycle_s, self._tiles, self._options
+            )
         else:
             chosen = self._in_turn(kinds, moment.cycle)
         found = [
@@ -206,7 +208,7 @@ class Filter(Policy[State]):
         position = batch.position.reshape(-1, 2) * side
         if state.view is not None and traced.hits is not None:
             hits = traced.hits
-            place, depth = motion.project(state.view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
+            place, depth = project(state.view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
             position = torch.where((depth > 0.0)[:, None], place * side, -1.0)
         pixel = samples.pixels_of(position, side)
         seen = samples.gathered(color, batch.times, state.spacing, pixel, now_s, before.roughness)
@@ -233,7 +235,7 @@ class Filter(Policy[State]):
             aged = _uncertain(aged, state.surfels)
         if not self._options.smoothing:
             return replace(state, shown=aged.color, remaining=aged.variance)
-        shown, remaining = smoothed(aged.color, aged.variance, aged.roughness)
+        shown, remaining = self._stages.smoothed(aged.color, aged.variance, aged.roughness)
         return replace(state, shown=shown, remaining=remaining)
 
 

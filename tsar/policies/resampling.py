@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import product
 
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, Float64, Int64, Shaped
 from torch import Tensor
 
@@ -72,3 +73,21 @@ def _columns(position: Float64[Tensor, "*n 2"]) -> tuple[Float64[Tensor, "*n"], 
 
 def _within(at: Float64[Tensor, "*n"], count: int) -> Int64[Tensor, "*n"]:
     return at.clamp(0.0, count - 1.0).to(torch.int64)
+
+
+def double_width(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
+    """Twice as many columns, as :func:`widened` has them."""
+    return widened(plane, 2)
+
+
+def widened(plane: Float[Tensor, "c h w"], factor: int) -> Float[Tensor, "c h w2"]:
+    """``factor`` times as many columns, bilinear, the border repeated. Not ``F.interpolate``: it takes another path,
+    with other rounding, when there is one thread."""
+    padded = F.pad(plane, (1, 1), mode="replicate")
+    parts = []
+    for column in range(factor):
+        # centre of the new column, in columns from the centre of the old one
+        offset = (column + 0.5) / factor - 0.5
+        nearer = padded[..., 2:] if offset > 0 else padded[..., :-2]
+        parts.append((1.0 - abs(offset)) * plane + abs(offset) * nearer)
+    return torch.stack(parts, dim=-1).flatten(-2)

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from tsar.config import TsarConfig
 from tsar.error import replace_nonfinite
+from tsar.policies.resampling import double_width
 from tsar.policy import Moment
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
@@ -81,21 +82,3 @@ def pull_push(color: Float[Tensor, "c h w"], weight: Float[Tensor, "1 h w"]) -> 
     coarse = pull_push(mean, total.clamp(max=1.0))
     fine = double_width(double_width(coarse).transpose(1, 2)).transpose(1, 2)
     return weight * color + (1.0 - weight) * fine
-
-
-def double_width(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
-    """Twice as many columns, as :func:`widened` has them."""
-    return widened(plane, 2)
-
-
-def widened(plane: Float[Tensor, "c h w"], factor: int) -> Float[Tensor, "c h w2"]:
-    """``factor`` times as many columns, bilinear, the border repeated. Not ``F.interpolate``: it takes another path,
-    with other rounding, when there is one thread."""
-    padded = F.pad(plane, (1, 1), mode="replicate")
-    parts = []
-    for column in range(factor):
-        # centre of the new column, in columns from the centre of the old one
-        offset = (column + 0.5) / factor - 0.5
-        nearer = padded[..., 2:] if offset > 0 else padded[..., :-2]
-        parts.append((1.0 - abs(offset)) * plane + abs(offset) * nearer)
-    return torch.stack(parts, dim=-1).flatten(-2)

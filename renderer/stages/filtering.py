@@ -1,0 +1,153 @@
+"""The stages of the filter as kernels on the CPU, with the bits of the reference; threads take rows."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from renderer.compute.launching import Command, address
+from renderer.compute.memory import Memory
+from renderer.compute.team import TEAM
+from renderer.stages import filtering_kernels as kernels
+from tsar.filtering.records import TILE_SIDE, Estimates, FilterOptions, Surfels
+from tsar.filtering.stages import FilterStages
+from tsar.filtering.tiles import filled_up, spacings
+from tsar.projection import to_camera
+from tsar.types import Viewpoint
+
+_F32, _F64, _I64 = torch.float32, torch.float64, torch.int64
+_LANES = 16
+_ROW = 12
+"""Numbers of an instance: three rows of a matrix, and an offset."""
+_KINDS = {
+    "color": (3, _F32), "aged": (1, _F32), "inverse": (1, _F32), "time_s": (1, _F64), "roughness": (1, _F32),
+    "instance": (1, _I64), "point": (3, _F32), "position": (2, _F32), "step": (2, _F32),
+}  # fmt: skip
+"""Planes of estimates and surfels, in the order of the native records, and the kind of their elements."""
+
+
+def filter_stages(side: int, threads: int = 1) -> FilterStages:
+    """Kernels for a picture of ``side`` pixels; the reference where it has fewer than they take at a time."""
+    if side * side % _LANES or side < TILE_SIDE:
+        return FilterStages()
+    made = _Compiled(side, threads)
+    return FilterStages(made.moved, made.chosen, made.smoothed)
+
+
+class _Compiled:
+    """Recorded launches and working memory for one size, nothing of a run."""
+
+    def __init__(self, side: int, threads: int) -> None:
+        self._side, self._pixels, self._memory = side, side * side, Memory()
+        room = self._memory.room
+        self._plans = [kernels.FilterPlan() for _ in range(2)]
+        x, y, depth = (room(name, self._pixels, _F64) for name in ("x", "y", "depth"))
+        least, source = room("least", self._pixels, _I64), room("source", self._pixels, torch.int32)
+        for perspective, plan in enumerate(self._plans):
+            plan.side, plan.perspective = side, perspective
+            plan.x, plan.y, plan.depth, plan.least, plan.source = x, y, depth, least, source
+        edges = [side * number // threads for number in range(threads + 1)]
+        self._rows = [(a, b) for a, b in pairwise(edges) if b > a]
+        self._project = [[Command(kernels.project, plan, *rows) for rows in self._rows] for plan in self._plans]
+        plan = self._plans[0]
+        self._choose = [Command(kernels.choose, plan, *rows) for rows in self._rows]
+        self._keep = [Command(kernels.keep, plan, *rows) for rows in self._rows]
+        self._planes = np.zeros(2 * len(_KINDS) - 1, np.int64)
+        planes = address("planes", self._planes, _I64, len(self._planes))
+        self._take = [Command(kernels.take, plan, planes, *rows) for rows in self._rows]
+        self._prepare_tiles()
+        self._prepare_picture()
+
+    def moved(self, estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:
+        """As :func:`tsar.filtering.motion.moved`."""
+        matrix, offset = to_camera(view)
+        rows = torch.cat((matrix.reshape(-1, 9), offset), dim=1).contiguous()
+        before = [_plane(record, name) for name in _KINDS for record in (estimates, surfels) if hasattr(record, name)]
+        after = [torch.empty_like(plane) for plane in before]
+        where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
+        self._planes[:] = [
+            *where[:-1], *(self._address(name, plane) for name, plane in zip(_KINDS, after, strict=True))
+        ]  # fmt: skip
+        at = dict(zip(_KINDS, where, strict=True))
+        poses = address("rows", rows, _F64, rows.numel()), len(rows), view.tan_x, view.tan_y
+        project = self._project[view.kind == "perspective"]
+        for command in project:
+            command.set(*poses, at["instance"], at["point"])
+        for command in self._choose:
+            command.set(at["aged"], at["inverse"], at["roughness"])
+        for commands in (project, self._choose, self._keep, self._take):
+            TEAM.run(commands)
+        return Estimates(*after[:5]), Surfels(*after[5:])
+
+    def chosen(
+        self,
+        variance: Tensor,
+        roughness: Tensor,
+        rate: Tensor,
+        speed: Tensor,
+        cycle_s: float,
+        count: int,
+        options: FilterOptions,
+    ) -> list[Tensor]:
+        """As :func:`tsar.filtering.tiles.chosen`."""
+        planes = {"variance": variance, "roughness": roughness, "rate": rate, "speed": speed}
+        kept = {name: plane.contiguous() for name, plane in planes.items()}
+        where = [address(name, plane, _F32, self._pixels) for name, plane in kept.items()]
+        lengths = cycle_s, options.reach * self._side, options.life_min_s, options.life_max_s
+        for (spacing, tiles, plane, gain), command in zip(self._levels, self._gain, strict=True):
+            command.set(spacing, *lengths, self._side, tiles, *where, plane, gain)
+        for first in range(0, len(self._gain), len(self._rows)):
+            TEAM.run(self._gain[first : first + len(self._rows)])
+        self._best(count)
+        found = [level.bool() for level in self._split(self._taken)]
+        gains = self._split(self._gains)
+        return filled_up(found, gains, self._spacings.index(1.0), count)
+
+    def smoothed(self, color: Tensor, variance: Tensor, roughness: Tensor) -> tuple[Tensor, Tensor]:
+        """As :func:`tsar.filtering.display.smoothed`."""
+        levels, fine = self._pyramid, (color, variance, roughness)
+        finest = levels[: 5 * self._pixels].reshape(5, self._side, self._side)
+        torch.cat(fine, out=finest)
+        self._smooth()
+        return finest[:3].clone(), finest[3:4].clone()
+
+    def _prepare_tiles(self) -> None:
+        self._spacings = spacings(self._side)
+        sides = [int(self._side / (TILE_SIDE * spacing)) for spacing in self._spacings]
+        self._sides, total = sides, sum(side * side for side in sides)
+        self._gains, self._taken = torch.zeros(total, dtype=_F64), torch.zeros(total, dtype=torch.uint8)
+        room, gains = self._memory.room, address("gains", self._gains, _F64, total)
+        starts = np.cumsum([0, *(side * side for side in sides)])
+        self._levels = [
+            (spacing, side, room(f"plane {side}", self._pixels * 3 // 2), gains + 8 * int(start))
+            for spacing, side, start in zip(self._spacings, sides, starts, strict=False)
+        ]
+        self._gain = [Command(kernels.gain) for _ in self._levels]
+        best = Command(kernels.best)
+        memory = room("value", total, _F64), room("count", total, torch.int32)
+        taken = address("taken", self._taken, torch.uint8, total)
+        self._best = lambda count: best(gains, len(sides), sides[0], count, *memory, taken)
+
+    def _prepare_picture(self) -> None:
+        pixels, wide = 0, self._side
+        while wide >= 1:
+            pixels, wide = pixels + wide * wide, wide // 2
+        self._pyramid = torch.zeros(5 * pixels)
+        levels = address("levels", self._pyramid, _F32, 5 * pixels)
+        spare = self._memory.room("spare", 2 * self._pixels)
+        self._smooth = Command(kernels.smooth, levels, self._side, spare).launch
+
+    def _split(self, values: Tensor) -> list[Tensor]:
+        sizes = [side * side for side in self._sides]
+        return [part.reshape(side, side) for part, side in zip(values.split(sizes), self._sides, strict=True)]
+
+    def _address(self, name: str, plane: Tensor) -> int:
+        planes, kind = _KINDS[name]
+        return address(name, plane, kind, planes * self._pixels)
+
+
+def _plane(record: object, name: str) -> Tensor:
+    return getattr(record, name).contiguous()

@@ -1,0 +1,165 @@
+"""Kernel entry points of the filter's stages (``native/surfels.h``, ``gains.h``, ``pyramid.h``), defined in
+``tsar/filtering``. Threads take rows."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.compute.launching import Address
+from renderer.compute.native_code import module_options
+from renderer.stages import sizes
+
+wp.set_module_options(module_options("gains.h", "pyramid.h", "surfels.h", given=sizes.FILTERING))
+
+
+@wp.struct
+class FilterPlan:
+    """Size of the picture, and addresses of working memory for each of its pixels."""
+
+    side: wp.int32
+    perspective: wp.int32
+    x: wp.uint64
+    """float64, where surfels are, pixels."""
+    y: wp.uint64
+    depth: wp.uint64
+    """float64."""
+    least: wp.uint64
+    """int64, the best rank for each pixel."""
+    source: wp.uint64
+    """int32, the surfel that each pixel takes, -1 where it takes none."""
+
+
+@wp.func_native("""
+    surfels::project_rows(plan, (const double*)rows, row_count, tan_x, tan_y, (const long long*)instance,
+                          (const float*)point, first, last);
+""")
+def native_project(
+    plan: FilterPlan,
+    first: wp.int32,
+    last: wp.int32,
+    rows: Address,
+    row_count: wp.int32,
+    tan_x: wp.float64,
+    tan_y: wp.float64,
+    instance: Address,
+    point: Address,
+): ...
+
+
+@wp.func_native("""
+    surfels::choose_rows(plan, (const float*)aged, (const float*)inverse, (const float*)roughness, first, last);
+""")
+def native_choose(
+    plan: FilterPlan, first: wp.int32, last: wp.int32, aged: Address, inverse: Address, roughness: Address
+): ...
+
+
+@wp.func_native("surfels::keep_rows(plan, first, last);")
+def native_keep(plan: FilterPlan, first: wp.int32, last: wp.int32): ...
+
+
+@wp.func_native("surfels::take_rows(plan, (const long long*)planes, first, last);")
+def native_take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32): ...
+
+
+@wp.func_native("""
+    gains::of_level(spacing, {cycle_s, reach_px, life_min_s, life_max_s}, side, tiles, (const float*)variance,
+                    (const float*)roughness, (const float*)rate, (const float*)speed, (float*)plane, (double*)gain);
+""")
+def native_gain(
+    spacing: wp.float32,
+    cycle_s: wp.float32,
+    reach_px: wp.float32,
+    life_min_s: wp.float32,
+    life_max_s: wp.float32,
+    side: wp.int32,
+    tiles: wp.int32,
+    variance: Address,
+    roughness: Address,
+    rate: Address,
+    speed: Address,
+    plane: Address,
+    gain: Address,
+): ...
+
+
+@wp.func_native("""
+    gains::best((const double*)gain, levels, coarsest, most, (double*)value, (int*)count, (unsigned char*)taken);
+""")
+def native_best(
+    gain: Address, levels: wp.int32, coarsest: wp.int32, most: wp.int32, value: Address, count: Address, taken: Address
+): ...
+
+
+@wp.func_native("pyramid::smooth((float*)levels, side, (float*)spare);")
+def native_smooth(levels: Address, side: wp.int32, spare: Address): ...
+
+
+@wp.kernel
+def project(
+    plan: FilterPlan,
+    first: wp.int32,
+    last: wp.int32,
+    rows: Address,
+    row_count: wp.int32,
+    tan_x: wp.float64,
+    tan_y: wp.float64,
+    instance: Address,
+    point: Address,
+):
+    """Where the surfels of some rows are seen."""
+    native_project(plan, first, last, rows, row_count, tan_x, tan_y, instance, point)
+
+
+@wp.kernel
+def choose(plan: FilterPlan, first: wp.int32, last: wp.int32, aged: Address, inverse: Address, roughness: Address):
+    """The best of all surfels for each pixel of some rows."""
+    native_choose(plan, first, last, aged, inverse, roughness)
+
+
+@wp.kernel
+def keep(plan: FilterPlan, first: wp.int32, last: wp.int32):
+    """Which pixels of some rows keep their surfel."""
+    native_keep(plan, first, last)
+
+
+@wp.kernel
+def take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32):
+    """Estimates and surfels that the pixels of some rows took; ``planes`` are addresses of int64: of what there was
+    (``surfels::Before``), then of what is written (``surfels::After``)."""
+    native_take(plan, planes, first, last)
+
+
+@wp.kernel
+def gain(
+    spacing: wp.float32,
+    cycle_s: wp.float32,
+    reach_px: wp.float32,
+    life_min_s: wp.float32,
+    life_max_s: wp.float32,
+    side: wp.int32,
+    tiles: wp.int32,
+    variance: Address,
+    roughness: Address,
+    rate: Address,
+    speed: Address,
+    plane: Address,
+    gain: Address,
+):
+    """What the tiles of a level gain."""
+    native_gain(spacing, cycle_s, reach_px, life_min_s, life_max_s, side, tiles, variance, roughness, rate, speed,
+                plane, gain)  # fmt: skip
+
+
+@wp.kernel
+def best(
+    gain: Address, levels: wp.int32, coarsest: wp.int32, most: wp.int32, value: Address, count: Address, taken: Address
+):
+    """The best tiles of all levels."""
+    native_best(gain, levels, coarsest, most, value, count, taken)
+
+
+@wp.kernel
+def smooth(levels: Address, side: wp.int32, spare: Address):
+    """A picture from the planes of its finest level, in place."""
+    native_smooth(levels, side, spare)

@@ -1,0 +1,116 @@
+"""The filter's compiled stages against the reference: the same bits, whatever the threads."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from math import inf
+
+import pytest
+import torch
+from torch import Tensor
+
+from renderer.stages.control import stages
+from renderer.stages.filtering import filter_stages
+from tests.oracles.screens import Layer, Screen
+from tsar.config import TilingConfig, TsarConfig
+from tsar.filtering.records import DEFAULT, UNSEEN, VARIANCE_MAX, Estimates, Surfels, centres
+from tsar.filtering.stages import FilterStages
+from tsar.policies.filter import Filter, unmoved
+from tsar.policy import Moment, Setting, step
+from tsar.types import Viewpoint
+
+REFERENCE = FilterStages()
+SIDES = [16, 64, 128]
+
+
+def equal(ours: object, theirs: object) -> None:
+    for field in fields(theirs):  # type: ignore[arg-type]
+        mine, wanted = getattr(ours, field.name), getattr(theirs, field.name)
+        assert mine.dtype is wanted.dtype and torch.equal(mine, wanted), field.name
+
+
+def planes(side: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Colours, variances up to the greatest, and roughnesses over many octaves."""
+    made = torch.Generator().manual_seed(seed)
+    variance = torch.rand(1, side, side, generator=made) ** 4 * VARIANCE_MAX
+    roughness = 10.0 ** (-6.0 * torch.rand(1, side, side, generator=made))
+    return torch.rand(3, side, side, generator=made), variance, roughness
+
+
+def scene(side: int, kind: str, seed: int) -> tuple[Estimates, Surfels, Viewpoint]:
+    """Surfels of three instances that have moved by up to some pixels, of the sky, and of pixels that hold none."""
+    made = torch.Generator().manual_seed(seed)
+    color, variance, roughness = planes(side, seed)
+
+    def uniform(*shape: int) -> Tensor:
+        return torch.rand(*shape, generator=made)
+
+    seen = torch.where(uniform(1, side, side) < 0.1, torch.tensor(-inf, dtype=torch.float64), 0.5)
+    estimates = Estimates(color, variance, uniform(1, side, side), seen, roughness)
+    across = (centres(side) / side - 0.5) * 2.0
+    depth = 1.0 + (uniform(1, side, side) * 3.0).floor()
+    point = torch.cat((across[:1] * depth, -across[1:] * depth, -depth))
+    instance = torch.randint(UNSEEN, 3, (1, side, side), generator=made)
+    angle = torch.tensor([0.0, 0.03, -0.05], dtype=torch.float64)
+    rotation = torch.zeros(3, 3, 3, dtype=torch.float64)
+    rotation[:, 0, 0] = rotation[:, 1, 1] = angle.cos()
+    rotation[:, 0, 1], rotation[:, 1, 0], rotation[:, 2, 2] = -angle.sin(), angle.sin(), 1.0
+    translation = torch.tensor([[0.0, 0.0, 0.0], [0.03, 0.0, 0.1], [0.0, -0.02, 2.5]], dtype=torch.float64)
+    view = Viewpoint(0.5, torch.arange(3), rotation, translation, torch.eye(3, dtype=torch.float64),
+                     torch.tensor([0.01, 0.0, 0.0], dtype=torch.float64), kind, 1.0, 1.0)  # type: ignore[arg-type]  # fmt: skip
+    return estimates, Surfels(instance, point, centres(side) + 0.1, uniform(2, side, side)), view
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("kind", ["perspective", "parallel"])
+@pytest.mark.parametrize("side", SIDES)
+def test_surfels_move_as_the_reference_moves_them(side: int, kind: str, threads: int) -> None:
+    compiled = filter_stages(side, threads)
+    assert compiled.moved is not REFERENCE.moved
+    for seed in range(4):
+        arguments = scene(side, kind, seed)
+        for ours, theirs in zip(compiled.moved(*arguments), REFERENCE.moved(*arguments), strict=True):
+            equal(ours, theirs)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("side", SIDES)
+def test_tiles_are_those_of_the_reference(side: int, threads: int) -> None:
+    compiled = filter_stages(side, threads)
+    for seed in range(4):
+        _, variance, roughness = planes(side, seed)
+        _, rate, speed = planes(side, seed + 100)
+        count = 1 + seed * (side // 16) ** 2
+        arguments = variance, roughness, rate + 1e-5, 1e3 * (speed - 1e-3).clamp(min=0.0), 0.01, count, DEFAULT
+        for ours, theirs in zip(compiled.chosen(*arguments), REFERENCE.chosen(*arguments), strict=True):
+            assert torch.equal(ours, theirs)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_pictures_are_those_of_the_reference(side: int) -> None:
+    compiled = filter_stages(side)
+    for seed in range(4):
+        arguments = planes(side, seed)
+        for ours, theirs in zip(compiled.smoothed(*arguments), REFERENCE.smoothed(*arguments), strict=True):
+            assert torch.equal(ours, theirs)
+
+
+@pytest.mark.parametrize("maker", [Filter, unmoved])
+def test_runs_have_the_bits_of_the_reference(maker) -> None:
+    def checkers(u, v, t):
+        value = 0.5 + 0.3 * torch.sign(torch.sin(50.0 * u) * torch.sin(35.0 * v))
+        return value[..., None].expand(*u.shape, 3)
+
+    screen = Screen((Layer(checkers),), lambda t: (t / 2.0, torch.zeros_like(t)))
+    config = TsarConfig(batch_size=4, resolution_px=64, tiling=TilingConfig(level_min=1))
+    setting = Setting(config, view=screen.view)
+    reference = maker(setting)
+    compiled = maker(replace(setting, stages_of=lambda config: stages(config, threads=2)))
+    ours, theirs = compiled.start(), reference.start()
+    for cycle in range(40):
+        moment = Moment(cycle / 200.0, cycle, 1.0 / 200.0)
+        one = step(compiled, ours, screen.trace, moment)
+        other = step(reference, theirs, screen.trace, moment)
+        assert torch.equal(one.shown.image, other.shown.image), cycle
+        ours, theirs = one.after, other.after
+    equal(ours.estimates, theirs.estimates)
