@@ -12,7 +12,9 @@ from renderer.compute.launching import Command, address
 from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels as kernels
-from tsar.filtering.records import TILE_SIDE, Estimates, FilterOptions, Surfels
+from renderer.stages.sizes import PIXEL_WORDS
+from tsar.filtering.batches import Traced
+from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, FilterOptions, Surfels
 from tsar.filtering.stages import FilterStages
 from tsar.filtering.tiles import filled_up, spacings
 from tsar.projection import to_camera
@@ -34,7 +36,7 @@ def filter_stages(side: int, threads: int = 1) -> FilterStages:
     if side * side % _LANES or side < TILE_SIDE:
         return FilterStages()
     made = _Compiled(side, threads)
-    return FilterStages(made.moved, made.chosen, made.smoothed)
+    return FilterStages(made.moved, made.chosen, made.taken_in, made.smoothed)
 
 
 class _Compiled:
@@ -44,11 +46,15 @@ class _Compiled:
         self._side, self._pixels, self._memory = side, side * side, Memory()
         room = self._memory.room
         self._plans = [kernels.FilterPlan() for _ in range(2)]
-        x, y, depth = (room(name, self._pixels, _F64) for name in ("x", "y", "depth"))
+        x, y, depth, front = (room(name, self._pixels, _F64) for name in ("x", "y", "depth", "front"))
         least, source = room("least", self._pixels, _I64), room("source", self._pixels, torch.int32)
+        slot = self._memory.keep("slot", torch.full((self._pixels,), -1, dtype=torch.int32), torch.int32, self._pixels)
+        pixel = room("pixel", self._pixels * PIXEL_WORDS, _I64)  # more than the image has are never hit
+        done = self._memory.zeros("done", self._pixels, torch.uint8)
         for perspective, plan in enumerate(self._plans):
             plan.side, plan.perspective = side, perspective
             plan.x, plan.y, plan.depth, plan.least, plan.source = x, y, depth, least, source
+            plan.slot, plan.pixel, plan.done, plan.front = slot, pixel, done, front
         edges = [side * number // threads for number in range(threads + 1)]
         self._rows = [(a, b) for a, b in pairwise(edges) if b > a]
         self._project = [[Command(kernels.project, plan, *rows) for rows in self._rows] for plan in self._plans]
@@ -58,13 +64,15 @@ class _Compiled:
         self._planes = np.zeros(2 * len(_KINDS) - 1, np.int64)
         planes = address("planes", self._planes, _I64, len(self._planes))
         self._take = [Command(kernels.take, plan, planes, *rows) for rows in self._rows]
+        self._addresses = np.zeros(6 + len(_KINDS) + 8, np.int64)
+        addresses = address("addresses", self._addresses, _I64, len(self._addresses))
+        self._take_in = [Command(kernels.take_in, plan, addresses) for plan in self._plans]
         self._prepare_tiles()
         self._prepare_picture()
 
     def moved(self, estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:
         """As :func:`tsar.filtering.motion.moved`."""
-        matrix, offset = to_camera(view)
-        rows = torch.cat((matrix.reshape(-1, 9), offset), dim=1).contiguous()
+        rows = _rows(view)
         before = [_plane(record, name) for name in _KINDS for record in (estimates, surfels) if hasattr(record, name)]
         after = [torch.empty_like(plane) for plane in before]
         where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
@@ -72,7 +80,7 @@ class _Compiled:
             *where[:-1], *(self._address(name, plane) for name, plane in zip(_KINDS, after, strict=True))
         ]  # fmt: skip
         at = dict(zip(_KINDS, where, strict=True))
-        poses = address("rows", rows, _F64, rows.numel()), len(rows), view.tan_x, view.tan_y
+        poses = _poses(rows, view)
         project = self._project[view.kind == "perspective"]
         for command in project:
             command.set(*poses, at["instance"], at["point"])
@@ -81,6 +89,40 @@ class _Compiled:
         for commands in (project, self._choose, self._keep, self._take):
             TEAM.run(commands)
         return Estimates(*after[:5]), Surfels(*after[5:])
+
+    def taken_in(
+        self, estimates: Estimates, surfels: Surfels, known: Change, traced: Traced, options: FilterOptions
+    ) -> tuple[Estimates, Surfels, Change]:
+        """As :func:`tsar.filtering.batches.taken_in`; estimates that were moved are changed in place."""
+        hits, view, tiles = traced.hits, traced.view, len(traced.color)
+        moves = view is not None and hits is not None
+        planes = [_plane(record, name) for name in _KINDS for record in (estimates, surfels) if hasattr(record, name)]
+        if not moves:  # aged, but for that those of the cycle before
+            planes[:5] = [plane.clone() for plane in planes[:5]]
+        samples = tiles * TILE_SIDE**2
+        batch = [
+            (traced.color, _F32, 3 * samples), (traced.position, _F32, 2 * samples), (traced.time_s, _F64, samples),
+            (traced.spacing, _F32, tiles),
+        ]  # fmt: skip
+        if hits is not None:
+            batch += [(hits.instance, torch.int32, samples), (hits.point, _F32, 3 * samples)]
+        kept = [values.contiguous() for values, _, _ in batch]
+        elements = (self._side // ELEMENT_PX) ** 2
+        before = [known.excess.contiguous(), known.span_s.contiguous(), known.seen_s.contiguous()]
+        after = [torch.empty_like(plane) for plane in (*before, known.rate, known.rate)]
+        changes = [address("change", plane, plane.dtype, elements) for plane in (*before, *after)]
+        where = [address("batch", values, *kind) for values, (_, *kind) in zip(kept, batch, strict=True)]
+        where += [0] * (6 - len(where))
+        own = [self._address(name, plane) for name, plane in zip(_KINDS, planes, strict=True)]
+        self._addresses[:] = [*where, *own, *changes]
+        moment = traced.now_s, options.memory_s, VARIANCE_MAX / traced.cycle_s
+        parts = moves, options.accumulation, options.spread
+        views = [seen if moves else None for seen in (view, traced.earlier)]
+        rows = [_rows(seen) if seen is not None else None for seen in views]
+        poses = [_poses(row, seen) for row, seen in zip(rows, views, strict=True)]
+        command = self._take_in[view is None or view.kind == "perspective"]
+        command(tiles, *moment, *map(int, parts), *poses[0], *poses[1])
+        return Estimates(*planes[:5]), Surfels(*planes[5:]), Change(*after[:4])
 
     def chosen(
         self,
@@ -147,6 +189,19 @@ class _Compiled:
     def _address(self, name: str, plane: Tensor) -> int:
         planes, kind = _KINDS[name]
         return address(name, plane, kind, planes * self._pixels)
+
+
+def _rows(view: Viewpoint) -> Tensor:
+    """What takes each instance to the camera, and last of all directions."""
+    matrix, offset = to_camera(view)
+    return torch.cat((matrix.reshape(-1, 9), offset), dim=1).contiguous()
+
+
+def _poses(rows: Tensor | None, view: Viewpoint | None) -> tuple[int, int, float, float]:
+    """A view as a launch takes it; 0 where there is none."""
+    if rows is None or view is None:
+        return 0, 0, 1.0, 1.0
+    return address("rows", rows, _F64, rows.numel()), len(rows), view.tan_x, view.tan_y
 
 
 def _plane(record: object, name: str) -> Tensor:

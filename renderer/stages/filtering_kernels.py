@@ -9,7 +9,7 @@ from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
 from renderer.stages import sizes
 
-wp.set_module_options(module_options("gains.h", "pyramid.h", "surfels.h", given=sizes.FILTERING))
+wp.set_module_options(module_options("batches.h", "gains.h", "pyramid.h", "surfels.h", given=sizes.FILTERING))
 
 
 @wp.struct
@@ -25,12 +25,20 @@ class FilterPlan:
     """float64."""
     least: wp.uint64
     """int64, the best rank for each pixel."""
+    front: wp.uint64
+    """float64, depth of the surfel that each pixel takes."""
     source: wp.uint64
     """int32, the surfel that each pixel takes, -1 where it takes none."""
+    slot: wp.uint64
+    """int32, where the sums of a pixel's samples are, -1 between launches."""
+    pixel: wp.uint64
+    """``batches::Pixel`` for every sample of a batch."""
+    done: wp.uint64
+    """uint8, 0 between launches."""
 
 
 @wp.func_native("""
-    surfels::project_rows(plan, (const double*)rows, row_count, tan_x, tan_y, (const long long*)instance,
+    surfels::project_rows(plan, {(const double*)rows, row_count, tan_x, tan_y}, (const long long*)instance,
                           (const float*)point, first, last);
 """)
 def native_project(
@@ -60,6 +68,33 @@ def native_keep(plan: FilterPlan, first: wp.int32, last: wp.int32): ...
 
 @wp.func_native("surfels::take_rows(plan, (const long long*)planes, first, last);")
 def native_take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32): ...
+
+
+@wp.func_native("""
+    batches::take_in(plan, (const long long*)addresses, tiles, {(const double*)rows, row_count, tan_x, tan_y},
+                     {(const double*)earlier_rows, earlier_count, earlier_tan_x, earlier_tan_y},
+                     {now_s, memory_s, rate_max, reprojected, accumulates, spreads}, (int*)plan.slot,
+                     (batches::Pixel*)plan.pixel, (unsigned char*)plan.done);
+""")
+def native_take_in(
+    plan: FilterPlan,
+    addresses: Address,
+    tiles: wp.int32,
+    now_s: wp.float64,
+    memory_s: wp.float32,
+    rate_max: wp.float32,
+    reprojected: wp.int32,
+    accumulates: wp.int32,
+    spreads: wp.int32,
+    rows: Address,
+    row_count: wp.int32,
+    tan_x: wp.float64,
+    tan_y: wp.float64,
+    earlier_rows: Address,
+    earlier_count: wp.int32,
+    earlier_tan_x: wp.float64,
+    earlier_tan_y: wp.float64,
+): ...
 
 
 @wp.func_native("""
@@ -128,6 +163,32 @@ def take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32):
     """Estimates and surfels that the pixels of some rows took; ``planes`` are addresses of int64: of what there was
     (``surfels::Before``), then of what is written (``surfels::After``)."""
     native_take(plan, planes, first, last)
+
+
+@wp.kernel
+def take_in(
+    plan: FilterPlan,
+    addresses: Address,
+    tiles: wp.int32,
+    now_s: wp.float64,
+    memory_s: wp.float32,
+    rate_max: wp.float32,
+    reprojected: wp.int32,
+    accumulates: wp.int32,
+    spreads: wp.int32,
+    rows: Address,
+    row_count: wp.int32,
+    tan_x: wp.float64,
+    tan_y: wp.float64,
+    earlier_rows: Address,
+    earlier_count: wp.int32,
+    earlier_tan_x: wp.float64,
+    earlier_tan_y: wp.float64,
+):
+    """Estimates, surfels and change after a batch; ``addresses`` are int64, those of ``batches::Traced``, ``Planes``
+    and ``Change``."""
+    native_take_in(plan, addresses, tiles, now_s, memory_s, rate_max, reprojected, accumulates, spreads, rows,
+                   row_count, tan_x, tan_y, earlier_rows, earlier_count, earlier_tan_x, earlier_tan_y)  # fmt: skip
 
 
 @wp.kernel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tsar.error import OCTAVES_OF_FULL_ERROR
-from tsar.filtering import motion, records, tiles
+from tsar.filtering import change, motion, records, samples, tiles
 from tsar.reconstruction import AGE_MOST, AGE_STEPS, SHIFT_CYCLES
 from tsar.types import LUMINANCE
 
@@ -29,7 +29,11 @@ GIVEN: dict[str, float] = {
 }
 """As in :mod:`renderer.compute.sizes`."""
 
+PIXEL_WORDS = 6
+"""Words of eight bytes for what the samples of a pixel say together."""
+
 FILTERING: dict[str, float] = {
+    "PIXEL_WORDS": PIXEL_WORDS,
     "VARIANCE_MAX": records.VARIANCE_MAX,
     "UNSEEN": records.UNSEEN,
     "NEARER": motion.NEARER,
@@ -39,6 +43,16 @@ FILTERING: dict[str, float] = {
     "SCORES": motion.SCORES,
     "SCORE_SCALE": motion.SCORE_SCALE,
     "BESIDE": motion.BESIDE,
+    "TILE_SIDE": records.TILE_SIDE,
+    "ELEMENT_PX": records.ELEMENT_PX,
+    "ROUGHNESS_MIN": samples.ROUGHNESS_MIN,
+    "MOVES_PX": samples.MOVES_PX,
+    "SHARE_MOVING": samples.SHARE_MOVING,
+    "TOLERANCE": change.TOLERANCE,
+    "SURE": change.SURE,
+    "DROPPED": change.DROPPED,
+    "RATE_MIN": change.RATE_MIN,
+    "SPAN_MIN_S": change.SPAN_MIN_S,
     "BISECTIONS": tiles.BISECTIONS,
     "PRICE_LEAST": tiles.PRICE_LEAST,
 }

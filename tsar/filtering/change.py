@@ -10,11 +10,11 @@ from torch import Tensor
 from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates, FilterOptions
 from tsar.roots import encoded
 
-_TOLERANCE = 4.0  # variances that a squared residual may have before it speaks of change
-_SURE = 4.0  # expected residuals beyond which what was remembered is dropped
-_DROPPED = 0.1
-_RATE_MIN = 1e-5
-_SPAN_MIN_S = 1e-3
+TOLERANCE = 4.0  # variances that a squared residual may have before it speaks of change
+SURE = 4.0  # expected residuals beyond which what was remembered is dropped
+DROPPED = 0.1
+RATE_MIN = 1e-5
+SPAN_MIN_S = 1e-3
 
 
 def observed(
@@ -47,8 +47,9 @@ def observed(
         now_s, cycle_s: start of the cycle and length of the one before, seconds.
         options: of the filter.
     """
-    residual = (encoded(color) - encoded(estimates.color)).square().mean(0, keepdim=True)
-    expected = _TOLERANCE * (estimates.observed + 0.8 * estimates.roughness / count.clamp(min=1.0))
+    red, green, blue = (encoded(color) - encoded(estimates.color)).square()
+    residual = ((red + green + blue) / 3.0)[None]
+    expected = TOLERANCE * (estimates.observed + 0.8 * estimates.roughness / count.clamp(min=1.0))
     nothing = torch.zeros_like(residual)
     excess = _summed(torch.where(compared, residual - expected, nothing))
     usual = _summed(torch.where(compared, expected, nothing))
@@ -56,16 +57,16 @@ def observed(
     looked = F.max_pool2d(compared.to(torch.float32)[None], ELEMENT_PX)[0] > 0.0
     gap = (now_s - before.seen_s).clamp(0.0, 1e3).to(torch.float32) / options.memory_s
     fade = 1.0 / (1.0 + gap + 0.5 * gap * gap)
-    fade = torch.where(excess > _SURE * usual, fade.clamp(max=_DROPPED), fade)
+    fade = torch.where(excess > SURE * usual, fade.clamp(max=DROPPED), fade)
     total = torch.where(looked, fade * before.excess + excess, before.excess)
     span = torch.where(looked, fade * before.span_s + span_s, before.span_s)
     seen_s = torch.where(looked, torch.full_like(before.seen_s, now_s), before.seen_s)
-    own = total.clamp(min=0.0) / span.clamp(min=_SPAN_MIN_S)
+    own = total.clamp(min=0.0) / span.clamp(min=SPAN_MIN_S)
     rate = own
     if options.spread:
         rate = torch.maximum(rate, 0.5 * F.max_pool2d(own[None], 3, 1, 1)[0])
         rate = torch.maximum(rate, 0.25 * F.max_pool2d(own[None], 5, 1, 2)[0])
-    return Change(total, span, seen_s, rate.clamp(_RATE_MIN, VARIANCE_MAX / cycle_s))
+    return Change(total, span, seen_s, rate.clamp(RATE_MIN, VARIANCE_MAX / cycle_s))
 
 
 def _summed(pixels: Float[Tensor, "1 h w"]) -> Float[Tensor, "1 e e"]:

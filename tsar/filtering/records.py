@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import torch
@@ -90,6 +90,10 @@ class Estimates:
     def variance(self) -> Float[Tensor, "1 h w"]:
         """Variance of the error of its colour, at most :data:`VARIANCE_MAX`."""
         return (self.aged + self.observed).clamp(max=VARIANCE_MAX)
+
+    def beside(self, surfels: Surfels) -> Estimates:
+        """With the variance of surfels that lie beside their pixels."""
+        return replace(self, aged=self.aged + self.roughness * surfels.outside_px)
 
     @staticmethod
     def empty(side: int) -> Estimates:

@@ -15,10 +15,10 @@ from tsar.projection import project
 from tsar.roots import encoded, square_root
 from tsar.types import Hits, Viewpoint
 
-_ROUGHNESS_MIN = 1e-6
-_MOVES_PX = 0.02
+ROUGHNESS_MIN = 1e-6
+MOVES_PX = 0.02
 """Pixels a cycle beyond which a surface moves against another."""
-_SHARE_MOVING = 1.0 / 17.0
+SHARE_MOVING = 1.0 / 17.0
 """Least share of new samples in the estimate of a surfel that moves."""
 COLOR_MAX = 1.5
 """Samples are clipped here before they are averaged: a brighter glint would spread over its neighbours."""
@@ -85,7 +85,7 @@ def gathered(
     bounded = torch.minimum(
         torch.maximum(roughness, _box(least) / near.clamp(min=1e-9)), _box(most) / near.clamp(min=1e-9)
     )
-    mixed = torch.where(near > 0.0, 0.5 * (roughness + bounded), roughness).clamp(min=_ROUGHNESS_MIN)
+    mixed = torch.where(near > 0.0, 0.5 * (roughness + bounded), roughness).clamp(min=ROUGHNESS_MIN)
     return Seen(
         color=torch.cat([summed(flat[:, channel].contiguous()) for channel in range(3)]) / many,
         time_s=summed(time_s.reshape(-1) - now_s) / many.to(torch.float64) + now_s,
@@ -178,9 +178,9 @@ def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewp
 
     found = Surfels(spread(instance[None]), spread(point.T), spread(position), spread(step))
     same = seen.hit & (found.instance == before.instance)
-    moves = (found.step - before.step).abs().amax(0, keepdim=True) > _MOVES_PX
-    fast = before.step.abs().amax(0, keepdim=True) > _MOVES_PX
-    share = torch.where(fast, _SHARE_MOVING, 0.0)
+    moves = (found.step - before.step).abs().amax(0, keepdim=True) > MOVES_PX
+    fast = before.step.abs().amax(0, keepdim=True) > MOVES_PX
+    share = torch.where(fast, SHARE_MOVING, 0.0)
     return Met(found, same, seen.hit & ~same & moves, share)
 
 
@@ -211,8 +211,10 @@ def _image(
 def _semivariance(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:
     """Half the mean squared difference of each sample from its neighbours in the tile, Morton order."""
     plane = color[:, raster_to_morton(TILE_SIDE)].reshape(-1, TILE_SIDE, TILE_SIDE, 3)
-    across = 0.5 * (plane[:, :, 1:] - plane[:, :, :-1]).square().mean(-1)
-    down = 0.5 * (plane[:, 1:] - plane[:, :-1]).square().mean(-1)
+    across, down = (
+        0.5 * ((square[..., 0] + square[..., 1] + square[..., 2]) / 3.0)
+        for square in ((plane[:, :, 1:] - plane[:, :, :-1]).square(), (plane[:, 1:] - plane[:, :-1]).square())
+    )
     total = F.pad(across, (1, 0)) + F.pad(across, (0, 1)) + F.pad(down, (0, 0, 1, 0)) + F.pad(down, (0, 0, 0, 1))
     row = torch.full((TILE_SIDE,), 2.0)
     row[0] = row[-1] = 1.0

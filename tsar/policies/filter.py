@@ -20,7 +20,8 @@ from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
-from tsar.filtering import change, samples, tiles
+from tsar.filtering import samples, tiles
+from tsar.filtering.batches import Traced
 from tsar.filtering.records import (
     DEFAULT,
     ELEMENT_PX,
@@ -33,7 +34,6 @@ from tsar.filtering.records import (
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting
-from tsar.projection import project
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 
 PIXEL_FLOPS = {True: 560.0, False: 290.0}
@@ -202,37 +202,20 @@ class Filter(Policy[State]):
         fine.reshape(-1)[morton_to_raster(fine.shape[0])[turn]] = True
         return chosen
 
-    def _updated(self, state: State, batch: FrameletBatch, traced: SampleBatch, moment: Moment) -> State:
-        now_s, side, before = moment.time_s, self._side, state.estimates
-        color = replace_nonfinite(traced.color, TILE_SIDE)[0].clamp(0.0, samples.COLOR_MAX)
-        position = batch.position.reshape(-1, 2) * side
-        if state.view is not None and traced.hits is not None:
-            hits = traced.hits
-            place, depth = project(state.view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
-            position = torch.where((depth > 0.0)[:, None], place * side, -1.0)
-        pixel = samples.pixels_of(position, side)
-        seen = samples.gathered(color, batch.times, state.spacing, pixel, now_s, before.roughness)
-        compared = seen.hit & before.known
-        judged = replace(before, roughness=seen.roughness)
-        changed = change.observed(
-            state.change, judged, seen.color, seen.count, seen.time_s, compared, now_s, moment.cycle_s, self._options
-        )
-        rate, surfels = changed.rate_px, state.surfels
-        if state.view is None or traced.hits is None:
-            none = torch.zeros_like(before.variance)
-            after, _ = samples.updated(before, seen, rate, now_s, none > 0.0, none, self._options)
-        else:
-            found = samples.met(traced.hits, seen, surfels, state.view, state.earlier)
-            beside = _uncertain(before, surfels)
-            after, share = samples.updated(beside, seen, rate, now_s, found.replaced, found.least_share, self._options)
-            after = replace(after, aged=torch.where(seen.hit, after.aged, before.aged))
-            surfels = samples.joined(surfels, found, seen.hit, share)
-        return replace(state, estimates=after, surfels=surfels, change=changed)
+    def _updated(self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment) -> State:
+        color = replace_nonfinite(answered.color, TILE_SIDE)[0].clamp(0.0, samples.COLOR_MAX)
+        traced = Traced(
+            color, batch.position * self._side, batch.times, state.spacing, moment.time_s, moment.cycle_s,
+            answered.hits, state.view, state.earlier,
+        )  # fmt: skip
+        after = self._stages.taken_in(state.estimates, state.surfels, state.change, traced, self._options)
+        estimates, surfels, observed = after
+        return replace(state, estimates=estimates, surfels=surfels, change=observed)
 
     def _displayed(self, state: State, moment: Moment) -> State:
         aged = _aged(state.estimates, state.change, moment.cycle_s)
         if state.view is not None:
-            aged = _uncertain(aged, state.surfels)
+            aged = aged.beside(state.surfels)
         if not self._options.smoothing:
             return replace(state, shown=aged.color, remaining=aged.variance)
         shown, remaining = self._stages.smoothed(aged.color, aged.variance, aged.roughness)
@@ -243,11 +226,6 @@ def _aged(estimates: Estimates, observed: Change, seconds: float) -> Estimates:
     """Estimates some seconds later."""
     aged = (estimates.aged + observed.rate_px * seconds).clamp(max=VARIANCE_MAX)
     return replace(estimates, aged=aged)
-
-
-def _uncertain(estimates: Estimates, surfels: Surfels) -> Estimates:
-    """With the variance of surfels that lie beside their pixels."""
-    return replace(estimates, aged=estimates.aged + estimates.roughness * surfels.outside_px)
 
 
 unmoved = partial(Filter, options=FilterOptions(reprojection=False, probes=False, share_max=1.0))

@@ -43,8 +43,7 @@ inline void halve(const float* from, int side, float* to) {
     for (int row = 0; row < side / 2; ++row) {
         const float *a = from + 2 * row * side, *b = a + side;
         for (int column = 0; column < side / 2; ++column)
-            to[row * (side / 2) + column] =
-                ((a[2 * column] + a[2 * column + 1]) + b[2 * column]) + b[2 * column + 1];
+            to[row * (side / 2) + column] = ((a[2 * column] + a[2 * column + 1]) + b[2 * column]) + b[2 * column + 1];
     }
 }
 

@@ -24,7 +24,7 @@ inline void up(const float* fine, int side, float between, float* weight, float*
     for (int row = 0; row < half; ++row)
         for (int column = 0; column < half; ++column) {
             const float* a = weight + 2 * row * side;
-            const float *g = roughness + 2 * row * side;
+            const float* g = roughness + 2 * row * side;
             const int i = row * half + column;
             coarse[3 * quarter + i] = 4.0f * mean4(a, a + side, column);
             coarse[4 * quarter + i] = mean4(g, g + side, column);

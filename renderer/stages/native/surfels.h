@@ -16,49 +16,75 @@ constexpr double INF = __builtin_inf(), NOT_A_NUMBER = __builtin_nan("");
 constexpr Key NONE = 0x7fffffffffffffffll;
 constexpr int ROW = 12;  // numbers of an instance: three rows of a matrix, and an offset
 
-// Projects eight surfels that lie side by side. `rows` holds what takes each instance to the camera, and last of all
-// what takes directions there.
+// What takes each instance to the camera, and last of all what takes directions there.
+struct Poses {
+    const double* rows;
+    int count;
+    double tan_x, tan_y;
+};
+
+inline int row_of(long long instance, int count) {
+    return instance < 0 || instance >= count ? count - 1 : (int)instance;
+}
+
+// From the space of the camera to pixels.
 template <class Plan>
-inline void project8(const Plan& plan, const double* rows, int row_count, double tan_x, double tan_y,
-                     const long long* instance, const float* x, const float* y, const float* z, double* out_x,
-                     double* out_y, double* out_depth) {
+inline void finish(const Plan& plan, long long instance, double right, double up, double depth, double tan_x,
+                   double tan_y, double& x, double& y, double& out_depth) {
+    const bool infinite = instance < 0;
+    const double unit = plan.perspective ? depth : infinite ? 0.0 : 1.0;
+    const bool inside = unit > 0.0;
+    x = inside ? (0.5 + right / (2.0 * tan_x * unit)) * plan.side : NOT_A_NUMBER;
+    y = inside ? (0.5 - up / (2.0 * tan_y * unit)) * plan.side : NOT_A_NUMBER;
+    out_depth = instance <= given::UNSEEN ? -1.0 : !infinite ? depth : depth > 0.0 ? INF : -INF;
+}
+
+// Projects eight surfels that lie side by side.
+template <class Plan>
+inline void project8(const Plan& plan, const Poses& poses, const long long* instance, const float* x, const float* y,
+                     const float* z, double* out_x, double* out_y, double* out_depth) {
     int row[8];
     bool same = true;
     for (int i = 0; i < 8; ++i) {
-        row[i] = instance[i] < 0 || instance[i] >= row_count ? row_count - 1 : (int)instance[i];
+        row[i] = row_of(instance[i], poses.count);
         same &= row[i] == row[0];
     }
     d8 m[ROW];
     for (int k = 0; k < ROW; ++k) {
         if (same)
-            m[k] = rows[row[0] * ROW + k];
+            m[k] = poses.rows[row[0] * ROW + k];
         else
-            for (int i = 0; i < 8; ++i) m[k][i] = rows[row[i] * ROW + k];
+            for (int i = 0; i < 8; ++i) m[k][i] = poses.rows[row[i] * ROW + k];
     }
     const d8 px = __builtin_convertvector(packets::load<packets::f8>(x), d8),
              py = __builtin_convertvector(packets::load<packets::f8>(y), d8),
              pz = __builtin_convertvector(packets::load<packets::f8>(z), d8);
     const d8 right = m[0] * px + m[1] * py + m[2] * pz + m[9], up = m[3] * px + m[4] * py + m[5] * pz + m[10];
     const d8 depth = -(m[6] * px + m[7] * py + m[8] * pz + m[11]);
-    for (int i = 0; i < 8; ++i) {
-        const bool infinite = instance[i] < 0;
-        const double unit = plan.perspective ? depth[i] : infinite ? 0.0 : 1.0;
-        const bool inside = unit > 0.0;
-        out_x[i] = inside ? (0.5 + right[i] / (2.0 * tan_x * unit)) * plan.side : NOT_A_NUMBER;
-        out_y[i] = inside ? (0.5 - up[i] / (2.0 * tan_y * unit)) * plan.side : NOT_A_NUMBER;
-        const double far = depth[i] > 0.0 ? INF : -INF;
-        out_depth[i] = instance[i] <= given::UNSEEN ? -1.0 : infinite ? far : depth[i];
-    }
+    for (int i = 0; i < 8; ++i)
+        finish(plan, instance[i], right[i], up[i], depth[i], poses.tan_x, poses.tan_y, out_x[i], out_y[i],
+               out_depth[i]);
+}
+
+// One surfel.
+template <class Plan>
+inline void project(const Plan& plan, const Poses& poses, long long instance, const float* point, double& out_x,
+                    double& out_y, double& out_depth) {
+    const double* m = poses.rows + ROW * row_of(instance, poses.count);
+    const double x = point[0], y = point[1], z = point[2];
+    const double right = m[0] * x + m[1] * y + m[2] * z + m[9], up = m[3] * x + m[4] * y + m[5] * z + m[10];
+    const double depth = -(m[6] * x + m[7] * y + m[8] * z + m[11]);
+    finish(plan, instance, right, up, depth, poses.tan_x, poses.tan_y, out_x, out_y, out_depth);
 }
 
 template <class Plan>
-inline void project_rows(const Plan& plan, const double* rows, int row_count, double tan_x, double tan_y,
-                         const long long* instance, const float* point, int first, int last) {
+inline void project_rows(const Plan& plan, const Poses& poses, const long long* instance, const float* point, int first,
+                         int last) {
     const int count = plan.side * plan.side;
     double *x = (double*)plan.x, *y = (double*)plan.y, *depth = (double*)plan.depth;
     for (int i = first * plan.side; i < last * plan.side; i += 8)
-        project8(plan, rows, row_count, tan_x, tan_y, instance + i, point + i, point + count + i,
-                 point + 2 * count + i, x + i, y + i, depth + i);
+        project8(plan, poses, instance + i, point + i, point + count + i, point + 2 * count + i, x + i, y + i,
+                 depth + i);
 }
 
 // The rank of a surfel in one of the pixels around it: the least one takes it.
@@ -100,34 +126,28 @@ inline void choose_rows(const Plan& plan, const float* aged, const float* invers
             }
         }
     }
+    int* source = (int*)plan.source;
+    double* front = (double*)plan.front;
+    for (int i = first * side; i < last * side; ++i) {
+        source[i] = least[i] == NONE ? -1 : (int)(least[i] % count);
+        front[i] = source[i] < 0 ? INF : depth[source[i]];
+    }
 }
 
 // Which pixels keep what they took: not where most of their neighbours took what is in front.
 template <class Plan> inline void keep_rows(const Plan& plan, int first, int last) {
     const int side = plan.side;
-    const Key count = (Key)side * side;
-    const double* depth = (const double*)plan.depth;
-    const Key* least = (const Key*)plan.least;
+    const double* front = (const double*)plan.front;
     int* source = (int*)plan.source;
-    const auto depth_at = [&](int row, int column) {
-        if (row < 0 || column < 0 || row >= side || column >= side) return INF;
-        const Key key = least[row * side + column];
-        return key == NONE ? INF : depth[key % count];
-    };
     for (int row = first; row < last; ++row)
         for (int column = 0; column < side; ++column) {
-            const Key key = least[row * side + column];
-            if (key == NONE) {
-                source[row * side + column] = -1;
-                continue;
-            }
-            const int from = (int)(key % count);
-            const double bound = depth[from] / given::NEARER;
+            const int at = row * side + column;
+            const double bound = front[at] / given::NEARER;
             int nearer = 0;
-            for (int down = -1; down < 2; ++down)
-                for (int right = -1; right < 2; ++right)
-                    if (down || right) nearer += depth_at(row + down, column + right) < bound;
-            source[row * side + column] = nearer >= given::NEARER_COUNT ? -1 : from;
+            for (int down = row > 0 ? -1 : 0; down < (row + 1 < side ? 2 : 1); ++down)
+                for (int right = column > 0 ? -1 : 0; right < (column + 1 < side ? 2 : 1); ++right)
+                    nearer += front[at + down * side + right] < bound;
+            if (nearer >= given::NEARER_COUNT) source[at] = -1;
         }
 }
 

@@ -13,9 +13,9 @@ from renderer.stages.control import stages
 from renderer.stages.filtering import filter_stages
 from tests.oracles.screens import Layer, Screen
 from tsar.config import TilingConfig, TsarConfig
-from tsar.filtering.records import DEFAULT, UNSEEN, VARIANCE_MAX, Estimates, Surfels, centres
+from tsar.filtering.records import DEFAULT, UNSEEN, VARIANCE_MAX, Estimates, FilterOptions, Surfels, centres
 from tsar.filtering.stages import FilterStages
-from tsar.policies.filter import Filter, unmoved
+from tsar.policies.filter import Filter
 from tsar.policy import Moment, Setting, step
 from tsar.types import Viewpoint
 
@@ -95,8 +95,15 @@ def test_pictures_are_those_of_the_reference(side: int) -> None:
             assert torch.equal(ours, theirs)
 
 
-@pytest.mark.parametrize("maker", [Filter, unmoved])
-def test_runs_have_the_bits_of_the_reference(maker) -> None:
+OPTIONS = {
+    "tsar": DEFAULT,
+    "filter": FilterOptions(reprojection=False, probes=False, share_max=1.0),
+    "replaces": FilterOptions(accumulation=False, spread=False),
+}
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_runs_have_the_bits_of_the_reference(options: FilterOptions) -> None:
     def checkers(u, v, t):
         value = 0.5 + 0.3 * torch.sign(torch.sin(50.0 * u) * torch.sin(35.0 * v))
         return value[..., None].expand(*u.shape, 3)
@@ -104,8 +111,8 @@ def test_runs_have_the_bits_of_the_reference(maker) -> None:
     screen = Screen((Layer(checkers),), lambda t: (t / 2.0, torch.zeros_like(t)))
     config = TsarConfig(batch_size=4, resolution_px=64, tiling=TilingConfig(level_min=1))
     setting = Setting(config, view=screen.view)
-    reference = maker(setting)
-    compiled = maker(replace(setting, stages_of=lambda config: stages(config, threads=2)))
+    reference = Filter(setting, options)
+    compiled = Filter(replace(setting, stages_of=lambda config: stages(config, threads=2)), options)
     ours, theirs = compiled.start(), reference.start()
     for cycle in range(40):
         moment = Moment(cycle / 200.0, cycle, 1.0 / 200.0)
@@ -113,4 +120,5 @@ def test_runs_have_the_bits_of_the_reference(maker) -> None:
         other = step(reference, theirs, screen.trace, moment)
         assert torch.equal(one.shown.image, other.shown.image), cycle
         ours, theirs = one.after, other.after
-    equal(ours.estimates, theirs.estimates)
+    for name in ("estimates", "surfels", "change"):
+        equal(getattr(ours, name), getattr(theirs, name))

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 
+from renderer.stages.control import stages
 from tests.oracles.screens import Layer, Screen
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TilingConfig, TsarConfig
@@ -52,7 +53,7 @@ def test_a_still_picture_converges(name: str) -> None:
     """With 16 samples a pixel the error is below a half of that of one, with 32 below a third, and it stays there."""
     screen = panned(0.0)
     options = FilterOptions(reprojection=name == "tsar", share_max=1.0 / 8.0)  # longer cycles, for the test's speed
-    policy = Filter(Setting(replace(CONFIG, resolution_px=128), view=screen.view), options)
+    policy = Filter(Setting(replace(CONFIG, resolution_px=128), stages, view=screen.view), options)
     state, cycles = policy.start(), 32 * 128**2 // policy.price.samples
     cycle_s, truth = 4.0 / cycles, screen.picture(0.0, 128)
     framed = float((screen.picture(0.0, 128, 1) - truth).square().mean())
@@ -67,7 +68,7 @@ def test_surfaces_are_followed() -> None:
     screen = panned(40.0)
     found = {}
     for name in ("tsar", "filter"):
-        last = shown(POLICIES[name](Setting(CONFIG, view=screen.view)), screen, 1.0)[-1]
+        last = shown(POLICIES[name](Setting(CONFIG, stages, view=screen.view)), screen, 1.0)[-1]
         found[name] = error(last, screen, last.sample_time_s)
     assert found["tsar"] < 0.5 * found["filter"], found
 
@@ -75,7 +76,7 @@ def test_surfaces_are_followed() -> None:
 def test_without_poses_nothing_is_reprojected() -> None:
     screen = panned(0.0)
     options = FilterOptions(reprojection=False)
-    with_poses = shown(Filter(Setting(CONFIG, view=screen.view), options), screen, 0.2)
+    with_poses = shown(Filter(Setting(CONFIG, stages, view=screen.view), options), screen, 0.2)
     without = shown(Filter(Setting(CONFIG)), screen, 0.2)
     assert all(torch.equal(one.image, other.image) for one, other in zip(with_poses, without, strict=True))
 
@@ -93,7 +94,9 @@ def test_threads_change_no_bit(name: str) -> None:
     try:
         for threads in (1, 2):
             torch.set_num_threads(threads)
-            found.append([one.image for one in shown(POLICIES[name](Setting(CONFIG, view=screen.view)), screen, 0.3)])
+            found.append(
+                [one.image for one in shown(POLICIES[name](Setting(CONFIG, stages, view=screen.view)), screen, 0.3)]
+            )
     finally:
         torch.set_num_threads(before)
     assert all(torch.equal(one, other) for one, other in zip(*found, strict=True))
@@ -109,15 +112,17 @@ def test_samples_that_are_not_finite_are_never_shown() -> None:
         color[::3, 1] = torch.inf
         return replace(found, color=color)
 
-    images = run(POLICIES["tsar"](Setting(CONFIG, view=screen.view)), spoilt, fixed_clock(CYCLE_S), 0.0, 0.3)
+    images = run(POLICIES["tsar"](Setting(CONFIG, stages, view=screen.view)), spoilt, fixed_clock(CYCLE_S), 0.0, 0.3)
     assert all(bool(torch.isfinite(image.image).all()) for _, image in images)
 
 
 @pytest.mark.parametrize("part", ["smoothing", "accumulation", "jitter", "by_gain", "spread", "probes"])
 def test_every_part_can_be_left_out(part: str) -> None:
     screen = panned(20.0)
-    whole = shown(Filter(Setting(CONFIG, view=screen.view)), screen, 0.2)[-1].image
-    less = shown(Filter(Setting(CONFIG, view=screen.view), FilterOptions(**{part: False})), screen, 0.2)[-1].image
+    whole = shown(Filter(Setting(CONFIG, stages, view=screen.view)), screen, 0.2)[-1].image
+    less = shown(Filter(Setting(CONFIG, stages, view=screen.view), FilterOptions(**{part: False})), screen, 0.2)[
+        -1
+    ].image
     assert torch.isfinite(less).all() and not torch.equal(whole, less)
 
 

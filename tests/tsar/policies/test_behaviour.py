@@ -12,6 +12,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from renderer.stages.control import stages
 from tests.oracles.screens import Layer, Screen
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
@@ -83,7 +84,7 @@ SCREENS = {
 def shown(policy: str, name: str) -> tuple[ShownImage, ...]:
     """What a policy shows up to 0.6 s; a cycle of fewer samples than a batch has is as much shorter."""
     screen = SCREENS[name]
-    made = POLICIES[policy](Setting(CONFIG, view=screen.view))
+    made = POLICIES[policy](Setting(CONFIG, stages, view=screen.view))
     cycle_s = CYCLE_S * made.price.samples / CONFIG.budget
     return tuple(image for _, image in run(made, screen.trace, fixed_clock(cycle_s), 0.0, 0.6))
 

@@ -1,0 +1,77 @@
+"""A batch of samples taken into the estimates, the surfels and what is known of change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+from jaxtyping import Float, Float64
+from torch import Tensor
+
+from tsar.filtering import change, samples
+from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
+from tsar.projection import project
+from tsar.types import Hits, Viewpoint
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What was traced in a cycle.
+
+    Attributes:
+        color: finite, at most :data:`tsar.filtering.samples.COLOR_MAX`.
+        position: on the image, pixels.
+        time_s: animation time.
+        spacing: of each tile, pixels.
+        now_s: start of the cycle.
+        cycle_s: length of the one before, seconds.
+        hits, view: first hits, and poses at the start of the cycle; None where nothing is reprojected.
+        earlier: poses at the start of the cycle before; None where there was none.
+    """
+
+    color: Float[Tensor, "n samples 3"]
+    position: Float[Tensor, "n samples 2"]
+    time_s: Float64[Tensor, "n samples"]
+    spacing: Float[Tensor, " n"]
+    now_s: float
+    cycle_s: float
+    hits: Hits | None = None
+    view: Viewpoint | None = None
+    earlier: Viewpoint | None = None
+
+
+def taken_in(
+    estimates: Estimates, surfels: Surfels, known: Change, traced: Traced, options: FilterOptions
+) -> tuple[Estimates, Surfels, Change]:
+    """Estimates, surfels and change after a batch.
+
+    A sample belongs to the pixel in which its first hit is seen at the start of the cycle.
+
+    Args:
+        estimates, surfels: moved and aged to the start of the cycle. A compiled set writes into those that were moved.
+        known: change observed so far.
+        traced: the batch.
+        options: of the filter.
+    """
+    side, now_s, hits, view = estimates.color.shape[-1], traced.now_s, traced.hits, traced.view
+    position: Tensor = traced.position.reshape(-1, 2)
+    if view is not None and hits is not None:
+        place, depth = project(view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
+        position = torch.where((depth > 0.0)[:, None], place * side, -1.0)
+    pixel = samples.pixels_of(position, side)
+    seen = samples.gathered(traced.color, traced.time_s, traced.spacing, pixel, now_s, estimates.roughness)
+    compared = seen.hit & estimates.known
+    judged = replace(estimates, roughness=seen.roughness)
+    changed = change.observed(
+        known, judged, seen.color, seen.count, seen.time_s, compared, now_s, traced.cycle_s, options
+    )  # fmt: skip
+    if view is None or hits is None:
+        none = torch.zeros_like(estimates.variance)
+        after, _ = samples.updated(estimates, seen, changed.rate_px, now_s, none > 0.0, none, options)
+        return after, surfels, changed
+    found = samples.met(hits, seen, surfels, view, traced.earlier)
+    after, share = samples.updated(
+        estimates.beside(surfels), seen, changed.rate_px, now_s, found.replaced, found.least_share, options
+    )
+    after = replace(after, aged=torch.where(seen.hit, after.aged, estimates.aged))
+    return after, samples.joined(surfels, found, seen.hit, share), changed
