@@ -10,7 +10,7 @@ from tests.oracles import pictures, runs
 from tsar.clock import fixed_clock
 from tsar.config import ConfigError, TsarConfig
 from tsar.policies.framed import Framed, PromptlyFramed
-from tsar.policies.scatter import widened
+from tsar.policies.resampling import widened
 from tsar.policy import Moment, Setting
 
 CONFIG = TsarConfig(batch_size=16, resolution_px=128)

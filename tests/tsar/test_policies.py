@@ -5,7 +5,8 @@ import torch.nn.functional as F
 from tests.oracles import pictures, runs
 from tsar.clock import fixed_clock
 from tsar.config import TsarConfig
-from tsar.policies.scatter import PixelBuffer, double_width, pull_push, write
+from tsar.policies.resampling import double_width
+from tsar.policies.scatter import PixelBuffer, pull_push, write
 
 CONFIG = TsarConfig(batch_size=32, resolution_px=128, warmup_cycles=6)
 

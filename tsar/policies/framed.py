@@ -19,7 +19,7 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import require
 from tsar.morton import raster_to_morton
-from tsar.policies.scatter import widened
+from tsar.policies.resampling import widened
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.selection import sample_positions
 from tsar.tiling import uniform

@@ -24,7 +24,7 @@ from tsar.config import TsarConfig
 from tsar.error import replace_nonfinite
 from tsar.estimators import state_size
 from tsar.morton import morton_to_raster, raster_to_morton
-from tsar.policies.scatter import double_width
+from tsar.policies.resampling import double_width
 from tsar.policies.thesis import Thesis
 from tsar.policy import Moment, Picture, Policy, Setting
 from tsar.reconstruction import reconstruct
