@@ -47,7 +47,7 @@ class FilterOptions:
     by_gain: bool = True
     spread: bool = True
     probes: bool = True
-    share_max: float = 3.0 / 64.0
+    share_max: float = 1.0 / 32.0
     footprint: int = 4
     life_min_s: float = 0.1
     life_max_s: float = 1.0

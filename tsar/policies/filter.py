@@ -5,8 +5,8 @@ surfaces that they belong to, by the poses known at its start; chooses the tiles
 for longest; averages the new samples into the estimates; learns from the residuals how fast the picture changes; and
 shows the estimates, blended with their surroundings where they are uncertain. ``filter`` leaves the moving out.
 
-The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than three 64ths of the output's pixels is
-sampled in several cycles, so that the picture is late by little.
+The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is sampled in
+several cycles, so that the picture is late by little.
 """
 
 from __future__ import annotations
