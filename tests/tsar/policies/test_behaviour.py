@@ -136,7 +136,7 @@ def test_a_change_is_on_the_display_before_a_frame_would_be(policy: str, name: s
     ("policy", "share"), [("tsar", 0.125), ("filter", 0.125), ("interruptible", 0.125), ("afr", 1.0)]
 )
 def test_a_still_picture_converges(policy: str, share: float) -> None:
-    """After one second its error is below an eighth of a frame's of one sample a pixel and stays there; that of the AFR,
+    """After one second its error is below an eighth of a frame's of one sample a pixel, and stays. That of the AFR,
     which takes jitter within a pixel for change, is below the frame's."""
     least = framed_error("detail", 1.0) * share
     late = [image for image in shown(policy, "detail", 1.3) if image.display_time_s > 1.0]
