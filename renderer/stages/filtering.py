@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -21,9 +22,6 @@ from tsar.projection import to_camera
 from tsar.types import Viewpoint
 
 _F32, _F64, _I64 = torch.float32, torch.float64, torch.int64
-_LANES = 16
-_ROW = 12
-"""Numbers of an instance: three rows of a matrix, and an offset."""
 _KINDS = {
     "color": (3, _F32), "aged": (1, _F32), "inverse": (1, _F32), "time_s": (1, _F64), "roughness": (1, _F32),
     "instance": (1, _I64), "point": (3, _F32), "position": (2, _F32), "step": (2, _F32),
@@ -32,9 +30,7 @@ _KINDS = {
 
 
 def filter_stages(side: int, threads: int = 1) -> FilterStages:
-    """Kernels for a picture of ``side`` pixels; the reference where it has fewer than they take at a time."""
-    if side * side % _LANES or side < TILE_SIDE:
-        return FilterStages()
+    """Kernels for a picture of ``side`` pixels, a power of two of at least 16."""
     made = _Compiled(side, threads)
     return FilterStages(made.moved, made.chosen, made.taken_in, made.smoothed)
 
@@ -73,7 +69,7 @@ class _Compiled:
     def moved(self, estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:
         """As :func:`tsar.filtering.motion.moved`."""
         rows = _rows(view)
-        before = [_plane(record, name) for name in _KINDS for record in (estimates, surfels) if hasattr(record, name)]
+        before = _planes(estimates, surfels)
         after = [torch.empty_like(plane) for plane in before]
         where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
         self._planes[:] = [
@@ -96,7 +92,7 @@ class _Compiled:
         """As :func:`tsar.filtering.batches.taken_in`; estimates that were moved are changed in place."""
         hits, view, tiles = traced.hits, traced.view, len(traced.color)
         moves = view is not None and hits is not None
-        planes = [_plane(record, name) for name in _KINDS for record in (estimates, surfels) if hasattr(record, name)]
+        planes = _planes(estimates, surfels)
         if not moves:  # aged, but for that those of the cycle before
             planes[:5] = [plane.clone() for plane in planes[:5]]
         samples = tiles * TILE_SIDE**2
@@ -204,5 +200,6 @@ def _poses(rows: Tensor | None, view: Viewpoint | None) -> tuple[int, int, float
     return address("rows", rows, _F64, rows.numel()), len(rows), view.tan_x, view.tan_y
 
 
-def _plane(record: object, name: str) -> Tensor:
-    return getattr(record, name).contiguous()
+def _planes(estimates: Estimates, surfels: Surfels) -> list[Tensor]:
+    """In the order of :data:`_KINDS`, each contiguous."""
+    return [getattr(record, field.name).contiguous() for record in (estimates, surfels) for field in fields(record)]

@@ -161,7 +161,7 @@ def keep(plan: FilterPlan, first: wp.int32, last: wp.int32):
 @wp.kernel
 def take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32):
     """Estimates and surfels that the pixels of some rows took; ``planes`` are addresses of int64: of what there was
-    (``surfels::Before``), then of what is written (``surfels::After``)."""
+    (``surfels::Before``), then of what is written (``surfels::Planes``)."""
     native_take(plan, planes, first, last)
 
 
@@ -185,8 +185,8 @@ def take_in(
     earlier_tan_x: wp.float64,
     earlier_tan_y: wp.float64,
 ):
-    """Estimates, surfels and change after a batch; ``addresses`` are int64, those of ``batches::Traced``, ``Planes``
-    and ``Change``."""
+    """Estimates, surfels and change after a batch; ``addresses`` are int64, those of ``batches::Traced``,
+    ``surfels::Planes`` and ``batches::Change``."""
     native_take_in(plan, addresses, tiles, now_s, memory_s, rate_max, reprojected, accumulates, spreads, rows,
                    row_count, tan_x, tan_y, earlier_rows, earlier_count, earlier_tan_x, earlier_tan_y)  # fmt: skip
 

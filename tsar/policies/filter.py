@@ -34,6 +34,7 @@ from tsar.filtering.records import (
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.roots import square_root
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 
 PIXEL_FLOPS = {True: 340.0, False: 185.0}
@@ -155,7 +156,10 @@ class Filter(Policy[State]):
     def _maps(self, state: State) -> dict[str, MapShown]:
         """How fast the picture is taken to change, and how far off each pixel is taken to be."""
         rate = MapShown(state.change.rate[0].clone(), (1e-4, 1.0), "variance per second")
-        return {"rate of change": rate, "expected error": MapShown(state.remaining[0].sqrt(), (0.003, 0.3), "RMS")}
+        return {
+            "rate of change": rate,
+            "expected error": MapShown(square_root(state.remaining[0]), (0.003, 0.3), "RMS"),
+        }
 
     def _advanced(self, state: State, now_s: float) -> State:
         estimates, surfels = state.estimates, state.surfels

@@ -8,6 +8,8 @@
 
 namespace batches {
 
+using surfels::Planes;
+
 constexpr int TILE = given::TILE_SIDE, SAMPLES = TILE * TILE, EDGE = given::ELEMENT_PX;
 
 struct Traced {
@@ -16,15 +18,6 @@ struct Traced {
     const float* spacing;
     const int* instance;
     const float* point;
-};
-
-// Planes that are changed in place.
-struct Planes {
-    float *color, *aged, *inverse;
-    double* time_s;
-    float* roughness;
-    long long* instance;
-    float *point, *position, *step;
 };
 
 // By elements: as it was, and as it will be.

@@ -163,7 +163,8 @@ struct Before {
     const long long* instance;
     const float *point, *position;
 };
-struct After {
+// Of estimates and surfels, to be written.
+struct Planes {
     float *color, *aged, *inverse;
     double* time_s;
     float* roughness;
@@ -171,10 +172,10 @@ struct After {
     float *point, *position, *step;
 };
 
-// `planes` holds the addresses of Before, then those of After.
+// `planes` holds the addresses of Before, then those of Planes.
 template <class Plan> inline void take_rows(const Plan& plan, const long long* planes, int first, int last) {
     Before b;
-    After a;
+    Planes a;
     __builtin_memcpy(&b, planes, sizeof(b));
     __builtin_memcpy(&a, planes + sizeof(b) / sizeof(*planes), sizeof(a));
     const int side = plan.side, count = side * side, start = first * side, end = last * side;
