@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import fields
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from renderer.compute.launching import Command, address
-from renderer.compute.memory import Memory
+from renderer.compute.memory import Memory, Recycled
 from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels as kernels
-from renderer.stages.sizes import PIXEL_WORDS
+from renderer.stages.sizes import FRAME, PIXEL_WORDS
 from tsar.filtering.batches import Traced
 from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, FilterOptions, Surfels
 from tsar.filtering.stages import FilterStages
@@ -27,6 +28,9 @@ _KINDS = {
     "instance": (1, _I64), "point": (3, _F32), "position": (2, _F32), "step": (2, _F32),
 }  # fmt: skip
 """Planes of estimates and surfels, in the order of the native records, and the kind of their elements."""
+
+_APART = 320
+"""Bytes between planes, which are read and written together: addresses that differ by whole pages alone take turns."""
 
 
 def filter_stages(side: int, threads: int = 1) -> FilterStages:
@@ -42,24 +46,35 @@ class _Compiled:
         self._side, self._pixels, self._memory = side, side * side, Memory()
         room = self._memory.room
         self._plans = [kernels.FilterPlan() for _ in range(2)]
-        x, y, depth, front = (room(name, self._pixels, _F64) for name in ("x", "y", "depth", "front"))
-        least, source = room("least", self._pixels, _I64), room("source", self._pixels, torch.int32)
+        motion, depth = room("motion", 4 * self._pixels), room("depth", self._pixels, _F64)
+        frame = (side + 2) * (side + 2 * FRAME)
+        front = self._memory.keep("front", torch.full((frame,), inf, dtype=_F64), _F64, frame)
+        source = room("source", self._pixels, torch.int32)
         slot = self._memory.keep("slot", torch.full((self._pixels,), -1, dtype=torch.int32), torch.int32, self._pixels)
         pixel = room("pixel", self._pixels * PIXEL_WORDS, _I64)  # more than the image has are never hit
         done = self._memory.zeros("done", self._pixels, torch.uint8)
         for perspective, plan in enumerate(self._plans):
             plan.side, plan.perspective = side, perspective
-            plan.x, plan.y, plan.depth, plan.least, plan.source = x, y, depth, least, source
-            plan.slot, plan.pixel, plan.done, plan.front = slot, pixel, done, front
+            plan.motion, plan.depth, plan.source, plan.front = motion, depth, source, front
+            plan.slot, plan.pixel, plan.done = slot, pixel, done
         edges = [side * number // threads for number in range(threads + 1)]
         self._rows = [(a, b) for a, b in pairwise(edges) if b > a]
-        self._project = [[Command(kernels.project, plan, *rows) for rows in self._rows] for plan in self._plans]
-        plan = self._plans[0]
-        self._choose = [Command(kernels.choose, plan, *rows) for rows in self._rows]
-        self._keep = [Command(kernels.keep, plan, *rows) for rows in self._rows]
+        self._bands = np.zeros((len(self._rows), 5), np.int64)  # surfels::Band
+        for number, (first, last) in enumerate(self._rows):
+            least = room(f"least {number}", (last - first + 4) * (side + 4), _I64)
+            crossing = room(f"crossing {number}", 3 * (last - first) * side // 8, torch.int32)
+            self._bands[number] = first, last, least, crossing, 0
+        bands, numbers = address("bands", self._bands, _I64, self._bands.size), range(len(self._rows))
+        self._offer = [[Command(kernels.offer, plan, bands, number) for number in numbers] for plan in self._plans]
+        count = len(self._rows)
+        self._choose = [
+            [Command(kernels.choose, plan, bands, count, number) for number in numbers] for plan in self._plans
+        ]
+        self._sizes = [planes * self._pixels * kind.itemsize for planes, kind in _KINDS.values()]
+        self._recycled = Recycled(sum(self._sizes) + _APART * len(_KINDS))
         self._planes = np.zeros(2 * len(_KINDS) - 1, np.int64)
         planes = address("planes", self._planes, _I64, len(self._planes))
-        self._take = [Command(kernels.take, plan, planes, *rows) for rows in self._rows]
+        self._take = [Command(kernels.take, self._plans[0], bands, number, planes) for number in numbers]
         self._addresses = np.zeros(6 + len(_KINDS) + 8, np.int64)
         addresses = address("addresses", self._addresses, _I64, len(self._addresses))
         self._take_in = [Command(kernels.take_in, plan, addresses) for plan in self._plans]
@@ -70,19 +85,20 @@ class _Compiled:
         """As :func:`tsar.filtering.motion.moved`."""
         rows = _rows(view)
         before = _planes(estimates, surfels)
-        after = [torch.empty_like(plane) for plane in before]
+        after = self._new_planes()
         where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
         self._planes[:] = [
             *where[:-1], *(self._address(name, plane) for name, plane in zip(_KINDS, after, strict=True))
         ]  # fmt: skip
         at = dict(zip(_KINDS, where, strict=True))
-        poses = _poses(rows, view)
-        project = self._project[view.kind == "perspective"]
-        for command in project:
-            command.set(*poses, at["instance"], at["point"])
-        for command in self._choose:
-            command.set(at["aged"], at["inverse"], at["roughness"])
-        for commands in (project, self._choose, self._keep, self._take):
+        names = "instance", "point", "aged", "inverse", "roughness"
+        arguments = *_poses(rows, view), *(at[name] for name in names)
+        perspective = view.kind == "perspective"
+        offer, choose = self._offer[perspective], self._choose[perspective]
+        for one, other in zip(offer, choose, strict=True):
+            one.set(*arguments, at["position"])
+            other.set(*arguments)
+        for commands in (offer, choose, self._take):
             TEAM.run(commands)
         return Estimates(*after[:5]), Surfels(*after[5:])
 
@@ -181,6 +197,13 @@ class _Compiled:
     def _split(self, values: Tensor) -> list[Tensor]:
         sizes = [side * side for side in self._sides]
         return [part.reshape(side, side) for part, side in zip(values.split(sizes), self._sides, strict=True)]
+
+    def _new_planes(self) -> list[Tensor]:
+        block, made, start = self._recycled.block(), [], 0
+        for (planes, kind), size in zip(_KINDS.values(), self._sizes, strict=True):
+            made.append(block[start : start + size].view(kind).reshape(planes, self._side, self._side))
+            start += size + _APART
+        return made
 
     def _address(self, name: str, plane: Tensor) -> int:
         planes, kind = _KINDS[name]

@@ -1,5 +1,5 @@
-"""Kernel entry points of the filter's stages (``native/surfels.h``, ``gains.h``, ``pyramid.h``), defined in
-``tsar/filtering``. Threads take rows."""
+"""Kernel entry points of the filter's stages (``native/surfels.h``, ``taking.h``, ``batches.h``, ``gains.h``,
+``pyramid.h``), defined in ``tsar/filtering``. Threads take rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
 from renderer.stages import sizes
 
-wp.set_module_options(module_options("batches.h", "gains.h", "pyramid.h", "surfels.h", given=sizes.FILTERING))
+wp.set_module_options(module_options("batches.h", "gains.h", "pyramid.h", "taking.h", given=sizes.FILTERING))
 
 
 @wp.struct
@@ -18,15 +18,12 @@ class FilterPlan:
 
     side: wp.int32
     perspective: wp.int32
-    x: wp.uint64
-    """float64, where surfels are, pixels."""
-    y: wp.uint64
+    motion: wp.uint64
+    """float32, where surfels are and how far they moved, pixels: x, y, x, y."""
     depth: wp.uint64
     """float64."""
-    least: wp.uint64
-    """int64, the best rank for each pixel."""
     front: wp.uint64
-    """float64, depth of the surfel that each pixel takes."""
+    """float64, depth of the surfel that each pixel takes, infinite in the frame around them."""
     source: wp.uint64
     """int32, the surfel that each pixel takes, -1 where it takes none."""
     slot: wp.uint64
@@ -38,36 +35,52 @@ class FilterPlan:
 
 
 @wp.func_native("""
-    surfels::project_rows(plan, {(const double*)rows, row_count, tan_x, tan_y}, (const long long*)instance,
-                          (const float*)point, first, last);
+    surfels::offer_own(plan, {(const double*)rows, row_count, tan_x, tan_y}, (const long long*)instance,
+                       (const float*)point, (const float*)position,
+                       {(const float*)aged, (const float*)inverse, (const float*)roughness},
+                       ((surfels::Band*)bands)[number]);
 """)
-def native_project(
+def native_offer(
     plan: FilterPlan,
-    first: wp.int32,
-    last: wp.int32,
+    bands: Address,
+    number: wp.int32,
     rows: Address,
     row_count: wp.int32,
     tan_x: wp.float64,
     tan_y: wp.float64,
     instance: Address,
     point: Address,
+    aged: Address,
+    inverse: Address,
+    roughness: Address,
+    position: Address,
 ): ...
 
 
 @wp.func_native("""
-    surfels::choose_rows(plan, (const float*)aged, (const float*)inverse, (const float*)roughness, first, last);
+    surfels::choose(plan, {(const double*)rows, row_count, tan_x, tan_y}, (const long long*)instance,
+                    (const float*)point, {(const float*)aged, (const float*)inverse, (const float*)roughness},
+                    (const surfels::Band*)bands, band_count, number);
 """)
 def native_choose(
-    plan: FilterPlan, first: wp.int32, last: wp.int32, aged: Address, inverse: Address, roughness: Address
+    plan: FilterPlan,
+    bands: Address,
+    band_count: wp.int32,
+    number: wp.int32,
+    rows: Address,
+    row_count: wp.int32,
+    tan_x: wp.float64,
+    tan_y: wp.float64,
+    instance: Address,
+    point: Address,
+    aged: Address,
+    inverse: Address,
+    roughness: Address,
 ): ...
 
 
-@wp.func_native("surfels::keep_rows(plan, first, last);")
-def native_keep(plan: FilterPlan, first: wp.int32, last: wp.int32): ...
-
-
-@wp.func_native("surfels::take_rows(plan, (const long long*)planes, first, last);")
-def native_take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32): ...
+@wp.func_native("surfels::take_rows(plan, (const long long*)planes, ((const surfels::Band*)bands)[number]);")
+def native_take(plan: FilterPlan, bands: Address, number: wp.int32, planes: Address): ...
 
 
 @wp.func_native("""
@@ -131,38 +144,53 @@ def native_smooth(levels: Address, side: wp.int32, spare: Address): ...
 
 
 @wp.kernel
-def project(
+def offer(
     plan: FilterPlan,
-    first: wp.int32,
-    last: wp.int32,
+    bands: Address,
+    number: wp.int32,
     rows: Address,
     row_count: wp.int32,
     tan_x: wp.float64,
     tan_y: wp.float64,
     instance: Address,
     point: Address,
+    aged: Address,
+    inverse: Address,
+    roughness: Address,
+    position: Address,
 ):
-    """Where the surfels of some rows are seen."""
-    native_project(plan, first, last, rows, row_count, tan_x, tan_y, instance, point)
+    """Where the surfels of a band are seen, and the best of them for each of its pixels; ``bands`` are
+    ``surfels::Band``."""
+    native_offer(plan, bands, number, rows, row_count, tan_x, tan_y, instance, point, aged, inverse, roughness,
+                 position)  # fmt: skip
 
 
 @wp.kernel
-def choose(plan: FilterPlan, first: wp.int32, last: wp.int32, aged: Address, inverse: Address, roughness: Address):
-    """The best of all surfels for each pixel of some rows."""
-    native_choose(plan, first, last, aged, inverse, roughness)
+def choose(
+    plan: FilterPlan,
+    bands: Address,
+    band_count: wp.int32,
+    number: wp.int32,
+    rows: Address,
+    row_count: wp.int32,
+    tan_x: wp.float64,
+    tan_y: wp.float64,
+    instance: Address,
+    point: Address,
+    aged: Address,
+    inverse: Address,
+    roughness: Address,
+):
+    """The best of all surfels for each pixel of a band, once all bands were offered theirs."""
+    native_choose(plan, bands, band_count, number, rows, row_count, tan_x, tan_y, instance, point, aged, inverse,
+                  roughness)  # fmt: skip
 
 
 @wp.kernel
-def keep(plan: FilterPlan, first: wp.int32, last: wp.int32):
-    """Which pixels of some rows keep their surfel."""
-    native_keep(plan, first, last)
-
-
-@wp.kernel
-def take(plan: FilterPlan, planes: Address, first: wp.int32, last: wp.int32):
-    """Estimates and surfels that the pixels of some rows took; ``planes`` are addresses of int64: of what there was
+def take(plan: FilterPlan, bands: Address, number: wp.int32, planes: Address):
+    """Estimates and surfels that the pixels of a band keep; ``planes`` are addresses of int64: of what there was
     (``surfels::Before``), then of what is written (``surfels::Planes``)."""
-    native_take(plan, planes, first, last)
+    native_take(plan, bands, number, planes)
 
 
 @wp.kernel

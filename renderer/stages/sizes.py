@@ -31,9 +31,12 @@ GIVEN: dict[str, float] = {
 
 PIXEL_WORDS = 6
 """Words of eight bytes for what the samples of a pixel say together."""
+FRAME = 8
+"""Columns of nothing beside each row of depths, so that every pixel has neighbours."""
 
 FILTERING: dict[str, float] = {
     "PIXEL_WORDS": PIXEL_WORDS,
+    "FRAME": FRAME,
     "VARIANCE_MAX": records.VARIANCE_MAX,
     "UNSEEN": records.UNSEEN,
     "NEARER": motion.NEARER,

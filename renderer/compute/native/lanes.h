@@ -38,6 +38,7 @@ typedef bool b16 __attribute__((ext_vector_type(16)));
 // One bit a lane from a comparison, and back.
 inline unsigned bits(i4 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b4)) & 15u; }
 inline unsigned bits(i8 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b8)); }
+inline unsigned bits(l8 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b8)); }
 inline unsigned bits(i16 c) { return __builtin_bit_cast(unsigned short, __builtin_convertvector(c, b16)); }
 inline i16 lanes_of(unsigned mask) {
     return __builtin_convertvector(__builtin_bit_cast(b16, (unsigned short)mask), i16) != 0;
@@ -56,7 +57,7 @@ inline f16 clamped(f16 a, float low, float high) { return vmin(vmax(a, (f16)low)
 inline i16 to_int(f16 a) { return __builtin_convertvector(a, i16); }
 inline f16 to_float(i16 a) { return __builtin_convertvector(a, f16); }
 
-template <class F> inline F load(const float* from) {
+template <class F, class T> inline F load(const T* from) {
     F value;
     __builtin_memcpy(&value, from, sizeof(F));
     return value;

@@ -2,7 +2,7 @@
 // samples.py and change.py, whose bits these are). Only pixels that samples touch are looked at.
 #pragma once
 #include "quadtree.h"
-#include "surfels.h"
+#include "taking.h"
 
 #pragma clang fp contract(off)
 

@@ -9,11 +9,22 @@
 namespace surfels {
 
 using packets::d8;
+using packets::f16;
+using packets::f4;
+using packets::f8;
+using packets::i8;
 using packets::l8;
+using packets::load;
+using packets::store;
+using packets::vabs;
+using packets::vfloor;
+using packets::vmax;
+using packets::vmin;
 typedef long long Key;
 
 constexpr double INF = __builtin_inf(), NOT_A_NUMBER = __builtin_nan("");
 constexpr Key NONE = 0x7fffffffffffffffll;
+constexpr int FRAME = given::FRAME;
 constexpr int ROW = 12;  // numbers of an instance: three rows of a matrix, and an offset
 
 // What takes each instance to the camera, and last of all what takes directions there.
@@ -39,31 +50,38 @@ inline void finish(const Plan& plan, long long instance, double right, double up
     out_depth = instance <= given::UNSEEN ? -1.0 : !infinite ? depth : depth > 0.0 ? INF : -INF;
 }
 
-// Projects eight surfels that lie side by side.
+// Eight surfels that lie side by side, on the image; those that are not seen are anywhere.
+struct Eight {
+    d8 x, y, depth;
+    l8 seen;
+};
+
 template <class Plan>
-inline void project8(const Plan& plan, const Poses& poses, const long long* instance, const float* x, const float* y,
-                     const float* z, double* out_x, double* out_y, double* out_depth) {
-    int row[8];
-    bool same = true;
-    for (int i = 0; i < 8; ++i) {
-        row[i] = row_of(instance[i], poses.count);
-        same &= row[i] == row[0];
+inline Eight project8(const Plan& plan, const Poses& poses, const long long* instance, const float* point, int start) {
+    const int count = plan.side * plan.side;
+    const auto component = [&](int k) { return __builtin_convertvector(load<f8>(point + k * count + start), d8); };
+    const l8 number = load<l8>(instance + start);
+    const l8 infinite = number < 0, row = (infinite | (number >= poses.count)) ? (l8)(poses.count - 1) : number;
+    const d8 x = component(0), y = component(1), z = component(2);
+    d8 right = 0.0, up = 0.0, depth = 0.0;
+    // most often all are of one instance
+    for (unsigned left = 255u; left;) {
+        const long long chosen = row[packets::first_bit(left)];
+        const double* m = poses.rows + ROW * chosen;
+        const l8 here = row == chosen;
+        right = here ? m[0] * x + m[1] * y + m[2] * z + m[9] : right;
+        up = here ? m[3] * x + m[4] * y + m[5] * z + m[10] : up;
+        depth = here ? -(m[6] * x + m[7] * y + m[8] * z + m[11]) : depth;
+        left &= ~packets::bits(here);
     }
-    d8 m[ROW];
-    for (int k = 0; k < ROW; ++k) {
-        if (same)
-            m[k] = poses.rows[row[0] * ROW + k];
-        else
-            for (int i = 0; i < 8; ++i) m[k][i] = poses.rows[row[i] * ROW + k];
-    }
-    const d8 px = __builtin_convertvector(packets::load<packets::f8>(x), d8),
-             py = __builtin_convertvector(packets::load<packets::f8>(y), d8),
-             pz = __builtin_convertvector(packets::load<packets::f8>(z), d8);
-    const d8 right = m[0] * px + m[1] * py + m[2] * pz + m[9], up = m[3] * px + m[4] * py + m[5] * pz + m[10];
-    const d8 depth = -(m[6] * px + m[7] * py + m[8] * pz + m[11]);
-    for (int i = 0; i < 8; ++i)
-        finish(plan, instance[i], right[i], up[i], depth[i], poses.tan_x, poses.tan_y, out_x[i], out_y[i],
-               out_depth[i]);
+    const d8 away = infinite ? (d8)0.0 : (d8)1.0, unit = plan.perspective ? depth : away;
+    Eight e;
+    e.x = (0.5 + right / (2.0 * poses.tan_x * unit)) * plan.side;
+    e.y = (0.5 - up / (2.0 * poses.tan_y * unit)) * plan.side;
+    e.depth = infinite ? (d8)INF : depth;
+    e.seen = (number > given::UNSEEN) & (unit > 0.0) & (depth > 0.0) & (e.x > -1.0) & (e.x < plan.side + 1.0) &
+             (e.y > -1.0) & (e.y < plan.side + 1.0);
+    return e;
 }
 
 // One surfel.
@@ -77,125 +95,121 @@ inline void project(const Plan& plan, const Poses& poses, long long instance, co
     finish(plan, instance, right, up, depth, poses.tan_x, poses.tan_y, out_x, out_y, out_depth);
 }
 
-template <class Plan>
-inline void project_rows(const Plan& plan, const Poses& poses, const long long* instance, const float* point, int first,
-                         int last) {
-    const int count = plan.side * plan.side;
-    double *x = (double*)plan.x, *y = (double*)plan.y, *depth = (double*)plan.depth;
-    for (int i = first * plan.side; i < last * plan.side; i += 8)
-        project8(plan, poses, instance + i, point + i, point + count + i, point + 2 * count + i, x + i, y + i,
-                 depth + i);
+// Eight surfels that serve pixels of rows `low` to `high`, some of them in other bands.
+struct Crossing {
+    int start, low, high;
+};
+
+// Rows of the image that one thread works on.
+struct Band {
+    long long first, last;
+    Key* least;          // the best rank of each pixel, and of two more on every side
+    Crossing* crossing;  // room for an eighth of its pixels
+    long long crossings;
+};
+
+struct Uncertain {
+    const float *aged, *inverse, *roughness;
+};
+
+// The rank of surfels in pixels whose centres are `away` from them; the number breaks ties. It fits into 32 bits.
+static_assert(2ll * given::DEPTHS * given::SCORES < 1ll << 31);
+inline i8 rank(i8 near, f8 variance, f8 beside_cost, f8 away) {
+    const f8 cost = (variance + beside_cost * away) * given::SCORE_SCALE;
+    const i8 score = __builtin_convertvector(vmax(vmin(cost, (f8)(given::SCORES - 1.0f)), (f8)0.0f), i8);
+    return (away > 0.5f ? 2 * given::DEPTHS - 1 - near : near) * given::SCORES + score;
 }
 
-// The rank of a surfel in one of the pixels around it: the least one takes it.
-inline Key rank(int beside, int near, float cost, Key count, int number) {
-    Key score = (Key)(cost * given::SCORE_SCALE);
-    score = score < 0 ? 0 : score > given::SCORES - 1 ? given::SCORES - 1 : score;
-    const Key order = beside ? given::DEPTHS - 1 - near : near;
-    return (((Key)beside * given::DEPTHS + order) * given::SCORES + score) * count + number;
+// Offers eight surfels to the four pixels around each of them, those of the band.
+template <class Plan>
+inline void offer8(const Plan& plan, const Eight& e, const Uncertain& of, int start, const Band& band) {
+    const int stride = plan.side + 4, rows = (int)(band.last - band.first);
+    const d8 left = e.seen ? vfloor(e.x - 0.5) : (d8)-2.0, top = e.seen ? vfloor(e.y - 0.5) : (d8)-2.0;
+    const i8 column = __builtin_convertvector(left, i8) + 2,
+             row = __builtin_convertvector(top, i8) - (int)band.first + 2;
+    // what is of no use to the band goes beside its pixels
+    const i8 within = row < 0 ? (i8)0 : row > rows + 2 ? (i8)(rows + 2) : row;
+    const i8 first = __builtin_convertvector(e.seen, i8) ? within * stride + column : (i8)0;
+    const i8 near = __builtin_bit_cast(i8, __builtin_convertvector(e.depth, f8)) >> given::DEPTH_SHIFT;
+    const f8 roughness = load<f8>(of.roughness + start), beside_cost = given::BESIDE * roughness;
+    const f8 known = load<f8>(of.aged + start) + 0.5f * roughness * load<f8>(of.inverse + start);
+    const f8 variance = vmin(known, (f8)given::VARIANCE_MAX);
+    f8 away_x[2], away_y[2];
+    for (int k = 0; k < 2; ++k) {
+        away_x[k] = __builtin_convertvector(vabs(left + k + 0.5 - e.x), f8);
+        away_y[k] = __builtin_convertvector(vabs(top + k + 0.5 - e.y), f8);
+    }
+    int at[8];
+    unsigned key[4][8];
+    store(at, first);
+    for (int k = 0; k < 4; ++k) store(key[k], rank(near, variance, beside_cost, vmax(away_x[k % 2], away_y[k / 2])));
+    for (int i = 0; i < 8; ++i)
+        for (int k = 0; k < 4; ++k) {
+            Key& best = band.least[at[i] + k / 2 * stride + k % 2];
+            const Key offered = (Key)key[k][i] << 32 | (start + i);
+            best = offered < best ? offered : best;
+        }
 }
 
-// For the pixels of some rows the best surfel of all.
+// Eight places and steps, one surfel after the other.
+inline void store_motion(float* to, f8 x, f8 y, f8 step_x, f8 step_y) {
+    const f16 place = __builtin_shufflevector(x, y, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
+    const f16 step = __builtin_shufflevector(step_x, step_y, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
+    store(to, __builtin_shufflevector(place, step, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23));
+    store(to + 16, __builtin_shufflevector(place, step, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31));
+}
+
+// Projects the surfels that lie in a band and offers them to its pixels.
 template <class Plan>
-inline void choose_rows(const Plan& plan, const float* aged, const float* inverse, const float* roughness, int first,
-                        int last) {
+inline void offer_own(const Plan& plan, const Poses& poses, const long long* instance, const float* point,
+                      const float* position, const Uncertain& of, Band& band) {
     const int side = plan.side, count = side * side;
-    const double *x = (const double*)plan.x, *y = (const double*)plan.y, *depth = (const double*)plan.depth;
-    Key* least = (Key*)plan.least;
-    for (int i = first * side; i < last * side; ++i) least[i] = NONE;
-    for (int i = 0; i < count; ++i) {
-        if (!(y[i] > first - 1.0 && y[i] < last + 1.0 && x[i] > -1.0 && x[i] < side + 1.0 && depth[i] > 0.0)) continue;
-        const double left = __builtin_floor(x[i] - 0.5), top = __builtin_floor(y[i] - 0.5);
-        const float near_depth = (float)depth[i];
-        const int near = __builtin_bit_cast(int, near_depth) >> given::DEPTH_SHIFT;
-        float variance = aged[i] + 0.5f * roughness[i] * inverse[i];
-        variance = variance > given::VARIANCE_MAX ? given::VARIANCE_MAX : variance;
-        const float beside_cost = given::BESIDE * roughness[i];
-        for (int down = 0; down < 2; ++down) {
-            const double row = top + down;
-            if (row < first || row >= last) continue;
-            const double away_y = __builtin_fabs(row + 0.5 - y[i]);
-            for (int right = 0; right < 2; ++right) {
-                const double column = left + right;
-                if (column < 0.0 || column >= side) continue;
-                const double away_x = __builtin_fabs(column + 0.5 - x[i]);
-                const float away = (float)(away_x > away_y ? away_x : away_y);
-                const Key key = rank(away > 0.5f, near, variance + beside_cost * away, count, i);
-                Key& best = least[(int)row * side + (int)column];
-                best = key < best ? key : best;
-            }
+    double* depth = (double*)plan.depth;
+    for (long long i = 0; i < (band.last - band.first + 4) * (side + 4); ++i) band.least[i] = NONE;
+    band.crossings = 0;
+    for (int start = (int)band.first * side; start < band.last * side; start += 8) {
+        const Eight e = project8(plan, poses, instance, point, start);
+        const f8 x = __builtin_convertvector(e.x, f8), y = __builtin_convertvector(e.y, f8);
+        store_motion((float*)plan.motion + 4 * start, x, y, x - load<f8>(position + start),
+                     y - load<f8>(position + count + start));
+        store(depth + start, e.depth);
+        if (!packets::bits(e.seen)) continue;
+        offer8(plan, e, of, start, band);
+        const d8 top = vfloor(e.y - 0.5);
+        const unsigned crosses =
+            packets::bits(e.seen & ((top < (double)band.first) | (top + 1.0 >= (double)band.last)));
+        if (!crosses) continue;
+        Crossing& crossing = band.crossing[band.crossings++];
+        crossing = {start, side, -1};
+        for (unsigned left = crosses; left; left &= left - 1) {
+            const int row = (int)top[packets::first_bit(left)];
+            crossing.low = row < crossing.low ? row : crossing.low;
+            crossing.high = row + 1 > crossing.high ? row + 1 : crossing.high;
         }
-    }
-    int* source = (int*)plan.source;
-    double* front = (double*)plan.front;
-    for (int i = first * side; i < last * side; ++i) {
-        source[i] = least[i] == NONE ? -1 : (int)(least[i] % count);
-        front[i] = source[i] < 0 ? INF : depth[source[i]];
     }
 }
 
-// Which pixels keep what they took: not where most of their neighbours took what is in front.
-template <class Plan> inline void keep_rows(const Plan& plan, int first, int last) {
-    const int side = plan.side;
-    const double* front = (const double*)plan.front;
-    int* source = (int*)plan.source;
-    for (int row = first; row < last; ++row)
+// Offers to a band those of the other bands that reach into it; then the best of all surfels are known.
+template <class Plan>
+inline void choose(const Plan& plan, const Poses& poses, const long long* instance, const float* point,
+                   const Uncertain& of, const Band* bands, int count, int number) {
+    const Band& band = bands[number];
+    const int side = plan.side, stride = side + 4, wide = side + 2 * FRAME;
+    for (int other = 0; other < count; ++other)
+        for (int i = 0; other != number && i < bands[other].crossings; ++i) {
+            const Crossing& crossing = bands[other].crossing[i];
+            if (crossing.high < band.first || crossing.low >= band.last) continue;
+            offer8(plan, project8(plan, poses, instance, point, crossing.start), of, crossing.start, band);
+        }
+    const double* depth = (const double*)plan.depth;
+    for (int row = (int)band.first; row < band.last; ++row) {
+        const Key* least = band.least + (row - band.first + 2) * stride + 2;
+        int* source = (int*)plan.source + row * side;
+        double* front = (double*)plan.front + (row + 1) * wide + FRAME;
         for (int column = 0; column < side; ++column) {
-            const int at = row * side + column;
-            const double bound = front[at] / given::NEARER;
-            int nearer = 0;
-            for (int down = row > 0 ? -1 : 0; down < (row + 1 < side ? 2 : 1); ++down)
-                for (int right = column > 0 ? -1 : 0; right < (column + 1 < side ? 2 : 1); ++right)
-                    nearer += front[at + down * side + right] < bound;
-            if (nearer >= given::NEARER_COUNT) source[at] = -1;
+            source[column] = least[column] == NONE ? -1 : (int)least[column];
+            front[column] = source[column] < 0 ? INF : depth[source[column]];
         }
-}
-
-// A plane of what every pixel took.
-template <class T> inline void take(T* to, const T* from, const int* source, int first, int last, T otherwise) {
-    for (int i = first; i < last; ++i) to[i] = source[i] >= 0 ? from[source[i]] : otherwise;
-}
-
-struct Before {
-    const float *color, *aged, *inverse;
-    const double* time_s;
-    const float* roughness;
-    const long long* instance;
-    const float *point, *position;
-};
-// Of estimates and surfels, to be written.
-struct Planes {
-    float *color, *aged, *inverse;
-    double* time_s;
-    float* roughness;
-    long long* instance;
-    float *point, *position, *step;
-};
-
-// `planes` holds the addresses of Before, then those of Planes.
-template <class Plan> inline void take_rows(const Plan& plan, const long long* planes, int first, int last) {
-    Before b;
-    Planes a;
-    __builtin_memcpy(&b, planes, sizeof(b));
-    __builtin_memcpy(&a, planes + sizeof(b) / sizeof(*planes), sizeof(a));
-    const int side = plan.side, count = side * side, start = first * side, end = last * side;
-    const int* source = (const int*)plan.source;
-    const double *x = (const double*)plan.x, *y = (const double*)plan.y;
-    for (int plane = 0; plane < 3; ++plane) {
-        take(a.color + plane * count, b.color + plane * count, source, start, end, 0.0f);
-        take(a.point + plane * count, b.point + plane * count, source, start, end, 0.0f);
-    }
-    take(a.aged, b.aged, source, start, end, given::VARIANCE_MAX);
-    take(a.inverse, b.inverse, source, start, end, 1.0f);
-    take(a.time_s, b.time_s, source, start, end, -INF);
-    take(a.instance, b.instance, source, start, end, (long long)given::UNSEEN);
-    for (int i = start; i < end; ++i) {
-        const int from = source[i];
-        a.roughness[i] = b.roughness[from >= 0 ? from : i];
-        a.position[i] = from >= 0 ? (float)x[from] : i % side + 0.5f;
-        a.position[count + i] = from >= 0 ? (float)y[from] : i / side + 0.5f;
-        a.step[i] = from >= 0 ? a.position[i] - b.position[from] : 0.0f;
-        a.step[count + i] = from >= 0 ? a.position[count + i] - b.position[count + from] : 0.0f;
     }
 }
 

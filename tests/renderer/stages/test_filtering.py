@@ -61,7 +61,7 @@ def scene(side: int, kind: str, seed: int) -> tuple[Estimates, Surfels, Viewpoin
     return estimates, Surfels(instance, point, centres(side) + 0.1, uniform(2, side, side)), view
 
 
-@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("threads", [1, 3, 16])
 @pytest.mark.parametrize("kind", ["perspective", "parallel"])
 @pytest.mark.parametrize("side", SIDES)
 def test_surfels_move_as_the_reference_moves_them(side: int, kind: str, threads: int) -> None:
