@@ -32,7 +32,8 @@ class FilterOptions:
         jitter: whether samples move within their pixels from cycle to cycle.
         by_gain: whether tiles are chosen by what they gain; without, pixels are sampled in turn.
         spread: whether change is expected beside elements that changed.
-        probes: whether a tile a cycle looks where nothing is expected.
+        shadows: whether change is expected where shadows of what moves lie.
+        probes: whether a tile now and then looks where nothing is expected.
         share_max: most samples of a cycle, as a share of the output's pixels; a batch of more becomes several cycles.
         footprint: samples along a pixel's side that textures are filtered for.
         life_min_s, life_max_s: bounds of how long a sample is taken to be of use.
@@ -46,13 +47,14 @@ class FilterOptions:
     jitter: bool = True
     by_gain: bool = True
     spread: bool = True
+    shadows: bool = True
     probes: bool = True
     share_max: float = 1.0 / 32.0
     footprint: int = 4
-    life_min_s: float = 0.1
-    life_max_s: float = 1.0
+    life_min_s: float = 0.2
+    life_max_s: float = 4.0
     reach: float = 0.125
-    memory_s: float = 0.1
+    memory_s: float = 0.2
 
 
 DEFAULT = FilterOptions()

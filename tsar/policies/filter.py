@@ -2,8 +2,9 @@
 
 Every pixel has an estimate of its colour and of the variance of its error. A cycle moves the estimates with the
 surfaces that they belong to, by the poses known at its start; chooses the tiles whose samples remove most of the error
-for longest; averages the new samples into the estimates; learns from the residuals how fast the picture changes; and
-shows the estimates, blended with their surroundings where they are uncertain. ``filter`` leaves the moving out.
+for longest; averages the new samples into the estimates; learns from the residuals how fast the picture changes, and
+from the shadows of what moves where it soon will; and shows the estimates, blended with their surroundings where they
+are uncertain. ``filter`` leaves the moving out.
 
 The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is sampled in
 several cycles, so that the picture is late by little.
@@ -20,17 +21,19 @@ from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
-from tsar.filtering import samples, tiles
+from tsar.filtering import samples, shadows, tiles
 from tsar.filtering.batches import Traced
 from tsar.filtering.records import (
     DEFAULT,
     ELEMENT_PX,
     TILE_SIDE,
+    UNSEEN,
     VARIANCE_MAX,
     Change,
     Estimates,
     FilterOptions,
     Surfels,
+    by_pixels,
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting
@@ -40,12 +43,12 @@ from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoin
 PIXEL_FLOPS = {True: 340.0, False: 185.0}
 """Operations per output pixel and cycle, with and without reprojection, as a test counts them in the code: aging,
 moving, choosing and smoothing. A batch is taken in where its samples lie, which they pay for."""
-SAMPLE_FLOPS = 650.0
+SAMPLE_FLOPS = 740.0
 """Operations per sample, an upper bound: replacing 6, encoding 6, roughness 24, sums 16, projection 40, taking in the
-pixel 135, and 3 x 3 pixels of roughness around it 9 x 35, with about 100 to spare."""
+pixel 135, a shadow's drift 85, and 3 x 3 pixels of roughness around it 9 x 35, with about 100 to spare."""
 _STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # golden ratio of two dimensions
 _GRID = 65536
-_WARMUP_FRAMES = 8
+_WARMUP_FRAMES = 12  # as many as framed renderers that accumulate have
 _TILES_A_PROBE = 64
 _FIRST_CYCLE = 1 << 20  # cycles before the start have numbers down to its negative
 
@@ -58,6 +61,7 @@ class State:
         estimates: of all pixels, aged to ``now_s``.
         surfels: in all pixels.
         change: observed so far.
+        drift_s: how fast shadows move over each element, image sides per second, as its newest samples met them.
         now_s: start of the newest cycle; None before the first.
         view: poses at that time; None where nothing is reprojected.
         earlier: poses at the start of the cycle before; None where there was none.
@@ -69,6 +73,7 @@ class State:
     estimates: Estimates
     surfels: Surfels
     change: Change
+    drift_s: Float[Tensor, "1 e e"]
     now_s: float | None
     view: Viewpoint | None
     earlier: Viewpoint | None
@@ -99,7 +104,7 @@ class Filter(Policy[State]):
 
     @property
     def warmup_cycles(self) -> int:
-        """Enough to sample every pixel eight times: a second at the usual rate, however short the cycles are."""
+        """Enough to sample every pixel twelve times, however short the cycles are."""
         return max(self.config.warmup_cycles, _WARMUP_FRAMES * self._side**2 // (self._tiles * TILE_SIDE**2))
 
     @property
@@ -112,7 +117,8 @@ class Filter(Policy[State]):
         side = self._side
         nothing, observed = Estimates.empty(side), Change.empty(side)
         visits = torch.zeros_like(observed.rate, dtype=torch.int64)
-        return State(nothing, Surfels.empty(side), observed, None, None, None, torch.ones(self._tiles), visits,
+        still = torch.zeros_like(observed.rate)
+        return State(nothing, Surfels.empty(side), observed, still, None, None, None, torch.ones(self._tiles), visits,
                      nothing.color, nothing.variance)  # fmt: skip
 
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
@@ -155,7 +161,7 @@ class Filter(Policy[State]):
 
     def _maps(self, state: State) -> dict[str, MapShown]:
         """How fast the picture is taken to change, and how far off each pixel is taken to be."""
-        rate = MapShown(state.change.rate[0].clone(), (1e-4, 1.0), "variance per second")
+        rate = MapShown(self._rate(state)[0].clone(), (1e-4, 1.0), "variance per second")
         return {
             "rate of change": rate,
             "expected error": MapShown(square_root(state.remaining[0]), (0.003, 0.3), "RMS"),
@@ -164,7 +170,7 @@ class Filter(Policy[State]):
     def _advanced(self, state: State, now_s: float) -> State:
         estimates, surfels = state.estimates, state.surfels
         if state.now_s is not None:
-            estimates = _aged(estimates, state.change, now_s - state.now_s)
+            estimates = self._aged(state, now_s - state.now_s)
         view = self._view(now_s) if self._view is not None else None
         if view is not None and view.kind == "panorama":
             view = None
@@ -178,8 +184,11 @@ class Filter(Policy[State]):
         """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
         kinds = tiles.spacings(self._side)
         if self._options.by_gain:
-            rate = state.change.rate_px
+            rate = by_pixels(self._rate(state))
             speed = state.surfels.step.abs().amax(0, keepdim=True) / moment.cycle_s
+            if state.view is not None:
+                # what was not seen yet lies where much moves, and is not of use for long
+                speed = torch.where(state.surfels.instance == UNSEEN, torch.inf, speed)
             chosen = self._stages.chosen(
                 state.remaining, state.estimates.roughness, rate, speed, moment.cycle_s, self._tiles, self._options
             )
@@ -192,7 +201,7 @@ class Filter(Policy[State]):
         tile = torch.cat(found).to(torch.float64)
         tile = tile[torch.arange(self._tiles) % len(tile)]
         middle = ((tile[:, :2] + 0.5 * TILE_SIDE * tile[:, 2:]) / ELEMENT_PX).to(torch.int64)
-        order = torch.argsort(state.change.rate[0][middle[:, 0], middle[:, 1]], stable=True)
+        order = torch.argsort(self._rate(state)[0][middle[:, 0], middle[:, 1]], stable=True)
         y, x, spacing = tile[order].unbind(1)
         if self._probes(moment):
             width = TILE_SIDE * kinds[0]
@@ -221,10 +230,30 @@ class Filter(Policy[State]):
         )  # fmt: skip
         after = self._stages.taken_in(state.estimates, state.surfels, state.change, traced, self._options)
         estimates, surfels, observed = after
-        return replace(state, estimates=estimates, surfels=surfels, change=observed)
+        drift_s = self._shadows(state, batch, answered, moment)
+        return replace(state, estimates=estimates, surfels=surfels, change=observed, drift_s=drift_s)
+
+    def _shadows(
+        self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment
+    ) -> Float[Tensor, "1 e e"]:
+        if not self._options.shadows or answered.hits is None or state.view is None or state.earlier is None:
+            return state.drift_s
+        across = state.drift_s.shape[-1]
+        place = (batch.position.reshape(-1, 2) * across).to(torch.int64)
+        drift_s = shadows.drift(answered.hits, state.view, state.earlier) / moment.cycle_s
+        return shadows.last_seen(state.drift_s, drift_s, place[:, 1] * across + place[:, 0])
+
+    def _rate(self, state: State) -> Float[Tensor, "1 e e"]:
+        """Variance per second by which estimates age: what was observed, or what shadows make likely."""
+        return torch.maximum(state.change.rate, shadows.expected_rate(state.drift_s, self._options.reach))
+
+    def _aged(self, state: State, seconds: float) -> Estimates:
+        """Estimates some seconds later."""
+        aged = (state.estimates.aged + by_pixels(self._rate(state)) * seconds).clamp(max=VARIANCE_MAX)
+        return replace(state.estimates, aged=aged)
 
     def _displayed(self, state: State, moment: Moment) -> State:
-        aged = _aged(state.estimates, state.change, moment.cycle_s)
+        aged = self._aged(state, moment.cycle_s)
         if state.view is not None:
             aged = aged.beside(state.surfels)
         if not self._options.smoothing:
@@ -233,11 +262,9 @@ class Filter(Policy[State]):
         return replace(state, shown=shown, remaining=remaining)
 
 
-def _aged(estimates: Estimates, observed: Change, seconds: float) -> Estimates:
-    """Estimates some seconds later."""
-    aged = (estimates.aged + observed.rate_px * seconds).clamp(max=VARIANCE_MAX)
-    return replace(estimates, aged=aged)
-
-
-unmoved = partial(Filter, options=FilterOptions(reprojection=False, probes=False, share_max=1.0))
+WITHOUT_REPROJECTION = FilterOptions(
+    reprojection=False, probes=False, share_max=1.0, life_min_s=0.1, life_max_s=1.0, memory_s=0.1
+)
+"""The filter alone: its samples are of use for less long, as they stay behind when surfaces move on."""
+unmoved = partial(Filter, options=WITHOUT_REPROJECTION)
 """The filter without reprojection."""
