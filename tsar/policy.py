@@ -76,6 +76,23 @@ class Moment:
     cycle_s: float
 
 
+class WhenAsked(Mapping[str, MapShown]):
+    """Maps that are made when somebody draws them: most cycles are never looked at."""
+
+    def __init__(self, made_by: Mapping[str, Callable[[], MapShown]]) -> None:
+        """Takes a function for each name."""
+        self._made_by = made_by
+
+    def __getitem__(self, name: str) -> MapShown:
+        return self._made_by[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made_by)
+
+    def __len__(self) -> int:
+        return len(self._made_by)
+
+
 @dataclass(frozen=True)
 class Picture:
     """What a policy puts on the display.

@@ -36,7 +36,7 @@ _APART = 320
 def filter_stages(side: int, threads: int = 1) -> FilterStages:
     """Kernels for a picture of ``side`` pixels, a power of two of at least 16."""
     made = _Compiled(side, threads)
-    return FilterStages(made.moved, made.chosen, made.taken_in, made.smoothed)
+    return FilterStages(made.advanced, made.chosen, made.taken_in, made.displayed)
 
 
 class _Compiled:
@@ -47,6 +47,7 @@ class _Compiled:
         room = self._memory.room
         self._plans = [kernels.FilterPlan() for _ in range(2)]
         motion, depth = room("motion", 4 * self._pixels), room("depth", self._pixels, _F64)
+        aged = room("aged", self._pixels)
         frame = (side + 2) * (side + 2 * FRAME)
         front = self._memory.keep("front", torch.full((frame,), inf, dtype=_F64), _F64, frame)
         source = room("source", self._pixels, torch.int32)
@@ -55,10 +56,9 @@ class _Compiled:
         done = self._memory.zeros("done", self._pixels, torch.uint8)
         for perspective, plan in enumerate(self._plans):
             plan.side, plan.perspective = side, perspective
-            plan.motion, plan.depth, plan.source, plan.front = motion, depth, source, front
+            plan.motion, plan.aged, plan.depth, plan.source, plan.front = motion, aged, depth, source, front
             plan.slot, plan.pixel, plan.done = slot, pixel, done
-        edges = [side * number // threads for number in range(threads + 1)]
-        self._rows = [(a, b) for a, b in pairwise(edges) if b > a]
+        self._rows = _shares(side, threads)
         self._bands = np.zeros((len(self._rows), 5), np.int64)  # surfels::Band
         for number, (first, last) in enumerate(self._rows):
             least = room(f"least {number}", (last - first + 4) * (side + 4), _I64)
@@ -78,12 +78,14 @@ class _Compiled:
         self._addresses = np.zeros(6 + len(_KINDS) + 8, np.int64)
         addresses = address("addresses", self._addresses, _I64, len(self._addresses))
         self._take_in = [Command(kernels.take_in, plan, addresses) for plan in self._plans]
-        self._prepare_tiles()
-        self._prepare_picture()
+        self._prepare_tiles(threads)
+        self._prepare_picture(threads)
 
-    def moved(self, estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:
-        """As :func:`tsar.filtering.motion.moved`."""
-        rows = _rows(view)
+    def advanced(
+        self, estimates: Estimates, surfels: Surfels, rate: Tensor, seconds: float, view: Viewpoint
+    ) -> tuple[Estimates, Surfels]:
+        """As :func:`tsar.filtering.motion.advanced`."""
+        rows, rate = _rows(view), rate.contiguous()
         before = _planes(estimates, surfels)
         after = self._new_planes()
         where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
@@ -91,13 +93,13 @@ class _Compiled:
             *where[:-1], *(self._address(name, plane) for name, plane in zip(_KINDS, after, strict=True))
         ]  # fmt: skip
         at = dict(zip(_KINDS, where, strict=True))
-        names = "instance", "point", "aged", "inverse", "roughness"
-        arguments = *_poses(rows, view), *(at[name] for name in names)
+        of = *_poses(rows, view), *(at[name] for name in ("instance", "point", "inverse", "roughness"))
+        ageing = at["position"], at["aged"], self._elements(rate), seconds
         perspective = view.kind == "perspective"
         offer, choose = self._offer[perspective], self._choose[perspective]
         for one, other in zip(offer, choose, strict=True):
-            one.set(*arguments, at["position"])
-            other.set(*arguments)
+            one.set(*of, *ageing)
+            other.set(*of)
         for commands in (offer, choose, self._take):
             TEAM.run(commands)
         return Estimates(*after[:5]), Surfels(*after[5:])
@@ -141,58 +143,78 @@ class _Compiled:
         variance: Tensor,
         roughness: Tensor,
         rate: Tensor,
-        speed: Tensor,
+        surfels: Surfels | None,
         cycle_s: float,
         count: int,
         options: FilterOptions,
     ) -> list[Tensor]:
         """As :func:`tsar.filtering.tiles.chosen`."""
-        planes = {"variance": variance, "roughness": roughness, "rate": rate, "speed": speed}
-        kept = {name: plane.contiguous() for name, plane in planes.items()}
-        where = [address(name, plane, _F32, self._pixels) for name, plane in kept.items()]
+        kept = [("variance", variance), ("roughness", roughness), ("rate", rate)]
+        if surfels is not None:
+            kept += [("step", surfels.step), ("instance", surfels.instance)]
+        planes = [(name, plane.contiguous()) for name, plane in kept]
+        where = [self._elements(one) if name == "rate" else self._address(name, one) for name, one in planes]
+        where += [0] * (5 - len(where))
         lengths = cycle_s, options.reach * self._side, options.life_min_s, options.life_max_s
-        for (spacing, tiles, plane, gain), command in zip(self._levels, self._gain, strict=True):
-            command.set(spacing, *lengths, self._side, tiles, *where, plane, gain)
-        for first in range(0, len(self._gain), len(self._rows)):
-            TEAM.run(self._gain[first : first + len(self._rows)])
+        for command in self._gain:
+            command.set(*where, *lengths)
+        TEAM.run(self._gain)
         self._best(count)
         found = [level.bool() for level in self._split(self._taken)]
-        gains = self._split(self._gains)
-        return filled_up(found, gains, self._spacings.index(1.0), count)
+        if int(self._found[0]) == count:
+            return found
+        return filled_up(found, self._split(self._gains), self._spacings.index(1.0), count)
 
-    def smoothed(self, color: Tensor, variance: Tensor, roughness: Tensor) -> tuple[Tensor, Tensor]:
-        """As :func:`tsar.filtering.display.smoothed`."""
-        levels, fine = self._pyramid, (color, variance, roughness)
-        finest = levels[: 5 * self._pixels].reshape(5, self._side, self._side)
-        torch.cat(fine, out=finest)
+    def displayed(
+        self, estimates: Estimates, surfels: Surfels | None, rate: Tensor, seconds: float
+    ) -> tuple[Tensor, Tensor]:
+        """As :func:`tsar.filtering.display.displayed`."""
+        rate = rate.contiguous()
+        names = ["color", "roughness", "aged", "inverse"]
+        planes = [getattr(estimates, name).contiguous() for name in names]
+        if surfels is not None:
+            names, planes = [*names, "position"], [*planes, surfels.position.contiguous()]
+        at = {name: self._address(name, plane) for name, plane in zip(names, planes, strict=True)}
+        block = self._pictures.block().view(_F32)
+        where, (variance, levels) = block.data_ptr(), self._room
+        self._picture[:] = [
+            at["color"], at["roughness"], variance,
+            at["aged"], at["inverse"], at["roughness"], self._elements(rate), at.get("position", 0),
+            levels, where, where + 4 * 3 * self._pixels,
+        ]  # fmt: skip
+        for command in self._shrink:
+            command.set(seconds)
+        TEAM.run(self._shrink)
         self._smooth()
-        return finest[:3].clone(), finest[3:4].clone()
+        TEAM.run(self._show)
+        color, remaining = block.split([3 * self._pixels, self._pixels])
+        return color.view(self._side, self._side, 3).permute(2, 0, 1), remaining.view(1, self._side, self._side)
 
-    def _prepare_tiles(self) -> None:
+    def _prepare_tiles(self, threads: int) -> None:
         self._spacings = spacings(self._side)
         sides = [int(self._side / (TILE_SIDE * spacing)) for spacing in self._spacings]
         self._sides, total = sides, sum(side * side for side in sides)
         self._gains, self._taken = torch.zeros(total, dtype=_F64), torch.zeros(total, dtype=torch.uint8)
-        room, gains = self._memory.room, address("gains", self._gains, _F64, total)
-        starts = np.cumsum([0, *(side * side for side in sides)])
-        self._levels = [
-            (spacing, side, room(f"plane {side}", self._pixels * 3 // 2), gains + 8 * int(start))
-            for spacing, side, start in zip(self._spacings, sides, starts, strict=False)
-        ]
-        self._gain = [Command(kernels.gain) for _ in self._levels]
-        best = Command(kernels.best)
-        memory = room("value", total, _F64), room("count", total, torch.int32)
-        taken = address("taken", self._taken, torch.uint8, total)
-        self._best = lambda count: best(gains, len(sides), sides[0], count, *memory, taken)
+        self._found = np.zeros(1, np.int32)
+        gains, taken = address("gains", self._gains, _F64, total), address("taken", self._taken, torch.uint8, total)
+        fixed = self._side, sides[0], len(sides), self._spacings[0], gains
+        self._gain = [Command(kernels.gain, *fixed, *rows) for rows in _shares(sides[0], threads)]
+        found = address("found", self._found, torch.int32, 1)
+        self._best = Command(kernels.best, gains, len(sides), sides[0], self._memory.room("most", total, _F64), taken,
+                             found)  # fmt: skip
 
-    def _prepare_picture(self) -> None:
-        pixels, wide = 0, self._side
-        while wide >= 1:
-            pixels, wide = pixels + wide * wide, wide // 2
-        self._pyramid = torch.zeros(5 * pixels)
-        levels = address("levels", self._pyramid, _F32, 5 * pixels)
-        spare = self._memory.room("spare", 2 * self._pixels)
-        self._smooth = Command(kernels.smooth, levels, self._side, spare).launch
+    def _prepare_picture(self, threads: int) -> None:
+        side, pixels = self._side, self._pixels
+        self._pictures = Recycled(4 * 4 * pixels)
+        self._picture = np.zeros(11, np.int64)  # pyramid::Picture
+        levels = sum(5 * 4**level for level in range(side.bit_length() - 1))
+        self._room = self._memory.room("variance", pixels), self._memory.room("levels", levels)
+        picture = address("picture", self._picture, _I64, 11)
+        spare = [self._memory.room(f"spare {number}", 16 * side) for number in range(threads)]
+        rows = list(enumerate(_shares(side // 2, threads)))
+        self._shrink = [Command(kernels.shrink, picture, side, *share, spare[number]) for number, share in rows]
+        self._show = [Command(kernels.show, picture, side, *share, spare[number]) for number, share in rows]
+        self._smooth = Command(kernels.smooth, self._room[1], side // 2, spare[0]).launch
 
     def _split(self, values: Tensor) -> list[Tensor]:
         sizes = [side * side for side in self._sides]
@@ -205,9 +227,18 @@ class _Compiled:
             start += size + _APART
         return made
 
+    def _elements(self, rate: Tensor) -> int:
+        return address("rate", rate, _F32, self._pixels // ELEMENT_PX**2)
+
     def _address(self, name: str, plane: Tensor) -> int:
-        planes, kind = _KINDS[name]
+        planes, kind = _KINDS.get(name, (1, _F32))
         return address(name, plane, kind, planes * self._pixels)
+
+
+def _shares(rows: int, threads: int) -> list[tuple[int, int]]:
+    """First and last row, exclusive, of each thread that has any."""
+    edges = [rows * number // threads for number in range(threads + 1)]
+    return [(first, last) for first, last in pairwise(edges) if last > first]
 
 
 def _rows(view: Viewpoint) -> Tensor:

@@ -20,6 +20,8 @@ class FilterPlan:
     perspective: wp.int32
     motion: wp.uint64
     """float32, where surfels are and how far they moved, pixels: x, y, x, y."""
+    aged: wp.uint64
+    """float32, variance by change at the new time."""
     depth: wp.uint64
     """float64."""
     front: wp.uint64
@@ -37,8 +39,8 @@ class FilterPlan:
 @wp.func_native("""
     surfels::offer_own(plan, {(const double*)rows, row_count, tan_x, tan_y}, (const long long*)instance,
                        (const float*)point, (const float*)position,
-                       {(const float*)aged, (const float*)inverse, (const float*)roughness},
-                       ((surfels::Band*)bands)[number]);
+                       {(const float*)plan.aged, (const float*)inverse, (const float*)roughness},
+                       {(const float*)aged, (const float*)rate, seconds}, ((surfels::Band*)bands)[number]);
 """)
 def native_offer(
     plan: FilterPlan,
@@ -50,16 +52,18 @@ def native_offer(
     tan_y: wp.float64,
     instance: Address,
     point: Address,
-    aged: Address,
     inverse: Address,
     roughness: Address,
     position: Address,
+    aged: Address,
+    rate: Address,
+    seconds: wp.float32,
 ): ...
 
 
 @wp.func_native("""
     surfels::choose(plan, {(const double*)rows, row_count, tan_x, tan_y}, (const long long*)instance,
-                    (const float*)point, {(const float*)aged, (const float*)inverse, (const float*)roughness},
+                    (const float*)point, {(const float*)plan.aged, (const float*)inverse, (const float*)roughness},
                     (const surfels::Band*)bands, band_count, number);
 """)
 def native_choose(
@@ -73,7 +77,6 @@ def native_choose(
     tan_y: wp.float64,
     instance: Address,
     point: Address,
-    aged: Address,
     inverse: Address,
     roughness: Address,
 ): ...
@@ -111,36 +114,57 @@ def native_take_in(
 
 
 @wp.func_native("""
-    gains::of_level(spacing, {cycle_s, reach_px, life_min_s, life_max_s}, side, tiles, (const float*)variance,
-                    (const float*)roughness, (const float*)rate, (const float*)speed, (float*)plane, (double*)gain);
+    gains::of_tiles({(const float*)variance, (const float*)roughness, (const float*)rate, (const float*)step,
+                     (const long long*)instance},
+                    {cycle_s, reach_px, life_min_s, life_max_s}, side, coarsest, levels, spacing, first, last,
+                    (double*)gain);
 """)
 def native_gain(
+    side: wp.int32,
+    coarsest: wp.int32,
+    levels: wp.int32,
     spacing: wp.float32,
+    gain: Address,
+    first: wp.int32,
+    last: wp.int32,
+    variance: Address,
+    roughness: Address,
+    rate: Address,
+    step: Address,
+    instance: Address,
     cycle_s: wp.float32,
     reach_px: wp.float32,
     life_min_s: wp.float32,
     life_max_s: wp.float32,
-    side: wp.int32,
-    tiles: wp.int32,
-    variance: Address,
-    roughness: Address,
-    rate: Address,
-    speed: Address,
-    plane: Address,
-    gain: Address,
 ): ...
 
 
 @wp.func_native("""
-    gains::best((const double*)gain, levels, coarsest, most, (double*)value, (int*)count, (unsigned char*)taken);
+    *(int*)found = gains::best((const double*)gain, levels, coarsest, limit, (double*)most, (unsigned char*)taken);
 """)
 def native_best(
-    gain: Address, levels: wp.int32, coarsest: wp.int32, most: wp.int32, value: Address, count: Address, taken: Address
+    gain: Address,
+    levels: wp.int32,
+    coarsest: wp.int32,
+    most: Address,
+    taken: Address,
+    found: Address,
+    limit: wp.int32,
+): ...
+
+
+@wp.func_native("pyramid::shrink(*(const pyramid::Picture*)picture, side, seconds, first, last, (float*)spare);")
+def native_shrink(
+    picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address, seconds: wp.float32
 ): ...
 
 
 @wp.func_native("pyramid::smooth((float*)levels, side, (float*)spare);")
 def native_smooth(levels: Address, side: wp.int32, spare: Address): ...
+
+
+@wp.func_native("pyramid::show(*(const pyramid::Picture*)picture, side, first, last, (float*)spare);")
+def native_show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address): ...
 
 
 @wp.kernel
@@ -154,15 +178,17 @@ def offer(
     tan_y: wp.float64,
     instance: Address,
     point: Address,
-    aged: Address,
     inverse: Address,
     roughness: Address,
     position: Address,
+    aged: Address,
+    rate: Address,
+    seconds: wp.float32,
 ):
     """Where the surfels of a band are seen, and the best of them for each of its pixels; ``bands`` are
     ``surfels::Band``."""
-    native_offer(plan, bands, number, rows, row_count, tan_x, tan_y, instance, point, aged, inverse, roughness,
-                 position)  # fmt: skip
+    native_offer(plan, bands, number, rows, row_count, tan_x, tan_y, instance, point, inverse, roughness, position,
+                 aged, rate, seconds)  # fmt: skip
 
 
 @wp.kernel
@@ -177,12 +203,11 @@ def choose(
     tan_y: wp.float64,
     instance: Address,
     point: Address,
-    aged: Address,
     inverse: Address,
     roughness: Address,
 ):
     """The best of all surfels for each pixel of a band, once all bands were offered theirs."""
-    native_choose(plan, bands, band_count, number, rows, row_count, tan_x, tan_y, instance, point, aged, inverse,
+    native_choose(plan, bands, band_count, number, rows, row_count, tan_x, tan_y, instance, point, inverse,
                   roughness)  # fmt: skip
 
 
@@ -221,34 +246,55 @@ def take_in(
 
 @wp.kernel
 def gain(
+    side: wp.int32,
+    coarsest: wp.int32,
+    levels: wp.int32,
     spacing: wp.float32,
+    gain: Address,
+    first: wp.int32,
+    last: wp.int32,
+    variance: Address,
+    roughness: Address,
+    rate: Address,
+    step: Address,
+    instance: Address,
     cycle_s: wp.float32,
     reach_px: wp.float32,
     life_min_s: wp.float32,
     life_max_s: wp.float32,
-    side: wp.int32,
-    tiles: wp.int32,
-    variance: Address,
-    roughness: Address,
-    rate: Address,
-    speed: Address,
-    plane: Address,
-    gain: Address,
 ):
-    """What the tiles of a level gain."""
-    native_gain(spacing, cycle_s, reach_px, life_min_s, life_max_s, side, tiles, variance, roughness, rate, speed,
-                plane, gain)  # fmt: skip
+    """What the tiles of all levels gain, in some rows of the coarsest."""
+    native_gain(side, coarsest, levels, spacing, gain, first, last, variance, roughness, rate, step, instance,
+                cycle_s, reach_px, life_min_s, life_max_s)  # fmt: skip
 
 
 @wp.kernel
 def best(
-    gain: Address, levels: wp.int32, coarsest: wp.int32, most: wp.int32, value: Address, count: Address, taken: Address
+    gain: Address,
+    levels: wp.int32,
+    coarsest: wp.int32,
+    most: Address,
+    taken: Address,
+    found: Address,
+    limit: wp.int32,
 ):
-    """The best tiles of all levels."""
-    native_best(gain, levels, coarsest, most, value, count, taken)
+    """The best tiles of all levels, and how many they are."""
+    native_best(gain, levels, coarsest, most, taken, found, limit)
+
+
+@wp.kernel
+def shrink(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address, seconds: wp.float32):
+    """Some rows of the second finest level from the estimates; ``picture`` is a ``pyramid::Picture``."""
+    native_shrink(picture, side, first, last, spare, seconds)
 
 
 @wp.kernel
 def smooth(levels: Address, side: wp.int32, spare: Address):
-    """A picture from the planes of its finest level, in place."""
+    """The coarser levels, from the second finest on, in place."""
     native_smooth(levels, side, spare)
+
+
+@wp.kernel
+def show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address):
+    """The picture, from some rows of the second finest level."""
+    native_show(picture, side, first, last, spare)

@@ -6,7 +6,19 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 
+from tsar.filtering.records import Estimates, Surfels
 from tsar.policies.resampling import double_width
+
+
+def displayed(
+    estimates: Estimates, surfels: Surfels | None, rate: Float[Tensor, "1 e e"], seconds: float
+) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
+    """Picture and variance of its errors some seconds later, :func:`smoothed`; surfels are those of the estimates, None
+    where nothing is reprojected."""
+    later = estimates.later(rate, seconds)
+    if surfels is not None:
+        later = later.beside(surfels)
+    return smoothed(later.color, later.variance, later.roughness)
 
 
 def smoothed(

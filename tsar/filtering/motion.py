@@ -6,7 +6,7 @@ from math import inf
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from tsar.filtering.records import UNSEEN, VARIANCE_MAX, Estimates, Surfels, centres
@@ -20,6 +20,13 @@ DEPTHS = 1 << 13
 SCORES = 1 << 14
 SCORE_SCALE = 8e4  # scores of variances up to 0.2
 BESIDE = 0.5  # variance per roughness and pixel of distance
+
+
+def advanced(
+    estimates: Estimates, surfels: Surfels, rate: Float[Tensor, "1 e e"], seconds: float, view: Viewpoint
+) -> tuple[Estimates, Surfels]:
+    """Estimates some seconds later, at a rate of change, and :func:`moved` to the poses of that time."""
+    return moved(estimates.later(rate, seconds), surfels, view)
 
 
 def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:

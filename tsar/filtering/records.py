@@ -93,6 +93,10 @@ class Estimates:
         """Variance of the error of its colour, at most :data:`VARIANCE_MAX`."""
         return (self.aged + self.observed).clamp(max=VARIANCE_MAX)
 
+    def later(self, rate: Float[Tensor, "1 e e"], seconds: float) -> Estimates:
+        """Some seconds later, at a rate of variance per second in each element."""
+        return replace(self, aged=(self.aged + by_pixels(rate) * seconds).clamp(max=VARIANCE_MAX))
+
     def beside(self, surfels: Surfels) -> Estimates:
         """With the variance of surfels that lie beside their pixels."""
         return replace(self, aged=self.aged + self.roughness * surfels.outside_px)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from tsar.filtering.batches import Traced, taken_in
-from tsar.filtering.display import smoothed
-from tsar.filtering.motion import moved
+from tsar.filtering.display import displayed
+from tsar.filtering.motion import advanced
 from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
 from tsar.filtering.tiles import chosen
 from tsar.types import Viewpoint
@@ -20,18 +20,18 @@ class FilterStages:
     """One function a stage; arguments and results are those of the reference, which is the default.
 
     Attributes:
-        moved: estimates and surfels as new poses show them.
+        advanced: estimates and surfels of a later time, as its poses show them.
         chosen: the tiles to sample.
         taken_in: estimates, surfels and change after a batch.
-        smoothed: the picture, and the variance of its errors.
+        displayed: the picture, and the variance of its errors.
     """
 
-    moved: Callable[[Estimates, Surfels, Viewpoint], tuple[Estimates, Surfels]] = moved
-    chosen: Callable[[Tensor, Tensor, Tensor, Tensor, float, int, FilterOptions], list[Tensor]] = chosen
+    advanced: Callable[[Estimates, Surfels, Tensor, float, Viewpoint], tuple[Estimates, Surfels]] = advanced
+    chosen: Callable[[Tensor, Tensor, Tensor, Surfels | None, float, int, FilterOptions], list[Tensor]] = chosen
     taken_in: Callable[[Estimates, Surfels, Change, Traced, FilterOptions], tuple[Estimates, Surfels, Change]] = (
         taken_in
     )
-    smoothed: Callable[[Tensor, Tensor, Tensor], tuple[Tensor, Tensor]] = smoothed
+    displayed: Callable[[Estimates, Surfels | None, Tensor, float], tuple[Tensor, Tensor]] = displayed
 
 
 REFERENCE = FilterStages()

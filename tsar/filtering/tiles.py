@@ -9,7 +9,16 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from tsar.filtering.records import ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX, FilterOptions
+from tsar.filtering.records import (
+    ELEMENT_PX,
+    SPACINGS,
+    TILE_SIDE,
+    UNSEEN,
+    VARIANCE_MAX,
+    FilterOptions,
+    Surfels,
+    by_pixels,
+)
 
 BISECTIONS = 30
 PRICE_LEAST = 2.0**-46  # of the greatest gain
@@ -64,17 +73,21 @@ def gains(
 def chosen(
     variance: Float[Tensor, "1 h w"],
     roughness: Float[Tensor, "1 h w"],
-    rate: Float[Tensor, "1 h w"],
-    speed: Float[Tensor, "1 h w"],
+    rate: Float[Tensor, "1 e e"],
+    surfels: Surfels | None,
     cycle_s: float,
     count: int,
     options: FilterOptions,
 ) -> list[Bool[Tensor, "_ _"]]:
     """The ``count`` tiles that gain most, for every spacing whether each is one of them; fewer where none is free.
 
-    Arguments are those of :func:`gains`.
+    Arguments are those of :func:`gains`, but for the rate by elements and the surfels, None where nothing moves. What
+    was not seen yet lies where much moves, and is not of use for long.
     """
-    gain = gains(variance, roughness, rate, speed, cycle_s, options)
+    speed = torch.zeros_like(variance)
+    if surfels is not None:
+        speed = torch.where(surfels.instance == UNSEEN, torch.inf, surfels.step.abs().amax(0, keepdim=True) / cycle_s)
+    gain = gains(variance, roughness, by_pixels(rate), speed, cycle_s, options)
     return filled_up(best(gain, count), gain, spacings(variance.shape[-1]).index(1.0), count)
 
 

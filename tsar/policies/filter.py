@@ -12,6 +12,7 @@ several cycles, so that the picture is late by little.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,16 +28,13 @@ from tsar.filtering.records import (
     DEFAULT,
     ELEMENT_PX,
     TILE_SIDE,
-    UNSEEN,
-    VARIANCE_MAX,
     Change,
     Estimates,
     FilterOptions,
     Surfels,
-    by_pixels,
 )
 from tsar.morton import morton_to_raster
-from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
 from tsar.roots import square_root
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 
@@ -62,6 +60,7 @@ class State:
         surfels: in all pixels.
         change: observed so far.
         drift_s: how fast shadows move over each element, image sides per second, as its newest samples met them.
+        rate: variance per second by which estimates age: what was observed, or what shadows make likely.
         now_s: start of the newest cycle; None before the first.
         view: poses at that time; None where nothing is reprojected.
         earlier: poses at the start of the cycle before; None where there was none.
@@ -74,6 +73,7 @@ class State:
     surfels: Surfels
     change: Change
     drift_s: Float[Tensor, "1 e e"]
+    rate: Float[Tensor, "1 e e"]
     now_s: float | None
     view: Viewpoint | None
     earlier: Viewpoint | None
@@ -81,6 +81,11 @@ class State:
     visits: Int64[Tensor, "1 e e"]
     shown: Float[Tensor, "3 h w"]
     remaining: Float[Tensor, "1 h w"]
+
+    @property
+    def reprojected(self) -> Surfels | None:
+        """Surfels, where anything moves with them."""
+        return self.surfels if self.view is not None else None
 
 
 class Filter(Policy[State]):
@@ -96,6 +101,8 @@ class Filter(Policy[State]):
         most = int(options.share_max * self._side**2) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
+        level = max(0, (self._side // self.config.framelet_side).bit_length() - 1)
+        self._level = torch.full((self._side, self._side), level)
         self._every = max(1, _TILES_A_PROBE // self._tiles)  # cycles from one probe to the next
 
     @property
@@ -118,8 +125,8 @@ class Filter(Policy[State]):
         nothing, observed = Estimates.empty(side), Change.empty(side)
         visits = torch.zeros_like(observed.rate, dtype=torch.int64)
         still = torch.zeros_like(observed.rate)
-        return State(nothing, Surfels.empty(side), observed, still, None, None, None, torch.ones(self._tiles), visits,
-                     nothing.color, nothing.variance)  # fmt: skip
+        return State(nothing, Surfels.empty(side), observed, still, self._rate(observed, still), None, None, None,
+                     torch.ones(self._tiles), visits, nothing.color, nothing.variance)  # fmt: skip
 
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
         """Moves the estimates to the start of the cycle and asks for what they need."""
@@ -155,27 +162,19 @@ class Filter(Policy[State]):
             return self._displayed(state, moment)
 
     def image(self, state: State, moment: Moment) -> Picture:
-        level = torch.full((self._side, self._side), max(0, (self._side // self.config.framelet_side).bit_length() - 1))
-        newest = SampleMap(state.estimates.time_s[0].clone(), level)
-        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=self._maps(state))
-
-    def _maps(self, state: State) -> dict[str, MapShown]:
-        """How fast the picture is taken to change, and how far off each pixel is taken to be."""
-        rate = MapShown(self._rate(state)[0].clone(), (1e-4, 1.0), "variance per second")
-        return {
-            "rate of change": rate,
-            "expected error": MapShown(square_root(state.remaining[0]), (0.003, 0.3), "RMS"),
-        }
+        newest = SampleMap(state.estimates.time_s[0], self._level)
+        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=_maps(state))
 
     def _advanced(self, state: State, now_s: float) -> State:
         estimates, surfels = state.estimates, state.surfels
-        if state.now_s is not None:
-            estimates = self._aged(state, now_s - state.now_s)
+        seconds = now_s - state.now_s if state.now_s is not None else 0.0
         view = self._view(now_s) if self._view is not None else None
         if view is not None and view.kind == "panorama":
             view = None
         if view is not None:
-            estimates, surfels = self._stages.moved(estimates, surfels, view)
+            estimates, surfels = self._stages.advanced(estimates, surfels, state.rate, seconds, view)
+        else:
+            estimates = estimates.later(state.rate, seconds)
         return replace(state, estimates=estimates, surfels=surfels, now_s=now_s, view=view, earlier=state.view)
 
     def _chosen(
@@ -184,14 +183,10 @@ class Filter(Policy[State]):
         """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
         kinds = tiles.spacings(self._side)
         if self._options.by_gain:
-            rate = by_pixels(self._rate(state))
-            speed = state.surfels.step.abs().amax(0, keepdim=True) / moment.cycle_s
-            if state.view is not None:
-                # what was not seen yet lies where much moves, and is not of use for long
-                speed = torch.where(state.surfels.instance == UNSEEN, torch.inf, speed)
             chosen = self._stages.chosen(
-                state.remaining, state.estimates.roughness, rate, speed, moment.cycle_s, self._tiles, self._options
-            )
+                state.remaining, state.estimates.roughness, state.rate, state.reprojected, moment.cycle_s, self._tiles,
+                self._options,
+            )  # fmt: skip
         else:
             chosen = self._in_turn(kinds, moment.cycle)
         found = [
@@ -201,7 +196,7 @@ class Filter(Policy[State]):
         tile = torch.cat(found).to(torch.float64)
         tile = tile[torch.arange(self._tiles) % len(tile)]
         middle = ((tile[:, :2] + 0.5 * TILE_SIDE * tile[:, 2:]) / ELEMENT_PX).to(torch.int64)
-        order = torch.argsort(self._rate(state)[0][middle[:, 0], middle[:, 1]], stable=True)
+        order = torch.argsort(state.rate[0][middle[:, 0], middle[:, 1]], stable=True)
         y, x, spacing = tile[order].unbind(1)
         if self._probes(moment):
             width = TILE_SIDE * kinds[0]
@@ -231,7 +226,8 @@ class Filter(Policy[State]):
         after = self._stages.taken_in(state.estimates, state.surfels, state.change, traced, self._options)
         estimates, surfels, observed = after
         drift_s = self._shadows(state, batch, answered, moment)
-        return replace(state, estimates=estimates, surfels=surfels, change=observed, drift_s=drift_s)
+        rate = self._rate(observed, drift_s)
+        return replace(state, estimates=estimates, surfels=surfels, change=observed, drift_s=drift_s, rate=rate)
 
     def _shadows(
         self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment
@@ -243,23 +239,25 @@ class Filter(Policy[State]):
         drift_s = shadows.drift(answered.hits, state.view, state.earlier) / moment.cycle_s
         return shadows.last_seen(state.drift_s, drift_s, place[:, 1] * across + place[:, 0])
 
-    def _rate(self, state: State) -> Float[Tensor, "1 e e"]:
-        """Variance per second by which estimates age: what was observed, or what shadows make likely."""
-        return torch.maximum(state.change.rate, shadows.expected_rate(state.drift_s, self._options.reach))
-
-    def _aged(self, state: State, seconds: float) -> Estimates:
-        """Estimates some seconds later."""
-        aged = (state.estimates.aged + by_pixels(self._rate(state)) * seconds).clamp(max=VARIANCE_MAX)
-        return replace(state.estimates, aged=aged)
+    def _rate(self, observed: Change, drift_s: Float[Tensor, "1 e e"]) -> Float[Tensor, "1 e e"]:
+        return torch.maximum(observed.rate, shadows.expected_rate(drift_s, self._options.reach))
 
     def _displayed(self, state: State, moment: Moment) -> State:
-        aged = self._aged(state, moment.cycle_s)
-        if state.view is not None:
-            aged = aged.beside(state.surfels)
+        surfels = state.reprojected
         if not self._options.smoothing:
-            return replace(state, shown=aged.color, remaining=aged.variance)
-        shown, remaining = self._stages.smoothed(aged.color, aged.variance, aged.roughness)
+            later = state.estimates.later(state.rate, moment.cycle_s)
+            later = later if surfels is None else later.beside(surfels)
+            return replace(state, shown=later.color, remaining=later.variance)
+        shown, remaining = self._stages.displayed(state.estimates, surfels, state.rate, moment.cycle_s)
         return replace(state, shown=shown, remaining=remaining)
+
+
+def _maps(state: State) -> Mapping[str, MapShown]:
+    """How fast the picture is taken to change, and how far off each pixel is taken to be."""
+    return WhenAsked({
+        "rate of change": lambda: MapShown(state.rate[0], (1e-4, 1.0), "variance per second"),
+        "expected error": lambda: MapShown(square_root(state.remaining[0]), (0.003, 0.3), "RMS"),
+    })  # fmt: skip
 
 
 WITHOUT_REPROJECTION = FilterOptions(

@@ -108,6 +108,21 @@ struct Band {
     long long crossings;
 };
 
+// Variance by change of estimates, and how fast elements change.
+struct Ageing {
+    const float *aged, *rate;
+    float seconds;
+};
+
+// Of eight pixels that lie side by side.
+inline f8 later8(const Ageing& by, int side, int start) {
+    const int edge = given::ELEMENT_PX;
+    const float* q = by.rate + start / side / edge * (side / edge) + start % side / edge;
+    const f8 rate = {q[0], q[0], q[0], q[0], q[1], q[1], q[1], q[1]};
+    static_assert(given::ELEMENT_PX == 4);
+    return vmin(load<f8>(by.aged + start) + rate * by.seconds, (f8)given::VARIANCE_MAX);
+}
+
 struct Uncertain {
     const float *aged, *inverse, *roughness;
 };
@@ -162,7 +177,7 @@ inline void store_motion(float* to, f8 x, f8 y, f8 step_x, f8 step_y) {
 // Projects the surfels that lie in a band and offers them to its pixels.
 template <class Plan>
 inline void offer_own(const Plan& plan, const Poses& poses, const long long* instance, const float* point,
-                      const float* position, const Uncertain& of, Band& band) {
+                      const float* position, const Uncertain& of, const Ageing& ageing, Band& band) {
     const int side = plan.side, count = side * side;
     double* depth = (double*)plan.depth;
     for (long long i = 0; i < (band.last - band.first + 4) * (side + 4); ++i) band.least[i] = NONE;
@@ -173,6 +188,7 @@ inline void offer_own(const Plan& plan, const Poses& poses, const long long* ins
         store_motion((float*)plan.motion + 4 * start, x, y, x - load<f8>(position + start),
                      y - load<f8>(position + count + start));
         store(depth + start, e.depth);
+        store((float*)plan.aged + start, later8(ageing, side, start));
         if (!packets::bits(e.seen)) continue;
         offer8(plan, e, of, start, band);
         const d8 top = vfloor(e.y - 0.5);

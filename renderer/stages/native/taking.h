@@ -92,7 +92,7 @@ template <class Plan> inline void take_rows(const Plan& plan, const long long* p
             take(a.color + plane * count, b.color + plane * count, by, 0.0f);
             take(a.point + plane * count, b.point + plane * count, by, 0.0f);
         }
-        take(a.aged, b.aged, by, given::VARIANCE_MAX);
+        take(a.aged, (const float*)plan.aged, by, given::VARIANCE_MAX);
         take(a.inverse, b.inverse, by, 1.0f);
         take(a.time_s, b.time_s, by, -INF);
         take(a.instance, b.instance, by, (long long)given::UNSEEN);

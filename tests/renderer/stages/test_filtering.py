@@ -13,7 +13,7 @@ from renderer.stages.control import stages
 from renderer.stages.filtering import filter_stages
 from tests.oracles.screens import Layer, Screen
 from tsar.config import TilingConfig, TsarConfig
-from tsar.filtering.records import DEFAULT, UNSEEN, VARIANCE_MAX, Estimates, FilterOptions, Surfels, centres
+from tsar.filtering.records import DEFAULT, ELEMENT_PX, UNSEEN, VARIANCE_MAX, Estimates, FilterOptions, Surfels, centres
 from tsar.filtering.stages import FilterStages
 from tsar.policies.filter import Filter
 from tsar.policy import Moment, Setting, step
@@ -35,6 +35,11 @@ def planes(side: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
     variance = torch.rand(1, side, side, generator=made) ** 4 * VARIANCE_MAX
     roughness = 10.0 ** (-6.0 * torch.rand(1, side, side, generator=made))
     return torch.rand(3, side, side, generator=made), variance, roughness
+
+
+def rates(side: int, seed: int) -> Tensor:
+    """Variances per second of elements."""
+    return planes(side // ELEMENT_PX, seed + 50)[1] + 1e-5
 
 
 def scene(side: int, kind: str, seed: int) -> tuple[Estimates, Surfels, Viewpoint]:
@@ -66,10 +71,11 @@ def scene(side: int, kind: str, seed: int) -> tuple[Estimates, Surfels, Viewpoin
 @pytest.mark.parametrize("side", SIDES)
 def test_surfels_move_as_the_reference_moves_them(side: int, kind: str, threads: int) -> None:
     compiled = filter_stages(side, threads)
-    assert compiled.moved is not REFERENCE.moved
+    assert compiled.advanced is not REFERENCE.advanced
     for seed in range(4):
-        arguments = scene(side, kind, seed)
-        for ours, theirs in zip(compiled.moved(*arguments), REFERENCE.moved(*arguments), strict=True):
+        estimates, surfels, view = scene(side, kind, seed)
+        arguments = estimates, surfels, rates(side, seed), 0.02 * seed, view
+        for ours, theirs in zip(compiled.advanced(*arguments), REFERENCE.advanced(*arguments), strict=True):
             equal(ours, theirs)
 
 
@@ -79,19 +85,21 @@ def test_tiles_are_those_of_the_reference(side: int, threads: int) -> None:
     compiled = filter_stages(side, threads)
     for seed in range(4):
         _, variance, roughness = planes(side, seed)
-        _, rate, speed = planes(side, seed + 100)
+        surfels = scene(side, "perspective", seed)[1] if seed else None
         count = 1 + seed * (side // 16) ** 2
-        arguments = variance, roughness, rate + 1e-5, 1e3 * (speed - 1e-3).clamp(min=0.0), 0.01, count, DEFAULT
+        arguments = variance, roughness, rates(side, seed), surfels, 0.01, count, DEFAULT
         for ours, theirs in zip(compiled.chosen(*arguments), REFERENCE.chosen(*arguments), strict=True):
             assert torch.equal(ours, theirs)
 
 
+@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("side", SIDES)
-def test_pictures_are_those_of_the_reference(side: int) -> None:
-    compiled = filter_stages(side)
+def test_pictures_are_those_of_the_reference(side: int, threads: int) -> None:
+    compiled = filter_stages(side, threads)
     for seed in range(4):
-        arguments = planes(side, seed)
-        for ours, theirs in zip(compiled.smoothed(*arguments), REFERENCE.smoothed(*arguments), strict=True):
+        estimates, surfels, _ = scene(side, "perspective", seed)
+        arguments = estimates, surfels if seed % 2 else None, rates(side, seed), 0.02 * seed
+        for ours, theirs in zip(compiled.displayed(*arguments), REFERENCE.displayed(*arguments), strict=True):
             assert torch.equal(ours, theirs)
 
 
