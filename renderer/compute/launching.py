@@ -120,6 +120,24 @@ def _packer(structure: type[ctypes.Structure], first: int) -> Callable[..., None
     return lambda target, *numbers: pack(target, start, *numbers)
 
 
+class Record:
+    """A structure of native code that launches read by its address: words of eight bytes.
+
+    Attributes:
+        address: where it lies.
+    """
+
+    def __init__(self, layout: str) -> None:
+        """Takes the kinds of its words as :mod:`struct` names them."""
+        self._pack = struct.Struct("=" + layout).pack_into
+        self._bytes = np.zeros(struct.calcsize("=" + layout), np.uint8)
+        self.address = self._bytes.ctypes.data
+
+    def set(self, *words: float) -> None:
+        """Sets all words."""
+        self._pack(self._bytes, 0, *words)
+
+
 _CODES = {
     ctypes.c_int32: "i",
     ctypes.c_int64: "q",

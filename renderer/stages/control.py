@@ -17,7 +17,7 @@ from renderer.compute import device as devices
 from renderer.compute.launching import Command, address, require_same
 from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
-from renderer.stages import filtering_kernels, kernels, plans, reconstruction_kernels
+from renderer.stages import filtering_kernels, kernels, picture_kernels, plans, reconstruction_kernels
 from renderer.stages.coverage import StageName, covers
 from renderer.stages.filtering import filter_stages
 from renderer.stages.reconstruction import Reconstructor
@@ -51,7 +51,7 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
 
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
     """Kernels throughout, but for what they do not cover of a configuration (:mod:`renderer.stages.coverage`)."""
-    devices.load_kernels((kernels, reconstruction_kernels, filtering_kernels), "cpu")
+    devices.load_kernels((kernels, reconstruction_kernels, filtering_kernels, picture_kernels), "cpu")
     control, reconstructor = Control(config, threads), Reconstructor(config, threads)
     return Stages(
         observe=control.observe,

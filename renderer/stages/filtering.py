@@ -10,10 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from renderer.compute.launching import Command, address
+from renderer.compute.launching import Command, Record, address
 from renderer.compute.memory import Memory, Recycled
 from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels as kernels
+from renderer.stages import picture_kernels
 from renderer.stages.sizes import FRAME, PIXEL_WORDS
 from tsar.filtering.batches import Traced
 from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, FilterOptions, Surfels
@@ -75,9 +76,7 @@ class _Compiled:
         self._planes = np.zeros(2 * len(_KINDS) - 1, np.int64)
         planes = address("planes", self._planes, _I64, len(self._planes))
         self._take = [Command(kernels.take, self._plans[0], bands, number, planes) for number in numbers]
-        self._addresses = np.zeros(6 + len(_KINDS) + 8, np.int64)
-        addresses = address("addresses", self._addresses, _I64, len(self._addresses))
-        self._take_in = [Command(kernels.take_in, plan, addresses) for plan in self._plans]
+        self._prepare_batch(threads)
         self._prepare_tiles(threads)
         self._prepare_picture(threads)
 
@@ -114,6 +113,8 @@ class _Compiled:
         if not moves:  # aged, but for that those of the cycle before
             planes[:5] = [plane.clone() for plane in planes[:5]]
         samples = tiles * TILE_SIDE**2
+        if samples > self._pixels:
+            raise ValueError(f"batch: expected at most {self._pixels} samples, got {samples}")
         batch = [
             (traced.color, _F32, 3 * samples), (traced.position, _F32, 2 * samples), (traced.time_s, _F64, samples),
             (traced.spacing, _F32, tiles),
@@ -128,14 +129,19 @@ class _Compiled:
         where = [address("batch", values, *kind) for values, (_, *kind) in zip(kept, batch, strict=True)]
         where += [0] * (6 - len(where))
         own = [self._address(name, plane) for name, plane in zip(_KINDS, planes, strict=True)]
-        self._addresses[:] = [*where, *own, *changes]
-        moment = traced.now_s, options.memory_s, VARIANCE_MAX / traced.cycle_s
-        parts = moves, options.accumulation, options.spread
         views = [seen if moves else None for seen in (view, traced.earlier)]
         rows = [_rows(seen) if seen is not None else None for seen in views]
         poses = [_poses(row, seen) for row, seen in zip(rows, views, strict=True)]
-        command = self._take_in[view is None or view.kind == "perspective"]
-        command(tiles, *moment, *map(int, parts), *poses[0], *poses[1])
+        moment = traced.now_s, options.memory_s, VARIANCE_MAX / traced.cycle_s
+        flags = moves, options.accumulation, options.spread
+        self._batch.set(*where, tiles, *own, *changes, *self._samples, *poses[0], *poses[1], *moment, *map(int, flags))
+        perspective = view is None or view.kind == "perspective"
+        locate = self._locate[perspective]
+        for command, (first, last) in zip(locate, _shares(tiles, len(locate)), strict=False):
+            command.set(first, last)
+        TEAM.run(locate[: len(_shares(tiles, len(locate)))])
+        for commands in (self._gather, self._learn, self._take_in):
+            TEAM.run(commands)
         return Estimates(*planes[:5]), Surfels(*planes[5:]), Change(*after[:4])
 
     def chosen(
@@ -190,6 +196,19 @@ class _Compiled:
         color, remaining = block.split([3 * self._pixels, self._pixels])
         return color.view(self._side, self._side, 3).permute(2, 0, 1), remaining.view(1, self._side, self._side)
 
+    def _prepare_batch(self, threads: int) -> None:
+        room, pixels = self._memory.room, self._pixels
+        self._samples = [room("at", pixels, torch.int32), *(room(f"samples {k}", pixels) for k in range(5))]
+        self._batch = Record("6Q Q 9Q 8Q 6Q Qqdd Qqdd 3d 3q")  # batches::Batch
+        rows = [(ELEMENT_PX * a, ELEMENT_PX * b) for a, b in _shares(self._side // ELEMENT_PX, threads)]
+        self._parts = np.array([(*share, 0) for share in rows], np.int64)  # batches::Part
+        batch, parts, count = self._batch.address, address("parts", self._parts, _I64, 3 * len(rows)), len(rows)
+        self._locate = [[Command(kernels.locate, plan, batch) for _ in range(threads)] for plan in self._plans]
+        plan = self._plans[0]
+        self._gather = [Command(kernels.gather, plan, batch, parts, number) for number in range(count)]
+        self._learn = [Command(kernels.learn, plan, batch, parts, count, number) for number in range(count)]
+        self._take_in = [Command(kernels.take_in, plan, batch, parts, number) for number in range(count)]
+
     def _prepare_tiles(self, threads: int) -> None:
         self._spacings = spacings(self._side)
         sides = [int(self._side / (TILE_SIDE * spacing)) for spacing in self._spacings]
@@ -198,10 +217,10 @@ class _Compiled:
         self._found = np.zeros(1, np.int32)
         gains, taken = address("gains", self._gains, _F64, total), address("taken", self._taken, torch.uint8, total)
         fixed = self._side, sides[0], len(sides), self._spacings[0], gains
-        self._gain = [Command(kernels.gain, *fixed, *rows) for rows in _shares(sides[0], threads)]
+        self._gain = [Command(picture_kernels.gain, *fixed, *rows) for rows in _shares(sides[0], threads)]
         found = address("found", self._found, torch.int32, 1)
-        self._best = Command(kernels.best, gains, len(sides), sides[0], self._memory.room("most", total, _F64), taken,
-                             found)  # fmt: skip
+        most = self._memory.room("most", total, _F64)
+        self._best = Command(picture_kernels.best, gains, len(sides), sides[0], most, taken, found)
 
     def _prepare_picture(self, threads: int) -> None:
         side, pixels = self._side, self._pixels
@@ -212,9 +231,9 @@ class _Compiled:
         picture = address("picture", self._picture, _I64, 11)
         spare = [self._memory.room(f"spare {number}", 16 * side) for number in range(threads)]
         rows = list(enumerate(_shares(side // 2, threads)))
-        self._shrink = [Command(kernels.shrink, picture, side, *share, spare[number]) for number, share in rows]
-        self._show = [Command(kernels.show, picture, side, *share, spare[number]) for number, share in rows]
-        self._smooth = Command(kernels.smooth, self._room[1], side // 2, spare[0]).launch
+        self._shrink = [Command(picture_kernels.shrink, picture, side, *share, spare[number]) for number, share in rows]
+        self._show = [Command(picture_kernels.show, picture, side, *share, spare[number]) for number, share in rows]
+        self._smooth = Command(picture_kernels.smooth, self._room[1], side // 2, spare[0]).launch
 
     def _split(self, values: Tensor) -> list[Tensor]:
         sizes = [side * side for side in self._sides]

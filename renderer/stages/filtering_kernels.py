@@ -1,5 +1,5 @@
-"""Kernel entry points of the filter's stages (``native/surfels.h``, ``taking.h``, ``batches.h``, ``gains.h``,
-``pyramid.h``), defined in ``tsar/filtering``. Threads take rows."""
+"""Kernel entry points of the filter's stages that move estimates and take batches in (``native/surfels.h``,
+``taking.h``, ``changes.h``, ``batches.h``), defined in ``tsar/filtering``. Threads take rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
 from renderer.stages import sizes
 
-wp.set_module_options(module_options("batches.h", "gains.h", "pyramid.h", "taking.h", given=sizes.FILTERING))
+wp.set_module_options(module_options("batches.h", given=sizes.FILTERING))
 
 
 @wp.struct
@@ -86,85 +86,23 @@ def native_choose(
 def native_take(plan: FilterPlan, bands: Address, number: wp.int32, planes: Address): ...
 
 
-@wp.func_native("""
-    batches::take_in(plan, (const long long*)addresses, tiles, {(const double*)rows, row_count, tan_x, tan_y},
-                     {(const double*)earlier_rows, earlier_count, earlier_tan_x, earlier_tan_y},
-                     {now_s, memory_s, rate_max, reprojected, accumulates, spreads}, (int*)plan.slot,
-                     (batches::Pixel*)plan.pixel, (unsigned char*)plan.done);
-""")
-def native_take_in(
-    plan: FilterPlan,
-    addresses: Address,
-    tiles: wp.int32,
-    now_s: wp.float64,
-    memory_s: wp.float32,
-    rate_max: wp.float32,
-    reprojected: wp.int32,
-    accumulates: wp.int32,
-    spreads: wp.int32,
-    rows: Address,
-    row_count: wp.int32,
-    tan_x: wp.float64,
-    tan_y: wp.float64,
-    earlier_rows: Address,
-    earlier_count: wp.int32,
-    earlier_tan_x: wp.float64,
-    earlier_tan_y: wp.float64,
-): ...
+@wp.func_native("batches::locate(plan, *(const batches::Batch*)batch, first, last);")
+def native_locate(plan: FilterPlan, batch: Address, first: wp.int32, last: wp.int32): ...
 
 
 @wp.func_native("""
-    gains::of_tiles({(const float*)variance, (const float*)roughness, (const float*)rate, (const float*)step,
-                     (const long long*)instance},
-                    {cycle_s, reach_px, life_min_s, life_max_s}, side, coarsest, levels, spacing, first, last,
-                    (double*)gain);
+    batches::Part& part = ((batches::Part*)parts)[number];
+    part.pixels = batches::gather(plan, *(const batches::Batch*)batch, (int)part.first, (int)part.last);
 """)
-def native_gain(
-    side: wp.int32,
-    coarsest: wp.int32,
-    levels: wp.int32,
-    spacing: wp.float32,
-    gain: Address,
-    first: wp.int32,
-    last: wp.int32,
-    variance: Address,
-    roughness: Address,
-    rate: Address,
-    step: Address,
-    instance: Address,
-    cycle_s: wp.float32,
-    reach_px: wp.float32,
-    life_min_s: wp.float32,
-    life_max_s: wp.float32,
-): ...
+def native_gather(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32): ...
 
 
-@wp.func_native("""
-    *(int*)found = gains::best((const double*)gain, levels, coarsest, limit, (double*)most, (unsigned char*)taken);
-""")
-def native_best(
-    gain: Address,
-    levels: wp.int32,
-    coarsest: wp.int32,
-    most: Address,
-    taken: Address,
-    found: Address,
-    limit: wp.int32,
-): ...
+@wp.func_native("batches::learn(plan, *(const batches::Batch*)batch, (const batches::Part*)parts, part_count, number);")
+def native_learn(plan: FilterPlan, batch: Address, parts: Address, part_count: wp.int32, number: wp.int32): ...
 
 
-@wp.func_native("pyramid::shrink(*(const pyramid::Picture*)picture, side, seconds, first, last, (float*)spare);")
-def native_shrink(
-    picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address, seconds: wp.float32
-): ...
-
-
-@wp.func_native("pyramid::smooth((float*)levels, side, (float*)spare);")
-def native_smooth(levels: Address, side: wp.int32, spare: Address): ...
-
-
-@wp.func_native("pyramid::show(*(const pyramid::Picture*)picture, side, first, last, (float*)spare);")
-def native_show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address): ...
+@wp.func_native("batches::take_in(plan, *(const batches::Batch*)batch, ((const batches::Part*)parts)[number]);")
+def native_take_in(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32): ...
 
 
 @wp.kernel
@@ -219,82 +157,24 @@ def take(plan: FilterPlan, bands: Address, number: wp.int32, planes: Address):
 
 
 @wp.kernel
-def take_in(
-    plan: FilterPlan,
-    addresses: Address,
-    tiles: wp.int32,
-    now_s: wp.float64,
-    memory_s: wp.float32,
-    rate_max: wp.float32,
-    reprojected: wp.int32,
-    accumulates: wp.int32,
-    spreads: wp.int32,
-    rows: Address,
-    row_count: wp.int32,
-    tan_x: wp.float64,
-    tan_y: wp.float64,
-    earlier_rows: Address,
-    earlier_count: wp.int32,
-    earlier_tan_x: wp.float64,
-    earlier_tan_y: wp.float64,
-):
-    """Estimates, surfels and change after a batch; ``addresses`` are int64, those of ``batches::Traced``,
-    ``surfels::Planes`` and ``batches::Change``."""
-    native_take_in(plan, addresses, tiles, now_s, memory_s, rate_max, reprojected, accumulates, spreads, rows,
-                   row_count, tan_x, tan_y, earlier_rows, earlier_count, earlier_tan_x, earlier_tan_y)  # fmt: skip
+def locate(plan: FilterPlan, batch: Address, first: wp.int32, last: wp.int32):
+    """The pixels of the samples of some tiles; ``batch`` is a ``batches::Batch``."""
+    native_locate(plan, batch, first, last)
 
 
 @wp.kernel
-def gain(
-    side: wp.int32,
-    coarsest: wp.int32,
-    levels: wp.int32,
-    spacing: wp.float32,
-    gain: Address,
-    first: wp.int32,
-    last: wp.int32,
-    variance: Address,
-    roughness: Address,
-    rate: Address,
-    step: Address,
-    instance: Address,
-    cycle_s: wp.float32,
-    reach_px: wp.float32,
-    life_min_s: wp.float32,
-    life_max_s: wp.float32,
-):
-    """What the tiles of all levels gain, in some rows of the coarsest."""
-    native_gain(side, coarsest, levels, spacing, gain, first, last, variance, roughness, rate, step, instance,
-                cycle_s, reach_px, life_min_s, life_max_s)  # fmt: skip
+def gather(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
+    """What the samples of each pixel of some rows say; ``parts`` are ``batches::Part``."""
+    native_gather(plan, batch, parts, number)
 
 
 @wp.kernel
-def best(
-    gain: Address,
-    levels: wp.int32,
-    coarsest: wp.int32,
-    most: Address,
-    taken: Address,
-    found: Address,
-    limit: wp.int32,
-):
-    """The best tiles of all levels, and how many they are."""
-    native_best(gain, levels, coarsest, most, taken, found, limit)
+def learn(plan: FilterPlan, batch: Address, parts: Address, part_count: wp.int32, number: wp.int32):
+    """Roughness and change in some rows, once all parts are gathered."""
+    native_learn(plan, batch, parts, part_count, number)
 
 
 @wp.kernel
-def shrink(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address, seconds: wp.float32):
-    """Some rows of the second finest level from the estimates; ``picture`` is a ``pyramid::Picture``."""
-    native_shrink(picture, side, first, last, spare, seconds)
-
-
-@wp.kernel
-def smooth(levels: Address, side: wp.int32, spare: Address):
-    """The coarser levels, from the second finest on, in place."""
-    native_smooth(levels, side, spare)
-
-
-@wp.kernel
-def show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address):
-    """The picture, from some rows of the second finest level."""
-    native_show(picture, side, first, last, spare)
+def take_in(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
+    """Rates, estimates and surfels of some rows after a batch, once all parts have learnt."""
+    native_take_in(plan, batch, parts, number)

@@ -1,6 +1,8 @@
-// A batch of samples taken into the estimates, the surfels and what is known of change (tsar/filtering/batches.py,
-// samples.py and change.py, whose bits these are). Only pixels that samples touch are looked at.
+// A batch of samples taken into the estimates and surfels (tsar/filtering/batches.py and samples.py, whose bits these
+// are). Only pixels that samples touch are looked at. First threads take tiles, and then rows of the image three times:
+// each time all must be done before the next.
 #pragma once
+#include "changes.h"
 #include "quadtree.h"
 #include "taking.h"
 
@@ -8,9 +10,16 @@
 
 namespace batches {
 
+using packets::d8;
+using packets::f16;
+using packets::f8;
+using packets::i8;
+using packets::l8;
+using packets::load;
+using packets::store;
 using surfels::Planes;
 
-constexpr int TILE = given::TILE_SIDE, SAMPLES = TILE * TILE, EDGE = given::ELEMENT_PX;
+constexpr int TILE = given::TILE_SIDE, SAMPLES = TILE * TILE;
 
 struct Traced {
     const float *color, *position;
@@ -18,221 +27,183 @@ struct Traced {
     const float* spacing;
     const int* instance;
     const float* point;
+    long long tiles;
 };
 
-// By elements: as it was, and as it will be.
-struct Change {
-    const float *excess, *span_s;
-    const double* seen_s;
-    float *new_excess, *new_span_s;
-    double* new_seen_s;
-    float *rate, *own;
+// Of each sample: its pixel, -1 outside the image, its semivariance, and its surface's place and step on the image.
+struct Samples {
+    int* at;
+    float *semivariance, *x, *y, *step_x, *step_y;
 };
 
-// What the samples of a pixel say together, and its roughness before.
-struct Pixel {
-    double time_s;
-    int at, newest;
-    float count, color[3], least, most, roughness;
+// All that a batch is taken in from and to.
+struct Batch {
+    Traced traced;
+    Planes planes;
+    Change change;
+    Samples samples;
+    surfels::Poses now, earlier;  // the rows of the second are null where there are none
+    Moment moment;
 };
-static_assert(sizeof(Pixel) <= 8 * given::PIXEL_WORDS);
-
-struct Moment {
-    double now_s;
-    float memory_s, rate_max;
-    int reprojected, accumulates, spreads;
-};
-
-inline float clipped(float value) { return value < 0.0f ? 0.0f : value > 1.0f ? 1.0f : value; }
-inline float encoded(float value) { return __builtin_sqrtf(clipped(value)); }
-inline float larger(float a, float b) { return a > b ? a : b; }
-inline float smaller(float a, float b) { return a < b ? a : b; }
 
 // Half the mean squared difference of each sample from its neighbours in the tile.
 inline void semivariances(const float* color, float* found) {
-    float value[TILE][TILE][3], across[TILE + 1][TILE + 1] = {}, down[TILE + 1][TILE + 1] = {};
+    static_assert(TILE == 8);
+    float value[3][SAMPLES], raster[SAMPLES];
     for (int i = 0; i < SAMPLES; ++i)
-        for (int k = 0; k < 3; ++k) value[quadtree::row_of(i)][quadtree::column_of(i)][k] = encoded(color[3 * i + k]);
-    const auto half = [](const float* a, const float* b) {
-        const float red = a[0] - b[0], green = a[1] - b[1], blue = a[2] - b[2];
+        for (int k = 0; k < 3; ++k)
+            value[k][quadtree::row_of(i) * TILE + quadtree::column_of(i)] = clipped(color[3 * i + k]);
+    f8 v[3][TILE];
+    for (int k = 0; k < 3; ++k)
+        for (int row = 0; row < TILE; ++row) v[k][row] = packets::vsqrt(load<f8>(value[k] + TILE * row));
+    const auto half = [](f8 red, f8 green, f8 blue) {
         return 0.5f * ((red * red + green * green + blue * blue) / 3.0f);
     };
-    // at i the difference from the neighbour before: 0 at both ends
-    for (int row = 0; row < TILE; ++row)
-        for (int i = 1; i < TILE; ++i) {
-            across[row][i] = half(value[row][i], value[row][i - 1]);
-            down[i][row] = half(value[i][row], value[i - 1][row]);
+    const f8 none = 0.0f, beside = {1, 2, 2, 2, 2, 2, 2, 1};
+    // lane i: the difference from the one after, and from the one before
+    const auto after = [](f8 a) { return __builtin_shufflevector(a, a, 1, 2, 3, 4, 5, 6, 7, 7) - a; };
+    f8 above = none;
+    for (int row = 0; row < TILE; ++row) {
+        const f8 right = half(after(v[0][row]), after(v[1][row]), after(v[2][row]));
+        const f8 left = __builtin_shufflevector(right, none, 8, 0, 1, 2, 3, 4, 5, 6);
+        f8 below = none;
+        if (row + 1 < TILE)
+            below = half(v[0][row + 1] - v[0][row], v[1][row + 1] - v[1][row], v[2][row + 1] - v[2][row]);
+        const float rows = row == 0 || row + 1 == TILE ? 1.0f : 2.0f;
+        store(raster + TILE * row, (((left + right) + above) + below) / (beside + rows));
+        above = below;
+    }
+    for (int i = 0; i < SAMPLES; ++i) found[i] = raster[quadtree::row_of(i) * TILE + quadtree::column_of(i)];
+}
+
+// Finds the pixels of the samples of some tiles.
+template <class Plan> inline void locate(const Plan& plan, const Batch& b, int first, int last) {
+    const Samples& s = b.samples;
+    for (int tile = first; tile < last; ++tile)
+        semivariances(b.traced.color + 3 * SAMPLES * tile, s.semivariance + SAMPLES * tile);
+    for (int start = SAMPLES * first; start < SAMPLES * last; start += 8) {
+        d8 x, y;
+        l8 seen = l8() == 0;
+        if (b.moment.reprojected) {
+            const l8 instance = __builtin_convertvector(load<i8>(b.traced.instance + start), l8);
+            const float* p = b.traced.point + 3ll * start;
+            const auto component = [p](int k) {
+                return d8{p[k], p[3 + k], p[6 + k], p[9 + k], p[12 + k], p[15 + k], p[18 + k], p[21 + k]};
+            };
+            const d8 px = component(0), py = component(1), pz = component(2);
+            const surfels::Eight e = surfels::project8(plan, b.now, instance, px, py, pz);
+            x = e.x, y = e.y, seen = e.seen;
+            const f8 at_x = __builtin_convertvector(x, f8), at_y = __builtin_convertvector(y, f8);
+            f8 step_x = 0.0f, step_y = 0.0f;
+            if (b.earlier.rows) {
+                const surfels::Eight was = surfels::project8(plan, b.earlier, instance, px, py, pz);
+                step_x = at_x - __builtin_convertvector(was.inside ? was.x : (d8)0.0, f8);
+                step_y = at_y - __builtin_convertvector(was.inside ? was.y : (d8)0.0, f8);
+            }
+            store(s.x + start, at_x), store(s.y + start, at_y);
+            store(s.step_x + start, step_x), store(s.step_y + start, step_y);
+        } else {
+            const float* p = b.traced.position + 2 * start;
+            x = d8{p[0], p[2], p[4], p[6], p[8], p[10], p[12], p[14]};
+            y = d8{p[1], p[3], p[5], p[7], p[9], p[11], p[13], p[15]};
         }
-    for (int i = 0; i < SAMPLES; ++i) {
-        const int row = quadtree::row_of(i), column = quadtree::column_of(i);
-        const float total =
-            ((across[row][column] + across[row][column + 1]) + down[row][column]) + down[row + 1][column];
-        const auto neighbours = [](int at) { return at == 0 || at == TILE - 1 ? 1.0f : 2.0f; };
-        found[i] = total / (neighbours(column) + neighbours(row));
+        seen &= (x >= 0.0) & (y >= 0.0) & (x < (double)plan.side) & (y < (double)plan.side);
+        const i8 column = __builtin_convertvector(seen ? x : (d8)0.0, i8),
+                 row = __builtin_convertvector(seen ? y : (d8)0.0, i8);
+        store(s.at + start, __builtin_convertvector(seen, i8) ? row * plan.side + column : (i8)-1);
     }
 }
 
-// Sums the samples up by pixels. `slot` says for each pixel of the image where its sums are, -1 for nowhere; so it is
-// before and after.
-template <class Plan>
-inline int gather(const Plan& plan, const surfels::Poses& poses, const Traced& traced, int tiles, const Moment& moment,
-                  int* slot, Pixel* pixel) {
-    int pixels = 0;
-    for (int tile = 0; tile < tiles; ++tile) {
-        float semivariance[SAMPLES];
-        semivariances(traced.color + 3 * SAMPLES * tile, semivariance);
-        const float wide = larger(traced.spacing[tile], 1.0f), ratio = traced.spacing[tile] / wide;
+// Sums the samples up by the pixels of some rows, and returns how many pixels these are. `slot` says for each pixel of
+// the image where its sums are, -1 for nowhere; so it is before and after.
+template <class Plan> inline long long gather(const Plan& plan, const Batch& b, int first, int last) {
+    const int start = first * plan.side, end = last * plan.side;
+    int* const slot = (int*)plan.slot;
+    Pixel* const pixel = (Pixel*)plan.pixel;
+    int next = start;
+    for (int tile = 0; tile < b.traced.tiles; ++tile) {
+        const float wide = larger(b.traced.spacing[tile], 1.0f), ratio = b.traced.spacing[tile] / wide;
         const float root = __builtin_sqrtf(wide);
         for (int i = SAMPLES * tile; i < SAMPLES * (tile + 1); ++i) {
-            double x = traced.position[2 * i], y = traced.position[2 * i + 1];
-            if (moment.reprojected) {
-                double depth;
-                surfels::project(plan, poses, traced.instance[i], traced.point + 3 * i, x, y, depth);
-                if (!(depth > 0.0)) continue;
-            }
-            if (!(x >= 0.0 && y >= 0.0 && x < plan.side && y < plan.side)) continue;
-            const int at = (int)y * plan.side + (int)x;
+            const int at = b.samples.at[i];
+            if (at < start || at >= end) continue;
             if (slot[at] < 0) {
-                slot[at] = pixels;
-                pixel[pixels++] = Pixel{0.0, at, 0, 0.0f, {0.0f, 0.0f, 0.0f}, 0.0f, 0.0f, 0.0f};
+                slot[at] = next;
+                pixel[next++] = Pixel{0.0, at, 0, 0.0f, {0.0f, 0.0f, 0.0f}, 0.0f, 0.0f, 0.0f};
             }
             Pixel& p = pixel[slot[at]];
-            const float v = semivariance[i - SAMPLES * tile] / ratio;
-            p.count += 1.0f, p.newest = i, p.time_s += traced.time_s[i] - moment.now_s;
-            for (int k = 0; k < 3; ++k) p.color[k] += traced.color[3 * i + k];
+            const float v = b.samples.semivariance[i] / ratio;
+            p.count += 1.0f, p.newest = i, p.time_s += b.traced.time_s[i] - b.moment.now_s;
+            for (int k = 0; k < 3; ++k) p.color[k] += b.traced.color[3 * i + k];
             p.least += v / root, p.most += v;
         }
     }
-    for (int i = 0; i < pixels; ++i) {
+    for (int i = start; i < next; ++i) {
         Pixel& p = pixel[i];
         for (int k = 0; k < 3; ++k) p.color[k] = p.color[k] / p.count;
-        p.time_s = p.time_s / (double)p.count + moment.now_s;
+        p.time_s = p.time_s / (double)p.count + b.moment.now_s;
+        p.roughness = b.planes.roughness[p.at];
     }
-    return pixels;
+    return next - start;
 }
 
-// Roughness around the pixels that were hit, from the sums in 3 x 3 pixels; the border repeats.
-inline void roughen(int side, int pixels, const int* slot, Pixel* pixel, unsigned char* done, float* roughness) {
-    const auto inside = [side](int at) { return at < 0 ? 0 : at < side ? at : side - 1; };
-    for (int i = 0; i < pixels; ++i) pixel[i].roughness = roughness[pixel[i].at];
-    for (int i = 0; i < pixels; ++i)
-        for (int around = 0; around < 9; ++around) {
-            const int row = pixel[i].at / side + around / 3 - 1, column = pixel[i].at % side + around % 3 - 1;
-            const int at = row * side + column;
-            if (row < 0 || column < 0 || row >= side || column >= side || done[at]) continue;
-            done[at] = 1;
-            float count = 0.0f, least = 0.0f, most = 0.0f;
-            for (int k = 0; k < 9; ++k) {
-                const int other = slot[inside(row + k / 3 - 1) * side + inside(column + k % 3 - 1)];
-                if (other >= 0) count += pixel[other].count, least += pixel[other].least, most += pixel[other].most;
-            }
-            const float near = larger(count / 9.0f, 1e-9f), was = roughness[at];
-            const float bounded = smaller(larger(was, (least / 9.0f) / near), (most / 9.0f) / near);
-            roughness[at] = larger(0.5f * (was + bounded), given::ROUGHNESS_MIN);
-        }
-    for (int i = 0; i < pixels; ++i)
-        for (int around = 0; around < 9; ++around)
-            done[inside(pixel[i].at / side + around / 3 - 1) * side + inside(pixel[i].at % side + around % 3 - 1)] = 0;
-}
+// Rows of the image that one thread takes a batch into, whole elements; the pixels that were hit are counted.
+struct Part {
+    long long first, last, pixels;
+};
 
-// What the residuals of an element say of change.
-inline void observe_element(int side, int element, const Moment& moment, const int* slot, const Pixel* pixel,
-                            const Planes& planes, const Change& change) {
-    const int elements = side / EDGE, count = side * side;
-    const int first = element / elements * EDGE * side + element % elements * EDGE;
-    float excess = 0.0f, usual = 0.0f, span_s = 0.0f;
-    bool looked = false;
-    for (int k = 0; k < EDGE * EDGE; ++k) {
-        const int at = first + k / EDGE * side + k % EDGE, number = slot[at];
-        if (number < 0 || !(planes.time_s[at] > -surfels::INF)) continue;
-        const Pixel& p = pixel[number];
-        float square[3];
-        for (int c = 0; c < 3; ++c) {
-            const float off = encoded(p.color[c]) - encoded(planes.color[c * count + at]);
-            square[c] = off * off;
-        }
-        const float residual = ((square[0] + square[1]) + square[2]) / 3.0f, g = planes.roughness[at];
-        const float expected = given::TOLERANCE * (0.5f * g * planes.inverse[at] + 0.8f * g / p.count);
-        excess += residual - expected, usual += expected, span_s += (float)(p.time_s - planes.time_s[at]);
-        looked = true;
-    }
-    change.new_excess[element] = change.excess[element];
-    change.new_span_s[element] = change.span_s[element];
-    change.new_seen_s[element] = change.seen_s[element];
-    if (!looked) return;
-    double since = moment.now_s - change.seen_s[element];
-    since = since < 0.0 ? 0.0 : since > 1e3 ? 1e3 : since;
-    const float gap = (float)since / moment.memory_s;
-    float fade = 1.0f / (1.0f + gap + 0.5f * gap * gap);
-    if (excess > given::SURE * usual) fade = smaller(fade, given::DROPPED);
-    change.new_excess[element] = fade * change.excess[element] + excess;
-    change.new_span_s[element] = fade * change.span_s[element] + span_s;
-    change.new_seen_s[element] = moment.now_s;
-}
-
-inline float greatest_around(const float* own, int elements, int row, int column, int reach) {
-    float most = 0.0f;
-    for (int r = row - reach; r <= row + reach; ++r)
-        for (int c = column - reach; c <= column + reach; ++c)
-            if (r >= 0 && c >= 0 && r < elements && c < elements) most = larger(most, own[r * elements + c]);
-    return most;
-}
-
-inline void observe(int side, const Moment& moment, const int* slot, const Pixel* pixel, const Planes& planes,
-                    const Change& change) {
-    const int elements = side / EDGE;
-    for (int element = 0; element < elements * elements; ++element) {
-        observe_element(side, element, moment, slot, pixel, planes, change);
-        change.own[element] =
-            larger(change.new_excess[element], 0.0f) / larger(change.new_span_s[element], given::SPAN_MIN_S);
-    }
-    for (int row = 0; row < elements; ++row)
-        for (int column = 0; column < elements; ++column) {
-            float rate = change.own[row * elements + column];
-            if (moment.spreads) {
-                rate = larger(rate, 0.5f * greatest_around(change.own, elements, row, column, 1));
-                rate = larger(rate, 0.25f * greatest_around(change.own, elements, row, column, 2));
-            }
-            change.rate[row * elements + column] = smaller(larger(rate, given::RATE_MIN), moment.rate_max);
-        }
-}
-
-// Where a sample's surface is on the image, 0 where it is not seen.
+// Roughness of some rows around the pixels that were hit, from the sums in 3 x 3 pixels; the border repeats.
 template <class Plan>
-inline void image_of(const Plan& plan, const surfels::Poses& poses, const Traced& traced, int sample, float* at) {
-    double x, y, depth;
-    surfels::project(plan, poses, traced.instance[sample], traced.point + 3ll * sample, x, y, depth);
-    at[0] = x == x ? (float)x : 0.0f, at[1] = y == y ? (float)y : 0.0f;
+inline void roughen(const Plan& plan, const Part* parts, int count, const Part& own, float* roughness) {
+    const int side = plan.side;
+    const int* const slot = (const int*)plan.slot;
+    const Pixel* const pixel = (const Pixel*)plan.pixel;
+    unsigned char* const done = (unsigned char*)plan.done;
+    const auto inside = [side](int at) { return at < 0 ? 0 : at < side ? at : side - 1; };
+    for (const Part* part = parts; part < parts + count; ++part) {
+        if (part->first > own.last || part->last < own.first) continue;  // not even beside it
+        for (long long i = part->first * side; i < part->first * side + part->pixels; ++i)
+            for (int around = 0; around < 9; ++around) {
+                const int row = pixel[i].at / side + around / 3 - 1, column = pixel[i].at % side + around % 3 - 1;
+                const int at = row * side + column;
+                if (row < own.first || row >= own.last || column < 0 || column >= side || done[at]) continue;
+                done[at] = 1;
+                float hits = 0.0f, least = 0.0f, most = 0.0f;
+                for (int k = 0; k < 9; ++k) {
+                    const int other = slot[inside(row + k / 3 - 1) * side + inside(column + k % 3 - 1)];
+                    if (other >= 0) hits += pixel[other].count, least += pixel[other].least, most += pixel[other].most;
+                }
+                const float near = larger(hits / 9.0f, 1e-9f), was = roughness[at];
+                const float bounded = smaller(larger(was, (least / 9.0f) / near), (most / 9.0f) / near);
+                roughness[at] = larger(0.5f * (was + bounded), given::ROUGHNESS_MIN);
+            }
+    }
+    __builtin_memset(done + own.first * side, 0, (own.last - own.first) * side);
 }
 
 inline float most_of(float x, float y) { return larger(__builtin_fabsf(x), __builtin_fabsf(y)); }
 
 // Estimate and surfel of a pixel with its samples taken in.
-template <class Plan>
-inline void update(const Plan& plan, const surfels::Poses& poses, const surfels::Poses& earlier, const Traced& traced,
-                   const Moment& moment, const Pixel& p, float rate, const Planes& planes) {
+template <class Plan> inline void update(const Plan& plan, const Batch& b, const Pixel& p, float rate) {
+    const Planes& planes = b.planes;
+    const Samples& s = b.samples;
     const int at = p.at, count = plan.side * plan.side;
     bool replaced = false, same = true;
-    float least_share = 0.0f, aged = planes.aged[at], position[2], step[2] = {0.0f, 0.0f};
-    if (moment.reprojected) {
-        image_of(plan, poses, traced, p.newest, position);
-        if (earlier.rows) {
-            image_of(plan, earlier, traced, p.newest, step);
-            step[0] = position[0] - step[0], step[1] = position[1] - step[1];
-        }
+    float least_share = 0.0f, aged = planes.aged[at];
+    if (b.moment.reprojected) {
         const float was_x = planes.step[at], was_y = planes.step[count + at];
-        same = planes.instance[at] == traced.instance[p.newest];
-        replaced = !same && most_of(step[0] - was_x, step[1] - was_y) > given::MOVES_PX;
+        same = planes.instance[at] == b.traced.instance[p.newest];
+        replaced = !same && most_of(s.step_x[p.newest] - was_x, s.step_y[p.newest] - was_y) > given::MOVES_PX;
         least_share = most_of(was_x, was_y) > given::MOVES_PX ? given::SHARE_MOVING : 0.0f;
         const float away = most_of(planes.position[at] - (at % plan.side + 0.5f),
                                    planes.position[count + at] - (at / plan.side + 0.5f));
         aged = aged + p.roughness * larger(away - 0.5f, 0.0f);
     }
-    const float elapsed_s = (float)(p.time_s - moment.now_s), g = planes.roughness[at], inverse = planes.inverse[at];
+    const float elapsed_s = (float)(p.time_s - b.moment.now_s), g = planes.roughness[at], inverse = planes.inverse[at];
     aged = aged + rate * elapsed_s;
     const float variance = smaller(aged + 0.5f * g * inverse, given::VARIANCE_MAX);
     float share = larger(variance / (variance + 0.5f * g / p.count), least_share);
-    if (!moment.accumulates || replaced || !(planes.time_s[at] > -surfels::INF)) share = 1.0f;
+    if (!b.moment.accumulates || replaced || !(planes.time_s[at] > -surfels::INF)) share = 1.0f;
     const float kept = (1.0f - share) * (1.0f - share);
     for (int k = 0; k < 3; ++k) {
         float& color = planes.color[k * count + at];
@@ -241,41 +212,37 @@ inline void update(const Plan& plan, const surfels::Poses& poses, const surfels:
     planes.aged[at] = smaller(kept * aged, given::VARIANCE_MAX);
     planes.inverse[at] = kept * inverse + share * share / p.count;
     planes.time_s[at] = p.time_s;
-    if (!moment.reprojected) return;
+    if (!b.moment.reprojected) return;
     const float weight = same ? share : 1.0f;
     for (int k = 0; k < 3; ++k) {
         float& point = planes.point[k * count + at];
-        point = point + weight * (traced.point[3ll * p.newest + k] - point);
+        point = point + weight * (b.traced.point[3ll * p.newest + k] - point);
     }
-    for (int k = 0; k < 2; ++k) {
-        float& place = planes.position[k * count + at];
-        place = place + weight * (position[k] - place);
-        if (!same) planes.step[k * count + at] = step[k];
-    }
-    if (!same) planes.instance[at] = traced.instance[p.newest];
+    float &x = planes.position[at], &y = planes.position[count + at];
+    x = x + weight * (s.x[p.newest] - x), y = y + weight * (s.y[p.newest] - y);
+    if (same) return;
+    planes.step[at] = s.step_x[p.newest], planes.step[count + at] = s.step_y[p.newest];
+    planes.instance[at] = b.traced.instance[p.newest];
 }
 
-// `addresses` are those of Traced, Planes and Change. `slot`, all -1, and `done`, all 0, are left so.
-template <class Plan>
-inline void take_in(const Plan& plan, const long long* addresses, int tiles, const surfels::Poses& poses,
-                    const surfels::Poses& earlier, const Moment& moment, int* slot, Pixel* pixel, unsigned char* done) {
-    Traced traced;
-    Planes planes;
-    Change change;
-    __builtin_memcpy(&traced, addresses, sizeof(traced));
-    addresses += sizeof(traced) / sizeof(*addresses);
-    __builtin_memcpy(&planes, addresses, sizeof(planes));
-    addresses += sizeof(planes) / sizeof(*addresses);
-    __builtin_memcpy(&change, addresses, sizeof(change));
-    const int side = plan.side, elements = side / EDGE;
-    const int pixels = gather(plan, poses, traced, tiles, moment, slot, pixel);
-    roughen(side, pixels, slot, pixel, done, planes.roughness);
-    observe(side, moment, slot, pixel, planes, change);
-    for (int i = 0; i < pixels; ++i) {
+// What is learnt of the roughness and of change in the rows of a part.
+template <class Plan> inline void learn(const Plan& plan, const Batch& b, const Part* parts, int count, int number) {
+    const Part& own = parts[number];
+    roughen(plan, parts, count, own, b.planes.roughness);
+    const Pixel* const pixel = (const Pixel*)plan.pixel + own.first * plan.side;
+    observe_rows(plan.side, b.moment, (const int*)plan.slot, (const Pixel*)plan.pixel, pixel, own.pixels, b.planes,
+                 b.change, own.first, own.last);
+}
+
+// Takes the samples of a part's pixels in, and leaves `slot` as it was.
+template <class Plan> inline void take_in(const Plan& plan, const Batch& b, const Part& own) {
+    const int side = plan.side;
+    const Pixel* const pixel = (const Pixel*)plan.pixel + own.first * side;
+    rate_rows(side, b.moment, b.change, own.first, own.last);
+    for (int i = 0; i < own.pixels; ++i) {
         const int at = pixel[i].at;
-        const float rate = change.rate[at / side / EDGE * elements + at % side / EDGE];
-        update(plan, poses, earlier, traced, moment, pixel[i], rate, planes);
-        slot[at] = -1;
+        update(plan, b, pixel[i], b.change.rate[at / side / EDGE * (side / EDGE) + at % side / EDGE]);
+        ((int*)plan.slot)[at] = -1;
     }
 }
 

@@ -22,7 +22,7 @@ using packets::vmax;
 using packets::vmin;
 typedef long long Key;
 
-constexpr double INF = __builtin_inf(), NOT_A_NUMBER = __builtin_nan("");
+constexpr double INF = __builtin_inf();
 constexpr Key NONE = 0x7fffffffffffffffll;
 constexpr int FRAME = given::FRAME;
 constexpr int ROW = 12;  // numbers of an instance: three rows of a matrix, and an offset
@@ -34,35 +34,14 @@ struct Poses {
     double tan_x, tan_y;
 };
 
-inline int row_of(long long instance, int count) {
-    return instance < 0 || instance >= count ? count - 1 : (int)instance;
-}
-
-// From the space of the camera to pixels.
-template <class Plan>
-inline void finish(const Plan& plan, long long instance, double right, double up, double depth, double tan_x,
-                   double tan_y, double& x, double& y, double& out_depth) {
-    const bool infinite = instance < 0;
-    const double unit = plan.perspective ? depth : infinite ? 0.0 : 1.0;
-    const bool inside = unit > 0.0;
-    x = inside ? (0.5 + right / (2.0 * tan_x * unit)) * plan.side : NOT_A_NUMBER;
-    y = inside ? (0.5 - up / (2.0 * tan_y * unit)) * plan.side : NOT_A_NUMBER;
-    out_depth = instance <= given::UNSEEN ? -1.0 : !infinite ? depth : depth > 0.0 ? INF : -INF;
-}
-
 // Eight surfels that lie side by side, on the image; those that are not seen are anywhere.
 struct Eight {
     d8 x, y, depth;
-    l8 seen;
+    l8 inside, seen;  // whether there is a position, and whether it is on the image
 };
 
-template <class Plan>
-inline Eight project8(const Plan& plan, const Poses& poses, const long long* instance, const float* point, int start) {
-    const int count = plan.side * plan.side;
-    const auto component = [&](int k) { return __builtin_convertvector(load<f8>(point + k * count + start), d8); };
-    const l8 number = load<l8>(instance + start);
+template <class Plan> inline Eight project8(const Plan& plan, const Poses& poses, l8 number, d8 x, d8 y, d8 z) {
     const l8 infinite = number < 0, row = (infinite | (number >= poses.count)) ? (l8)(poses.count - 1) : number;
-    const d8 x = component(0), y = component(1), z = component(2);
     d8 right = 0.0, up = 0.0, depth = 0.0;
     // most often all are of one instance
     for (unsigned left = 255u; left;) {
@@ -79,20 +58,18 @@ inline Eight project8(const Plan& plan, const Poses& poses, const long long* ins
     e.x = (0.5 + right / (2.0 * poses.tan_x * unit)) * plan.side;
     e.y = (0.5 - up / (2.0 * poses.tan_y * unit)) * plan.side;
     e.depth = infinite ? (d8)INF : depth;
-    e.seen = (number > given::UNSEEN) & (unit > 0.0) & (depth > 0.0) & (e.x > -1.0) & (e.x < plan.side + 1.0) &
+    e.inside = unit > 0.0;
+    e.seen = (number > given::UNSEEN) & e.inside & (depth > 0.0) & (e.x > -1.0) & (e.x < plan.side + 1.0) &
              (e.y > -1.0) & (e.y < plan.side + 1.0);
     return e;
 }
 
-// One surfel.
+// Surfels of the image.
 template <class Plan>
-inline void project(const Plan& plan, const Poses& poses, long long instance, const float* point, double& out_x,
-                    double& out_y, double& out_depth) {
-    const double* m = poses.rows + ROW * row_of(instance, poses.count);
-    const double x = point[0], y = point[1], z = point[2];
-    const double right = m[0] * x + m[1] * y + m[2] * z + m[9], up = m[3] * x + m[4] * y + m[5] * z + m[10];
-    const double depth = -(m[6] * x + m[7] * y + m[8] * z + m[11]);
-    finish(plan, instance, right, up, depth, poses.tan_x, poses.tan_y, out_x, out_y, out_depth);
+inline Eight project8(const Plan& plan, const Poses& poses, const long long* instance, const float* point, int start) {
+    const int count = plan.side * plan.side;
+    const auto component = [&](int k) { return __builtin_convertvector(load<f8>(point + k * count + start), d8); };
+    return project8(plan, poses, load<l8>(instance + start), component(0), component(1), component(2));
 }
 
 // Eight surfels that serve pixels of rows `low` to `high`, some of them in other bands.
