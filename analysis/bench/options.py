@@ -20,6 +20,7 @@ GROUPS = (
     "hits",
     "features",
     "overhead",
+    "tsar",
     "growth",
     "conversion",
     "start",
@@ -42,7 +43,7 @@ class BenchOptions:
     """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
-    cores, order, hits, features, overhead, growth, conversion, start."""
+    cores, order, hits, features, overhead, tsar, growth, conversion, start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of ours are compared; runs nothing."""
     device: Literal["cpu", "cuda:0"] = "cpu"

@@ -11,6 +11,7 @@ from analysis.bench.growth import growth
 from analysis.bench.machine import machine, versions
 from analysis.bench.options import ON_CPU_ONLY, BenchOptions
 from analysis.bench.overhead import overhead
+from analysis.bench.policy import policy
 from analysis.bench.rays import coherent, incoherent
 from analysis.bench.rows import SPREAD, Group, Row
 from analysis.bench.scenes import driving_scenes
@@ -32,6 +33,7 @@ MEASURED_BY: Mapping[str, Group] = {
     "hits": hits,
     "features": features,
     "overhead": overhead,
+    "tsar": policy,
     "growth": growth,
     "conversion": conversion,
     "start": start_rows,

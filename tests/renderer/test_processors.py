@@ -164,12 +164,48 @@ for name in ("afr", "frameless"):
 print(json.dumps(found))
 """
 )
+FILTER = (
+    HASHED
+    + """
+import renderer.compute.device
+if sys.argv[1:]:  # nothing for SSE2
+    wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])
+from renderer.stages.control import compiled_stages
+from renderer.trace import Renderer
+from scenes import catalog
+from tsar.config import TsarConfig
+from tsar.policies.filter import Filter
+from tsar.policy import Moment, Setting, step
+from tsar.stages import REFERENCE
+
+renderer = Renderer(catalog.load("moving-camera"), threads=1)
+config = TsarConfig(batch_size=16, resolution_px=64)
+found = {}
+for name, stages in (("compiled", compiled_stages(config, threads=2)), ("reference", REFERENCE)):
+    policy = Filter(Setting(config, lambda config: stages, view=renderer.viewpoint))
+    state = policy.start()
+    for cycle in range(24):
+        state = step(policy, state, renderer.trace, Moment(cycle / 100, cycle, 1 / 100)).after
+        if cycle % 4 == 3:
+            for part in ("estimates", "surfels", "change", "shown", "remaining"):
+                hashes(getattr(state, part), f"{name} {cycle} {part}", found, set())
+print(json.dumps(found))
+"""
+)
 
 
 def test_runs_are_of_the_same_bits() -> None:
     native = printed_hashes(PIPELINE)
     assert len(native) > 40 and len(set(native.values())) > 40
     assert differing(native, printed_hashes(PIPELINE, **plain_paths())) == []
+
+
+def test_the_filter_runs_with_the_same_bits() -> None:
+    native = printed_hashes(FILTER)
+    compiled = {name: value for name, value in native.items() if name.startswith("compiled")}
+    assert len(compiled) > 60 and len(set(compiled.values())) > 40
+    assert list(compiled.values()) == [value for name, value in native.items() if name.startswith("reference")]
+    assert differing(native, printed_hashes(FILTER, **plain_paths())) == []
 
 
 TARGETS = {"AVX2": "-target-cpu haswell", "SSE2": ""}
@@ -199,3 +235,11 @@ def test_kernels_for_narrower_registers_give_the_same_bits(target: str, tmp_path
     other = printed_hashes(FRAMES, TARGETS[target], *names, WARP_CACHE_PATH=str(tmp_path))
     assert list(tmp_path.rglob("*.o")), "nothing was compiled"
     assert differing(printed_hashes(FRAMES, "-march=native", *names), other) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_filter_compiled_for_narrower_registers_gives_the_same_bits(target: str, tmp_path: Path) -> None:
+    other = printed_hashes(FILTER, TARGETS[target], WARP_CACHE_PATH=str(tmp_path))
+    assert list(tmp_path.rglob("*.o")), "nothing was compiled"
+    assert differing(printed_hashes(FILTER), other) == []
