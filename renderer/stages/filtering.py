@@ -54,11 +54,10 @@ class _Compiled:
         source = room("source", self._pixels, torch.int32)
         slot = self._memory.keep("slot", torch.full((self._pixels,), -1, dtype=torch.int32), torch.int32, self._pixels)
         pixel = room("pixel", self._pixels * PIXEL_WORDS, _I64)  # more than the image has are never hit
-        done = self._memory.zeros("done", self._pixels, torch.uint8)
         for perspective, plan in enumerate(self._plans):
             plan.side, plan.perspective = side, perspective
             plan.motion, plan.aged, plan.depth, plan.source, plan.front = motion, aged, depth, source, front
-            plan.slot, plan.pixel, plan.done = slot, pixel, done
+            plan.slot, plan.pixel = slot, pixel
         self._rows = _shares(side, threads)
         self._bands = np.zeros((len(self._rows), 5), np.int64)  # surfels::Band
         for number, (first, last) in enumerate(self._rows):
@@ -201,12 +200,15 @@ class _Compiled:
         self._samples = [room("at", pixels, torch.int32), *(room(f"samples {k}", pixels) for k in range(5))]
         self._batch = Record("6Q Q 9Q 8Q 6Q Qqdd Qqdd 3d 3q")  # batches::Batch
         rows = [(ELEMENT_PX * a, ELEMENT_PX * b) for a, b in _shares(self._side // ELEMENT_PX, threads)]
-        self._parts = np.array([(*share, 0) for share in rows], np.int64)  # batches::Part
-        batch, parts, count = self._batch.address, address("parts", self._parts, _I64, 3 * len(rows)), len(rows)
+        sums = [room(f"sums {number}", 9 * (self._side + 16)) for number in range(len(rows))]
+        self._parts = np.array(
+            [(*share, 0, at) for share, at in zip(rows, sums, strict=True)], np.int64
+        )  # batches::Part
+        batch, parts, count = self._batch.address, address("parts", self._parts, _I64, 4 * len(rows)), len(rows)
         self._locate = [[Command(kernels.locate, plan, batch) for _ in range(threads)] for plan in self._plans]
         plan = self._plans[0]
         self._gather = [Command(kernels.gather, plan, batch, parts, number) for number in range(count)]
-        self._learn = [Command(kernels.learn, plan, batch, parts, count, number) for number in range(count)]
+        self._learn = [Command(kernels.learn, plan, batch, parts, number) for number in range(count)]
         self._take_in = [Command(kernels.take_in, plan, batch, parts, number) for number in range(count)]
 
     def _prepare_tiles(self, threads: int) -> None:

@@ -32,8 +32,6 @@ class FilterPlan:
     """int32, where the sums of a pixel's samples are, -1 between launches."""
     pixel: wp.uint64
     """``batches::Pixel`` for every sample of a batch."""
-    done: wp.uint64
-    """uint8, 0 between launches."""
 
 
 @wp.func_native("""
@@ -97,8 +95,8 @@ def native_locate(plan: FilterPlan, batch: Address, first: wp.int32, last: wp.in
 def native_gather(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32): ...
 
 
-@wp.func_native("batches::learn(plan, *(const batches::Batch*)batch, (const batches::Part*)parts, part_count, number);")
-def native_learn(plan: FilterPlan, batch: Address, parts: Address, part_count: wp.int32, number: wp.int32): ...
+@wp.func_native("batches::learn(plan, *(const batches::Batch*)batch, ((const batches::Part*)parts)[number]);")
+def native_learn(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32): ...
 
 
 @wp.func_native("batches::take_in(plan, *(const batches::Batch*)batch, ((const batches::Part*)parts)[number]);")
@@ -169,9 +167,9 @@ def gather(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
 
 
 @wp.kernel
-def learn(plan: FilterPlan, batch: Address, parts: Address, part_count: wp.int32, number: wp.int32):
+def learn(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
     """Roughness and change in some rows, once all parts are gathered."""
-    native_learn(plan, batch, parts, part_count, number)
+    native_learn(plan, batch, parts, number)
 
 
 @wp.kernel

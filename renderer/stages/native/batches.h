@@ -150,35 +150,60 @@ template <class Plan> inline long long gather(const Plan& plan, const Batch& b, 
 // Rows of the image that one thread takes a batch into, whole elements; the pixels that were hit are counted.
 struct Part {
     long long first, last, pixels;
+    float* sums;  // room for nine rows
 };
 
-// Roughness of some rows around the pixels that were hit, from the sums in 3 x 3 pixels; the border repeats.
-template <class Plan>
-inline void roughen(const Plan& plan, const Part* parts, int count, const Part& own, float* roughness) {
-    const int side = plan.side;
-    const int* const slot = (const int*)plan.slot;
+// Counts and bounds of the roughness of three rows of pixels, one more at both ends.
+struct Row {
+    float* sums[3];
+};
+
+// What samples say of a row, nothing where there are none; returns whether there are any. The border repeats.
+template <class Plan> inline bool spread_row(const Plan& plan, int row, const Row& to) {
+    const int side = plan.side, *slot = (const int*)plan.slot + row * side;
     const Pixel* const pixel = (const Pixel*)plan.pixel;
-    unsigned char* const done = (unsigned char*)plan.done;
-    const auto inside = [side](int at) { return at < 0 ? 0 : at < side ? at : side - 1; };
-    for (const Part* part = parts; part < parts + count; ++part) {
-        if (part->first > own.last || part->last < own.first) continue;  // not even beside it
-        for (long long i = part->first * side; i < part->first * side + part->pixels; ++i)
-            for (int around = 0; around < 9; ++around) {
-                const int row = pixel[i].at / side + around / 3 - 1, column = pixel[i].at % side + around % 3 - 1;
-                const int at = row * side + column;
-                if (row < own.first || row >= own.last || column < 0 || column >= side || done[at]) continue;
-                done[at] = 1;
-                float hits = 0.0f, least = 0.0f, most = 0.0f;
-                for (int k = 0; k < 9; ++k) {
-                    const int other = slot[inside(row + k / 3 - 1) * side + inside(column + k % 3 - 1)];
-                    if (other >= 0) hits += pixel[other].count, least += pixel[other].least, most += pixel[other].most;
-                }
-                const float near = larger(hits / 9.0f, 1e-9f), was = roughness[at];
-                const float bounded = smaller(larger(was, (least / 9.0f) / near), (most / 9.0f) / near);
-                roughness[at] = larger(0.5f * (was + bounded), given::ROUGHNESS_MIN);
+    bool any = false;
+    for (float* sums : to.sums)
+        for (int i = 0; i < side + 2; ++i) sums[i] = 0.0f;
+    for (int i = 0; i < side; i += 8)
+        for (unsigned left = packets::bits(load<i8>(slot + i) >= 0); left; left &= left - 1) {
+            const int column = i + packets::first_bit(left);
+            const Pixel& p = pixel[slot[column]];
+            to.sums[0][1 + column] = p.count, to.sums[1][1 + column] = p.least, to.sums[2][1 + column] = p.most;
+            any = true;
+        }
+    for (float* sums : to.sums) sums[0] = sums[1], sums[side + 1] = sums[side];
+    return any;
+}
+
+// Roughness of some rows around the pixels that were hit, from the sums in 3 x 3 pixels.
+template <class Plan> inline void roughen(const Plan& plan, const Part& own, float* roughness) {
+    const int side = plan.side, wide = side + 16;
+    Row rows[3];
+    bool any[3];
+    for (int k = 0; k < 9; ++k) rows[k / 3].sums[k % 3] = own.sums + k * wide;
+    const auto spread = [&](int row) {
+        const int k = (row + 3) % 3;
+        any[k] = spread_row(plan, row < 0 ? 0 : row < side ? row : side - 1, rows[k]);
+    };
+    spread((int)own.first - 1), spread((int)own.first);
+    for (int row = (int)own.first; row < own.last; ++row) {
+        spread(row + 1);
+        if (!any[0] && !any[1] && !any[2]) continue;
+        for (int i = 0; i < side; i += 8) {
+            f8 count = 0.0f, least = 0.0f, most = 0.0f;
+            for (int k = 0; k < 9; ++k) {
+                const Row& from = rows[(row + 2 + k / 3) % 3];
+                count = count + load<f8>(from.sums[0] + i + k % 3);
+                least = least + load<f8>(from.sums[1] + i + k % 3), most = most + load<f8>(from.sums[2] + i + k % 3);
             }
+            if (!packets::bits(count > 0.0f)) continue;
+            const f8 near = packets::vmax(count / 9.0f, (f8)1e-9f), was = load<f8>(roughness + row * side + i);
+            const f8 bounded = packets::vmin(packets::vmax(was, (least / 9.0f) / near), (most / 9.0f) / near);
+            const f8 mixed = packets::vmax(0.5f * (was + bounded), (f8)given::ROUGHNESS_MIN);
+            store(roughness + row * side + i, count > 0.0f ? mixed : was);
+        }
     }
-    __builtin_memset(done + own.first * side, 0, (own.last - own.first) * side);
 }
 
 inline float most_of(float x, float y) { return larger(__builtin_fabsf(x), __builtin_fabsf(y)); }
@@ -226,9 +251,8 @@ template <class Plan> inline void update(const Plan& plan, const Batch& b, const
 }
 
 // What is learnt of the roughness and of change in the rows of a part.
-template <class Plan> inline void learn(const Plan& plan, const Batch& b, const Part* parts, int count, int number) {
-    const Part& own = parts[number];
-    roughen(plan, parts, count, own, b.planes.roughness);
+template <class Plan> inline void learn(const Plan& plan, const Batch& b, const Part& own) {
+    roughen(plan, own, b.planes.roughness);
     const Pixel* const pixel = (const Pixel*)plan.pixel + own.first * plan.side;
     observe_rows(plan.side, b.moment, (const int*)plan.slot, (const Pixel*)plan.pixel, pixel, own.pixels, b.planes,
                  b.change, own.first, own.last);

@@ -131,15 +131,18 @@ inline void offer8(const Plan& plan, const Eight& e, const Uncertain& of, int st
         away_x[k] = __builtin_convertvector(vabs(left + k + 0.5 - e.x), f8);
         away_y[k] = __builtin_convertvector(vabs(top + k + 0.5 - e.y), f8);
     }
+    const l8 number = l8{0, 1, 2, 3, 4, 5, 6, 7} + start;
     int at[8];
-    unsigned key[4][8];
+    Key key[4][8];
     store(at, first);
-    for (int k = 0; k < 4; ++k) store(key[k], rank(near, variance, beside_cost, vmax(away_x[k % 2], away_y[k / 2])));
+    for (int k = 0; k < 4; ++k) {
+        const i8 ranked = rank(near, variance, beside_cost, vmax(away_x[k % 2], away_y[k / 2]));
+        store(key[k], __builtin_convertvector(ranked, l8) << 32 | number);
+    }
     for (int i = 0; i < 8; ++i)
         for (int k = 0; k < 4; ++k) {
             Key& best = band.least[at[i] + k / 2 * stride + k % 2];
-            const Key offered = (Key)key[k][i] << 32 | (start + i);
-            best = offered < best ? offered : best;
+            best = key[k][i] < best ? key[k][i] : best;
         }
 }
 

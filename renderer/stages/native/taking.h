@@ -15,6 +15,10 @@ template <class Plan> inline void keep8(const Plan& plan, int at) {
     const double* front = (const double*)plan.front + (at / side + 1) * wide + FRAME + at % side;
     int* source = (int*)plan.source + at;
     const d8 bound = load<d8>(front) / (double)given::NEARER;
+    // one of any three neighbours is among six of eight
+    if (!packets::bits((load<d8>(front - 1) < bound) | (load<d8>(front + 1) < bound) |
+                       (load<d8>(front - wide) < bound)))
+        return;
     l8 nearer = 0;
     for (int down = -1; down <= 1; ++down)
         for (int right = -1; right <= 1; ++right) nearer -= load<d8>(front + down * wide + right) < bound;
