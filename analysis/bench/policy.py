@@ -30,7 +30,13 @@ CYCLE_S = 0.005
 """Animation time that a cycle takes, seconds: about what the cost model gives at the defaults."""
 MEASURED_CYCLES = 240
 ALL_ELSE_LIMIT = 0.60
-NAMES = {"advanced": "move", "chosen": "choose tiles", "taken_in": "take in", "displayed": "smooth"}
+NAMES = {
+    "advanced": "move",
+    "chosen": "choose tiles",
+    "taken_in": "take in",
+    "drifted": "shadows",
+    "displayed": "smooth",
+}
 """Stages of the filter by the names of their rows."""
 TRACING, REST, ALL_ELSE = "tracing", "remaining", "all but tracing"
 

@@ -15,13 +15,13 @@ from renderer.compute.memory import Memory, Recycled
 from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels as kernels
 from renderer.stages import picture_kernels
+from renderer.stages.poses import pose_words, rows_of
 from renderer.stages.sizes import FRAME, PIXEL_WORDS
 from tsar.filtering.batches import Traced
 from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, FilterOptions, Surfels
 from tsar.filtering.stages import FilterStages
 from tsar.filtering.tiles import filled_up, spacings
-from tsar.projection import to_camera
-from tsar.types import Viewpoint
+from tsar.types import Hits, Viewpoint
 
 _F32, _F64, _I64 = torch.float32, torch.float64, torch.int64
 _KINDS = {
@@ -37,7 +37,7 @@ _APART = 320
 def filter_stages(side: int, threads: int = 1) -> FilterStages:
     """Kernels for a picture of ``side`` pixels, a power of two of at least 16."""
     made = _Compiled(side, threads)
-    return FilterStages(made.advanced, made.chosen, made.taken_in, made.displayed)
+    return FilterStages(made.advanced, made.chosen, made.taken_in, made.drifted, made.displayed)
 
 
 class _Compiled:
@@ -76,6 +76,8 @@ class _Compiled:
         planes = address("planes", self._planes, _I64, len(self._planes))
         self._take = [Command(kernels.take, self._plans[0], bands, number, planes) for number in numbers]
         self._prepare_batch(threads)
+        self._shadows = Record("2Q q 4Q q Q Qqdd Qqdd qd")  # shadows::Batch
+        self._drifted = Command(kernels.drifted, self._shadows.address).launch
         self._prepare_tiles(threads)
         self._prepare_picture(threads)
 
@@ -83,7 +85,7 @@ class _Compiled:
         self, estimates: Estimates, surfels: Surfels, rate: Tensor, seconds: float, view: Viewpoint
     ) -> tuple[Estimates, Surfels]:
         """As :func:`tsar.filtering.motion.advanced`."""
-        rows, rate = _rows(view), rate.contiguous()
+        rows, rate = rows_of(view), rate.contiguous()
         before = _planes(estimates, surfels)
         after = self._new_planes()
         where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
@@ -91,7 +93,7 @@ class _Compiled:
             *where[:-1], *(self._address(name, plane) for name, plane in zip(_KINDS, after, strict=True))
         ]  # fmt: skip
         at = dict(zip(_KINDS, where, strict=True))
-        of = *_poses(rows, view), *(at[name] for name in ("instance", "point", "inverse", "roughness"))
+        of = *pose_words(rows, view), *(at[name] for name in ("instance", "point", "inverse", "roughness"))
         ageing = at["position"], at["aged"], self._elements(rate), seconds
         perspective = view.kind == "perspective"
         offer, choose = self._offer[perspective], self._choose[perspective]
@@ -129,8 +131,8 @@ class _Compiled:
         where += [0] * (6 - len(where))
         own = [self._address(name, plane) for name, plane in zip(_KINDS, planes, strict=True)]
         views = [seen if moves else None for seen in (view, traced.earlier)]
-        rows = [_rows(seen) if seen is not None else None for seen in views]
-        poses = [_poses(row, seen) for row, seen in zip(rows, views, strict=True)]
+        rows = [rows_of(seen) if seen is not None else None for seen in views]
+        poses = [pose_words(row, seen) for row, seen in zip(rows, views, strict=True)]
         moment = traced.now_s, options.memory_s, VARIANCE_MAX / traced.cycle_s
         flags = moves, options.accumulation, options.spread
         self._batch.set(*where, tiles, *own, *changes, *self._samples, *poses[0], *poses[1], *moment, *map(int, flags))
@@ -169,6 +171,26 @@ class _Compiled:
         if int(self._found[0]) == count:
             return found
         return filled_up(found, self._split(self._gains), self._spacings.index(1.0), count)
+
+    def drifted(
+        self, before: Tensor, position: Tensor, hits: Hits, view: Viewpoint, earlier: Viewpoint, cycle_s: float
+    ) -> Tensor:
+        """As :func:`tsar.filtering.shadows.drifted`."""
+        before, samples, after = before.contiguous(), hits.instance.numel(), torch.empty_like(before)
+        planes = [
+            (position, _F32, 2 * samples), (hits.instance, torch.int32, samples), (hits.point, _F32, 3 * samples),
+            (hits.occluder, torch.int32, samples),
+        ]  # fmt: skip
+        kept = [values.contiguous() for values, _, _ in planes]
+        where = [address("batch", values, *kind) for values, (_, *kind) in zip(kept, planes, strict=True)]
+        track, rows = view.track_of_instance.contiguous(), [rows_of(seen) for seen in (view, earlier)]
+        now, was = (pose_words(row, seen) for row, seen in zip(rows, (view, earlier), strict=True))
+        self._shadows.set(
+            self._elements(before), self._elements(after), self._side // ELEMENT_PX, *where, samples,
+            address("tracks", track, _I64, len(track)), *now, *was, earlier.kind == "perspective", cycle_s,
+        )  # fmt: skip
+        self._drifted()
+        return after
 
     def displayed(
         self, estimates: Estimates, surfels: Surfels | None, rate: Tensor, seconds: float
@@ -260,19 +282,6 @@ def _shares(rows: int, threads: int) -> list[tuple[int, int]]:
     """First and last row, exclusive, of each thread that has any."""
     edges = [rows * number // threads for number in range(threads + 1)]
     return [(first, last) for first, last in pairwise(edges) if last > first]
-
-
-def _rows(view: Viewpoint) -> Tensor:
-    """What takes each instance to the camera, and last of all directions."""
-    matrix, offset = to_camera(view)
-    return torch.cat((matrix.reshape(-1, 9), offset), dim=1).contiguous()
-
-
-def _poses(rows: Tensor | None, view: Viewpoint | None) -> tuple[int, int, float, float]:
-    """A view as a launch takes it; 0 where there is none."""
-    if rows is None or view is None:
-        return 0, 0, 1.0, 1.0
-    return address("rows", rows, _F64, rows.numel()), len(rows), view.tan_x, view.tan_y
 
 
 def _planes(estimates: Estimates, surfels: Surfels) -> list[Tensor]:

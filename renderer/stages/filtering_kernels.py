@@ -1,5 +1,5 @@
 """Kernel entry points of the filter's stages that move estimates and take batches in (``native/surfels.h``,
-``taking.h``, ``changes.h``, ``batches.h``), defined in ``tsar/filtering``. Threads take rows."""
+``taking.h``, ``changes.h``, ``batches.h``, ``shadows.h``), defined in ``tsar/filtering``. Threads take rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
 from renderer.stages import sizes
 
-wp.set_module_options(module_options("batches.h", given=sizes.FILTERING))
+wp.set_module_options(module_options("batches.h", "shadows.h", given=sizes.FILTERING))
 
 
 @wp.struct
@@ -103,6 +103,10 @@ def native_learn(plan: FilterPlan, batch: Address, parts: Address, number: wp.in
 def native_take_in(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32): ...
 
 
+@wp.func_native("shadows::drifted(*(const shadows::Batch*)batch);")
+def native_drifted(batch: Address): ...
+
+
 @wp.kernel
 def offer(
     plan: FilterPlan,
@@ -176,3 +180,9 @@ def learn(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
 def take_in(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
     """Rates, estimates and surfels of some rows after a batch, once all parts have learnt."""
     native_take_in(plan, batch, parts, number)
+
+
+@wp.kernel
+def drifted(batch: Address):
+    """How fast shadows move over each element; ``batch`` is a ``shadows::Batch``."""
+    native_drifted(batch)

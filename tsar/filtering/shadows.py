@@ -17,6 +17,28 @@ CROSSINGS_MAX = 4.0
 """Most crossings that are expected in a second."""
 
 
+def drifted(
+    before: Float[Tensor, "1 e e"],
+    position: Float[Tensor, "n samples 2"],
+    hits: Hits,
+    view: Viewpoint,
+    earlier: Viewpoint,
+    cycle_s: float,
+) -> Float[Tensor, "1 e e"]:
+    """How fast shadows move over each element, image sides per second, after a batch: as its newest samples met them.
+
+    Args:
+        before: as it was.
+        position: of the samples on the image plane, in ``[0, 1)``.
+        hits: of the samples.
+        view, earlier: poses at the start of the cycle, and of the one before.
+        cycle_s: seconds between the two.
+    """
+    across = before.shape[-1]
+    place = (position.reshape(-1, 2) * across).to(torch.int64)
+    return last_seen(before, drift(hits, view, earlier) / cycle_s, place[:, 1] * across + place[:, 0])
+
+
 def drift(hits: Hits, view: Viewpoint, earlier: Viewpoint) -> Float64[Tensor, " samples"]:
     """How far the shadow on each hit has moved over its surface since an earlier view.
 

@@ -11,8 +11,9 @@ from tsar.filtering.batches import Traced, taken_in
 from tsar.filtering.display import displayed
 from tsar.filtering.motion import advanced
 from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
+from tsar.filtering.shadows import drifted
 from tsar.filtering.tiles import chosen
-from tsar.types import Viewpoint
+from tsar.types import Hits, Viewpoint
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class FilterStages:
         advanced: estimates and surfels of a later time, as its poses show them.
         chosen: the tiles to sample.
         taken_in: estimates, surfels and change after a batch.
+        drifted: how fast shadows move over each element, after a batch.
         displayed: the picture, and the variance of its errors.
     """
 
@@ -31,6 +33,7 @@ class FilterStages:
     taken_in: Callable[[Estimates, Surfels, Change, Traced, FilterOptions], tuple[Estimates, Surfels, Change]] = (
         taken_in
     )
+    drifted: Callable[[Tensor, Tensor, Hits, Viewpoint, Viewpoint, float], Tensor] = drifted
     displayed: Callable[[Estimates, Surfels | None, Tensor, float], tuple[Tensor, Tensor]] = displayed
 
 

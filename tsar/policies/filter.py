@@ -234,10 +234,9 @@ class Filter(Policy[State]):
     ) -> Float[Tensor, "1 e e"]:
         if not self._options.shadows or answered.hits is None or state.view is None or state.earlier is None:
             return state.drift_s
-        across = state.drift_s.shape[-1]
-        place = (batch.position.reshape(-1, 2) * across).to(torch.int64)
-        drift_s = shadows.drift(answered.hits, state.view, state.earlier) / moment.cycle_s
-        return shadows.last_seen(state.drift_s, drift_s, place[:, 1] * across + place[:, 0])
+        return self._stages.drifted(
+            state.drift_s, batch.position, answered.hits, state.view, state.earlier, moment.cycle_s
+        )
 
     def _rate(self, observed: Change, drift_s: Float[Tensor, "1 e e"]) -> Float[Tensor, "1 e e"]:
         return torch.maximum(observed.rate, shadows.expected_rate(drift_s, self._options.reach))

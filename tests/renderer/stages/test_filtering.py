@@ -17,7 +17,7 @@ from tsar.filtering.records import DEFAULT, ELEMENT_PX, UNSEEN, VARIANCE_MAX, Es
 from tsar.filtering.stages import FilterStages
 from tsar.policies.filter import Filter
 from tsar.policy import Moment, Setting, step
-from tsar.types import Viewpoint
+from tsar.types import Hits, Viewpoint
 
 REFERENCE = FilterStages()
 SIDES = [16, 64, 128]
@@ -101,6 +101,26 @@ def test_pictures_are_those_of_the_reference(side: int, threads: int) -> None:
         arguments = estimates, surfels if seed % 2 else None, rates(side, seed), 0.02 * seed
         for ours, theirs in zip(compiled.displayed(*arguments), REFERENCE.displayed(*arguments), strict=True):
             assert torch.equal(ours, theirs)
+
+
+@pytest.mark.parametrize("kind", ["perspective", "parallel"])
+@pytest.mark.parametrize("side", SIDES)
+def test_shadows_move_as_in_the_reference(side: int, kind: str) -> None:
+    compiled = filter_stages(side)
+    for seed in range(4):
+        _, surfels, view = scene(side, kind, seed)
+        angle = view.rotation.flip(0) if seed % 2 else view.rotation
+        earlier = replace(view, rotation=angle, translation=view.translation + 0.01 * (seed + 1))
+        made = torch.Generator().manual_seed(seed)
+        count = (side // 8) ** 2
+        instance, occluder = torch.randint(-2, 3, (2, count, 64), generator=made, dtype=torch.int32)
+        point = surfels.point.reshape(3, -1)[:, : count * 64].T.reshape(count, 64, 3).contiguous()
+        hits = Hits(instance.clamp(min=-1), point, occluder)
+        before = rates(side, seed)
+        arguments = before, torch.rand(count, 64, 2, generator=made), hits, view, earlier, 0.02
+        found, wanted = compiled.drifted(*arguments), REFERENCE.drifted(*arguments)
+        assert torch.equal(found, wanted)
+        assert (wanted > 0.0).any() and not torch.equal(wanted, before)
 
 
 OPTIONS = {

@@ -1,0 +1,23 @@
+"""Poses as the filter's native code takes them (``surfels::Poses``)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from renderer.compute.launching import address
+from tsar.projection import to_camera
+from tsar.types import Viewpoint
+
+
+def rows_of(view: Viewpoint) -> Tensor:
+    """What takes each instance to the camera, and last of all directions."""
+    matrix, offset = to_camera(view)
+    return torch.cat((matrix.reshape(-1, 9), offset), dim=1).contiguous()
+
+
+def pose_words(rows: Tensor | None, view: Viewpoint | None) -> tuple[int, int, float, float]:
+    """A view as a launch takes it; 0 where there is none."""
+    if rows is None or view is None:
+        return 0, 0, 1.0, 1.0
+    return address("rows", rows, torch.float64, rows.numel()), len(rows), view.tan_x, view.tan_y
