@@ -19,6 +19,7 @@ COMMANDS = {
     "inputs": "analysis.comparison.inputs_command",
     "render": "analysis.tracer.render_command",
     "study": "analysis.suitability.command",
+    "ablation": "analysis.ablation.command",
     "sensitivity": "analysis.sensitivity.command",
     "spectrum": "analysis.spectrum.command",
     "cost_report": "analysis.cost_report.command",

@@ -19,7 +19,9 @@ BESIDE = ("scenes.animation", "scenes.arithmetic", "scenes.daylight", "scenes.lo
 MEASURED = tuple(f"analysis.{room}" for room in ("command", "storage", "metrics", "page"))
 DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks")
 OTHERS = ("renderer", "scenes", "tsar")
-QUESTIONS = "comparison suitability sensitivity spectrum cost_report conversion bench tracer perception".split()
+QUESTIONS = (
+    "comparison suitability ablation sensitivity spectrum cost_report conversion bench tracer perception".split()
+)
 
 # What the modules of a room may import of the project, beside the room itself. A room that is not named has the rule of
 # the nearest folder above it that is.

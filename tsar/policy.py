@@ -102,12 +102,14 @@ class Picture:
         sample_map: age and density of its samples; None where the policy cannot tell.
         counters: work done for it, by name; ``framelet_pixels`` are the pixels of all framelets that were accumulated.
         maps: what else the policy knows of every place, by name, for a page.
+        carried: see :class:`tsar.types.ShownImage`.
     """
 
     image: Float[Tensor, "h w 3"]
     sample_map: SampleMap | None = None
     counters: Mapping[str, int] = field(default_factory=dict)
     maps: Mapping[str, MapShown] = field(default_factory=dict)
+    carried: Callable[[Float[Tensor, "h w 3"]], Float[Tensor, "h w 3"]] | None = None
 
 
 @dataclass(frozen=True)
@@ -225,7 +227,7 @@ def run(
         shown = done.shown
         spent = Spent(cycle, cycle_s, dict(done.timer.seconds), done.counters)
         display_s = time_s + policy.latency_cycles * cycle_s
-        yield record, ShownImage(display_s, time_s, shown.image, shown.sample_map, shown.maps, spent)
+        yield record, ShownImage(display_s, time_s, shown.image, shown.sample_map, shown.maps, spent, shown.carried)
         state, cycle, time_s = done.after, cycle + 1, time_s + cycle_s
 
 

@@ -223,6 +223,8 @@ class ShownImage:
         sample_map: of what age and density its samples are.
         maps: what else the policy knows of every place, by name.
         spent: what the cycle that made it took; None where that was not counted.
+        carried: what the same blends of pixels make of another picture of the same time, linear RGB; None where pixels
+            are shown as they are.
     """
 
     display_time_s: float
@@ -231,6 +233,7 @@ class ShownImage:
     sample_map: SampleMap | None = None
     maps: Mapping[str, MapShown] = field(default_factory=dict)
     spent: Spent | None = None
+    carried: Callable[[Float[Tensor, "h w 3"]], Float[Tensor, "h w 3"]] | None = None
 
 
 @dataclass(frozen=True)

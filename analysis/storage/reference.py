@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from analysis.command.progress import Task
@@ -135,6 +135,12 @@ class Reference:
     rendered: int
 
 
+def as_stored(image: ArrayLike) -> NDArray[np.float16]:
+    """Linear radiance as a reference holds it: float16, not below 0, and 0 where it is not finite."""
+    finite = np.nan_to_num(np.asarray(image), nan=0.0, posinf=0.0, neginf=0.0)
+    return np.clip(finite, 0.0, _HALF_MAX).astype("<f2")
+
+
 Render = Callable[[float], Tensor]
 """``time_s -> (height, width, 3)`` linear RGB, already down-filtered to the resolution of the reference."""
 
@@ -227,8 +233,7 @@ class _Images:
         if image.shape != self._spec.shape[1:]:
             raise ValueError(f"reference: expected images {self._spec.shape[1:]}, got {image.shape}")
         nonfinite = int((~np.isfinite(image)).sum())
-        image = np.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
-        content = np.clip(image, 0.0, _HALF_MAX).astype("<f2").tobytes()
+        content = as_stored(image).tobytes()
         # not through mapped memory: a full disk would end the process there
         file.seek(self._offset(number))
         file.write(content)

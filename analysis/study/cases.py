@@ -121,6 +121,10 @@ class Case:
             second than all the rest; None for no score.
         display: the display it is scored for.
         stills_s: times whose pictures are kept, seconds after the start.
+        parts: options of the policy ``tsar`` that differ from its own, by name in alphabetical order
+            (:class:`tsar.filtering.records.FilterOptions`).
+        budget_s: the error is divided by where it lies (:mod:`analysis.metrics.budget`), with surfaces and lights
+            compared over so many seconds; None for no such division.
     """
 
     input: str
@@ -135,8 +139,13 @@ class Case:
     jod_span_s: tuple[float, float] | None = None
     display: DisplayModel = field(default_factory=DisplayModel)
     stills_s: tuple[float, ...] = ()
+    parts: tuple[tuple[str, bool | int | float], ...] = ()
+    budget_s: float | None = None
 
     def __post_init__(self) -> None:
+        require(not self.parts or self.policy == "tsar", "parts", "none but of tsar", self.parts)
+        budget = self.budget_s
+        require(budget is None or 0.0 < budget <= 10.0, "budget_s", "seconds in (0, 10]", budget)
         require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
         POLICIES.require(self.policy)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
@@ -165,10 +174,11 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For people: policy, input, batch, resolution, seed and phase."""
+        """For people: policy and changed parts, input, batch, resolution, seed and phase."""
         c = self.tsar
         batch = "" if is_framed(self.policy) else f"-b{c.batch_size}"
-        text = f"{self.policy}-{self.input}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
+        parts = "".join(f"-{name}-{value:g}" for name, value in self.parts)
+        text = f"{self.policy}{parts}-{self.input}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
         return text.replace(" ", "-")
 
     def key(self, source: str) -> str:

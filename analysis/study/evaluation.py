@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import torch
-import torch.nn.functional as F
 from PIL import Image
 
 from analysis.metrics.causes import Truths
@@ -29,9 +28,10 @@ from analysis.metrics.quality import View, reference_times
 from analysis.page.pictures import Pixels, tiling_image
 from analysis.page.video import to_pixels
 from analysis.storage.files import locked
-from analysis.storage.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
+from analysis.storage.reference import Reference, ReferenceSpec, as_stored, content_hash, obtain, renderer_hash
 from analysis.storage.source import code_hash
 from analysis.storage.store import Store
+from analysis.study.budget import Budgeting, averaged
 from analysis.study.cases import Case, Scale
 from analysis.study.displays import Measuring, Seen, watch
 from analysis.study.runs import Machine, PolicyRun, Totals, begin
@@ -173,13 +173,9 @@ def _scene_hash(input: str, phase: float) -> str:
 
 def _truths(case: Case, reference: Reference) -> Truths:
     """Reference images averaged down to the resolution of the case."""
-    factor = case.scale.reference_px // case.tsar.resolution_px
 
     def image(number: int) -> torch.Tensor:
-        found = torch.from_numpy(reference.images[number].astype(np.float32))
-        if factor == 1:
-            return found
-        return F.avg_pool2d(found.permute(2, 0, 1)[None], factor)[0].permute(1, 2, 0).contiguous()
+        return averaged(torch.from_numpy(reference.images[number].astype(np.float32)), case.tsar.resolution_px)
 
     return Truths(image, case.start_s, case.scale.reference_rate_hz, reference.spec.count)
 
@@ -208,8 +204,11 @@ def _run(case: Case, key: str, place: Place) -> None:
         kept=_scored(case),
     )
     stills_of = _Stills(case, len(times_s), keep)
-    seen = watch({case.policy: made.images}, truths, times_s, measuring, [stills_of])[case.policy]
+    dividing = [_budgeting(case, place)] if case.budget_s is not None else []
+    seen = watch({case.policy: made.images}, truths, times_s, measuring, [stills_of, *dividing])[case.policy]
     table, totals = pd.DataFrame(seen.rows), made.totals
+    for one in dividing:
+        table = table.join(pd.DataFrame(one.rows).add_prefix("budget_"))
     with store.make(place.files(key)["times"].name) as file:
         table.to_parquet(file.path)
     scored = time.perf_counter()
@@ -285,4 +284,17 @@ def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
 
     machine = Machine(case.ledger, case.capacity, case.cost)
     span_s = case.start_s, case.start_s + case.scale.seconds
-    return begin(case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads)
+    parts = dict(case.parts)
+    return begin(case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads, parts=parts)
+
+
+def _budgeting(case: Case, place: Place) -> Budgeting:
+    scale, side = case.scale, case.tsar.resolution_px
+    fine = _renderer(case.input, case.phase, scale.reference_px, place.threads)
+
+    def picture(time_s: float) -> torch.Tensor:
+        found = fine.render_frame(time_s, scale.reference_px, scale.reference_px, scale.reference_samples_per_axis)
+        return averaged(torch.from_numpy(as_stored(found).astype(np.float32)), side)
+
+    assert case.budget_s is not None
+    return Budgeting(case.policy, side, fine.trace, fine.viewpoint, picture, case.budget_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -147,6 +148,7 @@ def begin(
     stages: StagesName = "compiled",
     threads: int = 1,
     on_record: Callable[[StepRecord], None] = lambda record: None,
+    parts: Mapping[str, bool | int | float] | None = None,
 ) -> PolicyRun:
     """A run of a policy, not started yet.
 
@@ -160,6 +162,7 @@ def begin(
         stages: what runs the stages around tracing.
         threads: that share them.
         on_record: told of every recorded cycle.
+        parts: options of the policy ``tsar`` that differ from its own; None for its own.
 
     Raises:
         ConfigError: no policy has that name.
@@ -173,11 +176,18 @@ def begin(
         lambda batch: renderer_of(1).trace(batch),
         lambda time_s: renderer_of(1).viewpoint(time_s),
     )
-    policy = POLICIES[name](setting)
+    policy = _changed(setting, parts) if parts else POLICIES[name](setting)
     meter, totals = Meter(renderer_of(policy.footprint).trace), Totals(config)
     clock = cycle_seconds(machine.ledger, machine.capacity, machine.cost, policy.price)
     images = _noted(policy, meter, clock, span_s, totals, on_record)
     return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)
+
+
+def _changed(setting: Setting, parts: Mapping[str, Any]) -> Policy[Any]:
+    from tsar.filtering.records import DEFAULT
+    from tsar.policies.filter import Filter
+
+    return Filter(setting, dataclasses.replace(DEFAULT, **parts))
 
 
 def _noted(

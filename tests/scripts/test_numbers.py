@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from analysis.ablation.options import AblationOptions
 from analysis.bench.options import BenchOptions
 from analysis.comparison.options import RunOptions
 from analysis.comparison.repetitions import InputsOptions
@@ -38,6 +39,7 @@ from tests.scripts.commands import assert_refused, call_script, nothing_in, one_
 ROOT = Path(__file__).resolve().parents[2]
 
 OPTIONS: dict[str, Any] = {
+    "ablation.py": AblationOptions(),
     "accelerators.py": AcceleratorOptions(),
     "bench.py": BenchOptions(),
     "conversion_check.py": CheckOptions(markers=True),
@@ -158,6 +160,7 @@ ABSURD = {
     "inputs.py": [("--capacity", "1e-9"), ("--seconds", "1e9"), ("--repetitions", "1000000")],
     "render.py": [("--time-s", "1e15"), ("--fps", "1e-300"), ("--threads", "100000"), ("--frames", "1e9")],
     "cost_report.py": [("--measured-warmup", "1000000000"), ("--repetitions", "1000", "--cycles-per-turn", "10000")],
+    "ablation.py": [("--framed-rate-hz", "1e300"), ("--before-s", "inf"), ("--workers", "100000")],
     "suitability.py": [("--framed-rate-hz", "1e300"), ("--start-s", "nan"), ("--workers", "100000")],
     "perception.py": [("recover", "--experiments", "100000", "--bootstraps", "100000")],
     "tiles.py": [("--farm.workers", "100000"), ("--time-s", "inf")],

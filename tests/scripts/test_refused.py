@@ -10,10 +10,20 @@ import pytest
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 SMALL = "--resolution-px 64 --batch-size 16"
-CACHED = ("run", "sensitivity", "suitability")
+CACHED = ("run", "sensitivity", "suitability", "ablation")
 """Commands that have a cache of references."""
 
 REFUSED: dict[str, tuple[str, ...]] = {
+    "ablation --inputs nowhere": ("inputs", "nowhere"),
+    "ablation --rows 16": ("rows", "0 to 15"),
+    "ablation --rows 7 7": ("rows", "none twice"),
+    "ablation --parts magic": ("parts", "jitter", "footprint-1x", "magic"),
+    "ablation --parts jitter jitter": ("parts", "none twice"),
+    "ablation --rivals nobody": ("rivals", "nobody"),
+    "ablation --before-s 0": ("before_s", "between 0.001 and 10", "0.0"),
+    "ablation --repetitions 0": ("repetitions", "between 1 and 1000"),
+    "ablation --ledger wall": ("ledger", "wall"),
+    "ablation --scale huge": ("--scale", "huge"),
     "accelerators --triangles 3": ("triangles", "between 16", "3"),
     "accelerators --scale 0": ("scale", "0"),
     "accelerators --image report-three": ("report-three",),

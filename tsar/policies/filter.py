@@ -91,8 +91,6 @@ class State:
 class Filter(Policy[State]):
     """Samples accumulated in pixels, or on surfaces."""
 
-    latency_cycles = 1
-
     def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
         super().__init__(setting)
         self._options, self._side = options, self.config.resolution_px
@@ -104,6 +102,10 @@ class Filter(Policy[State]):
         level = max(0, (self._side // self.config.framelet_side).bit_length() - 1)
         self._level = torch.full((self._side, self._side), level)
         self._every = max(1, _TILES_A_PROBE // self._tiles)  # cycles from one probe to the next
+
+    @property
+    def latency_cycles(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self._options.latency_cycles
 
     @property
     def footprint(self) -> int:
@@ -163,7 +165,14 @@ class Filter(Policy[State]):
 
     def image(self, state: State, moment: Moment) -> Picture:
         newest = SampleMap(state.estimates.time_s[0], self._level)
-        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=_maps(state))
+        carried = partial(self._carried, state, moment) if self._options.smoothing else None
+        return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=_maps(state), carried=carried)
+
+    def _carried(self, state: State, moment: Moment, image: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
+        """What would be shown if these were the colours of all estimates, of the same variances."""
+        color = image.permute(2, 0, 1).clamp(0.0, samples.COLOR_MAX).contiguous()
+        shown = self._displayed(replace(state, estimates=replace(state.estimates, color=color)), moment).shown
+        return shown.permute(1, 2, 0).contiguous()
 
     def _advanced(self, state: State, now_s: float) -> State:
         estimates, surfels = state.estimates, state.surfels

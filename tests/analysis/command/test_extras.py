@@ -23,6 +23,7 @@ PACKAGES = ("tsar", "renderer", "analysis", "scenes")
 
 LACKING = [
     ("suitability.py", (), "distributed", "study"),
+    ("ablation.py", (), "distributed", "study"),
     ("suitability.py", (), "pycvvdp", "perception"),
     ("sensitivity.py", (), "flip_evaluator", "perception"),
     ("tiles.py", ("glass",), "dask", "study"),

@@ -65,6 +65,7 @@ COMMANDS = {
     "pointsets.py": (),
     "cost_report.py": (),
     "spectrum.py": (),
+    "ablation.py": (),
     "suitability.py": ("--inputs", "fly-by", "--rows", "0"),
     "sensitivity.py": (),
     "accelerators.py": (),

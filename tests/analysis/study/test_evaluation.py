@@ -16,6 +16,7 @@ from PIL import Image
 import analysis.study.evaluation as evaluation
 from analysis.command.cluster import ClusterOptions
 from analysis.command.progress import Task
+from analysis.metrics.budget import SHARES
 from analysis.study.cases import Case, Scale, framed_config
 from analysis.study.evaluation import Place, evaluate, finished, source_of_results, times_of
 from analysis.study.farm import run_cases
@@ -194,3 +195,32 @@ def test_a_running_cluster_is_used_by_its_address(place: Place) -> None:
         keys, failures = run_cases([one], place, ClusterOptions(scheduler=cluster.scheduler_address))
         assert len(cluster.scheduler.workers) == 1, "the cluster is not ours to close"
     assert not failures and finished(keys[one], place) is not None
+
+
+def test_parts_of_the_policy_are_left_out_and_named(place: Place) -> None:
+    whole, less = case("tsar"), case("tsar", parts=(("smoothing", False),))
+    tables = [pd.read_parquet(place.files(evaluate(one, key(one), place))["times"]) for one in (whole, less)]
+    assert (tables[0]["mse"] != tables[1]["mse"]).all() and "tsar-smoothing-0-fly-by" in key(less)
+    assert not any(name.startswith("budget") for name in tables[0])
+    with pytest.raises(ConfigError, match="^parts: expected none but of tsar"):
+        case("thesis", parts=(("smoothing", False),))
+
+
+@pytest.mark.parametrize("policy", ["tsar", "framed"])
+def test_the_budget_of_an_error_adds_up(policy: str, place: Place) -> None:
+    """At every time, with the truth rendered at the time that the image shows; the longer a frame is shown, the more
+    its latency leaves."""
+    one = case(policy, budget_s=0.05)
+    table = pd.read_parquet(place.files(evaluate(one, key(one), place))["times"])
+    assert len(table) == TIMES and np.allclose(table[[f"budget_{name}" for name in SHARES]].sum(axis=1), table["mse"])
+    assert (table["budget_floor"] > 0).all() and (table["budget_late_s"] > 0).all()
+    assert table["budget_uncovered"].between(0.0, 0.9).all() and table["budget_uncovered"].max() > 0.0
+    assert (table["budget_blur"] == 0.0).all() == (policy == "framed")
+    if policy == "framed":
+        assert (np.diff(table["budget_floor"][table["refresh"] == table["refresh"].iloc[0]]) > 0).all()
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, 11.0])
+def test_a_budget_over_no_time_is_refused(seconds: float) -> None:
+    with pytest.raises(ConfigError, match="^budget_s: expected seconds in"):
+        case("tsar", budget_s=seconds)

@@ -190,3 +190,31 @@ def test_the_price_is_what_the_code_counts(name: str) -> None:
     found = (count.operations - taken[-1]) / 256**2
     assert 0.8 * policy.price.pixel_flops < found <= policy.price.pixel_flops, found
     assert taken[-1] / 256**2 <= 135.0  # of a pixel, of which there is one at most for each sample
+
+
+def test_the_latency_decides_when_a_picture_is_shown_and_nothing_else() -> None:
+    screen = panned(20.0)
+    found = [
+        shown(Filter(Setting(CONFIG, stages, view=screen.view), FilterOptions(latency_cycles=cycles)), screen, 0.2)
+        for cycles in (1, 3)
+    ]
+    for one, late in zip(*found, strict=True):
+        assert torch.equal(one.image, late.image) and one.sample_time_s == late.sample_time_s
+        assert late.display_time_s - one.display_time_s == pytest.approx(2.0 * CYCLE_S)
+
+
+def test_what_is_shown_of_another_picture_is_blended_alike() -> None:
+    """A picture of one colour stays that; twice as bright a picture is shown twice as bright; nothing is clipped from
+    below; and without smoothing pixels are shown as they are."""
+    screen = panned(20.0)
+    setting = Setting(CONFIG, stages, view=screen.view)
+    last = shown(Filter(setting), screen, 0.3)[-1]
+    assert last.carried is not None
+    plain, noise = torch.full((64, 64, 3), 0.25), torch.rand(64, 64, 3, generator=torch.Generator().manual_seed(1))
+    assert torch.allclose(last.carried(plain), plain, atol=1e-5)
+    assert torch.allclose(last.carried(noise), 2.0 * last.carried(0.5 * noise), atol=1e-5)
+    assert (last.carried(noise) - noise).abs().max() > 0.05
+    before = last.image.clone()
+    last.carried(noise)
+    assert torch.equal(last.image, before)
+    assert shown(Filter(setting, FilterOptions(smoothing=False)), screen, 0.1)[-1].carried is None

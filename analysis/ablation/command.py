@@ -1,0 +1,35 @@
+"""Measure what each part of the policy tsar is worth, where its error lies, and how far it is from a perfect picture.
+
+Each run leaves one part out, or changes one number, on the five inputs. The error of the whole policy is divided into
+latency, blur, disocclusion, shadows and aliasing, and compared with that of a perfect picture shown as late.
+
+Examples: python scripts/ablation.py --out out/ablation
+          python scripts/ablation.py --inputs fly-by --parts jitter smoothing --repetitions 1 --rivals --out out/two
+          python scripts/ablation.py --scale half --rows 7 8 --markdown --out out/ablation-half
+"""
+
+from __future__ import annotations
+
+import sys
+
+from analysis.ablation.options import AblationOptions
+from analysis.command.cli import parse, require_unbroken
+from analysis.command.extras import require_extra
+
+
+def main() -> None:
+    """Runs what is missing; prints the tables."""
+    options = parse(AblationOptions, __doc__ or "")
+    require_extra("study", "perception")
+    from analysis.ablation.run import study
+    from analysis.ablation.shown import markdown, shown_tables
+    from analysis.command.console import show
+
+    summary, tables = study(options)
+    shown = shown_tables(tables)
+    show(*([markdown(shown)] if options.markdown else shown))
+    written = f"written to {options.out}: summary.json, tables/, tables.md, moments.parquet, parts_row_*.png"
+    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
+    require_unbroken(summary["broken_invariants"])
+    if summary["failures"]:
+        sys.exit(1)

@@ -1,0 +1,72 @@
+"""Options of the study of the parts of the project's own policy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from analysis.command import limits
+from analysis.command.cluster import ClusterOptions
+from analysis.command.options import REFERENCES, References, Unprefixed
+from analysis.metrics.cost_model import Ledger
+from analysis.study.cases import INPUTS, ROWS
+from tsar.config import TsarConfig, closed_choices, require
+from tsar.policies import POLICIES, RIVALS
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class AblationOptions:
+    """The policy tsar with each of its parts alone left out, what its error consists of, and how far it is from a
+    perfect picture as late as its own. Runs that are on disk are not repeated."""
+
+    inputs: tuple[str, ...] = INPUTS
+    """Built-in inputs."""
+    rows: tuple[int, ...] = (7,)
+    """Rows of table 7.2, 0 to 15."""
+    scale: Literal["thesis", "half", "quick"] = "quick"
+    """Sizes, as of the suitability study. quick: a quarter of the thesis' side, against a reference half as often."""
+    repetitions: int = 3
+    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    parts: tuple[str, ...] = ()
+    """Names of the changes to make, a run each; none makes all. A wrong name lists them."""
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
+    """Of all runs; batch and resolution come from the row, the seed from the repetition."""
+    rivals: tuple[str, ...] = RIVALS
+    """Rivals whose lowest error at each moment is the best rival's; framed is one of them in any case."""
+    before_s: float = 0.1
+    """Surfaces not in sight so long before count as disocclusion, those lit or shaded otherwise as shadows, seconds."""
+    ledger: Ledger = "thesis"
+    """How cost is counted; wall is refused, for it gives no result twice."""
+    framed_rate_hz: float = 8.0
+    """Images a second that the framed renderer shows at every resolution; the machine is as fast as that takes."""
+    trace_segments: float = 4.0
+    """Ray segments per sample in the cost model."""
+    start_s: float = 0.0
+    """Where in the animation the measurement starts, seconds."""
+    markdown: bool = False
+    """Print the tables as Markdown."""
+    farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
+    """Where the runs are made."""
+    out: Path = Path("out/ablation")
+    """Folder for the results."""
+    cache: References = REFERENCES
+
+    def __post_init__(self) -> None:
+        unknown = [one for one in self.inputs if one not in INPUTS]
+        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        for one in self.rivals:
+            POLICIES.require(one, "rivals")
+        for name in ("inputs", "rows"):
+            chosen = getattr(self, name)
+            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
+        require(all(0 <= row < len(ROWS) for row in self.rows), "rows", f"numbers from 0 to {len(ROWS) - 1}", self.rows)
+        limits.within(
+            self,
+            repetitions=limits.REPETITIONS,
+            before_s=(0.001, 10.0),
+            framed_rate_hz=(0.01, 1000.0),
+            trace_segments=limits.SEGMENTS,
+            start_s=limits.TIMES_S,
+        )

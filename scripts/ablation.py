@@ -1,0 +1,14 @@
+"""Measure what each part of the policy tsar is worth, where its error lies, and how far a perfect picture is."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.command.cli import run_process
+from analysis.command.later import command
+
+main = command("analysis.ablation.command")
+
+if __name__ == "__main__":
+    run_process(main)
