@@ -167,7 +167,7 @@ class _Compiled:
             command.set(*where, *lengths)
         TEAM.run(self._gain)
         self._best(count)
-        found = [level.bool() for level in self._split(self._taken)]
+        found = self._split(self._taken.clone())
         if int(self._found[0]) == count:
             return found
         return filled_up(found, self._split(self._gains), self._spacings.index(1.0), count)
@@ -237,9 +237,9 @@ class _Compiled:
         self._spacings = spacings(self._side)
         sides = [int(self._side / (TILE_SIDE * spacing)) for spacing in self._spacings]
         self._sides, total = sides, sum(side * side for side in sides)
-        self._gains, self._taken = torch.zeros(total, dtype=_F64), torch.zeros(total, dtype=torch.uint8)
+        self._gains, self._taken = torch.zeros(total, dtype=_F64), torch.zeros(total, dtype=torch.bool)
         self._found = np.zeros(1, np.int32)
-        gains, taken = address("gains", self._gains, _F64, total), address("taken", self._taken, torch.uint8, total)
+        gains, taken = address("gains", self._gains, _F64, total), address("taken", self._taken, torch.bool, total)
         fixed = self._side, sides[0], len(sides), self._spacings[0], gains
         self._gain = [Command(picture_kernels.gain, *fixed, *rows) for rows in _shares(sides[0], threads)]
         found = address("found", self._found, torch.int32, 1)

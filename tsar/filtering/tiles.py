@@ -131,14 +131,29 @@ def covered(
     x: Float64[Tensor, " n"], y: Float64[Tensor, " n"], spacing: Float64[Tensor, " n"], side: int
 ) -> Int64[Tensor, "1 e e"]:
     """How many tiles, at most one of a spacing, lie on each element; ``x`` and ``y`` are their edges, pixels."""
-    total = torch.zeros(1, side // ELEMENT_PX, side // ELEMENT_PX, dtype=torch.int64)
+    total = torch.zeros(1, 1, 1, dtype=torch.int64)
     for kind in spacings(side):
         width = int(TILE_SIDE * kind)
-        of = spacing == kind
+        of = (spacing == kind).nonzero().squeeze(1)
         tile = torch.zeros(1, side // width, side // width, dtype=torch.int64)
         tile[0, (y[of] / width).to(torch.int64), (x[of] / width).to(torch.int64)] = 1
-        total += tile.repeat_interleave(width // ELEMENT_PX, 1).repeat_interleave(width // ELEMENT_PX, 2)
-    return total
+        total = _enlarged(total, side // width) + tile
+    return _enlarged(total, side // ELEMENT_PX)
+
+
+def places(side: int) -> Float64[Tensor, "n 3"]:
+    """Upper and left edge and spacing of all tiles, pixels, spacing after spacing, by rows."""
+    found = []
+    for kind in spacings(side):
+        tile = torch.ones(int(side / (TILE_SIDE * kind)), int(side / (TILE_SIDE * kind))).nonzero()
+        found.append(torch.cat((tile * TILE_SIDE * kind, torch.full((len(tile), 1), kind)), dim=1))
+    return torch.cat(found).to(torch.float64)
+
+
+def _enlarged(plane: Int64[Tensor, "1 e e"], across: int) -> Int64[Tensor, "1 a a"]:
+    """Each value in all the places that it covers."""
+    side, times = plane.shape[-1], across // plane.shape[-1]
+    return plane[0, :, None, :, None].expand(side, times, side, times).reshape(1, across, across)
 
 
 def _worth(gain: list[Float64[Tensor, "_ _"]], price: float) -> list[Bool[Tensor, "_ _"]]:

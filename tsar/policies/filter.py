@@ -99,6 +99,9 @@ class Filter(Policy[State]):
         most = int(options.share_max * self._side**2) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
+        within = morton_to_raster(TILE_SIDE)
+        self._cell = torch.stack((within % TILE_SIDE, within // TILE_SIDE), dim=1).to(torch.float64)
+        self._places = tiles.places(self._side)
         level = max(0, (self._side // self.config.framelet_side).bit_length() - 1)
         self._level = torch.full((self._side, self._side), level)
         self._every = max(1, _TILES_A_PROBE // self._tiles)  # cycles from one probe to the next
@@ -134,15 +137,13 @@ class Filter(Policy[State]):
         """Moves the estimates to the start of the cycle and asks for what they need."""
         state = self._advanced(state, moment.time_s)
         x, y, spacing = self._chosen(state, moment)
-        within = morton_to_raster(TILE_SIDE)
-        cell = torch.stack((within % TILE_SIDE, within // TILE_SIDE), dim=1).to(torch.float64)
         place = torch.stack((x, y), dim=1)
         offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
         if self._options.jitter:
             # the next point of the sequence for each tile, so that a pixel sees consecutive ones
             middle = ((place + 0.5 * TILE_SIDE * spacing[:, None]) / ELEMENT_PX).to(torch.int64)
             offset = ((state.visits[0][middle[:, 1], middle[:, 0]][:, None] + 1) * _STEP) % 1.0
-        position = place[:, None] + (cell + offset[:, None]) * spacing[:, None, None]
+        position = place[:, None] + (self._cell + offset[:, None]) * spacing[:, None, None]
         position = (position / self._side * _GRID).floor() / _GRID
         at = torch.arange(self._tiles, dtype=torch.float64) / self._tiles * moment.cycle_s
         times = (moment.time_s + at)[:, None].expand(-1, TILE_SIDE**2).contiguous()
@@ -198,12 +199,10 @@ class Filter(Policy[State]):
             )  # fmt: skip
         else:
             chosen = self._in_turn(kinds, moment.cycle)
-        found = [
-            torch.cat((level.nonzero() * TILE_SIDE * kind, torch.full((int(level.sum()), 1), kind)), dim=1)
-            for kind, level in zip(kinds, chosen, strict=True)
-        ]
-        tile = torch.cat(found).to(torch.float64)
-        tile = tile[torch.arange(self._tiles) % len(tile)]
+        found = torch.cat([level.reshape(-1) for level in chosen]).nonzero().squeeze(1)
+        tile = self._places[found]
+        if len(tile) < self._tiles:
+            tile = tile[torch.arange(self._tiles) % len(tile)]
         middle = ((tile[:, :2] + 0.5 * TILE_SIDE * tile[:, 2:]) / ELEMENT_PX).to(torch.int64)
         order = torch.argsort(state.rate[0][middle[:, 0], middle[:, 1]], stable=True)
         y, x, spacing = tile[order].unbind(1)
