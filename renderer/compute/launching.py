@@ -130,8 +130,8 @@ class Record:
     def __init__(self, layout: str) -> None:
         """Takes the kinds of its words as :mod:`struct` names them."""
         self._pack = struct.Struct("=" + layout).pack_into
-        self._bytes = np.zeros(struct.calcsize("=" + layout), np.uint8)
-        self.address = self._bytes.ctypes.data
+        self._bytes = ctypes.create_string_buffer(struct.calcsize("=" + layout))
+        self.address = ctypes.addressof(self._bytes)
 
     def set(self, *words: float) -> None:
         """Sets all words."""

@@ -127,7 +127,7 @@ class _Compiled:
         before = [known.excess.contiguous(), known.span_s.contiguous(), known.seen_s.contiguous()]
         after = [torch.empty_like(plane) for plane in (*before, known.rate, known.rate)]
         changes = [address("change", plane, plane.dtype, elements) for plane in (*before, *after)]
-        where = [address("batch", values, *kind) for values, (_, *kind) in zip(kept, batch, strict=True)]
+        where = [address("batch", plane, kind, size) for plane, (_, kind, size) in zip(kept, batch, strict=True)]
         where += [0] * (6 - len(where))
         own = [self._address(name, plane) for name, plane in zip(_KINDS, planes, strict=True)]
         views = [seen if moves else None for seen in (view, traced.earlier)]
@@ -182,7 +182,7 @@ class _Compiled:
             (hits.occluder, torch.int32, samples),
         ]  # fmt: skip
         kept = [values.contiguous() for values, _, _ in planes]
-        where = [address("batch", values, *kind) for values, (_, *kind) in zip(kept, planes, strict=True)]
+        where = [address("batch", plane, kind, size) for plane, (_, kind, size) in zip(kept, planes, strict=True)]
         track, rows = view.track_of_instance.contiguous(), [rows_of(seen) for seen in (view, earlier)]
         now, was = (pose_words(row, seen) for row, seen in zip(rows, (view, earlier), strict=True))
         self._shadows.set(
