@@ -37,6 +37,7 @@ FRAME = 8
 FILTERING: dict[str, float] = {
     "PIXEL_WORDS": PIXEL_WORDS,
     "FRAME": FRAME,
+    "NOTHING_KNOWN": records.NOTHING_KNOWN,
     "VARIANCE_MAX": records.VARIANCE_MAX,
     "UNSEEN": records.UNSEEN,
     "NEARER": motion.NEARER,

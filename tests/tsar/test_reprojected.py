@@ -102,10 +102,10 @@ def test_a_still_scene_converges_or_stays_as_it_is(name: str) -> None:
 @pytest.mark.parametrize("pan", [0.3, -0.3])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_pan_is_followed(name: str, pan: float) -> None:
-    """A warp shows the poses of the cycle's start; a frame shows those of its own."""
+    """A warp shows the poses of its display; a frame shows those of its own time."""
     scene = Planes(pan=pan)
     for shown in play(name, scene)[-6:]:
-        right = scene.image(64, shown.sample_time_s, 4)
+        right = scene.image(64, shown.display_time_s if "late" in name else shown.sample_time_s, 4)
         late = scene.image(64, shown.sample_time_s - FRAME_S, 4)
         # what comes into view within two frames is not known
         found, wrong = (error(shown.image, truth, border=8) for truth in (right, late))

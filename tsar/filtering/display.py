@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import torch
 import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 
-from tsar.filtering.records import Estimates, Surfels
+from tsar.filtering.records import NOTHING_KNOWN, VARIANCE_MAX, Estimates, Surfels
 from tsar.policies.resampling import double_width
 
 
@@ -14,11 +15,13 @@ def displayed(
     estimates: Estimates, surfels: Surfels | None, rate: Float[Tensor, "1 e e"], seconds: float
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
     """Picture and variance of its errors some seconds later, :func:`smoothed`; surfels are those of the estimates, None
-    where nothing is reprojected."""
+    where nothing is reprojected. Pixels of the greatest variance do not count in their surroundings."""
     later = estimates.later(rate, seconds)
     if surfels is not None:
         later = later.beside(surfels)
-    return smoothed(later.color, later.variance, later.roughness)
+    variance = later.variance
+    variance = torch.where(variance < VARIANCE_MAX, variance, NOTHING_KNOWN)
+    return smoothed(later.color, variance, later.roughness)
 
 
 def smoothed(

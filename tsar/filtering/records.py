@@ -17,6 +17,8 @@ ELEMENT_PX = 4
 """Pixels along a side of the elements in which change is observed."""
 VARIANCE_MAX = 0.1
 """Variance of a pixel that nothing is known of, in squared encoded colour."""
+NOTHING_KNOWN = 10.0
+"""Variance at which a pixel is shown whose own has reached :data:`VARIANCE_MAX`: it takes its surroundings alone."""
 UNSEEN = -2
 """Instance of a pixel without a surfel; -1 is what is seen at infinity."""
 
@@ -27,6 +29,7 @@ class FilterOptions:
 
     Attributes:
         reprojection: whether estimates move with the surfaces that they belong to.
+        prediction: whether steady motion is continued to the time at which the picture is first shown.
         smoothing: whether uncertain pixels are blended with their surroundings when they are shown.
         accumulation: whether samples are averaged over time; without, the newest replaces what was known.
         jitter: whether samples move within their pixels from cycle to cycle.
@@ -43,6 +46,7 @@ class FilterOptions:
     """
 
     reprojection: bool = True
+    prediction: bool = True
     smoothing: bool = True
     accumulation: bool = True
     jitter: bool = True

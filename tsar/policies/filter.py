@@ -1,10 +1,10 @@
 """The project's own policies: estimates of every pixel, filtered over time and space, moving with their surfaces.
 
 Every pixel has an estimate of its colour and of the variance of its error. A cycle moves the estimates with the
-surfaces that they belong to, by the poses known at its start; chooses the tiles whose samples remove most of the error
-for longest; averages the new samples into the estimates; learns from the residuals how fast the picture changes, and
-from the shadows of what moves where it soon will; and shows the estimates, blended with their surroundings where they
-are uncertain. ``filter`` leaves the moving out.
+surfaces that they belong to, to where the poses known at its start say that they will be when it is shown; chooses the
+tiles whose samples remove most of the error for longest; averages the new samples into the estimates; learns from the
+residuals how fast the picture changes, and from the shadows of what moves where it soon will; and shows the estimates,
+blended with their surroundings where they are uncertain. ``filter`` leaves the moving out.
 
 The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is sampled in
 several cycles, so that the picture is late by little.
@@ -35,6 +35,7 @@ from tsar.filtering.records import (
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
+from tsar.prediction import predicted
 from tsar.roots import square_root
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 
@@ -62,8 +63,10 @@ class State:
         drift_s: how fast shadows move over each element, image sides per second, as its newest samples met them.
         rate: variance per second by which estimates age: what was observed, or what shadows make likely.
         now_s: start of the newest cycle; None before the first.
-        view: poses at that time; None where nothing is reprojected.
-        earlier: poses at the start of the cycle before; None where there was none.
+        known: poses at the start of the newest cycles, three at most; none where nothing is reprojected.
+        view: poses that estimates are moved to: those of the time at which the picture is first shown, as far as they
+            follow from the known ones; None where nothing is reprojected.
+        earlier: those of the cycle before; None where there was none.
         spacing: of the tiles that were asked for, pixels.
         visits: cycles that sampled each element.
         shown, remaining: the picture, and the variance of its errors.
@@ -75,6 +78,7 @@ class State:
     drift_s: Float[Tensor, "1 e e"]
     rate: Float[Tensor, "1 e e"]
     now_s: float | None
+    known: tuple[Viewpoint, ...]
     view: Viewpoint | None
     earlier: Viewpoint | None
     spacing: Float[Tensor, " n"]
@@ -130,12 +134,12 @@ class Filter(Policy[State]):
         nothing, observed = Estimates.empty(side), Change.empty(side)
         visits = torch.zeros_like(observed.rate, dtype=torch.int64)
         still = torch.zeros_like(observed.rate)
-        return State(nothing, Surfels.empty(side), observed, still, self._rate(observed, still), None, None, None,
-                     torch.ones(self._tiles), visits, nothing.color, nothing.variance)  # fmt: skip
+        return State(nothing, Surfels.empty(side), observed, still, self._rate(observed, still), None, (),
+                     None, None, torch.ones(self._tiles), visits, nothing.color, nothing.variance)  # fmt: skip
 
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
         """Moves the estimates to the start of the cycle and asks for what they need."""
-        state = self._advanced(state, moment.time_s)
+        state = self._advanced(state, moment)
         x, y, spacing = self._chosen(state, moment)
         place = torch.stack((x, y), dim=1)
         offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
@@ -175,17 +179,21 @@ class Filter(Policy[State]):
         shown = self._displayed(replace(state, estimates=replace(state.estimates, color=color)), moment).shown
         return shown.permute(1, 2, 0).contiguous()
 
-    def _advanced(self, state: State, now_s: float) -> State:
-        estimates, surfels = state.estimates, state.surfels
+    def _advanced(self, state: State, moment: Moment) -> State:
+        estimates, surfels, known, now_s = state.estimates, state.surfels, state.known, moment.time_s
         seconds = now_s - state.now_s if state.now_s is not None else 0.0
         view = self._view(now_s) if self._view is not None else None
         if view is not None and view.kind == "panorama":
             view = None
         if view is not None:
+            known = (*known[-2:], view)
+            view = predicted(known, now_s + moment.cycle_s) if self._options.prediction else view
             estimates, surfels = self._stages.advanced(estimates, surfels, state.rate, seconds, view)
         else:
             estimates = estimates.later(state.rate, seconds)
-        return replace(state, estimates=estimates, surfels=surfels, now_s=now_s, view=view, earlier=state.view)
+        return replace(
+            state, estimates=estimates, surfels=surfels, now_s=now_s, known=known, view=view, earlier=state.view
+        )
 
     def _chosen(
         self, state: State, moment: Moment

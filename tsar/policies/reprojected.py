@@ -1,7 +1,8 @@
 """Framed renderers that know where surfaces go: temporal accumulation, a warp of the last image to the newest poses.
 
 A frame is traced in parts, one a cycle; at the end of every cycle the last finished image is shown, warped to the poses
-at the cycle's start. No pose is later than that. A frame without warp is one part.
+of that time, predicted from those at the cycle's start and before. No pose that is used is later than that. A frame
+without warp is one part.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from tsar.policies.accumulation import ACCUMULATE_FLOPS, Accumulation, History, 
 from tsar.policies.late import WARP_FLOPS, warped
 from tsar.policies.surfaces import Surfaces
 from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.prediction import predicted
 from tsar.selection import sample_positions
 from tsar.tiling import uniform
 from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
@@ -147,7 +149,8 @@ class Reprojected(Policy[Progress]):
             return Progress(state.number + 1, finished=self._finish(state, parts))
 
     def image(self, state: Progress, moment: Moment) -> Picture:
-        """The last finished frame, warped to the poses at the start of the cycle; black before the first."""
+        """The last finished frame, warped to the poses of the time at which it is first shown, as those of the cycle's
+        start and before foretell them; black before the first."""
         side, last = self.config.resolution_px, state.finished
         if last is None:
             return Picture(torch.zeros(side, side, 3))
@@ -155,7 +158,9 @@ class Reprojected(Policy[Progress]):
         shown = SampleMap(age, torch.full((1, 1), self._level))
         if not self._warps:
             return Picture(last.color, shown)
-        return Picture(warped(last.color, last.surfaces, self._view(moment.time_s)), shown)
+        known = [self._view(moment.time_s - back * moment.cycle_s) for back in (2, 1, 0)]
+        view = predicted(known, moment.time_s + moment.cycle_s)
+        return Picture(warped(last.color, last.surfaces, view), shown)
 
     def _finish(self, state: Progress, parts: tuple[SampleBatch, ...]) -> Finished:
         side, order = self.config.resolution_px, raster_to_morton(self.config.resolution_px)

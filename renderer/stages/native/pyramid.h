@@ -50,7 +50,8 @@ inline void vary(const Estimated& of, float seconds, int side, int row, float* v
             const float away = larger(__builtin_fabsf(x), __builtin_fabsf(y));
             later = later + roughness[i] * larger(away - 0.5f, 0.0f);
         }
-        variance[i] = smaller(later + 0.5f * roughness[i] * inverse[i], given::VARIANCE_MAX);
+        const float known = later + 0.5f * roughness[i] * inverse[i];
+        variance[i] = known < given::VARIANCE_MAX ? known : given::NOTHING_KNOWN;
     }
 }
 

@@ -1,0 +1,55 @@
+"""Poses of a time that is still to come, from those that are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import torch
+from jaxtyping import Float64
+from torch import Tensor
+
+from tsar.types import Viewpoint
+
+STEADY = 0.5
+"""Greatest change of a step from that before, as a share of it, at which a motion is taken to go on."""
+
+
+def predicted(known: Sequence[Viewpoint], time_s: float) -> Viewpoint:
+    """The poses of a later time, if what moves goes on as it did.
+
+    With the poses ``T`` of the newest time, ``T'`` and ``T''`` of those before, a pose becomes ``T + a (T - T')``,
+    where ``a`` is the time to come over that between the newest two. Rotation and translation of camera and rigid
+    motions go on each for itself, and only where they are steady: no entry of ``(T - T') - (T' - T'')`` is beyond half
+    of the greatest of ``T - T'``. What starts, stops or jumps stays where it was last known.
+
+    Args:
+        known: the newest poses last, at equal steps of time; fewer than three are not continued.
+        time_s: of the prediction.
+
+    Returns:
+        The newest view with poses of ``time_s``. Matrices are continued entry by entry: they are rotations up to the
+        square of the angle between views.
+    """
+    now = known[-1]
+    if len(known) < 3 or not now.time_s > known[-2].time_s:
+        return now
+    ahead = (time_s - now.time_s) / (now.time_s - known[-2].time_s)
+    tracks = [view.rotation.flatten(1) for view in known[-3:]]
+    places = [view.translation for view in known[-3:]]
+    camera = [view.to_camera.reshape(1, -1) for view in known[-3:]]
+    offset = [view.to_camera_offset[None] for view in known[-3:]]
+    return replace(
+        now,
+        time_s=time_s,
+        rotation=_continued(tracks, ahead).reshape(now.rotation.shape),
+        translation=_continued(places, ahead),
+        to_camera=_continued(camera, ahead).reshape(3, 3),
+        to_camera_offset=_continued(offset, ahead)[0],
+    )
+
+
+def _continued(values: list[Float64[Tensor, "n entries"]], ahead: float) -> Float64[Tensor, "n entries"]:
+    before, newest = values[1] - values[0], values[2] - values[1]
+    steady = (newest - before).abs().amax(1, keepdim=True) <= STEADY * newest.abs().amax(1, keepdim=True)
+    return torch.where(steady, values[2] + ahead * newest, values[2])
