@@ -124,7 +124,7 @@ def test_a_square_is_shown_where_it_is_and_leaves_the_background() -> None:
     """It moves three quarters of its width in a frame; what it hid is filled from around."""
     scene = Planes(lambda x, y: torch.full_like(x, 0.25), square=0.1875 / FRAME_S)
     for shown in play("framed-late", scene, seconds=0.2)[-8:]:
-        truth = scene.image(64, shown.sample_time_s)
+        truth = scene.image(64, shown.display_time_s)
         off = (shown.image - truth).abs().amax(-1) > 0.05
         planes = truth.permute(2, 0, 1)[None, :1]
         edge = F.max_pool2d(planes, 3, 1, 1) + F.max_pool2d(-planes, 3, 1, 1) > 0
