@@ -21,6 +21,7 @@ _SWITCHED_OFF = {
     "by_gain": "pixels sampled in turn",
     "spread": "change not spread to neighbours",
     "reprojection": "estimates stay in their pixels",
+    "prediction": "shown where it was last known to be",
     "shadows": "no change expected where shadows move",
     "probes": "no tile looks where nothing is expected",
 }

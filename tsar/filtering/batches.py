@@ -25,8 +25,8 @@ class Traced:
         spacing: of each tile, pixels.
         now_s: start of the cycle.
         cycle_s: length of the one before, seconds.
-        hits, view: first hits, and poses at the start of the cycle; None where nothing is reprojected.
-        earlier: poses at the start of the cycle before; None where there was none.
+        hits, view: first hits, and the poses that estimates were moved to; None where nothing is reprojected.
+        earlier: those of the cycle before; None where there was none.
     """
 
     color: Float[Tensor, "n samples 3"]

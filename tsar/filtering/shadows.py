@@ -31,7 +31,7 @@ def drifted(
         before: as it was.
         position: of the samples on the image plane, in ``[0, 1)``.
         hits: of the samples.
-        view, earlier: poses at the start of the cycle, and of the one before.
+        view, earlier: poses of one time, and of an earlier one.
         cycle_s: seconds between the two.
     """
     across = before.shape[-1]

@@ -1,4 +1,4 @@
-"""Framed renderers that know where surfaces go: temporal accumulation, a warp of the last image to the newest poses.
+"""Framed renderers that know where surfaces go: temporal accumulation, a warp of the last image to newer poses.
 
 A frame is traced in parts, one a cycle; at the end of every cycle the last finished image is shown, warped to the poses
 of that time, predicted from those at the cycle's start and before. No pose that is used is later than that. A frame
@@ -207,10 +207,10 @@ def accumulating(setting: Setting) -> Reprojected:
 
 
 def late(setting: Setting) -> Reprojected:
-    """The last frame, warped to the newest poses."""
+    """The last frame, warped to the poses at which it is shown."""
     return Reprojected(setting, PARTS, footprint=LATE_FOOTPRINT)
 
 
 def accumulating_late(setting: Setting) -> Reprojected:
-    """Temporal accumulation, warped to the newest poses."""
+    """Temporal accumulation, warped to the poses at which it is shown."""
     return Reprojected(setting, PARTS, Accumulation(), WARM_FRAMES, ACCUMULATED_FOOTPRINT)
