@@ -1,11 +1,13 @@
-"""Square roots that are the same on every processor."""
+"""Roots that are the same on every processor."""
 
 from __future__ import annotations
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float64
 from torch import Tensor
+
+_NEWTON_STEPS = 5
 
 
 def square_root(value: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
@@ -16,6 +18,18 @@ def square_root(value: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
     """
     with np.errstate(invalid="ignore"):
         return torch.as_tensor(np.sqrt(value.numpy()))
+
+
+def cube_root(value: Float64[Tensor, "*n"]) -> Float64[Tensor, "*n"]:
+    """Cube roots of positive numbers, to a few units of the last place, by Newton's steps on ``x = m 2^(3k)``: sums,
+    products and quotients alone."""
+    _, exponent = np.frexp(value.numpy())
+    third = exponent // 3
+    part = np.ldexp(value.numpy(), -3 * third)  # in [1/2, 4)
+    root = 0.7 + 0.25 * part
+    for _ in range(_NEWTON_STEPS):
+        root = root - (root - part / (root * root)) / 3.0
+    return torch.as_tensor(np.ldexp(root, third))
 
 
 def encoded(color: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:

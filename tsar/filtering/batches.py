@@ -8,9 +8,10 @@ import torch
 from jaxtyping import Float, Float64
 from torch import Tensor
 
-from tsar.filtering import change, samples
+from tsar.filtering import change, samples, wavelets
 from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
 from tsar.projection import project
+from tsar.roots import encoded
 from tsar.types import Hits, Viewpoint
 
 
@@ -59,12 +60,16 @@ def taken_in(
         place, depth = project(view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
         position = torch.where((depth > 0.0)[:, None], place * side, -1.0)
     pixel = samples.pixels_of(position, side)
-    seen = samples.gathered(traced.color, traced.time_s, traced.spacing, pixel, now_s, estimates.roughness)
-    compared = seen.hit & estimates.known
+    color = encoded(traced.color)
+    rough = wavelets.semivariance_of(color) if options.wavelets else samples.semivariance_of(color)
+    seen = samples.gathered(traced.color, traced.time_s, traced.spacing, pixel, now_s, estimates.roughness, rough)
     judged = replace(estimates, roughness=seen.roughness)
-    changed = change.observed(
-        known, judged, seen.color, seen.count, seen.time_s, compared, now_s, traced.cycle_s, options
-    )  # fmt: skip
+    if options.wavelets:
+        found = wavelets.residuals(judged, color, pixel, seen.count)
+    else:
+        found = change.residuals(judged, seen.color, seen.count)
+    elapsed_s, compared = seen.time_s - estimates.time_s, seen.hit & estimates.known
+    changed = change.observed(known, *found, elapsed_s, compared, now_s, traced.cycle_s, options)
     if view is None or hits is None:
         none = torch.zeros_like(estimates.variance)
         after, _ = samples.updated(estimates, seen, changed.rate_px, now_s, none > 0.0, none, options)

@@ -17,12 +17,28 @@ RATE_MIN = 1e-5
 SPAN_MIN_S = 1e-3
 
 
+def residuals(
+    estimates: Estimates, color: Float[Tensor, "3 h w"], count: Float[Tensor, "1 h w"]
+) -> tuple[Float[Tensor, "1 h w"], Float[Tensor, "1 h w"]]:
+    """What new samples differ by, and what is expected at most, variances.
+
+    A pixel with ``k`` new samples has the residual ``d²``, the mean over the channels of the squared difference of
+    encoded colours, and ``4 (P + 0.8 g / k)`` is expected at most.
+
+    Args:
+        estimates: before the batch.
+        color, count: mean and number of the new samples of each pixel.
+    """
+    red, green, blue = (encoded(color) - encoded(estimates.color)).square()
+    expected = TOLERANCE * (estimates.observed + 0.8 * estimates.roughness / count.clamp(min=1.0))
+    return ((red + green + blue) / 3.0)[None], expected
+
+
 def observed(
     before: Change,
-    estimates: Estimates,
-    color: Float[Tensor, "3 h w"],
-    count: Float[Tensor, "1 h w"],
-    time_s: Float64[Tensor, "1 h w"],
+    residual: Float[Tensor, "1 h w"],
+    expected: Float[Tensor, "1 h w"],
+    elapsed_s: Float64[Tensor, "1 h w"],
     compared: Bool[Tensor, "1 h w"],
     now_s: float,
     cycle_s: float,
@@ -30,30 +46,25 @@ def observed(
 ) -> Change:
     """The rates after a batch.
 
-    A pixel with ``k`` new samples has the residual ``d²``, the mean over the channels of the squared difference of
-    encoded colours, and ``4 (P + 0.8 g / k)`` is expected at most. Per element ``N <- f N + sum(d² - expected)`` and
-    ``D <- f D + sum(time between the samples)``; the rate is ``max(N, 0) / D``, at least half of the greatest in the
-    3 x 3 elements around and a quarter of that in 5 x 5. What is remembered fades with ``f``, and at once where the
-    residuals are far beyond what was expected.
+    Per element ``N <- f N + sum(residual - expected)`` and ``D <- f D + sum(time between the samples)``; the rate is
+    ``max(N, 0) / D``, at least half of the greatest in the 3 x 3 elements around and a quarter of that in 5 x 5. What
+    is remembered fades with ``f``, and at once where the residuals are far beyond what was expected.
 
     Deviation: ``f = 1 / (1 + x + x²/2)`` with ``x`` the time since the element was seen over the memory, in place of
     ``exp(-x)``, whose last bit is the processor's.
 
     Args:
         before: as it was.
-        estimates: before the batch.
-        color, count, time_s: mean, number and mean time of the new samples of each pixel.
+        residual, expected: what new samples differ by, and what is expected at most.
+        elapsed_s: time between the new samples of a pixel and those before.
         compared: pixels that have both.
         now_s, cycle_s: start of the cycle and length of the one before, seconds.
         options: of the filter.
     """
-    red, green, blue = (encoded(color) - encoded(estimates.color)).square()
-    residual = ((red + green + blue) / 3.0)[None]
-    expected = TOLERANCE * (estimates.observed + 0.8 * estimates.roughness / count.clamp(min=1.0))
     nothing = torch.zeros_like(residual)
     excess = _summed(torch.where(compared, residual - expected, nothing))
     usual = _summed(torch.where(compared, expected, nothing))
-    span_s = _summed(torch.where(compared, (time_s - estimates.time_s).to(torch.float32), nothing))
+    span_s = _summed(torch.where(compared, elapsed_s.to(torch.float32), nothing))
     looked = F.max_pool2d(compared.to(torch.float32)[None], ELEMENT_PX)[0] > 0.0
     gap = (now_s - before.seen_s).clamp(0.0, 1e3).to(torch.float32) / options.memory_s
     fade = 1.0 / (1.0 + gap + 0.5 * gap * gap)

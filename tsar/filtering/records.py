@@ -38,6 +38,7 @@ class FilterOptions:
         shadows: whether change is expected where shadows of what moves lie.
         probes: whether a tile now and then looks where nothing is expected.
         latency_cycles: cycles from the start of one to the display of its picture, at least 1.
+        wavelets: whether roughness and change are measured by the wavelets of the dissertation.
         share_max: most samples of a cycle, as a share of the output's pixels; a batch of more becomes several cycles.
         footprint: samples along a pixel's side that textures are filtered for.
         life_min_s, life_max_s: bounds of how long a sample is taken to be of use.
@@ -55,6 +56,7 @@ class FilterOptions:
     shadows: bool = True
     probes: bool = True
     latency_cycles: int = 1
+    wavelets: bool = False
     share_max: float = 1.0 / 32.0
     footprint: int = 4
     life_min_s: float = 0.2

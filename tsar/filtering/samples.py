@@ -12,7 +12,7 @@ from torch import Tensor
 from tsar.filtering.records import TILE_SIDE, VARIANCE_MAX, Estimates, FilterOptions, Surfels
 from tsar.morton import morton_to_raster, raster_to_morton
 from tsar.projection import project
-from tsar.roots import encoded, square_root
+from tsar.roots import square_root
 from tsar.types import Hits, Viewpoint
 
 ROUGHNESS_MIN = 1e-6
@@ -60,13 +60,14 @@ def gathered(
     pixel: Int64[Tensor, " flat"],
     now_s: float,
     roughness: Float[Tensor, "1 h w"],
+    semivariance: Float[Tensor, "n samples"],
 ) -> Seen:
     """Sums the samples of a batch up by pixels.
 
-    The roughness of a sample is half the mean squared difference from its four neighbours in the tile, per pixel of
-    their distance. Those of a coarse tile bound it: a semivariance ``v`` at ``h`` pixels says that the roughness lies
-    between ``v / sqrt(h)``, for surfaces between smooth and random ones, and ``v``. The mean over 3 x 3 pixels is mixed
-    half and half with what was known.
+    The roughness of a sample is its semivariance, per pixel of the distance from one to the next. Those of a coarse
+    tile bound it: a semivariance ``v`` at ``h`` pixels says that the roughness lies between ``v / sqrt(h)``, for
+    surfaces between smooth and random ones, and ``v``. The mean over 3 x 3 pixels is mixed half and half with what was
+    known.
     """
     side = roughness.shape[-1]
 
@@ -77,7 +78,6 @@ def gathered(
     count = summed(torch.ones_like(flat[:, 0]))
     many = count.clamp(min=1.0)
     newest = torch.full((side * side + 1,), -1).scatter_reduce(0, pixel, torch.arange(pixel.numel()), "amax")[:-1]
-    semivariance = _semivariance(encoded(color))
     wide = spacing.clamp(min=1.0)[:, None]
     least = summed((semivariance / (spacing[:, None] / wide) / square_root(wide)).reshape(-1))
     most = summed((semivariance / (spacing[:, None] / wide)).reshape(-1))
@@ -208,8 +208,9 @@ def _image(
     return (position * side).nan_to_num(0.0).to(torch.float32).T.contiguous()
 
 
-def _semivariance(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:
-    """Half the mean squared difference of each sample from its neighbours in the tile, Morton order."""
+def semivariance_of(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:
+    """Half the mean squared difference of each sample from its four neighbours in the tile, Morton order; encoded
+    colours."""
     plane = color[:, raster_to_morton(TILE_SIDE)].reshape(-1, TILE_SIDE, TILE_SIDE, 3)
     across, down = (
         0.5 * ((square[..., 0] + square[..., 1] + square[..., 2]) / 3.0)

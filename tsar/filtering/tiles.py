@@ -6,7 +6,7 @@ from math import sqrt
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64, Shaped
 from torch import Tensor
 
 from tsar.filtering.records import (
@@ -115,7 +115,7 @@ def filled_up(
     missing = count - sum(int(level.sum()) for level in chosen)
     above = torch.zeros_like(chosen[0])
     for level in chosen[:spacing]:
-        above = _halved(above | level)
+        above = doubled(above | level)
     below = torch.zeros_like(chosen[-1])
     for level in reversed(chosen[spacing + 1 :]):
         below = F.max_pool2d((below | level).to(torch.float32)[None], 2)[0] > 0.0
@@ -168,11 +168,12 @@ def _worth(gain: list[Float64[Tensor, "_ _"]], price: float) -> list[Bool[Tensor
     free, found = torch.ones_like(taken[-1]), []
     for number, level in enumerate(reversed(taken)):
         if number:
-            free = _halved(free)
+            free = doubled(free)
         found.append(level & free)
         free = free & ~level
     return found
 
 
-def _halved(tiles: Bool[Tensor, "rows columns"]) -> Bool[Tensor, "rows2 columns2"]:
+def doubled(tiles: Shaped[Tensor, "rows columns"]) -> Shaped[Tensor, "rows2 columns2"]:
+    """What tiles have, in the four tiles within each."""
     return tiles.repeat_interleave(2, 0).repeat_interleave(2, 1)

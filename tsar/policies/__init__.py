@@ -18,6 +18,9 @@ POLICIES: Named[Make] = Named(
     {
         "tsar": "tsar.policies.filter:Filter",
         "filter": "tsar.policies.filter:unmoved",
+        "tsar-densities": "tsar.policies.densities:ByDensities",
+        "tsar-wavelets": "tsar.policies.densities:by_wavelets",
+        "tsar-densities-wavelets": "tsar.policies.densities:dense_by_wavelets",
         "thesis": "tsar.policies.thesis:Thesis",
         "framed": "tsar.policies.framed:Framed",
         "framed-1": "tsar.policies.framed:PromptlyFramed",

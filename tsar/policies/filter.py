@@ -17,13 +17,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import torch
-from jaxtyping import Float, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
 from tsar.filtering import samples, shadows, tiles
-from tsar.filtering.batches import Traced
+from tsar.filtering.batches import Traced, taken_in
 from tsar.filtering.records import (
     DEFAULT,
     ELEMENT_PX,
@@ -99,6 +99,8 @@ class Filter(Policy[State]):
         super().__init__(setting)
         self._options, self._side = options, self.config.resolution_px
         self._stages = setting.stages_of(self.config).filtering
+        if options.wavelets:  # compiled sets know residuals alone
+            self._stages = replace(self._stages, taken_in=taken_in)
         self._view = setting.view if options.reprojection else None
         most = int(options.share_max * self._side**2) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
@@ -140,7 +142,7 @@ class Filter(Policy[State]):
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
         """Moves the estimates to the start of the cycle and asks for what they need."""
         state = self._advanced(state, moment)
-        x, y, spacing = self._chosen(state, moment)
+        state, (x, y, spacing) = self._chosen(state, moment)
         place = torch.stack((x, y), dim=1)
         offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
         if self._options.jitter:
@@ -197,16 +199,10 @@ class Filter(Policy[State]):
 
     def _chosen(
         self, state: State, moment: Moment
-    ) -> tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]:
+    ) -> tuple[State, tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]]:
         """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
         kinds = tiles.spacings(self._side)
-        if self._options.by_gain:
-            chosen = self._stages.chosen(
-                state.remaining, state.estimates.roughness, state.rate, state.reprojected, moment.cycle_s, self._tiles,
-                self._options,
-            )  # fmt: skip
-        else:
-            chosen = self._in_turn(kinds, moment.cycle)
+        state, chosen = self._picked(state, moment)
         found = torch.cat([level.reshape(-1) for level in chosen]).nonzero().squeeze(1)
         tile = self._places[found]
         if len(tile) < self._tiles:
@@ -219,7 +215,16 @@ class Filter(Policy[State]):
             across = int(self._side / width)
             number = moment.cycle // self._every % across**2
             x[0], y[0], spacing[0] = number % across * width, number // across * width, kinds[0]
-        return x, y, spacing
+        return state, (x, y, spacing)
+
+    def _picked(self, state: State, moment: Moment) -> tuple[State, list[Bool[Tensor, "_ _"]]]:
+        """Which tiles of every spacing are sampled."""
+        if not self._options.by_gain:
+            return state, self._in_turn(tiles.spacings(self._side), moment.cycle)
+        return state, self._stages.chosen(
+            state.remaining, state.estimates.roughness, state.rate, state.reprojected, moment.cycle_s, self._tiles,
+            self._options,
+        )  # fmt: skip
 
     def _probes(self, moment: Moment) -> bool:
         """Whether the first tile of a cycle looks where nothing is expected."""

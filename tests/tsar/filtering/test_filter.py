@@ -88,7 +88,7 @@ def test_a_panorama_is_not_reprojected() -> None:
     assert torch.isfinite(shown(Filter(Setting(CONFIG, view=view)), screen, 0.1)[-1].image).all()
 
 
-@pytest.mark.parametrize("name", ["tsar", "filter"])
+@pytest.mark.parametrize("name", ["tsar", "filter", "tsar-densities-wavelets"])
 def test_threads_change_no_bit(name: str) -> None:
     screen, before = panned(30.0), torch.get_num_threads()
     found = []
@@ -161,7 +161,7 @@ class Counting(TorchDispatchMode):
         return made
 
 
-@pytest.mark.parametrize("name", ["tsar", "filter"])
+@pytest.mark.parametrize("name", ["tsar", "filter", "tsar-densities"])
 def test_the_price_is_what_the_code_counts(name: str) -> None:
     """Operations of a cycle in its steady state, at a size at which samples are few beside pixels. The reference takes
     a batch in everywhere, compiled stages where its samples lie."""

@@ -26,8 +26,9 @@ SIDE = 64
 CONFIG = TsarConfig(
     batch_size=4, resolution_px=SIDE, sdf_side=32, cache_size=64, warmup_cycles=8, tiling=TilingConfig(level_min=1)
 )
-ALL = ("tsar", "filter", "frameless", "afr", "afr-simple", "interruptible", "thesis")
-ADAPTIVE = ("tsar", "filter", "afr", "interruptible")
+VARIANTS = ("tsar-densities", "tsar-wavelets")
+ALL = ("tsar", "filter", *VARIANTS, "frameless", "afr", "afr-simple", "interruptible", "thesis")
+ADAPTIVE = ("tsar", "filter", *VARIANTS, "afr", "interruptible")
 
 
 def stripes(u: Tensor, v: Tensor, t: Tensor) -> Tensor:
@@ -133,7 +134,8 @@ def test_a_change_is_on_the_display_before_a_frame_would_be(policy: str, name: s
 
 
 @pytest.mark.parametrize(
-    ("policy", "share"), [("tsar", 0.125), ("filter", 0.125), ("interruptible", 0.125), ("afr", 1.0)]
+    ("policy", "share"),
+    [("tsar", 0.125), ("filter", 0.125), *((one, 0.125) for one in VARIANTS), ("interruptible", 0.125), ("afr", 1.0)],
 )
 def test_a_still_picture_converges(policy: str, share: float) -> None:
     """After one second its error is below an eighth of a frame's of one sample a pixel, and stays. That of the AFR,

@@ -1,0 +1,70 @@
+"""``tsar`` with ideas of the dissertation: densities in space and in time, whose product is conserved, in place of what
+tiles gain; and wavelets, in place of semivariance and residuals.
+
+Everything else is as in :mod:`tsar.policies.filter`, so that what each of the two contributes can be measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float64
+from torch import Tensor
+
+from tsar.filtering import densities
+from tsar.filtering.records import DEFAULT, ELEMENT_PX, TILE_SIDE
+from tsar.policies.filter import Filter, State
+from tsar.policy import Moment, Price
+
+_AGED = 4.0
+"""Weight of the variance by change so far, beside that of the next cycle; 1 to 8 give the same within 5 %."""
+
+PIXEL_FLOPS = 310.0
+"""Operations per output pixel and cycle, as a test counts them: aging, moving, densities and smoothing."""
+
+
+@dataclass(frozen=True)
+class DenseState(State):
+    """With what elements have gathered of their θ_t since they were sampled.
+
+    Attributes:
+        credit: refreshes that are due.
+    """
+
+    credit: Float64[Tensor, "1 e e"]
+
+
+class ByDensities(Filter):
+    """Tiles follow θ_s and are sampled when their θ_t is due."""
+
+    @property
+    def price(self) -> Price:
+        return replace(super().price, pixel_flops=PIXEL_FLOPS)
+
+    def start(self) -> DenseState:
+        """Credit is a seeded permutation in [0, 1), as in :func:`tsar.selection.initial_history`."""
+        side = self._side // ELEMENT_PX
+        generator = torch.Generator().manual_seed(self.config.seed)
+        credit = torch.randperm(side**2, generator=generator).to(torch.float64).reshape(1, side, side) / side**2
+        return DenseState(**vars(super().start()), credit=credit)
+
+    def _picked(self, state: State, moment: Moment) -> tuple[State, list[Bool[Tensor, "_ _"]]]:
+        """Roughness asks for samples in space; change for refreshes: what is expected of the next cycle, and what there
+        has been since the last sample. It is greatest where a surface comes into sight."""
+        assert isinstance(state, DenseState)
+        rough = F.avg_pool2d(state.estimates.roughness[None], ELEMENT_PX)[0].to(torch.float64)
+        aged = F.avg_pool2d(state.estimates.aged[None], ELEMENT_PX)[0].to(torch.float64)
+        stale = _AGED * aged + state.rate.to(torch.float64) * moment.cycle_s
+        budget = self._tiles * TILE_SIDE**2 / self._side**2
+        spatial, temporal = densities.best(rough, stale, budget)
+        chosen, credit = densities.due(densities.tiling(spatial), temporal, state.credit, self._tiles)
+        return replace(state, credit=credit), chosen
+
+
+by_wavelets = partial(Filter, options=replace(DEFAULT, wavelets=True))
+"""Tiles by what they gain; roughness and change by wavelets."""
+dense_by_wavelets = partial(ByDensities, options=replace(DEFAULT, wavelets=True))
+"""Both of the dissertation."""
