@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import torch
@@ -47,6 +47,17 @@ def predicted(known: Sequence[Viewpoint], time_s: float) -> Viewpoint:
         to_camera=_continued(camera, ahead).reshape(3, 3),
         to_camera_offset=_continued(offset, ahead)[0],
     )
+
+
+def foretold(view: Callable[[float], Viewpoint], now_s: float, cycle_s: float) -> Viewpoint:
+    """The poses a cycle later, :func:`predicted` from those of now and of one and two cycles before.
+
+    Args:
+        view: tells the poses of a time.
+        now_s: start of the cycle, seconds.
+        cycle_s: its length, seconds.
+    """
+    return predicted([view(now_s - back * cycle_s) for back in (2, 1, 0)], now_s + cycle_s)
 
 
 def _continued(values: list[Float64[Tensor, "n entries"]], ahead: float) -> Float64[Tensor, "n entries"]:

@@ -2,9 +2,10 @@
 filter over space and time that follows the gradients in each tile.
 
 A cycle samples *crosshairs*: a random place in a tile and the four places one pixel beside it. Their differences give
-the tile's spatial gradient. A deep buffer keeps all recent samples with their first hits, and takes them to the newest
-poses (reprojection); what it holds in a pixel, compared with a new sample there, gives the temporal gradient, which is
-of what reprojection does not explain. The tiles are split and merged by :mod:`tsar.policies.tiles`.
+the tile's spatial gradient. A deep buffer keeps all recent samples with their first hits, and takes them to the poses
+at which the picture is first shown, as far as the newest ones foretell them (reprojection); what it holds in a pixel,
+compared with a new sample there, gives the temporal gradient, which is of what reprojection does not explain. The tiles
+are split and merged by :mod:`tsar.policies.tiles`.
 
 The filter has a volume in which one sample is expected, ``e_x e_y e_t = 1 / R`` at a sampling rate of ``R`` samples per
 pixel and second, and extents along which colour changes alike, ``G_s e_x = G_s e_y = G_t e_t``: so
@@ -16,7 +17,7 @@ Source: Dayal, Woolley, Watson and Luebke 2005, *Adaptive frameless rendering*, 
 Stephens 2011, sec. 2.5 and 7.3.2.
 
 Deviation: all samples of a crosshair are traced in one cycle, and the temporal gradient comes from the buffer, not from
-a sample that is traced again. A pyramid stands for the splats of the original.
+a sample that is traced again. A pyramid stands for the splats of the original. Poses are foretold, as ``tsar`` does.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from tsar.policies.deep_buffer import DeepBuffer, Placed
 from tsar.policies.scatter import generator, pixel_colors, pull_push
 from tsar.policies.tiles import Tree
 from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.prediction import foretold
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 LEAVES = 1024
@@ -118,7 +120,7 @@ class Afr(Policy[Sampled]):
     ) -> Sampled:
         assert state.asked is not None
         side, buffer = self.config.resolution_px, state.buffer
-        view = self._view(moment.time_s) if self._view is not None else None
+        view = foretold(self._view, moment.time_s, moment.cycle_s) if self._view is not None else None
         color = pixel_colors(samples, self.config).clamp(max=COLOR_MAX)
         with timer("cache"):
             buffer.add(color, moment.time_s, state.asked.place, samples.hits)

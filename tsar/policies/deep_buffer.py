@@ -83,8 +83,8 @@ class DeepBuffer:
         self.head[0] = (self.head + place.numel()) % room
 
     def seen(self, view: Viewpoint | None, side: int) -> Placed:
-        """Samples that are seen, by newest poses, in a picture of ``side²`` pixels; without poses, all that are stored,
-        where they were sampled."""
+        """Samples that are seen, by the poses of a view, in a picture of ``side²`` pixels; without poses, all that are
+        stored, where they were sampled."""
         room = self.time_s.numel()
         order = (self.head + torch.arange(room)) % room
         order = order[self.time_s[order].isfinite()]

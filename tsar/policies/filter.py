@@ -189,7 +189,8 @@ class Filter(Policy[State]):
             view = None
         if view is not None:
             known = (*known[-2:], view)
-            view = predicted(known, now_s + moment.cycle_s) if self._options.prediction else view
+            shown_s = now_s + self.latency_cycles * moment.cycle_s
+            view = predicted(known, shown_s) if self._options.prediction else view
             estimates, surfels = self._stages.advanced(estimates, surfels, state.rate, seconds, view)
         else:
             estimates = estimates.later(state.rate, seconds)

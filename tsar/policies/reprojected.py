@@ -22,7 +22,7 @@ from tsar.policies.accumulation import ACCUMULATE_FLOPS, Accumulation, History, 
 from tsar.policies.late import WARP_FLOPS, warped
 from tsar.policies.surfaces import Surfaces
 from tsar.policy import Moment, Picture, Policy, Price, Setting
-from tsar.prediction import predicted
+from tsar.prediction import foretold
 from tsar.selection import sample_positions
 from tsar.tiling import uniform
 from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
@@ -158,8 +158,7 @@ class Reprojected(Policy[Progress]):
         shown = SampleMap(age, torch.full((1, 1), self._level))
         if not self._warps:
             return Picture(last.color, shown)
-        known = [self._view(moment.time_s - back * moment.cycle_s) for back in (2, 1, 0)]
-        view = predicted(known, moment.time_s + moment.cycle_s)
+        view = foretold(self._view, moment.time_s, moment.cycle_s)
         return Picture(warped(last.color, last.surfaces, view), shown)
 
     def _finish(self, state: Progress, parts: tuple[SampleBatch, ...]) -> Finished:

@@ -7,10 +7,17 @@ from math import cos, sin
 
 import torch
 
+from renderer.stages.control import stages
 from renderer.trace import Renderer
 from scenes import catalog
+from tsar.clock import fixed_clock
+from tsar.config import TilingConfig, TsarConfig
 from tsar.filtering import shadows
+from tsar.filtering.records import FilterOptions
+from tsar.policies.filter import Filter
+from tsar.policy import Setting, run
 from tsar.projection import project
+from tsar.roots import encoded
 from tsar.types import FrameletBatch, Hits, Viewpoint
 
 STANDING, MOVING = 0, 1  # instances
@@ -106,3 +113,23 @@ def test_the_shadow_of_a_car_is_found_where_it_lies() -> None:
     earlier, _ = project(before, found.instance.reshape(-1), found.point.reshape(-1, 3))
     speed = ((position - earlier).abs().amax(1) / 0.01).reshape(side, side)[moving]
     assert float(speed.min()) / 3.0 < float(drift[dark].median()) < 3.0 * float(speed.max())
+
+
+def test_no_shadow_stays_where_a_car_has_left() -> None:
+    """Where shadows say nothing, that of the car lies on the street long after it."""
+    config = TsarConfig(batch_size=4, resolution_px=64, tiling=TilingConfig(level_min=1))
+    renderer = Renderer(catalog.load("corner-exit"), "cpu", footprint_resolution_px=256)
+    gone_s, end_s = 1.45, 1.6
+    truth = {}
+
+    def error(expects: bool) -> float:
+        policy = Filter(Setting(config, stages, view=renderer.viewpoint), FilterOptions(shadows=expects))
+        found = []
+        for _, shown in run(policy, renderer.trace, fixed_clock(1.0 / 128.0), 0.6, end_s):
+            if shown.display_time_s > gone_s:
+                if shown.display_time_s not in truth:
+                    truth[shown.display_time_s] = renderer.render_frame(shown.display_time_s, 64, 64, 2)
+                found.append(float((encoded(shown.image) - encoded(truth[shown.display_time_s])).square().mean()))
+        return sum(found) / len(found)
+
+    assert error(True) < 0.7 * error(False)
