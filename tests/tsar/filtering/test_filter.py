@@ -192,15 +192,27 @@ def test_the_price_is_what_the_code_counts(name: str) -> None:
     assert taken[-1] / 256**2 <= 135.0  # of a pixel, of which there is one at most for each sample
 
 
-def test_the_latency_decides_when_a_picture_is_shown_and_nothing_else() -> None:
+def test_without_prediction_the_latency_decides_when_a_picture_is_shown_and_nothing_else() -> None:
     screen = panned(20.0)
+    setting = Setting(CONFIG, stages, view=screen.view)
     found = [
-        shown(Filter(Setting(CONFIG, stages, view=screen.view), FilterOptions(latency_cycles=cycles)), screen, 0.2)
-        for cycles in (1, 3)
+        shown(Filter(setting, FilterOptions(prediction=False, latency_cycles=cycles)), screen, 0.2) for cycles in (1, 3)
     ]
     for one, late in zip(*found, strict=True):
         assert torch.equal(one.image, late.image) and one.sample_time_s == late.sample_time_s
         assert late.display_time_s - one.display_time_s == pytest.approx(2.0 * CYCLE_S)
+
+
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_a_steady_pan_is_shown_where_it_is_then_whatever_the_latency(cycles: int) -> None:
+    screen = panned(60.0)
+    setting = Setting(CONFIG, stages, view=screen.view)
+    foretold, known = (
+        shown(Filter(setting, FilterOptions(prediction=on, latency_cycles=cycles)), screen, 0.3)[-1]
+        for on in (True, False)
+    )
+    late = error(known, screen, known.display_time_s)
+    assert error(foretold, screen, foretold.display_time_s) < 0.7 * late
 
 
 def test_what_is_shown_of_another_picture_is_blended_alike() -> None:
