@@ -45,13 +45,17 @@ def test_moving_scene_is_the_still_scene_at_its_pose(driving, time_s: float) -> 
     assert (moving - driving.render_frame(0.7, 64, 64)).abs().amax(-1).gt(1e-3).float().mean() > 0.2
 
 
-def test_a_sample_does_not_depend_on_the_times_of_others(driving) -> None:
-    """Poses found once for a batch and poses found by each sample are the same bits."""
+@pytest.mark.parametrize("in_turn", [False, True], ids=["one time a packet", "times in turn"])
+def test_a_sample_does_not_depend_on_the_times_of_others(driving, in_turn: bool) -> None:
+    """Poses found once for a batch, once for a packet, and by each sample are the same bits."""
     position = grid(32)
     times = np.array([0.05, 0.4, 0.81])
-    mixed = driving.trace(batch(np.concatenate([position] * 3), np.repeat(times, len(position)))).color
-    single = [driving.trace(batch(position, time_s)).color for time_s in times]
-    assert torch.equal(mixed, torch.cat(single))
+    order = np.arange(3 * len(position)).reshape(3, -1)
+    order = order.T.reshape(-1) if in_turn else order.reshape(-1)
+    place, at = np.concatenate([position] * 3), np.repeat(times, len(position))
+    mixed = driving.trace(batch(place[order], at[order])).color.reshape(-1, 3)
+    single = torch.cat([driving.trace(batch(position, time_s)).color.reshape(-1, 3) for time_s in times])
+    assert torch.equal(mixed, single[torch.from_numpy(order)])
 
 
 def test_long_times_keep_their_precision() -> None:

@@ -47,6 +47,12 @@ struct Pose {
     Vec16 rotated(const Vec16& v, float turn) const {
         return v * (2.0f * w * w - 1.0f) + cross(axis, v) * (2.0f * turn * w) + axis * (2.0f * dot(axis, v));
     }
+    // The first lane's in every lane.
+    Pose of_first() const {
+        return {{(f16)translation.x[0], (f16)translation.y[0], (f16)translation.z[0]},
+                {(f16)axis.x[0], (f16)axis.y[0], (f16)axis.z[0]},
+                (f16)w[0]};
+    }
     Vec16 to_world(const Vec16& v) const { return rotated(v, 1.0f); }
     Vec16 to_track(const Vec16& v) const { return rotated(v, -1.0f); }
 };
@@ -66,8 +72,10 @@ template <class Scene, class View> struct Stage {
             pose.axis = {(f16)q[0], (f16)q[1], (f16)q[2]}, pose.w = q[3];
             return pose;
         }
-        for (int lane = 0; lane < LANES; ++lane) pose_at(track, lane, pose);
-        return pose;
+        bool same = true;
+        for (int lane = 1; lane < LANES; ++lane) same &= time_s[lane] == time_s[0];
+        for (int lane = 0; lane < (same ? 1 : LANES); ++lane) pose_at(track, lane, pose);
+        return same ? pose.of_first() : pose;
     }
 
   private:
