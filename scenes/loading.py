@@ -5,25 +5,20 @@ A failure is a SceneError that names the file and the reason.
 
 from __future__ import annotations
 
-import warnings
 from functools import lru_cache
 from pathlib import Path
+from typing import cast
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
-from PIL import Image
 
 from scenes.arithmetic import power
 from scenes.canonical import SceneError
+from scenes.pictures import Pixels, decoded
 
 ASSETS = Path(__file__).parent / "assets"
 
-Picture = NDArray[np.float32]
-
-PIXELS_MOST = 1 << 27
-"""Most pixels of a picture, such as 16384 x 8192. A file of some kilobytes can hold more pixels than memory does; one
-pixel takes about 36 bytes while its scene is loaded."""
+Picture = Pixels
 
 
 def one_line(error: BaseException) -> str:
@@ -61,52 +56,48 @@ def state_of(path: Path) -> FileState | None:
 def read_image(path: Path) -> Picture:
     """Reads a picture as linear Rec. 709 RGB.
 
-    Eight-bit files are decoded from sRGB; OpenEXR files are linear already.
+    Whole numbers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and TIFF files of floating-point numbers
+    are linear already.
 
     Args:
-        path: PNG, JPEG or another format Pillow reads, or ``.exr``.
+        path: PNG, JPEG or another format Pillow reads, ``.exr``, ``.hdr`` or ``.pfm``.
 
     Returns:
         ``(height, width, 3)`` float32, row 0 at the top; shared between callers, so read-only.
 
     Raises:
-        SceneError: the file is missing, cannot be read, or holds more than :data:`PIXELS_MOST` pixels.
+        SceneError: the file is missing, cannot be read, or holds more than :data:`scenes.pictures.PIXELS_MOST` pixels.
     """
     path = Path(path)
     if not path.is_file():
         raise SceneError(f"texture {path}: expected an image file, found none")
-    return _image(path, state_of(path))
+    return _image(path, state_of(path))[0]
+
+
+def is_linear(path: Path) -> bool:
+    """Whether a picture holds linear numbers, not encoded ones; raises what :func:`read_image` does."""
+    read_image(path)
+    return _image(Path(path), state_of(Path(path)))[1]
 
 
 @lru_cache(maxsize=32)
-def _image(path: Path, state: FileState | None) -> Picture:
+def _image(path: Path, state: FileState | None) -> tuple[Picture, bool]:
     try:
-        pixels = _read_exr(path) if path.suffix.lower() == ".exr" else _read_srgb(path)
+        found = decoded(path)
+        linear = found.dtype == np.float32
+        pixels = cast(Picture, found) if linear else decode_srgb(cast(NDArray[np.uint8], found))
     except Exception as error:  # decoders raise what they like on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
         raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
     pixels.flags.writeable = False
-    return pixels
+    return pixels, linear
 
 
-def _require_size(width: int, height: int) -> None:
-    if width * height > PIXELS_MOST:
-        raise SceneError(f"expected at most {PIXELS_MOST:,} pixels, got {width} x {height}")
-
-
-def _read_srgb(path: Path) -> Picture:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large ones are refused here
-        image = Image.open(path)
-    with image:
-        _require_size(*image.size)
-        return decode_srgb(np.array(image.convert("RGB")))
-
-
-def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Linear values of 8-bit sRGB ones."""
-    steps = np.arange(256, dtype=np.float32) / np.float32(255.0)
+def decode_srgb(encoded: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]:
+    """Linear values of sRGB ones of 8 or 16 bits."""
+    most = np.iinfo(encoded.dtype).max
+    steps = np.arange(most + 1, dtype=np.float32) / np.float32(most)
     bright = power((steps + np.float32(0.055)) / np.float32(1.055), np.float32(2.4)).astype(np.float32)
     return np.where(steps > np.float32(0.04045), bright, steps / np.float32(12.92))[encoded]
 
@@ -115,19 +106,6 @@ def encoded_srgb(image: Picture) -> Picture:
     """sRGB values of linear ones, not rounded: undoes the decoding of a picture whose file says that it is linear."""
     low = image <= 0.0031308
     return np.where(low, 12.92 * image, 1.055 * power(np.maximum(image, 0.0), 1.0 / 2.4) - 0.055).astype(np.float32)
-
-
-def _read_exr(path: Path) -> Picture:
-    with OpenEXR.File(str(path), header_only=True) as file:
-        first, last = (corner.astype(np.int64) for corner in file.header()["dataWindow"])
-        _require_size(*(last - first + 1).tolist())
-    with OpenEXR.File(str(path)) as file:
-        channels = file.channels()
-        if "RGB" in channels:
-            return np.array(channels["RGB"].pixels, np.float32)
-        if "RGBA" in channels:
-            return np.array(channels["RGBA"].pixels[..., :3], np.float32)
-        return np.stack([np.array(channels[name].pixels, np.float32) for name in "RGB"], axis=-1)
 
 
 def clamp_radiance(image: Picture, limit: float) -> Picture:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from scenes import loading
+from scenes import loading, pictures
 from scenes.canonical import SceneError
 from scenes.loading import asset, clamp_radiance, read_image
 
@@ -120,15 +120,15 @@ def broken_pictures(folder: Path) -> dict[str, Path]:
     for name, content in contents.items():
         if content is not None:
             (folder / name).write_bytes(content)
-    write_exr(folder / "grey.exr", {"Y": np.ones((2, 2), np.float32)})
+    write_exr(folder / "two.exr", {name: np.ones((2, 2), np.float32) for name in "RG"})
     write_exr(folder / "holes.exr", {"RGB": holes})
-    return {name: folder / name for name in (*contents, "grey.exr", "holes.exr")}
+    return {name: folder / name for name in (*contents, "two.exr", "holes.exr")}
 
 
 @pytest.mark.parametrize(
     "name",
     ["missing.png", "missing.exr", "folder.png", "empty.png", "empty.exr", "garbage.png", "garbage.exr", "half.png",
-     "half.exr", "text.jpg", "grey.exr", "holes.exr"],
+     "half.exr", "text.jpg", "two.exr", "holes.exr"],
 )  # fmt: skip
 def test_broken_pictures_are_named(tmp_path: Path, name: str) -> None:
     path = broken_pictures(tmp_path)[name]
@@ -149,7 +149,7 @@ def test_pictures_too_large_for_memory_are_refused_before_they_are_decoded(
     else:
         path, size = tmp_path / "wide.exr", "3 x 2"
         write_exr(path, {"RGB": np.zeros((2, 3, 3), np.float32)})
-        monkeypatch.setattr(loading, "PIXELS_MOST", 5)
+        monkeypatch.setattr(pictures, "PIXELS_MOST", 5)
     monkeypatch.setattr(loading, "decode_srgb", lambda encoded: pytest.fail("decoded"))
     with pytest.raises(SceneError, match=rf"expected at most .* pixels, got {size}"):
         read_image(path)

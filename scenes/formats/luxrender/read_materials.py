@@ -168,7 +168,8 @@ def lux_image(path: Path, gamma: float, gain: float, where: str) -> np.ndarray:
     if not 0.1 <= gamma <= 10.0:
         raise SceneError(f"{where}: gamma: expected 0.1 to 10, got {gamma:g}")
     image = loading.read_image(path)
-    encoded = image if path.suffix.lower() == ".exr" else loading.encoded_srgb(image)
-    if gamma == 1.0 and gain == 1.0 and path.suffix.lower() == ".exr":
+    linear = loading.is_linear(path)
+    encoded = image if linear else loading.encoded_srgb(image)
+    if gamma == 1.0 and gain == 1.0 and linear:
         return image
     return np.float32(gain) * power(np.maximum(encoded, 0.0), np.float32(gamma)).astype(np.float32)

@@ -85,7 +85,7 @@ class MitsubaTextures:
         path = self.files.path(properties.text("filename", ""), where)
         image = loading.read_image(path)
         gamma = properties.number("gamma", -1.0)
-        if gamma > 0.0 and path.suffix.lower() != ".exr":
+        if gamma > 0.0 and not loading.is_linear(path):
             image = power(loading.encoded_srgb(image), np.float32(gamma)).astype(np.float32)
         wrap = properties.text("wrapMode", "repeat")
         if wrap not in _WRAPS:

@@ -49,7 +49,7 @@ class PbrtSurfaces(Surfaces):
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         path, wrap = self.image_path(parameters)
         image = loading.read_image(path)
-        encoded = path.suffix.lower() != ".exr"
+        encoded = not loading.is_linear(path)
         if not parameters.truth("gamma", encoded) and encoded:
             image = loading.encoded_srgb(image)
         factor = parameters.number("scale", 1.0)

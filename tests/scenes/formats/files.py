@@ -20,6 +20,7 @@ HEAD = 'LookAt 0 0 5 0 0 0 0 1 0\nCamera "perspective"\nWorldBegin\n'
 MESH = 'Shape "trianglemesh" "integer indices"'
 MITSUBA = sorted(path.relative_to(DATA).as_posix() for path in DATA.glob("mitsuba/**/*.xml"))
 DELIVERED = ASSETS / "cornell-box"
+CASES = Path(__file__).parent / "cases"
 SENSOR = '<sensor type="perspective"><float name="fov" value="40"/></sensor>'
 needs_data = pytest.mark.skipif(not REAL, reason="the scene files are not beside this project")
 
