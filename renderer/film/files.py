@@ -179,9 +179,13 @@ class _FilmWriter:
         if pixels.shape != (self._size[1], self._size[0], 3):
             raise FilmError(f"{self.path}: expected frames {self._size[1]} x {self._size[0]} x 3, got {pixels.shape}")
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
-        for packet in self._stream.encode(frame):
+        for packet in self._stream.encode(self._converted(frame)):
             self._container.mux(packet)
         self.frames += 1
+
+    def _converted(self, frame: Any) -> Any:
+        """A frame in the colours of the stream."""
+        return frame
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool | None:
         failure = self._finish(complete=kind is None)
@@ -206,7 +210,11 @@ class _FilmWriter:
 
 
 class Mp4Writer(_FilmWriter):
-    """An H.264 film (MPEG-4 part 2 where there is no encoder for it), of even width and height."""
+    """An H.264 film (MPEG-4 part 2 where there is no encoder for it), of even width and height.
+
+    Luma and chroma are those of ITU-R BT.709 in the limited range, and the stream says so; its transfer function is that
+    of sRGB (IEC 61966-2-1), in which frames are encoded. Without tags a player guesses the matrix by the size.
+    """
 
     def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:
         """Raises FilmError if a size is odd, the rate is not positive, or the file cannot be written."""
@@ -217,6 +225,7 @@ class Mp4Writer(_FilmWriter):
 
     def _add_stream(self, container: Any) -> Any:
         import av
+        from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTrc
 
         codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
         stream = container.add_stream(codec, rate=_fraction(self._fps))
@@ -225,7 +234,18 @@ class Mp4Writer(_FilmWriter):
             stream.options = {"crf": str(self._crf), "preset": "veryfast"}
         else:
             stream.bit_rate = max(1_000_000, int(4 * self._size[0] * self._size[1] * self._fps / 8))
+        context = stream.codec_context
+        context.colorspace, context.color_primaries = Colorspace.ITU709, ColorPrimaries.BT709
+        context.color_trc, context.color_range = ColorTrc.IEC61966_2_1, ColorRange.MPEG
         return stream
+
+    def _converted(self, frame: Any) -> Any:
+        from av.video.reformatter import ColorRange, Colorspace
+
+        return frame.reformat(
+            format="yuv420p", dst_colorspace=Colorspace.ITU709, src_color_range=ColorRange.JPEG,
+            dst_color_range=ColorRange.MPEG,
+        )  # fmt: skip
 
 
 class LosslessWriter(_FilmWriter):

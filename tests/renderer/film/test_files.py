@@ -178,6 +178,26 @@ def test_a_film_that_cannot_be_ended_leaves_nothing(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("side", "color"), [(64, (0, 255, 0)), (64, (255, 0, 0)), (720, (30, 60, 200))])
+def test_a_film_says_what_its_colours_mean(side: int, color: tuple[int, int, int], tmp_path: Path) -> None:
+    """Tags, and luma and chroma by the formula of ITU-R BT.709 in the limited range."""
+    with Mp4Writer(tmp_path / "a.mp4", 30, side, side) as writer:
+        writer.add(np.full((side, side, 3), color, np.uint8))
+    with av.open(str(tmp_path / "a.mp4")) as film:
+        context = film.streams.video[0].codec_context
+        assert (context.colorspace, context.color_primaries, context.color_trc) == (1, 1, 13)  # bt709, bt709, sRGB
+        assert context.color_range == 1  # limited
+        frame = next(film.decode(video=0))
+    red, green, blue = (value / 255.0 for value in color)
+    luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    planes = frame.to_ndarray().reshape(-1)
+    of_blue, of_red = (128.0 + 224.0 * part for part in ((blue - luma) / 1.8556, (red - luma) / 1.5748))
+    assert planes[0] == pytest.approx(16.0 + 219.0 * luma, abs=2.0)
+    assert planes[side * side] == pytest.approx(of_blue, abs=2.0)
+    assert planes[-1] == pytest.approx(of_red, abs=2.0)
+    assert frame.to_ndarray(format="rgb24")[5, 5] == pytest.approx(color, abs=4)
+
+
 @pytest.mark.parametrize("fps", [24.0, 60.0, 30000 / 1001, 7.5])
 def test_film_rate_and_order(fps: float, tmp_path: Path) -> None:
     with Mp4Writer(tmp_path / "a.mp4", fps, 32, 16) as writer:
