@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.arithmetic import cos, rotation_about, rotation_between, sin
-from scenes.canonical import Matrix, RigidTrack
+from scenes.canonical import Matrix, RigidTrack, SceneError
 
 Times = NDArray[np.floating]
 Pose = tuple[NDArray[np.float64], Rotation]
 PoseFunction = Callable[[Times], Pose]
 
 UP = np.array([0.0, 0.0, 1.0])
+
+_VERTICAL = 1e-9  # sine of the angle to the vertical below which the right of a picture is not told by it
 
 
 def continuous_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -78,14 +80,24 @@ def pose_at(track: RigidTrack, time_s: float) -> Matrix:
 def look_at(eye: NDArray[np.float64], target: NDArray[np.float64], roll_rad: float = 0.0) -> Rotation:
     """Orientation of a camera (looking along its ``-z``, ``+y`` up) at ``eye`` that sees ``target`` in the centre.
 
+    Of a camera that looks straight up or down, the right of the picture is the world's ``+x``: the picture is that of a
+    camera a little nearer to ``-y``.
+
     Args:
-        eye, target: ``(3,)`` or ``(n, 3)``, scene units; the line between them must not be vertical.
+        eye, target: ``(3,)`` or ``(n, 3)``, scene units.
         roll_rad: turn about the viewing axis, radians.
+
+    Raises:
+        SceneError: both are the same point, or not finite.
     """
     back = np.asarray(eye, np.float64) - np.asarray(target, np.float64)
-    back = back / np.linalg.norm(back, axis=-1, keepdims=True)
+    length = np.linalg.norm(back, axis=-1, keepdims=True)
+    if not (np.isfinite(length) & (length > 0.0)).all():
+        raise SceneError(f"look_at: expected finite points that differ, got eye {eye} and target {target}")
+    back = back / length
     right = np.cross(UP, back)
-    right = right / np.linalg.norm(right, axis=-1, keepdims=True)
+    size = np.linalg.norm(right, axis=-1, keepdims=True)
+    right = np.where(size > _VERTICAL, right / np.maximum(size, _VERTICAL), (1.0, 0.0, 0.0))
     rotation = Rotation.from_matrix(np.stack([right, np.cross(back, right), back], axis=-1))
     return rotation * rotation_about(UP, roll_rad) if roll_rad else rotation
 

@@ -20,7 +20,7 @@ from scenes.animation import (
     pose_at,
     sample_track,
 )
-from scenes.canonical import RigidTrack
+from scenes.canonical import RigidTrack, SceneError
 
 BENDS = ((4.0, 6.0, 0.9), (12.0, 5.0, -1.4))
 WINDING = Path((1.0, -2.0), 0.4, 8.0, BENDS)
@@ -87,6 +87,25 @@ def test_look_at_puts_the_target_straight_ahead(offset: tuple[float, float, floa
     target = eye + np.array(offset) + np.array([30.0, 0.0, 0.0])
     local = look_at(eye, target, roll_rad).inv().apply(target - eye)
     assert local == pytest.approx([0.0, 0.0, -np.linalg.norm(target - eye)], abs=1e-9)
+
+
+@pytest.mark.parametrize("height", [5.0, -5.0])
+def test_a_camera_may_look_straight_down_or_up(height: float) -> None:
+    """As one does that is a little nearer to -y."""
+    place = np.array([0.0, 0.0, height])
+    matrix = camera_to_world(place, np.zeros(3))
+    assert np.linalg.det(matrix) == pytest.approx(1.0) and matrix[:3, 3] == pytest.approx(place)
+    assert matrix[:3, 2] == pytest.approx((0.0, 0.0, np.sign(height))) and matrix[:3, 0] == pytest.approx((1, 0, 0))
+    near = camera_to_world(place + (0.0, -1e-4, 0.0), np.zeros(3))
+    assert near == pytest.approx(matrix, abs=2e-4)
+    both = look_at(np.stack([place, place + (0.0, -1e-4, 0.0)]), np.zeros((2, 3))).as_matrix()
+    assert both == pytest.approx(np.stack([matrix[:3, :3], near[:3, :3]]))
+
+
+@pytest.mark.parametrize("eye", [(0.0, 0.0, 1.0), (np.nan, 0.0, 0.0), (np.inf, 0.0, 0.0)])
+def test_a_camera_that_looks_nowhere_is_refused(eye: tuple[float, float, float]) -> None:
+    with pytest.raises(SceneError, match="expected finite points that differ"):
+        camera_to_world(np.array(eye), np.array([0.0, 0.0, 1.0]))
 
 
 def test_look_at_is_upright_and_rolls() -> None:
