@@ -6,6 +6,7 @@ Source: motion-blur perception thesis, chapter 2; Owen 1995, "Randomly permuted 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -25,6 +26,9 @@ BELOW_ONE = float(np.nextafter(1.0, 0.0))
 _POISSON_MAX = 4096
 _POISSON_START = 0.75  # share of the densest packing's distance to begin with: darts alone reach about 0.7
 _POISSON_TRIES = 4096
+
+_BALANCED = ("sobol", "owen")
+"""Sets of which every power of two of the first points is a net; other numbers of them are not."""
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
@@ -49,6 +53,10 @@ def point_set(name: str, count: int, seed: int = 0) -> Points:
         count: how many, at most 65,536; for ``stratified`` a cube.
         seed: of all but ``hammersley``.
 
+    Warns:
+        UserWarning: for ``sobol`` and ``owen`` and a count that is no power of two. Some elementary intervals then have
+            a point more than others, so that the set is no net.
+
     Raises:
         ValueError: for another name, a count that the set cannot have, or points that do not lie in the cube.
     """
@@ -56,6 +64,12 @@ def point_set(name: str, count: int, seed: int = 0) -> Points:
     most = _POISSON_MAX if name == "poisson" else COUNT_MAX
     if not 1 <= count <= most:
         raise ValueError(f"point set {name}: expected 1 to {most} points, got {count}")
+    if name in _BALANCED and count & (count - 1):
+        power_below = 1 << count.bit_length() - 1
+        warnings.warn(
+            f"point set {name}: {count} points are not balanced, {power_below} or {2 * power_below} would be",
+            stacklevel=2,
+        )
     points = np.minimum(POINT_SETS[name](count, np.random.default_rng([seed, count])), BELOW_ONE)
     if points.shape != (count, 3) or not (points >= 0.0).all():
         raise ValueError(f"point set {name}: expected ({count}, 3) numbers in [0, 1), got {points.shape} or others")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,6 +55,17 @@ def test_stratified_has_one_point_in_every_cell(side: int) -> None:
 def test_stratified_takes_cubes_only(count: int, near: str) -> None:
     with pytest.raises(ValueError, match=f"expected a cube of samples, such as {near}, got {count}"):
         point_set("stratified", count)
+
+
+@pytest.mark.parametrize("name", ["sobol", "owen"])
+def test_nets_say_where_their_balance_is_lost(name: str) -> None:
+    with pytest.warns(UserWarning, match=f"point set {name}: 100 points are not balanced, 64 or 128 would be"):
+        point_set(name, 100)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for count in (1, 2, 64, 128):
+            point_set(name, count)
+        point_set("halton", 100)
 
 
 def test_hammersley_is_its_formula() -> None:
