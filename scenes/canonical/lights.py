@@ -41,8 +41,10 @@ class SpotLight:
     """Intensity within a cone, falling off from ``inner_deg`` to ``outer_deg`` (half angles).
 
     Attributes:
-        profile: of the fall-off, with ``x`` from 0 at the edge to 1: ``3x² - 2x³`` or ``x⁴`` in the cosine, or ``x`` in
-            the angle. The renderer draws the first.
+        intensity: on the axis.
+        profile: of the fall-off, with ``x`` from 0 at the edge to 1: ``3x² - 2x³`` or ``x⁴`` in the cosine, ``x`` in
+            the angle, or (``secant``) ``x⁴`` in the cosine with all of the light divided by the cosine. The renderer
+            draws the first.
     """
 
     position: Rgb
@@ -50,7 +52,7 @@ class SpotLight:
     intensity: Rgb
     inner_deg: float
     outer_deg: float
-    profile: Literal["hermite", "quartic", "linear"] = "hermite"
+    profile: Literal["hermite", "quartic", "linear", "secant"] = "hermite"
 
 
 @dataclass(frozen=True, eq=False)

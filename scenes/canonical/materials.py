@@ -124,12 +124,21 @@ class Glossy:
 
 @dataclass(frozen=True)
 class Plastic:
-    """A dielectric coat of index ``ior`` over a diffuse base."""
+    """A dielectric coat of index ``ior`` over a diffuse base.
+
+    Attributes:
+        diffuse: albedo of the base by itself.
+        specular: multiplies what Fresnel's equations reflect.
+        roughness: microfacet alpha of the coat.
+        layered: whether the base gets what the coat lets through, both ways (Mitsuba); otherwise the coat adds to the
+            base and takes nothing from it (PBRT).
+    """
 
     diffuse: Texture
     specular: Texture = WHITE
     ior: float = 1.5
     roughness: float = 0.0
+    layered: bool = True
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,18 @@ def product_of(first: Texture, second: Texture) -> Texture:
     return ScaleTexture(first, second)
 
 
+def greatest_of(texture: Texture) -> float:
+    """The greatest value of any channel of a texture, or a bound on it where two textures are multiplied."""
+    if isinstance(texture, ConstantTexture):
+        return max(texture.value)
+    if isinstance(texture, ImageTexture):
+        return float(texture.image.max())
+    if isinstance(texture, CheckerboardTexture):
+        return max(greatest_of(texture.even), greatest_of(texture.odd))
+    parts = greatest_of(texture.first), greatest_of(texture.second)
+    return parts[0] * parts[1] if isinstance(texture, ScaleTexture) else max(parts)
+
+
 def mean_of(texture: Texture) -> Rgb:
     """Mean colour of a texture over the unit square of its coordinates."""
     if isinstance(texture, ConstantTexture):

@@ -83,16 +83,26 @@ def sampled_rgb(wavelength_nm: NDArray[np.float64], values: NDArray[np.float64])
     return xyz_to_rgb((spectrum[:, None] * matching(at)).sum(axis=0) / _Y_INTEGRAL)
 
 
+def planck(wavelength_nm: NDArray[np.float64], kelvin: float) -> NDArray[np.float64]:
+    """Radiance of a black body, W m⁻² sr⁻¹ nm⁻¹.
+
+    Source: Planck's law, ``2 h c² / λ⁵ / (exp(h c / λ k T) - 1)``, with the constants of CODATA 2018.
+    """
+    second = 1.438776877e7  # hc / k, nm K
+    return 1.191042972e20 * power(wavelength_nm, -5.0) / expm1(np.minimum(second / (wavelength_nm * kelvin), 700.0))
+
+
+def radiant_rgb(kelvin: float, scale: float) -> Rgb:
+    """Colour of a black body in its own radiance, W m⁻² sr⁻¹ nm⁻¹, times ``scale`` (as Mitsuba does)."""
+    at = np.arange(360.0, 831.0)
+    return sampled_rgb(at, scale * planck(at, kelvin))
+
+
 def blackbody_rgb(kelvin: float, scale: float) -> Rgb:
     """Colour of a black body whose spectrum is scaled so that its highest value is ``scale`` (as PBRT v3 does).
 
     Source: Planck's law; Wien's displacement law for the peak.
     """
     at = np.arange(360.0, 831.0)
-    second = 1.438776877e7  # hc / k, nm K
-
-    def emitted(nm: NDArray[np.float64]) -> NDArray[np.float64]:
-        return power(nm, -5.0) / expm1(np.minimum(second / (nm * kelvin), 700.0))
-
-    peak = emitted(np.array([2.897771955e6 / kelvin]))[0]
-    return sampled_rgb(at, scale * emitted(at) / peak)
+    peak = planck(np.array([2.897771955e6 / kelvin]), kelvin)[0]
+    return sampled_rgb(at, scale * planck(at, kelvin) / peak)

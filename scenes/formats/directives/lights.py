@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,13 @@ def lamp(kind: str, parameters: Parameters, start: Rgb, strength: Rgb, report: L
     return PointLight(start, strength)
 
 
-def spot(parameters: Parameters, start: Rgb, target: Rgb, strength: Rgb) -> SpotLight:
+def spot(
+    parameters: Parameters, start: Rgb, target: Rgb, strength: Rgb, profile: Literal["quartic", "secant"]
+) -> SpotLight:
     """A spot light that falls off over the outer part of its cone."""
     outer = parameters.number("coneangle", 30.0)
     inner = outer - parameters.number("conedeltaangle", 5.0)
-    return SpotLight(start, target, strength, max(inner, 0.0), outer, "quartic")
+    return SpotLight(start, target, strength, max(inner, 0.0), outer, profile)
 
 
 def distant(start: Rgb, target: Rgb, strength: Rgb, where: str, angle_deg: float = 0.0) -> DirectionalLight:

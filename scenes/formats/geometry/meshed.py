@@ -12,12 +12,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from scenes.arithmetic import product
 from scenes.canonical import (
     CheckerboardTexture,
     Cube,
     Disk,
     HeightField,
     ImageTexture,
+    Instance,
     Material,
     Mesh,
     Rectangle,
@@ -25,7 +27,7 @@ from scenes.canonical import (
     Sphere,
     Texture,
 )
-from scenes.formats.geometry.orientation import area_normals
+from scenes.formats.geometry.orientation import area_normals, turned
 from scenes.formats.geometry.revolution import partial_sphere, ring
 
 SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
@@ -73,6 +75,13 @@ def mitsuba_disk() -> Mesh:
     assert mesh.uvs is not None
     uvs = np.stack([1.0 - mesh.uvs[:, 1], mesh.uvs[:, 0]], axis=1)
     return Mesh(mesh.vertices, mesh.faces, mesh.normals, uvs, "disk")
+
+
+def turned_over(instance: Instance) -> Instance:
+    """The instance with its inside out; a rectangle that has no texture stays one, turned about its y axis."""
+    if isinstance(instance.shape, Rectangle) and not depends_on_uv(instance.material):
+        return dataclasses.replace(instance, to_world=product(instance.to_world, np.diag([-1.0, 1.0, -1.0, 1.0])))
+    return dataclasses.replace(instance, shape=turned(as_mesh(instance.shape)))
 
 
 def as_mesh(shape: Shape) -> Mesh:

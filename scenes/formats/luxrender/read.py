@@ -21,6 +21,7 @@ from scenes.arithmetic import norm, product
 from scenes.canonical import (
     ConstantTexture,
     EnvironmentLight,
+    Instance,
     Integrator,
     Rgb,
     Sampler,
@@ -34,7 +35,7 @@ from scenes.formats.directives import lights
 from scenes.formats.directives.reader import typed, word
 from scenes.formats.directives.scene_reader import SceneReader, scene_of
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
-from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.meshed import as_mesh, turned_over
 from scenes.formats.geometry.revolution import area
 from scenes.formats.geometry.transform_stack import KEYS_MAX
 from scenes.formats.losses import LossReport
@@ -48,6 +49,10 @@ _SAMPLERS = {"lowdiscrepancy": "sobol", "random": "independent", "metropolis": "
              "sobol": "sobol", "halton": "halton"}  # fmt: skip
 _NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
 _MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
+SPHERE_SR = 4.0 * math.pi
+"""``L`` of LuxCore's point light over its intensity (measured: 10 gives 0.0314 from a floor of albedo 0.5 two units
+below it)."""
+
 SKY_UNIT, SUN_UNIT = 72_922.0, 66_000.0
 """Radiance of LuxCore 2.10's sky2 and sun at a gain of 1 over that of Mitsuba 3 at a scale of 1. The sky is the same
 model, in luminous units (683 lm/W); the sun is another, and dimmer in haze. Held to 1 % and 15 % at a turbidity of 3 in
@@ -206,18 +211,17 @@ class LuxReader(SceneReader):
         start = self.placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
         target = self.placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
         if kind in ("point", "spot"):
-            power = parameters.number("power", 0.0) * parameters.number("efficacy", 17.0)
-            luminance = float(product(_LUMINANCE, strength))
-            if power > 0.0 and luminance > 0.0:
-                strength = rgb(np.array(strength) * power / (4.0 * math.pi * luminance))
-                self.report.add(where, "the power of a lamp", "an intensity, as even all round")
+            parameters.number("efficacy", 17.0)
+            if parameters.number("power", 0.0) > 0.0:
+                self.report.add(where, f"the power of a {kind} light", "none: its colour and gain count")
         if kind == "distant":
             angle_deg = math.degrees(2.0 * parameters.number("theta", 0.0))
             self.lights.append(lights.distant(start, target, strength, where, angle_deg))
         elif kind == "spot":
-            self.lights.append(lights.spot(parameters, start, target, strength))
+            self.lights.append(lights.spot(parameters, start, target, strength, "secant"))
         else:
-            self.lights.append(lights.lamp(kind, parameters, start, strength, self.report))
+            even = rgb(np.array(strength) / SPHERE_SR)
+            self.lights.append(lights.lamp(kind, parameters, start, even, self.report))
 
     def _daylight(self, kind: str, parameters: Parameters) -> None:
         toward = parameters.numbers("sundir", 3)
@@ -252,6 +256,12 @@ class LuxReader(SceneReader):
         self.attributes.power = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
         lights.lose_hints(parameters, self.report)
         self.left_over(parameters, "area light")
+
+    def _keep(self, instance: Instance, directive: Directive) -> None:
+        """Keeps a shape; a lamp shines to where its faces, as they are placed, are counter-clockwise."""
+        if instance.emission is not None and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+            instance = turned_over(instance)
+        super()._keep(instance, directive)
 
     def read_shape(self, directive: Directive) -> None:
         count = len(self.instances)

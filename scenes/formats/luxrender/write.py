@@ -41,7 +41,7 @@ from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, 
 from scenes.formats.geometry.revolution import lamp_sphere
 from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport, first_of
-from scenes.formats.luxrender.read import SKY_UNIT, SUN_UNIT
+from scenes.formats.luxrender.read import SKY_UNIT, SPHERE_SR, SUN_UNIT
 from scenes.formats.luxrender.write_materials import LuxSurfaceWriter
 from scenes.formats.text.numbers import listed, number, written_matrix
 from scenes.formats.text.output import Output
@@ -102,9 +102,10 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
 
     def write_light(self, light: Light) -> None:
         if isinstance(light, PointLight):
-            line = f'"point" "point from" {listed(light.position)} "color L" {listed(light.intensity)}'
+            shine = SPHERE_SR * np.array(light.intensity)
+            line = f'"point" "point from" {listed(light.position)} "color L" {listed(shine)}'
         elif isinstance(light, SpotLight):
-            light = reshaped(light, "quartic", self.report)
+            light = reshaped(light, "secant", self.report)
             cone = f'"float coneangle" [ {number(light.outer_deg)} ]'
             cone += f' "float conedeltaangle" [ {number(light.outer_deg - light.inner_deg)} ]'
             ends = f'"point from" {listed(light.position)} "point to" {listed(light.target)}'
@@ -159,7 +160,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
 
     def write_instance(self, instance: Instance) -> None:
         """Writes a shape in its place. LuxCore makes objects of mesh files only and shows the last key of a motion."""
-        if isinstance(instance.shape, Sphere) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+        mirrored = np.linalg.det(instance.to_world[:3, :3]) < 0.0
+        if mirrored and (isinstance(instance.shape, Sphere) or shines(instance)):
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
             instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)
         made = [self.object_line(instance)] if part_key(instance) in self.shared else self.part(instance)

@@ -28,7 +28,7 @@ from scenes.canonical import (
 )
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.indices import reflectance_of_index
-from scenes.formats.appearance.mixtures import dimmed
+from scenes.formats.appearance.mixtures import added_coat, dimmed, lobes_of
 from scenes.formats.appearance.spectra import METALS, rgb
 from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line, roughness_pair
 from scenes.formats.geometry.conventions import first_row_below
@@ -57,8 +57,12 @@ class LuxSurfaceWriter(SurfaceWriter):
             if material.scale != 1.0:
                 self.report.add(where, "the scale of a bump map", "1")
             return f"{self.material_line(material.base, name)} {self.texture(material.height, 'bumpmap', 'float')}"
+        if isinstance(material, Uber):
+            material = lobes_of(material, where, self.report, schlick=True)
         if isinstance(material, Masked):
             material = MixMaterial(self._nothing(), material.base, material.opacity)
+        elif isinstance(material, Plastic) and not material.layered:
+            material = added_coat(material)
         elif isinstance(material, Metal) and _even(material.reflectance_scale):
             material = dimmed(material)
         if isinstance(material, MixMaterial):
@@ -90,11 +94,11 @@ class LuxSurfaceWriter(SurfaceWriter):
                 self.report.add(where, "what a textured translucent surface lets through", "less what it reflects")
             sides = [self.texture(material.reflectance, "Kr"), self.texture(through, "Kt")]
             return "mattetranslucent", [*sides, '"bool energyconserving" [ "true" ]']
-        if isinstance(material, Glossy | Plastic | Phong | Uber):
+        if isinstance(material, Glossy | Plastic | Phong):
             return self._coated(material, where)
         return super().plain_material(material, where)
 
-    def _coated(self, material: Glossy | Plastic | Phong | Uber, where: str) -> tuple[str, list[str]]:
+    def _coated(self, material: Glossy | Plastic | Phong, where: str) -> tuple[str, list[str]]:
         """A material that is a coat over a diffuse base, or becomes one."""
         if isinstance(material, Glossy):
             parts = material.diffuse, material.specular, material.roughness
@@ -106,14 +110,11 @@ class LuxSurfaceWriter(SurfaceWriter):
             self.report.add(
                 where, "plastic", f"glossy that reflects {fresnel:.3g} of its highlight at normal incidence"
             )
-        elif isinstance(material, Phong):
+        else:
             alpha = math.sqrt(2.0 / (material.exponent + 2.0))
             mirror = np.array(material.specular) + material.fresnel_min * np.array(material.mirror_tint)
             parts = material.diffuse, ConstantTexture(rgb(mirror)), (alpha, alpha)
             self.report.add(where, "Phong reflection with a Fresnel-weighted mirror", f"glossy of alpha {alpha:.3g}")
-        else:
-            parts = material.diffuse, material.specular, material.roughness
-            self.report.add(where, "uber", "glossy, without its mirror, transmission and opacity")
         textures = [self.texture(parts[0], "Kd"), self.texture(parts[1], "Ks"), roughness_pair(parts[2])]
         return "glossy", [*textures, '"bool multibounce" [ "false" ]']
 

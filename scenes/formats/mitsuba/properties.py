@@ -10,7 +10,7 @@ import numpy as np
 from scenes.arithmetic import power, product
 from scenes.canonical import Rgb, SceneError
 from scenes.canonical.values import Matrix
-from scenes.formats.appearance.spectra import blackbody_rgb, grey, rgb, sampled_rgb, xyz_to_rgb
+from scenes.formats.appearance.spectra import grey, radiant_rgb, rgb, sampled_rgb, xyz_to_rgb
 from scenes.formats.geometry.transform_stack import KEYS_MAX, invertible, looking, rotation, scaling, translation
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import NUMBER_MAX
@@ -155,7 +155,7 @@ def color_of(node: Node) -> Rgb:
         kelvin = numbers(node, node.get("temperature", "5000").rstrip("Kk"), 1)[0]
         if not 100.0 <= kelvin <= 1e6:
             raise SceneError(f"{node.place}: temperature: expected 100 to 1000000 K, got {kelvin:g}")
-        return blackbody_rgb(kelvin, numbers(node, node.get("scale", "1"), 1)[0])
+        return radiant_rgb(kelvin, numbers(node, node.get("scale", "1"), 1)[0])
     if text.startswith("#"):
         if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
             raise SceneError(f"{node.place}: expected a colour such as #a0b0c0, got {text[:20]!r}")

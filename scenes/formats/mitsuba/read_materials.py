@@ -27,6 +27,7 @@ from scenes.canonical import (
     Translucent,
 )
 from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.mixtures import plastic_of
 from scenes.formats.appearance.spectra import grey, metal
 from scenes.formats.mitsuba.properties import Properties, ior
 from scenes.formats.mitsuba.read_textures import MitsubaTextures
@@ -197,7 +198,7 @@ class MitsubaSurfaces(MitsubaTextures):
         parts = self.inner(properties)
         if len(parts) != 2:
             raise SceneError(f"{properties.where}: blendbsdf: expected two bsdfs inside, got {len(parts)}")
-        return MixMaterial(parts[0], parts[1], self.texture(properties, "weight", grey(0.5)))
+        return plastic_of(MixMaterial(parts[0], parts[1], self.texture(properties, "weight", grey(0.5))))
 
     def _mixture(self, properties: Properties) -> Material:
         parts = self.inner(properties)

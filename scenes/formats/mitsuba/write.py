@@ -36,7 +36,7 @@ from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
-from scenes.formats.geometry.orientation import FLIPPED
+from scenes.formats.geometry.orientation import FLIPPED, upright
 from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read import FILTERS, FORWARD
@@ -260,6 +260,9 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
         made = self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):
+            if shines(instance) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+                # a lamp shines to where its faces, as they are placed, are counter-clockwise
+                shape, local = upright(shape, instance.to_world)[0], FLIPPED
             self.put(made, "string", "filename", self.output.mesh(shape))
             if shape.normals is None:
                 self.put(made, "boolean", "faceNormals", "true")

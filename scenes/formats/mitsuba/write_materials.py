@@ -33,6 +33,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.mixtures import added_metal, lobes_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.mitsuba.write_elements import Element, ElementWriter
 from scenes.formats.text.numbers import number
@@ -64,6 +65,10 @@ class MitsubaSurfaceWriter(ElementWriter):
             self.texture(made, material.opacity, "opacity")
             made.append(self.bsdf(material.base, where))
             return made
+        if isinstance(material, Plastic) and not material.layered:
+            return self.bsdf(added_metal(material, where, self.report), where)
+        if isinstance(material, Uber):
+            return self.bsdf(lobes_of(material, where, self.report), where)
         if isinstance(material, MixMaterial):
             made = self.plugin("bsdf", "blendbsdf")
             amount = material.amount
@@ -153,16 +158,16 @@ class MitsubaSurfaceWriter(ElementWriter):
         """A dielectric coat over a diffuse base, or what comes nearest to it."""
         if isinstance(material, Plastic):
             parts = material.diffuse, material.specular, material.ior, material.roughness
-        elif isinstance(material, Glossy | Uber):
+        elif isinstance(material, Glossy):
             # Fresnel's equations of an index reflect at normal incidence what the coat does
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
-            coat = np.array(mean_of(material.specular)) * (1.0 if isinstance(material, Glossy) else 0.04)
+            coat = np.array(mean_of(material.specular))
             most = float(np.clip(coat.max(), 1e-4, 0.25))
             if coat.max() > most:
                 self.report.add(where, f"a coat that reflects {coat.max():.3g}", f"one that reflects {most:.3g}")
             index = (1.0 + math.sqrt(most)) / (1.0 - math.sqrt(most))
             parts = material.diffuse, ConstantTexture(rgb(np.minimum(coat / most, 1.0))), index, alpha
-            self.report.add(where, type(material).__name__.lower(), f"rough plastic of alpha {alpha:.3g}")
+            self.report.add(where, "glossy", f"rough plastic of alpha {alpha:.3g}")
         else:
             assert isinstance(material, Phong)
             alpha = math.sqrt(2.0 / (material.exponent + 2.0))

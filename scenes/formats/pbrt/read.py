@@ -78,7 +78,7 @@ class PbrtReader(SceneReader):
         if kind in ("point", "projection", "goniometric"):
             self.lights.append(lights.lamp(kind, parameters, start, strength, self.report))
         elif kind == "spot":
-            self.lights.append(lights.spot(parameters, start, target, strength))
+            self.lights.append(lights.spot(parameters, start, target, strength, "quartic"))
         elif kind == "distant":
             self.lights.append(lights.distant(start, target, strength, where))
         elif kind in ("infinite", "exinfinite"):

@@ -114,7 +114,7 @@ class PbrtSurfaces(Surfaces):
 
     def _plastic(self, parameters: Parameters) -> Material:
         parts = self.texture(parameters, "Kd", grey(0.25)), self.texture(parameters, "Ks", grey(0.25))
-        return Plastic(*parts, 1.5, self._alphas(parameters, 0.1)[0])
+        return Plastic(*parts, 1.5, self._alphas(parameters, 0.1)[0], layered=False)
 
     def _translucent(self, parameters: Parameters) -> Material:
         base = self.texture(parameters, "Kd", grey(0.25))

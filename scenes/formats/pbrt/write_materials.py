@@ -11,6 +11,7 @@ import numpy as np
 
 from scenes.canonical import (
     Bumped,
+    ConstantTexture,
     Glass,
     Glossy,
     ImageTexture,
@@ -24,6 +25,8 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
+from scenes.formats.appearance.folding import folded, product_of
+from scenes.formats.appearance.indices import mean_reflectance
 from scenes.formats.appearance.mixtures import dimmed
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.surface_writer import Pair, SurfaceWriter, mixture_line, roughness_pair
@@ -74,11 +77,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
             parts = [self.texture(material.diffuse, "Kd"), self.texture(material.specular, "Ks")]
             return "substrate", [*parts, _roughness(material.roughness)]
         if isinstance(material, Plastic):
-            if material.ior != 1.5:
-                self.report.add(where, f"the index {material.ior:g} of a plastic", "1.5")
-            parts = [self.texture(material.diffuse, "Kd"), self.texture(material.specular, "Ks")]
-            rough = f'"float roughness" [ {number(material.roughness)} ] "bool remaproughness" [ "false" ]'
-            return "plastic", [*parts, rough]
+            return self._plastic(material, where)
         if isinstance(material, Translucent):
             coat = [self.constant("Kd", grey(1.0)), self.constant("Ks", grey(0.0))]
             sides = [self.texture(material.reflectance, "reflect"), self.texture(material.transmittance, "transmit")]
@@ -91,6 +90,21 @@ class PbrtSurfaceWriter(SurfaceWriter):
         if isinstance(material, Phong):
             return self._phong(material, where)
         return super().plain_material(material, where)
+
+    def _plastic(self, material: Plastic, where: str) -> tuple[str, list[str]]:
+        """PBRT's coat adds to the base; ``uber`` has other indices than 1.5 and smooth coats."""
+        diffuse = material.diffuse
+        if material.layered and material.ior > 1.0:
+            kept = 1.0 - mean_reflectance(material.ior)
+            diffuse = folded(product_of(diffuse, ConstantTexture(grey(kept))))
+            self.report.add(where, "a base under a coat", f"{kept:.3g} of it beside the coat")
+        rough = f'"float roughness" [ {number(material.roughness)} ] "bool remaproughness" [ "false" ]'
+        if material.ior == 1.5 and material.roughness > 0.0:
+            return "plastic", [self.texture(diffuse, "Kd"), self.texture(material.specular, "Ks"), rough]
+        smooth = material.roughness == 0.0
+        parts = [self.texture(diffuse, "Kd"), self.texture(material.specular, "Kr" if smooth else "Ks")]
+        parts += [self.constant("Ks" if smooth else "Kr", grey(0.0)), f'"float eta" [ {number(material.ior)} ]']
+        return "uber", parts if smooth else [*parts, rough]
 
     def _glass(self, material: Glass, where: str) -> tuple[str, list[str]]:
         if material.thin:
