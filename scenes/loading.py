@@ -5,6 +5,7 @@ A failure is a SceneError that names the file and the reason.
 
 from __future__ import annotations
 
+import warnings
 from functools import lru_cache
 from pathlib import Path
 from typing import cast
@@ -19,6 +20,9 @@ from scenes.pictures import Pixels, decoded
 ASSETS = Path(__file__).parent / "assets"
 
 Picture = Pixels
+
+RADIANCE_MOST = 65504.0
+"""The greatest number of half precision, of which infinite values of a picture are taken to be."""
 
 
 def one_line(error: BaseException) -> str:
@@ -57,7 +61,8 @@ def read_image(path: Path) -> Picture:
     """Reads a picture as linear Rec. 709 RGB.
 
     Whole numbers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and TIFF files of floating-point numbers
-    are linear already.
+    are linear already. Infinite values of these, such as a sun that half precision cannot hold, become
+    :data:`RADIANCE_MOST`, with a warning.
 
     Args:
         path: PNG, JPEG or another format Pillow reads, ``.exr``, ``.hdr`` or ``.pfm``.
@@ -85,13 +90,23 @@ def _image(path: Path, state: FileState | None) -> tuple[Picture, bool]:
     try:
         found = decoded(path)
         linear = found.dtype == np.float32
-        pixels = cast(Picture, found) if linear else decode_srgb(cast(NDArray[np.uint8], found))
+        pixels = _clamped(cast(Picture, found), path) if linear else decode_srgb(cast(NDArray[np.uint8], found))
     except Exception as error:  # decoders raise what they like on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
         raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
     pixels.flags.writeable = False
     return pixels, linear
+
+
+def _clamped(pixels: Picture, path: Path) -> Picture:
+    """A picture without infinite values."""
+    infinite = np.isposinf(pixels)
+    if not infinite.any():
+        return pixels
+    count = int(infinite.any(axis=-1).sum())
+    warnings.warn(f"texture {path}: {count} pixels of infinite light became {RADIANCE_MOST:g}", stacklevel=4)
+    return np.where(infinite, np.float32(RADIANCE_MOST), pixels)
 
 
 def decode_srgb(encoded: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]:

@@ -10,6 +10,7 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import OpenEXR
@@ -44,7 +45,7 @@ def decoded(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
         found = _float_tiff(path.read_bytes())
         if found is not None:
             return found
-    return _by_pillow(path)
+    return by_pillow(path)
 
 
 def _require_size(width: int, height: int) -> None:
@@ -54,7 +55,8 @@ def _require_size(width: int, height: int) -> None:
         raise ValueError(f"expected at most {PIXELS_MOST:,} pixels, got {width} x {height}")
 
 
-def _by_pillow(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
+def by_pillow(path: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
+    """As :func:`decoded`, of a file that Pillow reads, or of the content of one."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large ones are refused here
         image = Image.open(path)

@@ -212,8 +212,8 @@ class _FilmWriter:
 class Mp4Writer(_FilmWriter):
     """An H.264 film (MPEG-4 part 2 where there is no encoder for it), of even width and height.
 
-    Luma and chroma are those of ITU-R BT.709 in the limited range, and the stream says so; its transfer function is that
-    of sRGB (IEC 61966-2-1), in which frames are encoded. Without tags a player guesses the matrix by the size.
+    Luma and chroma are those of ITU-R BT.709 in the limited range, and the stream says so; its transfer function is
+    that of sRGB (IEC 61966-2-1), in which frames are encoded. Without tags a player guesses the matrix by the size.
     """
 
     def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:

@@ -96,9 +96,9 @@ def test_a_camera_may_look_straight_down_or_up(height: float) -> None:
     matrix = camera_to_world(place, np.zeros(3))
     assert np.linalg.det(matrix) == pytest.approx(1.0) and matrix[:3, 3] == pytest.approx(place)
     assert matrix[:3, 2] == pytest.approx((0.0, 0.0, np.sign(height))) and matrix[:3, 0] == pytest.approx((1, 0, 0))
-    near = camera_to_world(place + (0.0, -1e-4, 0.0), np.zeros(3))
+    near = camera_to_world(place + np.array([0.0, -1e-4, 0.0]), np.zeros(3))
     assert near == pytest.approx(matrix, abs=2e-4)
-    both = look_at(np.stack([place, place + (0.0, -1e-4, 0.0)]), np.zeros((2, 3))).as_matrix()
+    both = look_at(np.stack([place, place + np.array([0.0, -1e-4, 0.0])]), np.zeros((2, 3))).as_matrix()
     assert both == pytest.approx(np.stack([matrix[:3, :3], near[:3, :3]]))
 
 

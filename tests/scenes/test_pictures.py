@@ -16,6 +16,7 @@ from scenes.loading import is_linear, read_image
 from tests.scenes.formats.files import CASES
 
 FOLDER = CASES / "picture-files"
+OWN = Path(__file__).parent / "cases"
 
 
 def decoded(value: float) -> float:
@@ -115,3 +116,54 @@ def test_broken_pictures_are_one_line(name: str, content: bytes, tmp_path: Path)
     with pytest.raises(SceneError, match=f"texture .*{name}: cannot be read") as error:
         read_image(tmp_path / name)
     assert "\n" not in str(error.value)
+
+
+def test_a_ramp_of_16_bits_is_a_ramp() -> None:
+    ramp = read_image(OWN / "grey-ramp-16.png")[0, :, 0]
+    assert (np.diff(ramp) > 0.0).all() and ramp[0] == 0.0 and ramp[-1] == 1.0
+    assert ramp[len(ramp) // 2] == pytest.approx(0.21, abs=0.02)
+
+
+def test_a_sun_that_overflows_is_clamped_with_a_word() -> None:
+    with pytest.warns(UserWarning, match=r"infinite-sun\.exr: \d+ pixels of infinite light became 65504"):
+        found = read_image(OWN / "infinite-sun.exr")
+    assert np.isfinite(found).all() and found.max() == 65504.0
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "PA", "RGBA", "CMYK"])
+def test_grey_palettes_and_alpha_are_the_colours_they_mean(mode: str, tmp_path: Path) -> None:
+    """Alpha is no colour: what it hides keeps its own."""
+    picture = Image.new("RGB", (4, 2), (255, 255, 255))
+    picture.paste((0, 0, 0), (0, 0, 2, 2))
+    if mode == "PA":
+        picture = picture.convert("P")
+        picture.info["transparency"] = 0
+    elif mode in ("LA", "RGBA"):
+        picture = picture.convert(mode)
+        picture.putalpha(77)
+    else:
+        picture = picture.convert(mode)
+    path = tmp_path / ("a.tif" if mode == "CMYK" else "a.png")
+    picture.save(path)
+    found = read_image(path)
+    assert found[:, :2] == pytest.approx(np.zeros((2, 2, 3)), abs=1e-6)
+    assert found[:, 2:] == pytest.approx(np.ones((2, 2, 3)), abs=1e-6)
+
+
+@pytest.mark.parametrize("channels", [2, 4, 6])
+def test_16_bits_with_colour_or_alpha(channels: int, tmp_path: Path) -> None:
+    """PNG of colour type 4 (grey and alpha), 2 (colours) and 6 (both)."""
+    kinds = {2: (4, 2), 4: (6, 4), 6: (2, 3)}
+    kind, count = kinds[channels]
+    values = np.full((2, 3, count), 65535, ">u2")
+    values[..., : count - (kind in (4, 6))] = 32768
+    rows = b"".join(b"\0" + row.tobytes() for row in values)
+
+    def chunk(name: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+    header = struct.pack(">IIBBBBB", 3, 2, 16, kind, 0, 0, 0)
+    path = tmp_path / "a.png"
+    parts = (chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(rows)), chunk(b"IEND", b""))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
+    assert read_image(path) == pytest.approx(np.full((2, 3, 3), decoded(0.5)), abs=0.003)

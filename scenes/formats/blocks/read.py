@@ -187,7 +187,7 @@ class _Loader:
         if kind == "model":
             path = self.folder / source.require("modelfilename")
             try:
-                return list(place_model(path, matrix, track, material, name))
+                return list(place_model(path, matrix, track, material, name, source.get("smoothangle", 0.0)))
             except SceneError as error:
                 raise SceneError(f"{source.where}: {error}") from None
         if kind not in _SHAPES:

@@ -63,6 +63,7 @@ ALLOWED: Mapping[str, Mapping[str, Shape]] = {
         "type": str,
         "materialname": str,
         "modelfilename": str,
+        "smoothangle": 1,
         "radius": 1,
         "scale": (1, 3),
         "rotation": 3,

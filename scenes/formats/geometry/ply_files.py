@@ -25,6 +25,7 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _CORNERS_MAX = 64
 _PIECE = 1 << 16  # rows that are written at a time
 
@@ -42,6 +43,23 @@ def read_ply(content: bytes, name: str) -> Mesh:
     Raises:
         SceneError: it is no PLY file, or not what its header says.
     """
+    return _mesh(_tables(content, name), name)
+
+
+def ply_colours(content: bytes, name: str) -> NDArray[np.uint8] | None:
+    """Colours ``(v, 3)`` of the vertices of a file's content, eight bits a channel; None where it has none."""
+    vertex = _tables(content, name).get("vertex", {})
+    kinds = {part[0]: part[1] for element in _header(content, name)[1] for part in element.properties}
+    for names in _COLOURS:
+        if set(names) <= set(vertex):
+            columns = np.stack([vertex[part] for part in names], axis=1)
+            scale = 255.0 if kinds[names[0]][0] == "f" else 1.0 / 257.0 if kinds[names[0]] == "u2" else 1.0
+            return np.clip(np.rint(columns * scale), 0, 255).astype(np.uint8)
+    return None
+
+
+def _tables(content: bytes, name: str) -> dict[str, dict[str, NDArray]]:
+    """Columns of each element by name; those of the faces are their corners."""
     order, elements, body = _header(content, name)
     numbers = _numbers(body, name) if order == "" else None
     tables: dict[str, dict[str, NDArray]] = {}
@@ -59,7 +77,7 @@ def read_ply(content: bytes, name: str) -> Mesh:
             tables[element.name], at = _binary_columns(body, at, element, order, name)
         else:
             tables[element.name], at = _ascii_columns(numbers, at, element, name)
-    return _mesh(tables, name)
+    return tables
 
 
 def _header(content: bytes, name: str) -> tuple[str, list[_Element], memoryview]:
@@ -134,13 +152,14 @@ def _numbers(body: memoryview, name: str) -> NDArray[np.float64]:
 def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name: str) -> tuple[NDArray, int]:
     """Triangles ``(n, 3)``; fast where all faces have as many corners, which is the rule."""
     lists = [part for part in element.properties if part[2]]
-    if len(lists) != 1 or not lists[0][0].startswith("vertex_ind"):
-        raise SceneError(f"{name}: expected one list of vertex indices in faces")
+    wanted = next((part for part in lists if part[0].startswith("vertex_ind")), None)
+    if wanted is None:
+        raise SceneError(f"{name}: expected a list of vertex indices in faces")
     if element.count == 0:
         return np.zeros((0, 3)), at
-    position = element.properties.index(lists[0])
+    position = element.properties.index(wanted)
     before = np.dtype([(f"{n}", order + part[1]) for n, part in enumerate(element.properties[:position])]).itemsize
-    counter = np.dtype(order + lists[0][2])
+    counter = np.dtype(order + wanted[2])
     _enough(len(body), at + before + counter.itemsize, element, name)
 
     def row(corners: int) -> np.dtype:
@@ -153,19 +172,25 @@ def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name
         return np.dtype(fields)
 
     corners = int(np.frombuffer(body, counter, 1, at + before)[0])
-    if 3 <= corners <= _CORNERS_MAX and at + element.count * row(corners).itemsize <= len(body):
+    if len(lists) == 1 and 3 <= corners <= _CORNERS_MAX and at + element.count * row(corners).itemsize <= len(body):
         rows = np.frombuffer(body, row(corners), element.count, at)
         if (rows["count"] == corners).all():
             return _fans(rows["corners"]), at + element.count * row(corners).itemsize
     triangles = []
     for _ in range(element.count):
-        _enough(len(body), at + before + counter.itemsize, element, name)
-        corners = int(np.frombuffer(body, counter, 1, at + before)[0])
-        if not 3 <= corners <= _CORNERS_MAX:
-            raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners}")
-        _enough(len(body), at + row(corners).itemsize, element, name)
-        triangles.append(_fans(np.frombuffer(body, row(corners), 1, at)["corners"]))
-        at += row(corners).itemsize
+        for part in element.properties:
+            kind, corners = np.dtype(order + part[1]), 1
+            if part[2]:
+                counter = np.dtype(order + part[2])
+                _enough(len(body), at + counter.itemsize, element, name)
+                corners = int(np.frombuffer(body, counter, 1, at)[0])
+                at += counter.itemsize
+                if not (3 if part is wanted else 0) <= corners <= _CORNERS_MAX:
+                    raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners}")
+            _enough(len(body), at + corners * kind.itemsize, element, name)
+            if part is wanted:
+                triangles.append(_fans(np.frombuffer(body, kind, corners, at)[None]))
+            at += corners * kind.itemsize
     return np.concatenate(triangles), at
 
 

@@ -1,0 +1,109 @@
+"""Models from files, with their materials, as instances of a scene."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+from scenes.arithmetic import product
+from scenes.canonical import Instance, Material, Matrix, RigidTrack, SceneError
+from scenes.formats.losses import Loss, LossReport
+from scenes.loading import FileState, one_line, state_of
+from scenes.models.gltf_files import read_gltf
+from scenes.models.obj_files import read_obj
+from scenes.models.plain_files import read_plain
+from scenes.models.smoothing import smoothed
+from scenes.models.sources import Sources
+
+Read = Callable[[Sources, LossReport], tuple[Instance, ...]]
+
+_READERS: dict[str, Read] = {
+    ".obj": read_obj, ".ply": read_plain, ".stl": read_plain, ".glb": read_gltf, ".gltf": read_gltf,
+}  # fmt: skip
+MODEL_ENDINGS = tuple(_READERS)
+
+_KEPT_MAX = 32
+_Kept = tuple[dict[Path, FileState | None], tuple[Instance, ...], tuple[Loss, ...]]
+_kept: dict[Path, _Kept] = {}
+"""Models that were read, and the files that each was made of."""
+
+
+def read_model(path: Path, report: LossReport | None = None) -> tuple[Instance, ...]:
+    """Parts of a model, each with its own material, in the file's frame.
+
+    A part without normals has flat faces, unless its file asks for smoothing (smoothing groups of OBJ);
+    :func:`scenes.models.smoothing.smoothed` smooths it. Materials become Phong, mirrors, panes and lamps:
+    :mod:`scenes.models.mtl_files` says how those of MTL do, :mod:`scenes.models.gltf_materials` those of glTF. Colours
+    of vertices become a picture (:mod:`scenes.models.vertex_colours`). Files without materials are grey (STL, most
+    PLY).
+
+    Args:
+        path: OBJ, PLY, STL, GLB or glTF.
+        report: receives what the file holds and is not kept.
+
+    Returns:
+        Instances whose transforms are those of the file's nodes.
+
+    Raises:
+        SceneError: the file is missing, of another kind, cannot be read, has no faces, vertices that are not finite, or
+            a texture or material file that is not there.
+    """
+    path, report = Path(path), report or LossReport()
+    files, kept, losses = _kept.pop(path, ({}, (), ()))
+    if not files or any(state_of(file) != state for file, state in files.items()):
+        sources, found = Sources(path), LossReport()
+        kept = _read(path, sources, found)
+        files, losses = sources.files, found.losses
+    _kept[path] = files, kept, losses
+    if len(_kept) > _KEPT_MAX:
+        del _kept[next(iter(_kept))]
+    for loss in losses:
+        report.add(loss.where, loss.what, loss.became)
+    return kept
+
+
+def _read(path: Path, sources: Sources, report: LossReport) -> tuple[Instance, ...]:
+    if path.suffix.lower() not in _READERS:
+        raise SceneError(f"model {path}: expected a file that ends in {', '.join(MODEL_ENDINGS)}")
+    if not path.is_file():
+        raise SceneError(f"model {path}: expected a file, found none")
+    try:
+        parts = _READERS[path.suffix.lower()](sources, report)
+    except SceneError as error:
+        raise SceneError(f"model {path}: {str(error).removeprefix(f'{path}: ')}") from None
+    except Exception as error:  # parsers raise what they like on broken files
+        raise SceneError(f"model {path}: cannot be read: {one_line(error)}") from error
+    if not parts:
+        raise SceneError(f"model {path}: expected at least one face, found none")
+    return parts
+
+
+def place_model(
+    path: Path,
+    to_world: Matrix,
+    track: RigidTrack | None = None,
+    material: Material | None = None,
+    name: str = "",
+    smooth_deg: float = 0.0,
+) -> tuple[Instance, ...]:
+    """A model's parts moved into the world.
+
+    Args:
+        path: see :func:`read_model`.
+        to_world: applied outside the transforms of the file.
+        track: rigid motion of all parts.
+        material: of all parts, instead of the file's.
+        name: of the instances, instead of the file's.
+        smooth_deg: edges of parts without normals that turn by at most this are smooth, degrees; 0 keeps faces flat.
+    """
+    return tuple(
+        dataclasses.replace(
+            part,
+            to_world=product(to_world, part.to_world),
+            track=track,
+            material=material or part.material,
+            name=name or part.name,
+        )
+        for part in smoothed(read_model(path), smooth_deg)
+    )

@@ -1,0 +1,189 @@
+"""Materials of a glTF file: factors times textures, as metallic and rough as they say.
+
+The base colour is the factor times the texture times the colours of the vertices, all linear. The diffuse colour is the
+base colour where it is not metal, texel by texel. The highlight is that of the means of base colour, metal and
+roughness (:func:`scenes.models.phong_of_parts.metallic_rough`).
+
+Source: Khronos Group, "glTF 2.0 specification", section 3.9; extensions KHR_materials_emissive_strength,
+KHR_materials_ior, KHR_materials_transmission, KHR_materials_unlit, KHR_materials_volume.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import NDArray
+
+from scenes.canonical import ConstantTexture, Emissive, Glass, Material, Phong, Texture
+from scenes.formats.losses import LossReport
+from scenes.models.gltf_data import GltfData
+from scenes.models.gltf_textures import GltfTextures, Lookup, Uvs, lookup_of, multiplied
+from scenes.models.phong_of_parts import diffuse_share, glowing, mean_of, metallic_rough, rgb, seen_through
+from scenes.models.vertex_colours import coloured
+
+_USED = {"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_transmission", "KHR_materials_unlit",
+         "KHR_materials_volume"}  # fmt: skip
+_EVERYWHERE = Lookup(-1)
+
+
+@dataclass(frozen=True)
+class Painted:
+    """A material for triangles.
+
+    Attributes:
+        material: of all of them.
+        uvs: texture coordinates of their corners; None for no picture.
+        baked: whether these are of a picture of the colours of the corners, so that each triangle has its own.
+    """
+
+    material: Material
+    uvs: Float[NDArray[np.float32], "f 3 2"] | None
+    baked: bool = False
+
+
+class GltfMaterials:
+    """Materials of a file, each made once for meshes without colours of vertices."""
+
+    def __init__(self, data: GltfData, report: LossReport) -> None:
+        self.data, self.report = data, report
+        self.textures = GltfTextures(data, report)
+        self._made: dict[int, Material] = {}
+
+    def painted(
+        self, number: int | None, sets: dict[int, Uvs], colors: Float[NDArray[np.float64], "f 3 3"] | None
+    ) -> Painted:
+        """The material of a primitive.
+
+        Args:
+            number: of the material; None for the default one.
+            sets: texture coordinates ``(f, 3, 2)`` of the corners, by their number.
+            colors: linear colours of the corners.
+        """
+        given = {} if number is None else self.data.at("materials", number)
+        where = f"material {given.get('name', number)}" if given else "the default material"
+        lookup = lookup_of(_rough(given).get("baseColorTexture"))
+        if lookup is not None and lookup.coordinates not in sets:
+            self.report.add(where, "a texture on a part without its texture coordinates")
+            lookup = None
+        uvs = None
+        tint: Texture | None = None
+        if colors is not None and lookup is None:
+            tint, uvs = coloured(colors * _factor(given, "baseColorFactor"), str(self.data.sources.path))
+        elif colors is not None:
+            mean = colors.reshape(-1, 3).mean(axis=0)
+            if (colors != 1.0).any():
+                self.report.add(where, "colours of vertices beside a texture", "their mean times the texture")
+            tint = ConstantTexture(rgb(mean))
+        if lookup is not None:
+            uvs = lookup.moved(sets[lookup.coordinates]).astype(np.float32)
+        if tint is not None:
+            return Painted(self._material(given, where, lookup, tint), uvs, lookup is None and uvs is not None)
+        key = -1 if number is None else number
+        if key not in self._made or (lookup is None) != (lookup_of(_rough(given).get("baseColorTexture")) is None):
+            self._made[key] = self._material(given, where, lookup, None)
+        return Painted(self._made[key], uvs)
+
+    def _material(self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None) -> Material:
+        extensions = given.get("extensions", {})
+        for name in sorted(extensions.keys() - _USED):
+            self.report.add(where, name)
+        for name in ("normalTexture", "occlusionTexture"):
+            if name in given:
+                self.report.add(where, name)
+        base = self._base(given, where, lookup, tint)
+        if "KHR_materials_unlit" in extensions:
+            if isinstance(base, ConstantTexture):
+                return Emissive(base.value)
+            self.report.add(where, "a picture that no light changes", "a diffuse one")
+            return Phong(base)
+        through = extensions.get("KHR_materials_transmission", {})
+        if through.get("transmissionFactor", 0.0) > 0.5:
+            return self._glass(base, extensions, where)
+        material = self._rough(given, base, where, lookup)
+        mode = given.get("alphaMode", "OPAQUE")
+        solid: Material = material
+        if mode == "BLEND" and lookup is None:
+            alpha = _rough(given).get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3]
+            solid = seen_through(material, float(alpha), where, self.report)
+        elif mode in ("BLEND", "MASK"):
+            self.report.add(where, f"transparency of its picture ({mode})", "opaque")
+        return self._glowing(given, solid, where)
+
+    def _base(self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None) -> Texture:
+        if lookup is None:
+            return tint or ConstantTexture(rgb(_factor(given, "baseColorFactor")))
+        factor = _factor(given, "baseColorFactor") * (1.0 if tint is None else mean_of(tint))
+        image = self.textures.picture(lookup)
+        if (factor != 1.0).any():
+            image = image * factor.astype(np.float32)
+        return self.textures.texture(lookup, image, where)
+
+    def _rough(self, given: dict[str, Any], base: Texture, where: str, lookup: Lookup | None) -> Phong:
+        """Metal and roughness by their factors times the blue and green channels of their texture."""
+        parts = _rough(given)
+        metallic, roughness = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in _PARTS)
+        beside = lookup_of(parts.get("metallicRoughnessTexture"))
+        diffuse = None
+        if beside is not None:
+            numbers = np.clip(self.textures.picture(beside, numbers=True), 0.0, 1.0)
+            if np.ptp(numbers[..., 1]) > 0.0:
+                self.report.add(where, "a picture of the roughness", "its mean")
+            roughness = float(roughness * numbers[..., 1].mean(dtype=np.float64))
+            share = 1.0 - metallic * numbers[..., 2:3] * (1.0 - diffuse_share(1.0, roughness))
+            metallic = float(metallic * numbers[..., 2].mean(dtype=np.float64))
+            if np.ptp(share) > 0.0:
+                if lookup is not None and beside.place == lookup.place:
+                    image = multiplied(self.textures.picture(lookup), np.repeat(share.astype(np.float32), 3, axis=-1))
+                    factor = _factor(given, "baseColorFactor").astype(np.float32)
+                    diffuse = self.textures.texture(lookup, image * factor, where)
+                else:
+                    self.report.add(where, "a picture of what is metal", "its mean")
+        if diffuse is None:
+            diffuse = _scaled(base, diffuse_share(metallic, roughness))
+        return metallic_rough(base, diffuse, metallic, roughness)
+
+    def _glass(self, base: Texture, extensions: dict[str, Any], where: str) -> Material:
+        """Glass of the mean base colour, thin unless it has a volume."""
+        thickness = extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0)
+        if "KHR_materials_volume" in extensions:
+            self.report.add(where, "colour by the length of the way in glass")
+        ior = float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5))
+        if not isinstance(base, ConstantTexture):
+            self.report.add(where, "a picture on glass", "its mean")
+        color = rgb(np.clip(mean_of(base), 0.0, 1.0))
+        return Glass(transmittance=ConstantTexture(color), ior=max(ior, 1.0), thin=not thickness > 0.0)
+
+    def _glowing(self, given: dict[str, Any], material: Material, where: str) -> Material:
+        strength = given.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+        emission = np.asarray(given.get("emissiveFactor", (0.0, 0.0, 0.0)), np.float64) * strength
+        if "emissiveTexture" in given and (emission > 0.0).any():
+            lookup = lookup_of(given["emissiveTexture"])
+            picture = self.textures.picture(lookup or _EVERYWHERE)
+            if np.ptp(picture.reshape(-1, 3), axis=0).max() > 0.0:
+                self.report.add(where, "a picture of what glows")
+                return material
+            emission = emission * picture[0, 0]
+        return glowing(material, rgb(np.maximum(emission, 0.0)), where, self.report)
+
+
+_PARTS = ("metallic", "roughness")
+
+
+def _rough(given: dict[str, Any]) -> dict[str, Any]:
+    return given.get("pbrMetallicRoughness", {})
+
+
+def _factor(given: dict[str, Any], name: str) -> Float[NDArray[np.float64], " 3"]:
+    return np.asarray(_rough(given).get(name, (1.0, 1.0, 1.0, 1.0))[:3], np.float64)
+
+
+def _scaled(texture: Texture, factor: float) -> Texture:
+    if factor == 1.0:
+        return texture
+    if isinstance(texture, ConstantTexture):
+        return ConstantTexture(rgb(np.asarray(texture.value) * factor))
+    return dataclasses.replace(texture, image=texture.image * np.float32(factor))  # type: ignore[union-attr]

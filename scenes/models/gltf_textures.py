@@ -1,0 +1,133 @@
+"""Textures of a glTF file.
+
+Source: Khronos Group, "glTF 2.0 specification", sections 3.8 (textures, samplers) and the extension
+KHR_texture_transform.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import NDArray
+
+from scenes.arithmetic import cos, sin
+from scenes.canonical import ImageTexture
+from scenes.formats.losses import LossReport
+from scenes.loading import Picture, decode_srgb
+from scenes.models.gltf_data import GltfData
+from scenes.pictures import by_pillow, decoded
+
+Uvs = Float[NDArray[np.float64], "*n 2"]
+_NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """How a texture is looked up.
+
+    Attributes:
+        texture: its number.
+        coordinates: which of the texture coordinates of a mesh.
+        offset, rotation_rad, scale: of the coordinates.
+    """
+
+    texture: int
+    coordinates: int = 0
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation_rad: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def place(self) -> tuple[Any, ...]:
+        """What two textures share that are looked up alike."""
+        return self.coordinates, self.offset, self.rotation_rad, self.scale
+
+    def moved(self, uvs: Uvs) -> Uvs:
+        """Coordinates in the file, ``v`` downwards, as canonical ones, ``v`` upwards.
+
+        They are scaled, turned counter-clockwise as seen on the picture, and moved.
+        """
+        u, v = uvs[..., 0] * self.scale[0], uvs[..., 1] * self.scale[1]
+        along, across = cos(self.rotation_rad), sin(self.rotation_rad)
+        u, v = along * u + across * v, along * v - across * u
+        return np.stack([u + self.offset[0], 1.0 - (v + self.offset[1])], axis=-1)
+
+
+def lookup_of(info: dict[str, Any] | None) -> Lookup | None:
+    """The lookup that a material describes; None where it has none."""
+    if info is None or "index" not in info:
+        return None
+    change = info.get("extensions", {}).get("KHR_texture_transform", {})
+    offset, scale = change.get("offset", (0.0, 0.0)), change.get("scale", (1.0, 1.0))
+    return Lookup(
+        info["index"],
+        int(change.get("texCoord", info.get("texCoord", 0))),
+        (float(offset[0]), float(offset[1])),
+        float(change.get("rotation", 0.0)),
+        (float(scale[0]), float(scale[1])),
+    )
+
+
+class GltfTextures:
+    """Pictures and samplers of a file, each picture read once."""
+
+    def __init__(self, data: GltfData, report: LossReport) -> None:
+        self.data, self.report = data, report
+        self._pictures: dict[tuple[int, bool], Picture] = {}
+
+    def picture(self, lookup: Lookup, numbers: bool = False) -> Picture:
+        """Texels ``(h, w, 3)`` of a texture: linear colours, or numbers that are not encoded."""
+        texture = self.data.at("textures", lookup.texture)
+        extensions = texture.get("extensions", {})
+        source = texture.get("source", extensions.get("EXT_texture_webp", {}).get("source"))
+        key = (source, numbers)
+        if key not in self._pictures:
+            name, content = self.data.image_bytes(source)
+            if content is None:
+                found = decoded(self.data.sources.require(name, "a texture at"))
+            else:
+                found = by_pillow(content)
+            if found.dtype != np.float32:
+                most = np.iinfo(found.dtype).max  # type: ignore[type-var]
+                found = found.astype(np.float32) / np.float32(most) if numbers else decode_srgb(found)  # type: ignore[arg-type]
+            self._pictures[key] = found.astype(np.float32)
+        return self._pictures[key]
+
+    def texture(self, lookup: Lookup, image: Picture, where: str) -> ImageTexture:
+        """A texture of these texels, with the sampler of the file."""
+        sampler = self._sampler(lookup)
+        wraps = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
+        scale, offset = [1.0, 1.0], [0.0, 0.0]
+        for axis, wrap in enumerate(wraps):
+            if wrap == _MIRRORED:  # twice as large, the second half turned round
+                along = 1 - axis
+                image = np.concatenate([image, np.flip(image, along)], axis=along)
+                scale[axis] = 0.5
+                offset[axis] = 0.5 * axis  # the first half of rows is the upper one
+        kinds = {wrap == _CLAMP for wrap in wraps}
+        if len(kinds) > 1:
+            self.report.add(where, "a texture that ends along one axis and repeats along the other", "one that repeats")
+        wrap: Literal["clamp", "repeat"] = "clamp" if kinds == {True} else "repeat"
+        kind: Literal["nearest", "mipmap"] = "nearest" if sampler.get("magFilter") == _NEAREST else "mipmap"
+        source = str(self.data.sources.path)
+        return ImageTexture(image, (scale[0], scale[1]), (offset[0], offset[1]), wrap, kind, source)
+
+    def _sampler(self, lookup: Lookup) -> dict[str, Any]:
+        texture = self.data.at("textures", lookup.texture)
+        return self.data.at("samplers", texture["sampler"]) if "sampler" in texture else {}
+
+
+def resized(image: Picture, height: int, width: int) -> Picture:
+    """A picture with more texels, each the nearest one of before."""
+    rows = np.arange(height) * image.shape[0] // height
+    columns = np.arange(width) * image.shape[1] // width
+    return image[rows[:, None], columns[None]]
+
+
+def multiplied(first: Picture, second: Picture) -> Picture:
+    """The product of two pictures, with as many texels as the larger along each axis."""
+    height, width = (max(first.shape[axis], second.shape[axis]) for axis in (0, 1))
+    return resized(first, height, width) * resized(second, height, width)

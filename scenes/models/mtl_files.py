@@ -1,0 +1,204 @@
+"""Material libraries of OBJ (MTL).
+
+``Kd`` or the picture of ``map_Kd`` is the diffuse colour, ``Ks`` and ``Ns`` the highlight, dimmed so that no more is
+reflected than arrives. By ``illum``, 0 is a colour that no light changes, 1 has no highlight, 3 and 8 mirror by ``Ks``,
+5 mirrors more at grazing angles, 4 and 9 are thin panes, 6 and 7 glass of the index ``Ni``. ``d`` (or ``1 - Tr``) is
+the opacity, ``Ke`` emission. ``Pm`` and ``Pr``, where given, make it as metallic and rough as of glTF.
+
+Deviation: a picture replaces ``Kd`` (the format multiplies them), for exporters leave it at whatever grey it was.
+
+Source: Wavefront, "MTL material format" (Advanced Visualizer appendix); D. Dodson, "PBR extension of MTL".
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from scenes.canonical import ConstantTexture, Emissive, Glass, ImageTexture, Material, Phong, Rgb, SceneError, Texture
+from scenes.formats.losses import LossReport
+from scenes.models.phong_of_parts import (
+    EXPONENT_MAX,
+    diffuse_share,
+    glowing,
+    mean_of,
+    metallic_rough,
+    rgb,
+    seen_through,
+)
+from scenes.models.sources import Sources
+
+_FIXED = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-mm": 2, "-texres": 1, "-bm": 1, "-imfchan": 1,
+          "-boost": 1, "-type": 1}  # fmt: skip
+_VECTORS = ("-o", "-s", "-t")
+_MAPS = ("map_", "bump", "disp", "decal", "refl", "norm")
+_UNUSED = ("map_ka", "map_aat")  # ambient light, and anti-aliasing of pictures
+
+
+@dataclass
+class _Entry:
+    """What a library says of one material: rest of the line by keyword in lower case."""
+
+    lines: dict[str, str] = field(default_factory=dict)
+
+    def number(self, name: str, default: float) -> float:
+        words = self.lines.get(name, "").split()
+        return _number(words[-1]) if words else default
+
+    def color(self, name: str, default: Rgb) -> Rgb | None:
+        """A colour; None where it is no RGB triple."""
+        words = self.lines.get(name, "").split()
+        if not words:
+            return default
+        if words[0] in ("spectral", "xyz"):
+            return None
+        values = [_number(word) for word in words[:3]]
+        return rgb(values if len(values) == 3 else values[:1] * 3)
+
+
+def _number(word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise SceneError(f"material library: expected a number, got {word[:20]!r}")
+    return value
+
+
+def entries(text: str) -> dict[str, _Entry]:
+    """Materials of a library by name; of several with one name the first counts."""
+    found: dict[str, _Entry] = {}
+    entry = None
+    for line in text.replace("\\\n", " ").splitlines():
+        words = [] if line.lstrip().startswith("#") else line.split(maxsplit=1)
+        if len(words) == 2 and words[0].lower() == "newmtl":
+            entry = _Entry()
+            found.setdefault(words[1].strip(), entry)
+        elif len(words) == 2 and entry is not None:
+            entry.lines[words[0].lower()] = words[1].strip()
+    return found
+
+
+@dataclass(frozen=True)
+class Map:
+    """A picture's name and the options before it."""
+
+    name: str
+    options: dict[str, tuple[str, ...]]
+
+    def pair(self, option: str, default: float) -> tuple[float, float]:
+        values = [_number(word) for word in self.options.get(option, ())]
+        values += [default] * (2 - len(values))
+        return values[0], values[1]
+
+
+def map_of(rest: str) -> Map:
+    """The options and the name of a line such as ``-s 2 2 1 -clamp on bricks old.png``.
+
+    Vectors have one to three numbers, fewer where the name itself is a number; the name may hold blanks.
+    """
+    words = rest.split()
+    options: dict[str, tuple[str, ...]] = {}
+    at = 0
+    while at < len(words) - 1 and (words[at].lower() in _FIXED or words[at].lower() in _VECTORS):
+        name = words[at].lower()
+        count = _FIXED.get(name, 0)
+        if name in _VECTORS:
+            while count < 3 and at + 2 + count < len(words) and _is_number(words[at + 1 + count]):
+                count += 1
+        options[name] = tuple(words[at + 1 : at + 1 + count])
+        at += 1 + count
+    # blanks of the name as they are in the line
+    name = rest.split(maxsplit=at)[at] if at < len(words) else ""
+    return Map(name.strip().strip('"'), options)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def picture_of(line: str, sources: Sources, where: str, report: LossReport) -> ImageTexture:
+    """The texture of a map: ``-s`` scales and ``-o`` moves the coordinates, ``-clamp`` ends them, ``-mm`` changes the
+    values; other options are reported.
+
+    Raises:
+        SceneError: the picture is not there, or cannot be read.
+    """
+    found = map_of(line)
+    path, image = sources.picture(found.name)
+    base, gain = found.pair("-mm", 1.0) if "-mm" in found.options else (0.0, 1.0)
+    if (base, gain) != (0.0, 1.0):
+        image = np.clip(base + gain * image, 0.0, None).astype(np.float32)
+    for option in found.options.keys() - {"-s", "-o", "-clamp", "-mm"}:
+        report.add(where, f"the option {option} of {found.name}")
+    wrap: Literal["clamp", "repeat"] = "clamp" if found.options.get("-clamp") == ("on",) else "repeat"
+    return ImageTexture(image, found.pair("-s", 1.0), found.pair("-o", 0.0), wrap, source=str(path))
+
+
+def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport) -> Material:
+    """A material of a library.
+
+    Raises:
+        SceneError: a number is none, or a diffuse picture is not there.
+    """
+    where = f"material {name}"
+    for keyword in entry.lines:
+        if keyword.startswith(_MAPS) and keyword not in ("map_kd", *_UNUSED):
+            report.add(where, keyword)
+    diffuse = entry.color("kd", (0.8, 0.8, 0.8))
+    if diffuse is None:
+        report.add(where, "a diffuse colour that is no RGB", "grey")
+        diffuse = (0.5, 0.5, 0.5)
+    texture: Texture = ConstantTexture(rgb(np.clip(diffuse, 0.0, 1.0)))
+    if "map_kd" in entry.lines:
+        texture = picture_of(entry.lines["map_kd"], sources, where, report)
+    material = _reflecting(entry, texture, where, report)
+    opacity = entry.number("d", 1.0 - entry.number("tr", 0.0))
+    if isinstance(material, Phong):
+        material = seen_through(material, float(np.clip(opacity, 0.0, 1.0)), where, report)
+    emission = entry.color("ke", (0.0, 0.0, 0.0)) or (0.0, 0.0, 0.0)
+    return glowing(material, rgb(np.maximum(emission, 0.0)), where, report)
+
+
+def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport) -> Material:
+    """What ``illum`` makes of the colours."""
+    kind = int(entry.number("illum", -1))
+    if "pm" in entry.lines or "pr" in entry.lines:
+        metallic, roughness = (float(np.clip(entry.number(*part), 0.0, 1.0)) for part in (("pm", 0.0), ("pr", 0.5)))
+        return metallic_rough(texture, _times(texture, diffuse_share(metallic, roughness)), metallic, roughness)
+    if kind == 0:
+        if isinstance(texture, ConstantTexture):
+            return Emissive(texture.value)
+        report.add(where, "a picture that no light changes (illum 0)", "a diffuse one")
+        return Phong(texture)
+    filtered = rgb(np.clip(entry.color("tf", (1.0, 1.0, 1.0)) or (1.0, 1.0, 1.0), 0.0, 1.0))
+    if kind in (4, 6, 7, 9):
+        ior = max(entry.number("ni", 1.5), 1.0)
+        return Glass(transmittance=ConstantTexture(filtered), ior=ior, thin=kind in (4, 9) or ior == 1.0)
+    diffuse = np.clip(mean_of(texture), 0.0, 1.0)
+    specular = np.minimum(np.clip(entry.color("ks", (0.0, 0.0, 0.0)) or 0.0, 0.0, 1.0), 1.0 - diffuse)
+    exponent = entry.number("ns", 0.0)
+    if kind in (3, 5, 8) and specular.max() > 0.0:
+        share = float(specular.max())
+        grazing = 1.0 if kind == 5 else share
+        return Phong(
+            texture, (0.0, 0.0, 0.0), 1.0, fresnel_min=share, fresnel_max=grazing, mirror_tint=rgb(specular / share)
+        )
+    if exponent < 1.0 or kind == 1:  # a highlight wider than that is not visible as one
+        return Phong(texture)
+    return Phong(texture, rgb(specular), min(exponent, EXPONENT_MAX))
+
+
+def _times(texture: Texture, factor: float) -> Texture:
+    if isinstance(texture, ImageTexture):
+        return dataclasses.replace(texture, image=texture.image * np.float32(factor))
+    assert isinstance(texture, ConstantTexture)
+    return ConstantTexture(rgb(np.asarray(texture.value) * factor))

@@ -1,0 +1,229 @@
+"""OBJ files: a part for each material.
+
+Source: Wavefront, "OBJ file format" (Advanced Visualizer manual, appendix B1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.canonical import Instance, Material, Mesh, Phong, SceneError
+from scenes.canonical.values import vertices_of
+from scenes.formats.losses import LossReport
+from scenes.loading import decode_srgb
+from scenes.models.mtl_files import entries, material_of
+from scenes.models.plain_files import GREY
+from scenes.models.smoothing import corner_normals, with_corners
+from scenes.models.sources import Sources, text_of
+from scenes.models.vertex_colours import coloured
+
+_UNREAD = ("curv", "curv2", "surf", "vp", "p", "l", "lod", "shadow_obj", "trace_obj", "call")
+
+
+@dataclass
+class _Group:
+    """Polygons of one material: their corners, one behind the other, how many each has, and smoothing groups."""
+
+    corners: list[str] = field(default_factory=list)
+    counts: list[int] = field(default_factory=list)
+    smoothing: list[int] = field(default_factory=list)
+
+
+@dataclass
+class _File:
+    """What the lines of a file hold."""
+
+    points: list[list[str]] = field(default_factory=list)
+    uvs: list[list[str]] = field(default_factory=list)
+    normals: list[list[str]] = field(default_factory=list)
+    groups: dict[str, _Group] = field(default_factory=dict)
+    libraries: list[str] = field(default_factory=list)
+    unread: set[str] = field(default_factory=set)
+
+
+def read_obj(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
+    """A part for each material of an OBJ file, in the order of their first faces.
+
+    Parts without normals have flat faces but for those in a smoothing group (``s``), over which normals are smooth.
+    Colours behind the coordinates of vertices are taken for sRGB.
+
+    Raises:
+        SceneError: something cannot be read, or a material library or a diffuse picture is not there.
+    """
+    stem = sources.path.stem
+    file = _parsed(text_of(sources.path))
+    for keyword in sorted(file.unread):
+        report.add(stem, f"lines of the kind {keyword!r}")
+    materials = _materials(file.libraries, sources, report)
+    points = _table(file.points, (3, 4, 6, 7, 8), "v")
+    uvs, normals = _table(file.uvs, (1, 2, 3), "vt"), _table(file.normals, (3,), "vn")
+    if not np.isfinite(points[:, :3]).all():
+        raise SceneError("vertices hold non-finite values")
+    parts = []
+    for name, group in file.groups.items():
+        if name and name not in materials:
+            report.add(f"{stem}/{name}", "a material that no library has", "grey")
+        mesh, material = _part(group, points, uvs, normals, materials.get(name, GREY), str(sources.path))
+        if mesh is not None:
+            parts.append(Instance(mesh, material, name=f"{stem}/{name or stem}"))
+    return tuple(parts)
+
+
+def _parsed(text: str) -> _File:
+    file, group, smoothing = _File(), None, 0
+    name = ""
+    for number, line in enumerate(text.replace("\\\n", " ").replace("\\\r\n", " ").splitlines(), start=1):
+        words = line.split()
+        if not words or words[0][0] == "#":
+            continue
+        keyword, rest = words[0], words[1:]
+        if keyword == "v":
+            file.points.append(rest)
+        elif keyword == "vt":
+            file.uvs.append(rest)
+        elif keyword == "vn":
+            file.normals.append(rest)
+        elif keyword in ("f", "fo"):
+            if len(rest) < 3:
+                raise SceneError(f"cannot be read: line {number}: expected a face of three corners, got {line!r:.40}")
+            if group is None:
+                group = file.groups.setdefault(name, _Group())
+            if "-" in line:
+                counts = len(file.points), len(file.uvs), len(file.normals)
+                rest = [_absolute(word, counts, number) for word in rest]
+            group.corners += rest
+            group.counts.append(len(rest))
+            group.smoothing.append(smoothing)
+        elif keyword == "usemtl":
+            name, group = " ".join(rest), None
+        elif keyword == "s" and rest:
+            smoothing = int(rest[0]) if rest[0].isdecimal() else int(rest[0] == "on")
+        elif keyword == "mtllib":
+            file.libraries.append(line.split(maxsplit=1)[1].strip() if rest else "")
+        elif keyword in _UNREAD:
+            file.unread.add(keyword)
+    return file
+
+
+def _absolute(corner: str, counts: Sequence[int], number: int) -> str:
+    """A corner whose indices count from the first; negative ones count from the last line before."""
+    parts = corner.split("/")
+    try:
+        made = [str(int(part) + count + 1) if part[:1] == "-" else part for part, count in zip(parts, counts)]  # noqa: B905
+    except ValueError:
+        raise SceneError(f"cannot be read: line {number}: expected indices, got {corner!r:.40}") from None
+    return "/".join(made)
+
+
+def _table(rows: list[list[str]], widths: Sequence[int], keyword: str) -> NDArray[np.float64]:
+    """Numbers of lines; those that a line lacks are 0."""
+    if not rows:
+        return np.zeros((0, widths[-1]))
+    if any(len(row) not in widths for row in rows):
+        wrong = next(row for row in rows if len(row) not in widths)
+        raise SceneError(f"cannot be read: expected {widths[0]} to {widths[-1]} numbers behind {keyword}, got {wrong}")
+    width = max(len(row) for row in rows)
+    try:
+        return np.array([row + ["0"] * (width - len(row)) for row in rows], np.float64)
+    except ValueError as error:
+        raise SceneError(f"cannot be read: {error}") from None
+
+
+def _materials(libraries: list[str], sources: Sources, report: LossReport) -> dict[str, Material]:
+    """Materials of all libraries; of several with one name the first counts."""
+    found: dict[str, Material] = {}
+    for line in libraries:
+        # a name may hold blanks, and a line several names
+        names = [line] if sources.find(line) is not None else line.split() or [line]
+        for name in names:
+            path = sources.require(name, "its materials in")
+            for material, entry in entries(text_of(path)).items():
+                if material not in found:
+                    found[material] = material_of(material, entry, sources, report)
+    return found
+
+
+def _part(
+    group: _Group,
+    points: NDArray[np.float64],
+    uvs: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    material: Material,
+    source: str,
+) -> tuple[Mesh | None, Material]:
+    """The triangles of a group: polygons are fans about their first corner."""
+    index = _indices(group, (len(points), len(uvs), len(normals)))
+    starts = np.concatenate([[0], np.cumsum(group.counts)])
+    triangles = np.repeat(np.arange(len(group.counts)), np.asarray(group.counts) - 2)
+    within = np.arange(len(triangles)) - np.repeat(
+        np.cumsum(np.asarray(group.counts) - 2), np.asarray(group.counts) - 2
+    )
+    within += np.asarray(group.counts)[triangles] - 2  # from 0 on in each polygon
+    first = starts[triangles]
+    faces = np.stack([first, first + within + 1, first + within + 2], axis=1)
+    if not len(faces):
+        return None, material
+    at, texture, normal = (index[faces, column] for column in range(3))
+    corners = points[at][..., :3]
+    shading = _shading(corners, normal, normals, np.asarray(group.smoothing)[triangles])
+    coordinates = uvs[texture][..., :2] if len(uvs) and (texture >= 0).any() else None
+    if coordinates is not None:
+        if coordinates.shape[-1] < 2:
+            coordinates = np.concatenate([coordinates, np.zeros_like(coordinates)], axis=-1)
+        coordinates = np.where((texture >= 0)[..., None], coordinates, 0.0).astype(np.float32)
+    baked = None
+    if points.shape[1] >= 6 and material is GREY:
+        made, baked = coloured(decode_srgb(_eight_bits(points[:, 3:6]))[at], source)
+        material, coordinates = Phong(made), coordinates if baked is None else baked
+    if shading is None and coordinates is None:
+        used, place = np.unique(at, return_inverse=True)
+        return Mesh(vertices_of(points[used, :3]), place.reshape(-1, 3).astype(np.int32), source=source), material
+    given = (texture >= 0).all() or coordinates is None
+    keys = (at * (len(uvs) + 1) + texture + 1) * (len(normals) + 1) + normal + 1
+    alike = given and baked is None and (shading is None or bool((normal >= 0).all()))
+    return with_corners(corners, shading, coordinates, source, keys if alike else None), material
+
+
+def _eight_bits(colors: NDArray[np.float64]) -> NDArray[np.uint8]:
+    scale = 255.0 if colors.max() <= 1.0 else 1.0
+    return np.clip(np.rint(colors * scale), 0, 255).astype(np.uint8)
+
+
+def _indices(group: _Group, counts: Sequence[int]) -> NDArray[np.int64]:
+    """Indices of point, texture coordinates and normal of each corner, from 0; -1 where it has none.
+
+    Raises:
+        SceneError: one is no number, or beyond what there is.
+    """
+    rows: dict[str, tuple[int, int, int]] = {}
+    for corner in dict.fromkeys(group.corners):
+        parts = corner.split("/")
+        try:
+            found = [int(part) - 1 if part else -1 for part in (*parts, "", "")[:3]]
+        except ValueError:
+            raise SceneError(f"cannot be read: expected indices of a corner, got {corner!r:.40}") from None
+        if found[0] < 0 or any(one >= count for one, count in zip(found, counts, strict=True)) or min(found) < -1:
+            raise SceneError(f"cannot be read: a face refers to {corner!r:.40}, of {counts[0]} vertices")
+        rows[corner] = (found[0], found[1], found[2])
+    return np.array([rows[corner] for corner in group.corners], np.int64).reshape(-1, 3)
+
+
+def _shading(
+    corners: NDArray[np.float64], normal: NDArray[np.int64], normals: NDArray[np.float64], smoothing: NDArray[np.int64]
+) -> NDArray[np.float32] | None:
+    """Normals ``(f, 3, 3)`` at the corners; None where all faces are flat."""
+    given = normal >= 0
+    if not given.any() and not smoothing.any():
+        return None
+    if not len(normals):
+        return corner_normals(corners, groups=smoothing)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit = (normals / np.where(length > 0.0, length, 1.0)).astype(np.float32)
+    usable = given & (length[:, 0] > 0.0)[normal]
+    if usable.all():
+        return unit[normal]
+    return np.where(usable[..., None], unit[normal], corner_normals(corners, groups=smoothing))

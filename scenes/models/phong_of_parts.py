@@ -1,0 +1,90 @@
+"""Materials of models in those that the renderer has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import NDArray
+
+from scenes.arithmetic import power
+from scenes.canonical import ConstantTexture, Emissive, Glass, ImageTexture, Material, Phong, Rgb, Texture
+from scenes.formats.losses import LossReport
+
+EXPONENT_MAX = 1.0e4
+_SMOOTH = 0.2  # roughness below which metal mirrors
+_CLEAR = 0.5  # opacity below which a surface is a pane
+
+
+def rgb(values: Any) -> Rgb:
+    """Three numbers."""
+    red, green, blue = (float(value) for value in np.asarray(values).reshape(-1)[:3])
+    return red, green, blue
+
+
+def mean_of(texture: Texture) -> Float[NDArray[np.float64], " 3"]:
+    """Mean colour of a constant or a picture."""
+    if isinstance(texture, ImageTexture):
+        return texture.image.mean(axis=(0, 1), dtype=np.float64)
+    assert isinstance(texture, ConstantTexture)
+    return np.asarray(texture.value, np.float64)
+
+
+def _scattered(roughness: float) -> float:
+    """How much of what rough metal reflects counts as diffuse: its alpha, but none where it mirrors."""
+    return roughness * roughness if roughness >= _SMOOTH else 0.0
+
+
+def diffuse_share(metallic: float, roughness: float) -> float:
+    """How much of the base colour of a surface is diffuse."""
+    return 1.0 - metallic * (1.0 - _scattered(roughness))
+
+
+def metallic_rough(base: Texture, diffuse: Texture, metallic: float, roughness: float) -> Phong:
+    """Phong of a metallic and rough surface.
+
+    The highlight is 4 % of white, or the base colour for metal, with the exponent ``2 / roughness⁴ - 2``; below a
+    roughness of 0.2 metal mirrors.
+
+    Deviation: what rough metal reflects is divided into a diffuse part, by its alpha (``roughness²``), and the
+    highlight, for the highlight has one colour, and the metal may have a picture.
+
+    Args:
+        base: colour of the surface, of which the mean counts.
+        diffuse: what of it is diffuse, see :func:`diffuse_share`.
+        metallic, roughness: means of both, 0 to 1.
+    """
+    color = np.clip(mean_of(base), 0.0, 1.0)
+    mirror = metallic if roughness < _SMOOTH else 0.0
+    return Phong(
+        diffuse,
+        specular=rgb((0.04 * (1.0 - metallic) + color * metallic * (1.0 - _scattered(roughness))) * (1.0 - mirror)),
+        exponent=float(np.clip(2.0 / float(power(max(roughness, 1e-3), 4)) - 2.0, 1.0, EXPONENT_MAX)),
+        fresnel_min=mirror,
+        fresnel_max=mirror,
+        mirror_tint=rgb(color),
+    )
+
+
+def seen_through(material: Phong, opacity: float, where: str, report: LossReport) -> Material:
+    """A surface of constant opacity: a clear pane of its colour below a half, else opaque."""
+    if opacity >= 1.0:
+        return material
+    if opacity < _CLEAR:
+        tint = opacity * np.clip(mean_of(material.diffuse), 0.0, 1.0) + (1.0 - opacity)
+        report.add(where, f"an opacity of {opacity:.3g}", "a thin clear pane of its colour")
+        return Glass(transmittance=ConstantTexture(rgb(tint)), thin=True)
+    report.add(where, f"an opacity of {opacity:.3g}", "opaque")
+    return material
+
+
+def glowing(material: Material, radiance: Rgb, where: str, report: LossReport) -> Material:
+    """A surface that emits evenly: one that only emits."""
+    if max(radiance) <= 0.0:
+        return material
+    became = "a surface that is seen and gives no light"
+    if isinstance(material, Phong) and mean_of(material.diffuse).max() > 0.0:
+        became += ", without its other colours"
+    report.add(where, "emission", became)
+    return Emissive(radiance)

@@ -1,0 +1,53 @@
+"""Models without materials: PLY and STL."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from scenes.canonical import ConstantTexture, Instance, Mesh, Phong, SceneError
+from scenes.canonical.values import vertices_of
+from scenes.formats.geometry.ply_files import ply_colours, read_ply
+from scenes.formats.losses import LossReport
+from scenes.loading import decode_srgb
+from scenes.models.smoothing import with_corners
+from scenes.models.sources import Sources
+from scenes.models.vertex_colours import coloured
+
+GREY = Phong(ConstantTexture((0.5, 0.5, 0.5)))
+
+
+def read_plain(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
+    """The one part of a file, grey unless its vertices have colours (of sRGB, as programs write them)."""
+    path = sources.path
+    name = f"{path.stem}/{path.stem}"
+    if path.suffix.lower() == ".stl":
+        mesh = _stl(path.read_bytes(), str(path))
+        return () if mesh is None else (Instance(mesh, GREY, name=name),)
+    content = path.read_bytes()
+    mesh = read_ply(content, str(path))
+    colors = ply_colours(content, str(path))
+    if colors is None:
+        return (Instance(mesh, GREY, name=name),)
+    texture, uvs = coloured(decode_srgb(colors)[mesh.faces], str(path))
+    if uvs is not None:
+        if mesh.uvs is not None:
+            report.add(name, "texture coordinates beside colours of vertices")
+        normals = None if mesh.normals is None else mesh.normals[mesh.faces]
+        mesh = with_corners(mesh.vertices[mesh.faces], normals, uvs, str(path))
+    return (Instance(mesh, Phong(texture), name=name),)
+
+
+def _stl(content: bytes, name: str) -> Mesh | None:
+    """Triangles of an STL file; its normals are those of the triangles, and not read."""
+    import trimesh  # slow, and most scenes read no model
+
+    loaded = trimesh.load_mesh(io.BytesIO(content), file_type="stl", process=False)
+    vertices, faces = np.array(loaded.vertices, np.float64), np.array(loaded.faces, np.int64)
+    if not len(faces):
+        return None
+    if not np.isfinite(vertices).all():
+        raise SceneError("vertices hold non-finite values")
+    points, index = np.unique(vertices, axis=0, return_inverse=True)
+    return Mesh(vertices_of(points), index.reshape(-1)[faces].astype(np.int32), source=name)
