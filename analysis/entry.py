@@ -20,6 +20,7 @@ COMMANDS = {
     "render": "analysis.tracer.render_command",
     "study": "analysis.suitability.command",
     "ablation": "analysis.ablation.command",
+    "trade": "analysis.trade.command",
     "sensitivity": "analysis.sensitivity.command",
     "spectrum": "analysis.spectrum.command",
     "cost_report": "analysis.cost_report.command",

@@ -22,8 +22,8 @@ def main() -> None:
     options = parse(AblationOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.ablation.run import study
-    from analysis.ablation.shown import markdown, shown_tables
-    from analysis.command.console import show
+    from analysis.ablation.shown import shown_tables
+    from analysis.command.console import markdown, show
 
     summary, tables = study(options)
     shown = shown_tables(tables)

@@ -12,9 +12,10 @@ from analysis.ablation.options import AblationOptions
 from analysis.ablation.parts import WHOLE, Part, chosen_parts
 from analysis.ablation.plots import figure
 from analysis.ablation.runs import Run, rivals_of, runs
-from analysis.ablation.shown import markdown, shown_tables
+from analysis.ablation.shown import shown_tables
 from analysis.ablation.tables import Result, budget_table, floor_table, moment_table, part_table
 from analysis.command.cli import bad_input, full_disk
+from analysis.command.console import markdown
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json, write_table
 from analysis.storage.summary import with_source

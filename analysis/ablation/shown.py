@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -83,12 +83,3 @@ def _number(value: float | None, digits: int = 3) -> str:
 
 def _percent(value: float) -> str:
     return "—" if math.isnan(value) else f"{100.0 * value:.1f} %"
-
-
-def markdown(tables: Sequence[Table]) -> str:
-    """Tables as Markdown, each under its title."""
-    parts = []
-    for table in tables:
-        lines = [table.header, ["---"] * len(table.header), *table.rows]
-        parts.append("\n".join([f"{table.title}:", "", *("| " + " | ".join(line) + " |" for line in lines)]))
-    return "\n\n".join(parts) + "\n"

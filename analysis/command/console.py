@@ -79,6 +79,15 @@ def laid_out(table: Table) -> RichTable:
     return found
 
 
+def markdown(tables: Sequence[Table]) -> str:
+    """Tables as Markdown, each under its title."""
+    parts = []
+    for table in tables:
+        lines = [table.header, ["---"] * len(table.header), *table.rows]
+        parts.append("\n".join([f"{table.title}:", "", *("| " + " | ".join(line) + " |" for line in lines)]))
+    return "\n\n".join(parts) + "\n"
+
+
 def frame_table(rows: pd.DataFrame, title: str = "", digits: str = ".4g") -> Table:
     """A data frame as a table; NaN becomes a dash.
 

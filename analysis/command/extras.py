@@ -11,6 +11,7 @@ DISTRIBUTION = "tsar-render"
 
 EXTRAS: dict[str, dict[str, str]] = {
     "study": {"dask": "dask", "distributed": "distributed"},
+    "search": {"optuna": "optuna"},
     "perception": {"pycvvdp": "cvvdp", "torchvision": "torchvision", "flip_evaluator": "flip-evaluator"},
     "formats": {"astral": "astral", "defusedxml": "defusedxml"},
     "peers": {"embreex": "embreex", "mitsuba": "mitsuba", "pyluxcore": "pyluxcore", "pywt": "PyWavelets"},

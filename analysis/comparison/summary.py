@@ -11,17 +11,16 @@ import numpy as np
 
 from analysis.metrics.cost_model import (
     LEDGERS,
-    MODELLED,
     CostParameters,
     control_flops,
     policy_flops,
     stage_flops,
-    work_flops,
 )
 from analysis.metrics.quality import Floats, RatioStatistics, ratio, ratio_statistics
 from analysis.page.player import Step
 from analysis.study.displays import Seen
 from analysis.study.runs import PolicyRun, Totals
+from analysis.study.spending import cycle_flops
 
 AROUND = "all others"
 """Name of the stages around tracing where they have one price."""
@@ -105,16 +104,12 @@ def ledger_costs(measured: Measured) -> dict[str, dict[str, float]]:
     """Cost of a cycle of every run under every ledger; FLOPs, except under ``wall``, which is seconds."""
     costs: dict[str, dict[str, float]] = {ledger: {} for ledger in LEDGERS}
     for name, run in measured.runs.items():
-        cost = run.totals.of_a_cycle(measured.cost)
-        for ledger in MODELLED:
-            costs[ledger][name] = float(policy_flops(cost, run.price, ledger))
         totals, meter = run.totals, run.meter
         # the cycles of the span, or all where it has none
         counters, cycles = (totals.counters, totals.cycles) if totals.cycles else (meter.counters, max(meter.calls, 1))
-        if counters:
-            control = float(control_flops(cost, run.price))
-            # means of counts are not whole, which the price does not mind
-            costs["work"][name] = work_flops(cost, counters) / cycles + control
+        mean = {counter: count / cycles for counter, count in counters.items()}
+        for ledger, flops in cycle_flops(totals.of_a_cycle(measured.cost), run.price, mean).items():
+            costs[ledger][name] = flops
         costs["wall"][name] = (sum(totals.stage_s.values()) if totals.cycles else meter.wall_s) / cycles
     return {ledger: found for ledger, found in costs.items() if found}
 

@@ -6,6 +6,8 @@ import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
 
 from analysis.command import limits
 from analysis.metrics.cost_model import (
@@ -65,7 +67,10 @@ class Scale:
 
         A bound on the tiles that is too low for a row's batch is raised to the smallest tiling that holds it.
         """
-        batch, side = ROWS[row]
+        return self.sized(*ROWS[row], base)
+
+    def sized(self, batch: int, side: int, base: TsarConfig) -> TsarConfig:
+        """As :meth:`config`, with a batch and an output side of the thesis' size."""
         area, divisor = self.divisor**2, self.divisor
         level_min = max(1, base.tiling.level_min - (divisor.bit_length() - 1))
         support = base.reconstruction.age_support_px // divisor
@@ -103,12 +108,34 @@ SCALES: dict[str, Scale] = {
 
 
 @dataclass(frozen=True)
+class Animation:
+    """What is rendered: a scene in motion.
+
+    Attributes:
+        input: a scene by its name, or a file.
+        phase: of the animation.
+        camera_path: motion of the camera of a file that has none.
+    """
+
+    input: str
+    phase: float = 0.0
+    camera_path: str = ""
+
+
+Tracing = tuple[tuple[str, bool | int | str], ...]
+"""How a run is traced where that differs from its scene and from the renderer's own, by name in alphabetical order."""
+TRACING = ("depth", "light_cells", "packets", "structure")
+"""Names in :data:`Tracing`. ``depth``: of reflections; ``light_cells``: along each axis of a light that has an extent,
+0 for one random point of it; ``packets`` and ``structure`` as of :class:`renderer.trace.Renderer`."""
+
+
+@dataclass(frozen=True)
 @closed_choices()
 class Case:
     """One policy on one input at one setting: everything that decides its result.
 
     Attributes:
-        input: built-in input.
+        input: built-in input, another scene by its name, or a file.
         phase: of the animation.
         policy: who decides what is sampled.
         tsar: configuration; framed renderers read its resolution.
@@ -125,6 +152,11 @@ class Case:
             (:class:`tsar.filtering.records.FilterOptions`).
         budget_s: the error is divided by where it lies (:mod:`analysis.metrics.budget`), with surfaces and lights
             compared over so many seconds; None for no such division.
+        camera_path: motion of the camera of a file that has none.
+        tracing: how it is traced; the reference is always traced as the scene says.
+        display_px: side of the display, on which pictures of another size are shown enlarged; 0 for that of the
+            pictures. With a display no causes are told apart.
+        samples_per_s: samples a second of every policy, whatever they cost; None where the machine sets the pace.
     """
 
     input: str
@@ -141,16 +173,23 @@ class Case:
     stills_s: tuple[float, ...] = ()
     parts: tuple[tuple[str, bool | int | float], ...] = ()
     budget_s: float | None = None
+    camera_path: str = ""
+    tracing: Tracing = ()
+    display_px: int = 0
+    samples_per_s: float | None = None
 
     def __post_init__(self) -> None:
         require(not self.parts or self.policy == "tsar", "parts", "none but of tsar", self.parts)
         budget = self.budget_s
         require(budget is None or 0.0 < budget <= 10.0, "budget_s", "seconds in (0, 10]", budget)
-        require(self.input in INPUTS, "input", f"one of {', '.join(INPUTS)}", self.input)
+        _require_input(self.input)
+        require({name for name, _ in self.tracing} <= set(TRACING), "tracing", ", ".join(TRACING), self.tracing)
         POLICIES.require(self.policy)
         require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
-        if not is_framed(self.policy):
+        pace = self.samples_per_s
+        require(pace is None or 0.0 < pace < 1e15, "samples_per_s", "a positive number", pace)
+        if pace is None and not is_framed(self.policy):
             cycle_s = float(adaptive_flops(self.cost, expected_ledger(self.ledger))) / self.capacity
             pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
             limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
@@ -159,6 +198,19 @@ class Case:
         require(ok, "jod_span_s", f"from and to within the {self.scale.seconds:g} s of a run", span)
         require(self.scale.reference_px % self.tsar.resolution_px == 0, "resolution_px", "a divisor of the reference's",
                 self.tsar.resolution_px)  # fmt: skip
+        shown = self.shown_px
+        fits = shown % self.tsar.resolution_px == 0 == self.scale.reference_px % shown
+        require(fits, "display_px", "a multiple of the pictures' side, and a divisor of the reference's", shown)
+
+    @property
+    def animation(self) -> Animation:
+        """What is rendered."""
+        return Animation(self.input, self.phase, self.camera_path)
+
+    @property
+    def shown_px(self) -> int:
+        """Side of the display."""
+        return self.display_px or self.tsar.resolution_px
 
     @property
     def cost(self) -> CostParameters:
@@ -174,16 +226,46 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For people: policy and changed parts, input, batch, resolution, seed and phase."""
+        """For people: policy and changes, input, batch, resolution, seed and phase."""
         c = self.tsar
         batch = "" if is_framed(self.policy) else f"-b{c.batch_size}"
-        parts = "".join(f"-{name}-{value:g}" for name, value in self.parts)
-        text = f"{self.policy}{parts}-{self.input}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
+        changes = (f"-{name}-{_short(value)}" for name, value in (*self.parts, *self.tracing))
+        scene = Path(self.input).stem
+        text = f"{self.policy}{''.join(changes)}-{scene}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
         return text.replace(" ", "-")
 
     def key(self, source: str) -> str:
         """Name of its files: for people first, then a hash of all that decides it and of the source code."""
         # the source does not cover what was added to a table
         added = brought((POLICIES, self.policy), *chosen(self.tsar))
-        text = json.dumps([plain(self), source, *plain(added)], sort_keys=True)
+        content = (_content(self.animation),) if _is_file(self.input) else ()
+        text = json.dumps([plain(self), source, *plain(added), *content], sort_keys=True)
         return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+
+
+def _short(value: bool | int | float | str) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def _is_file(input: str) -> bool:
+    return input not in INPUTS and bool(Path(input).suffix)
+
+
+def _require_input(input: str) -> None:
+    if input in INPUTS:
+        return
+    if _is_file(input):
+        require(Path(input).is_file(), "input", "a scene by its name, or a file that is there", input)
+        return
+    from scenes import catalog
+
+    catalog.SCENES.require(input, "input")
+
+
+@lru_cache(maxsize=16)
+def _content(animation: Animation) -> str:
+    """Hash of the scene of a file, which the source does not cover."""
+    from analysis.storage.reference import content_hash
+    from scenes import catalog
+
+    return content_hash(catalog.load_any(animation.input, animation.phase, animation.camera_path)[0])

@@ -5,8 +5,8 @@ All runs advance together; two images of each are held at a time, however long t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from analysis.metrics import METRICS
 from analysis.metrics.causes import CAUSES, REGIONS, Split, Truths, flicker, split
 from analysis.metrics.quality import Floats, Hold, Shown, View, encode, pixel_errors
 from analysis.page.pictures import Pixels
+from tsar.policies.resampling import widened
 from tsar.types import ShownImage
 
 _MOTION_S = 0.1  # motion is judged over this long
@@ -87,6 +88,23 @@ class Seen:
             | {"share": mean([found.share[region] for found in self.splits])}
             for region in REGIONS
         }
+
+
+def enlarged(images: Iterable[Shown], side: int) -> Iterator[Shown]:
+    """Pictures as a square display of ``side`` pixels shows them: enlarged bilinearly where they are smaller.
+
+    Raises:
+        ValueError: the side is no multiple of theirs.
+    """
+    for record, shown in images:
+        own = shown.image.shape[0]
+        if own != side:
+            if side % own:
+                raise ValueError(f"display: expected a multiple of {own} pixels, got {side}")
+            across = widened(shown.image.permute(2, 0, 1), side // own)
+            image = widened(across.transpose(1, 2), side // own).permute(2, 1, 0).contiguous()
+            shown = replace(shown, image=image, sample_map=None, maps={}, carried=None)
+        yield record, shown
 
 
 def watch(

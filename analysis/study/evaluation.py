@@ -9,7 +9,6 @@ machines, except the entry ``machine`` of the JSON file, which holds measured se
 from __future__ import annotations
 
 import io
-import resource
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -28,13 +27,16 @@ from analysis.metrics.quality import View, reference_times
 from analysis.page.pictures import Pixels, tiling_image
 from analysis.page.video import to_pixels
 from analysis.storage.files import locked
-from analysis.storage.reference import Reference, ReferenceSpec, as_stored, content_hash, obtain, renderer_hash
+from analysis.storage.reference import Reference, as_stored
 from analysis.storage.source import code_hash
 from analysis.storage.store import Store
 from analysis.study.budget import Budgeting, averaged
-from analysis.study.cases import Case, Scale
-from analysis.study.displays import Measuring, Seen, watch
+from analysis.study.cases import Case
+from analysis.study.displays import Measuring, Seen, enlarged, watch
+from analysis.study.memory import PeakMemory
 from analysis.study.runs import Machine, PolicyRun, Totals, begin
+from analysis.study.scenery import render_reference, renderer
+from analysis.study.spending import spent
 
 if TYPE_CHECKING:
     from renderer.trace import Renderer
@@ -138,51 +140,18 @@ def evaluate(case: Case, key: str, place: Place) -> str:
     return key
 
 
-def render_reference(input: str, phase: float, start_s: float, scale: Scale, place: Place) -> Reference:
-    """The reference of an input, from disk or rendered now, on all threads of the place."""
-    with one_thread():
-        renderer = _renderer(input, phase, scale.reference_px, place.threads)
-        spec = ReferenceSpec(
-            scene=f"{input} phase {phase:g}",
-            scene_hash=_scene_hash(input, phase),
-            renderer_hash=renderer_hash(renderer, "cpu"),
-            start_s=start_s,
-            rate_hz=scale.reference_rate_hz,
-            count=len(reference_times(start_s, start_s + scale.seconds, scale.reference_rate_hz)),
-            resolution_px=scale.reference_px,
-            samples_per_axis=scale.reference_samples_per_axis,
-        )
-        side, axis = scale.reference_px, scale.reference_samples_per_axis
-        return obtain(place.references, spec, lambda t: renderer.render_frame(t, side, side, axis))
-
-
-@lru_cache(maxsize=8)
-def _renderer(input: str, phase: float, footprint_px: float, threads: int) -> Renderer:
-    from renderer.trace import Renderer
-    from scenes import catalog
-
-    return Renderer(catalog.load(input, phase), "cpu", threads, footprint_resolution_px=footprint_px)
-
-
-@lru_cache(maxsize=16)
-def _scene_hash(input: str, phase: float) -> str:
-    from scenes import catalog
-
-    return content_hash(catalog.load(input, phase))
-
-
 def _truths(case: Case, reference: Reference) -> Truths:
-    """Reference images averaged down to the resolution of the case."""
+    """Reference images averaged down to the resolution of the case's display."""
 
     def image(number: int) -> torch.Tensor:
-        return averaged(torch.from_numpy(reference.images[number].astype(np.float32)), case.tsar.resolution_px)
+        return averaged(torch.from_numpy(reference.images[number].astype(np.float32)), case.shown_px)
 
     return Truths(image, case.start_s, case.scale.reference_rate_hz, reference.spec.count)
 
 
 def _run(case: Case, key: str, place: Place) -> None:
     began = time.perf_counter()
-    reference = render_reference(case.input, case.phase, case.start_s, case.scale, place)
+    reference = render_reference(case.animation, case.start_s, case.scale, place.references, place.threads)
     truths = _truths(case, reference)
     began_run = time.perf_counter()
     store, stills = place.store(key), list[str]()
@@ -199,13 +168,15 @@ def _run(case: Case, key: str, place: Place) -> None:
     measuring = Measuring(
         metrics=("ssim", "flip"),
         stride=scale.stride,
-        causes=True,
+        causes=not case.display_px,
         framelet_side=config.framelet_side,
         kept=_scored(case),
     )
     stills_of = _Stills(case, len(times_s), keep)
     dividing = [_budgeting(case, place)] if case.budget_s is not None else []
-    seen = watch({case.policy: made.images}, truths, times_s, measuring, [stills_of, *dividing])[case.policy]
+    shown = enlarged(made.images, case.shown_px)
+    with PeakMemory() as peak:
+        seen = watch({case.policy: shown}, truths, times_s, measuring, [stills_of, *dividing])[case.policy]
     table, totals = pd.DataFrame(seen.rows), made.totals
     for one in dividing:
         table = table.join(pd.DataFrame(one.rows).add_prefix("budget_"))
@@ -223,13 +194,15 @@ def _run(case: Case, key: str, place: Place) -> None:
         "regions": seen.regions(),
         "stills": stills,
         **(_cycles(totals, case) if totals.recorded and totals.cycles else {}),
+        "spent": spent(made, case),
         "machine": {
             "reference_s": began_run - began,
             "run_s": scored - began_run,
             "jod_s": time.perf_counter() - scored,
             "threads": place.threads,
-            # of the process, so of the largest case it has run
-            "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+            "cycles_s": made.totals.seconds_of(case.scale.seconds),
+            "peak_memory_bytes": peak.bytes,
+            "run_memory_bytes": peak.grown,
         },
     }
     store.write_json(place.files(key)["summary"].name, found)
@@ -280,9 +253,9 @@ def _score(case: Case, seen: Seen) -> float | None:
 
 def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
     def renderer_of(footprint: float) -> Renderer:
-        return _renderer(case.input, case.phase, case.tsar.resolution_px * footprint, place.threads)
+        return renderer(case.animation, case.tsar.resolution_px * footprint, place.threads, case.tracing)
 
-    machine = Machine(case.ledger, case.capacity, case.cost)
+    machine = Machine(case.ledger, case.capacity, case.cost, case.samples_per_s)
     span_s = case.start_s, case.start_s + case.scale.seconds
     parts = dict(case.parts)
     return begin(case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads, parts=parts)
@@ -290,7 +263,7 @@ def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
 
 def _budgeting(case: Case, place: Place) -> Budgeting:
     scale, side = case.scale, case.tsar.resolution_px
-    fine = _renderer(case.input, case.phase, scale.reference_px, place.threads)
+    fine = renderer(case.animation, scale.reference_px, place.threads)
 
     def picture(time_s: float) -> torch.Tensor:
         found = fine.render_frame(time_s, scale.reference_px, scale.reference_px, scale.reference_samples_per_axis)

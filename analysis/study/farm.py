@@ -18,7 +18,7 @@ from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
 from analysis.storage.results import own_results
-from analysis.study.cases import Case, Scale
+from analysis.study.cases import Animation, Case, Scale
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -183,14 +183,14 @@ def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], plac
     }
 
 
-def _reference_of(case: Case) -> tuple[str, float, float, Scale]:
-    return case.input, case.phase, case.start_s, case.scale
+def _reference_of(case: Case) -> tuple[Animation, float, Scale]:
+    return case.animation, case.start_s, case.scale
 
 
-def _prepare(input: str, phase: float, start_s: float, scale: Scale, place: Place) -> None:
-    from analysis.study.evaluation import render_reference
+def _prepare(animation: Animation, start_s: float, scale: Scale, place: Place) -> None:
+    from analysis.study.scenery import render_reference
 
-    render_reference(input, phase, start_s, scale, place)
+    render_reference(animation, start_s, scale, place.references, place.threads)
 
 
 def _evaluate(case: Case, key: str, place: Place, reference: None) -> str:

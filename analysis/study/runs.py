@@ -98,6 +98,10 @@ class Totals:
             return p
         return measured_parameters(p, {name: count / self.cycles for name, count in self.counters.items()})
 
+    def seconds_of(self, span_s: float) -> float:
+        """Wall seconds of the cycles that so many simulated seconds have; NaN where there was none."""
+        return sum(self.stage_s.values()) / self.simulated_s * span_s if self.simulated_s else float("nan")
+
     @property
     def invariants(self) -> dict[str, Any]:
         """What :meth:`analysis.storage.invariants.InvariantCheck.result` found."""
@@ -107,11 +111,27 @@ class Totals:
 @dataclass(frozen=True)
 @closed_choices()
 class Machine:
-    """The simulated machine: how cost is counted, its speed in FLOP/s, and the parameters of the cost model."""
+    """The simulated machine.
+
+    Attributes:
+        ledger: how cost is counted.
+        capacity: its speed, FLOP/s.
+        cost: parameters of the cost model.
+        samples_per_s: the pace of a machine that is as fast as each policy needs it to be; None for one of the speed
+            above.
+    """
 
     ledger: Ledger
     capacity: float
     cost: CostParameters
+    samples_per_s: float | None = None
+
+    def clock(self, price: Price) -> Callable[[Mapping[str, int], float], float]:
+        """``(counters, wall_s) -> seconds`` of a cycle of a policy."""
+        if self.samples_per_s is None:
+            return cycle_seconds(self.ledger, self.capacity, self.cost, price)
+        paced_s = price.samples / self.samples_per_s
+        return lambda counters, wall_s: paced_s
 
 
 @dataclass(frozen=True)
@@ -178,7 +198,7 @@ def begin(
     )
     policy = _changed(setting, parts) if parts else POLICIES[name](setting)
     meter, totals = Meter(renderer_of(policy.footprint).trace), Totals(config)
-    clock = cycle_seconds(machine.ledger, machine.capacity, machine.cost, policy.price)
+    clock = machine.clock(policy.price)
     images = _noted(policy, meter, clock, span_s, totals, on_record)
     return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)
 

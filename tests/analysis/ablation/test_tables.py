@@ -12,8 +12,9 @@ from analysis.ablation.options import AblationOptions
 from analysis.ablation.parts import WHOLE, chosen_parts
 from analysis.ablation.plots import figure
 from analysis.ablation.runs import rivals_of, runs
-from analysis.ablation.shown import markdown, shown_tables
+from analysis.ablation.shown import shown_tables
 from analysis.ablation.tables import ALL, Result, budget_table, floor_table, moment_table, part_table
+from analysis.command.console import markdown
 from analysis.metrics.budget import SHARES
 
 OPTIONS = AblationOptions(inputs=("fly-by", "chase"), repetitions=2, rivals=("afr",))

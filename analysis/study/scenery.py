@@ -1,0 +1,82 @@
+"""Renderers of the scenes of a study, and their references; a process keeps those that it made."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from analysis.metrics.perceptual import one_thread
+from analysis.metrics.quality import reference_times
+from analysis.storage.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
+from analysis.study.cases import Animation, Scale, Tracing
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from renderer.trace import Renderer
+    from scenes.canonical import Scene
+
+_KEPT = 8
+_OF_THE_SCENE = ("depth", "light_cells")
+
+
+@lru_cache(maxsize=_KEPT)
+def _scene(animation: Animation, tracing: Tracing = ()) -> Scene:
+    from scenes import catalog
+
+    scene, _ = catalog.load_any(animation.input, animation.phase, animation.camera_path)
+    changed = dict[str, Any]()
+    for name, value in tracing:
+        if name == "depth":
+            changed["depth"] = int(value)
+        elif name == "light_cells":
+            changed |= {"shadow_rays": "all", "light_cells": int(value)} if value else {"shadow_rays": "one"}
+    return dataclasses.replace(scene, integrator=dataclasses.replace(scene.integrator, **changed)) if changed else scene
+
+
+@lru_cache(maxsize=_KEPT)
+def renderer(animation: Animation, footprint_px: float, threads: int, tracing: Tracing = ()) -> Renderer:
+    """A renderer on the CPU that filters textures for so many pixels along the image's side.
+
+    Raises:
+        ConfigError, SceneError: the scene cannot be had.
+        ValueError: it cannot be traced that way.
+    """
+    from renderer.trace import Renderer
+
+    scene = _scene(animation, tuple(one for one in tracing if one[0] in _OF_THE_SCENE))
+    how: dict[str, Any] = {name: value for name, value in tracing if name not in _OF_THE_SCENE}
+    return Renderer(scene, "cpu", threads, footprint_resolution_px=footprint_px, **how)
+
+
+def render_reference(animation: Animation, start_s: float, scale: Scale, folder: Path, threads: int) -> Reference:
+    """The reference of an animation, from disk or rendered now.
+
+    Args:
+        animation: what is rendered.
+        start_s: time of its first image, seconds.
+        scale: its sizes.
+        folder: of references.
+        threads: that trace.
+    """
+    with one_thread():
+        made_by = renderer(animation, scale.reference_px, threads)
+        path = f" {animation.camera_path}" if animation.camera_path else ""
+        spec = ReferenceSpec(
+            scene=f"{animation.input}{path} phase {animation.phase:g}",
+            scene_hash=_scene_hash(animation),
+            renderer_hash=renderer_hash(made_by, "cpu"),
+            start_s=start_s,
+            rate_hz=scale.reference_rate_hz,
+            count=len(reference_times(start_s, start_s + scale.seconds, scale.reference_rate_hz)),
+            resolution_px=scale.reference_px,
+            samples_per_axis=scale.reference_samples_per_axis,
+        )
+        side, axis = scale.reference_px, scale.reference_samples_per_axis
+        return obtain(folder, spec, lambda t: made_by.render_frame(t, side, side, axis))
+
+
+@lru_cache(maxsize=16)
+def _scene_hash(animation: Animation) -> str:
+    return content_hash(_scene(animation))

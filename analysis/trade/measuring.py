@@ -1,0 +1,115 @@
+"""Measures points at their places: those of single knobs in one go, those of the search as it asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from analysis.command.cli import bad_input, full_disk
+from analysis.command.progress import bars
+from analysis.metrics.front import means
+from analysis.study.cases import Case
+from analysis.study.evaluation import Place, finished, times_of
+from analysis.study.farm import run_cases, run_study
+from analysis.trade.knobs import Knob, Setting
+from analysis.trade.options import TradeOptions
+from analysis.trade.runs import Point, Run, points_of, runs
+from analysis.trade.search import search, searched
+from analysis.trade.tables import Result
+
+WRITTEN = (
+    *("trade.csv", "tables/*.csv", "tables.md", "front.json", "report.html"),
+    *("front.png", "knobs_*.png", "inputs.png"),
+)
+
+
+@dataclass
+class Measured:
+    """Runs that were made. Changes in place.
+
+    Attributes:
+        place: where their results are.
+        runs: all that were asked for, in order.
+        keys: of the results.
+        failures: reasons, by case.
+        dropped: settings that do not fit the scale, and why.
+    """
+
+    place: Place
+    runs: list[Run] = field(default_factory=list)
+    keys: dict[Case, str] = field(default_factory=dict)
+    failures: dict[Case, str] = field(default_factory=dict)
+    dropped: dict[str, str] = field(default_factory=dict)
+
+    def result(self, run: Run) -> Result | None:
+        """What is on disk of a run."""
+        key = self.keys[run.case]
+        summary = finished(key, self.place)
+        return None if summary is None else Result(run, summary, times_of(key, self.place))
+
+    def results(self) -> list[Result]:
+        """Of all runs that ended well."""
+        return [found for run in self.runs if (found := self.result(run)) is not None]
+
+    def keep(self, planned: list[Run], keys: dict[Case, str], failures: dict[Case, str]) -> None:
+        """Takes in runs that were made."""
+        self.runs += planned
+        self.keys |= keys
+        self.failures |= failures
+
+
+def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
+    """Runs what is missing, single knobs first, with a bar for each part.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    with bad_input():
+        planned, dropped = runs(options, points_of(knobs))
+    place, keys, failures = run_study(options, [run.case for run in planned], WRITTEN)
+    measured = Measured(place, dropped=dropped)
+    measured.keep(planned, keys, failures)
+    turned = searched(knobs)
+    if options.trials and turned:
+        with full_disk(place.results), bars() as shown:
+            task = shown.task("search", options.trials)
+
+            def costs_and_errors(points: Sequence[Point]) -> list[tuple[float, float] | None]:
+                asked, dropped = runs(options, points)
+                measured.dropped.update(dropped)
+                measured.keep(asked, *run_cases([run.case for run in asked], place, options.farm))
+                task.advance(len(points))
+                standing = _by_place(
+                    measured, [run for run in measured.runs if run.point.setting == Setting()], options
+                )
+                return [
+                    _over(_by_place(measured, [run for run in asked if run.point is point], options), standing)
+                    for point in points
+                ]
+
+            search(turned, options.trials, options.at_once, options.search_seed, costs_and_errors)
+    return measured
+
+
+Pair = tuple[float, float]
+
+
+def _by_place(measured: Measured, found: Sequence[Run], options: TradeOptions) -> dict[object, Pair]:
+    """Cost and error of the runs of one setting, by place."""
+    pairs = {}
+    for run in found:
+        result = measured.result(run)
+        if result is not None and result.summary["spent"]:
+            pairs[run.where] = result.summary["spent"]["flops"][options.ledger], float(result.times["mse"].mean())
+    return pairs
+
+
+def _over(here: dict[object, Pair], standing: dict[object, Pair]) -> Pair | None:
+    """Geometric means over the places of the default; None unless it was measured at all of them."""
+    if not standing or standing.keys() - here.keys():
+        return None
+    ratios = np.array([np.divide(here[where], standing[where]) for where in standing])
+    cost, error = means(ratios.T)
+    return float(cost), float(error)

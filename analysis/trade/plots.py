@@ -1,0 +1,121 @@
+"""The trade as figures; computes only places on the paper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from analysis.metrics.front import knee, on_front
+from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
+from analysis.trade.knobs import KNOBS, said
+from analysis.trade.runs import SEARCH
+from analysis.trade.tables import Relative
+
+_GRID = {"color": "0.88", "linewidth": 0.6}
+_LABELLED = 12
+"""Points of the front that have their setting beside them at most."""
+
+
+def _plain(axis: Axes, xlabel: str, ylabel: str) -> None:
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.grid(True, **_GRID)
+    axis.set_axisbelow(True)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel(xlabel)
+    axis.set_ylabel(ylabel)
+
+
+def _short_ticks(axis: Axes) -> None:
+    for one in (axis.xaxis, axis.yaxis):
+        one.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        one.set_minor_formatter(FuncFormatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "235" else ""))
+    axis.tick_params(which="minor", labelsize=8)
+
+
+def front(found: Relative, points: pd.DataFrame) -> Figure:
+    """Cost and error of all settings, over those of the default; the front with its band and its knee."""
+    drawn = Figure(figsize=(9.5, 6.5), layout="constrained")
+    axis = drawn.subplots()
+    _plain(axis, "cost over that of the default (log scale)", "mean squared error over that of the default (log scale)")
+    _short_ticks(axis)
+    of_search = set(points["setting"][points["knob"] == SEARCH])
+    of_policies = set(points["setting"][points["knob"] == "policy"])
+    table, bands = found.front, found.bands
+    assert bands is not None
+    inks = [FRAMED if name in of_policies else ADAPTIVE if name in of_search else OTHER for name in table["setting"]]
+    for ink, label in ((OTHER, "a knob alone"), (ADAPTIVE, "the search"), (FRAMED, "another policy")):
+        kept = [ink == one for one in inks]
+        axis.plot(table["cost"][kept], table["error"][kept], "o", color=ink, markersize=4.5, alpha=0.75, label=label)
+    seen = np.isfinite(bands.high)
+    axis.fill_between(bands.budgets[seen], bands.low[seen], bands.high[seen], color=ADAPTIVE, alpha=0.15, linewidth=0,
+                      label="95 % of the draws", step="post")  # fmt: skip
+    best = table[table["on_front"]].sort_values("cost")
+    axis.step(best["cost"], best["error"], color="0.15", linewidth=1.2, where="post", label="front")
+    at = table[table["knee"]]
+    axis.plot(at["cost"], at["error"], "*", color="k", markersize=15, label="knee")
+    axis.plot([1.0], [1.0], "s", markerfacecolor="none", markeredgecolor="k", markersize=10, label="default")
+    shown = best.iloc[np.unique(np.linspace(0, len(best) - 1, min(_LABELLED, len(best))).round().astype(int))]
+    for line in shown.to_dict("records"):
+        text = line["setting"].removeprefix("tsar, ")
+        text = text if len(text) <= 44 else text[:43] + "…"
+        axis.annotate(text, (line["cost"], line["error"]), xytext=(5, 6), textcoords="offset points", fontsize=7,
+                      color="0.25")  # fmt: skip
+    axis.legend(frameon=False, fontsize=8, loc="upper right")
+    return drawn
+
+
+def knobs(table: pd.DataFrame) -> Figure:
+    """A panel a knob: cost and error of its values, over those of its default, bars for 95 % of the draws."""
+    names = list(dict.fromkeys(table["knob"]))
+    columns = min(4, len(names))
+    rows = -(-len(names) // columns)
+    drawn = Figure(figsize=(3.4 * columns, 2.7 * rows + 0.4), layout="constrained")
+    panels = drawn.subplots(rows, columns, squeeze=False)
+    for axis in panels.flat[len(names) :]:
+        axis.set_visible(False)
+    low, high = table[["cost_flops"]].min().item() / 1.15, table[["cost_flops"]].max().item() * 1.15
+    for axis, name in zip(panels.flat, names, strict=False):
+        _plain(axis, "cost", "error")
+        _short_ticks(axis)
+        axis.set_title(name, fontsize=10, loc="left")
+        lines = table[table["knob"] == name].sort_values("cost_flops")
+        x, y = lines["cost_flops"].to_numpy(), lines["mse"].to_numpy()
+        spread = np.stack((y - lines["mse_low"].to_numpy(), lines["mse_high"].to_numpy() - y)).clip(min=0.0)
+        axis.axhline(1.0, color="0.6", linewidth=0.8)
+        axis.axvline(1.0, color="0.6", linewidth=0.8)
+        joined = "-" if name != "policy" else ""
+        axis.errorbar(x, y, spread, fmt=f"o{joined}", color=ADAPTIVE, markersize=4, linewidth=1.0, capsize=2)
+        for value, place in zip(lines["value"], zip(x, y, strict=True), strict=True):
+            weight = "bold" if value == said(KNOBS[name].default) else "normal"
+            axis.annotate(str(value), place, xytext=(4, 4), textcoords="offset points", fontsize=7, fontweight=weight)
+        axis.set_xlim(low, high)
+        least, most = min(0.8, *(y / 1.15)), max(1.25, *(y * 1.2))
+        axis.set_ylim(least, most)
+    return drawn
+
+
+def inputs(points: pd.DataFrame) -> Figure:
+    """A panel an input: FLOPs and error of all points of all seeds, the front and the knee of the first seed."""
+    names = list(dict.fromkeys(points["input"]))
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    drawn = Figure(figsize=(4.4 * columns, 3.6 * rows), layout="constrained")
+    panels = drawn.subplots(rows, columns, squeeze=False)
+    for axis in panels.flat[len(names) :]:
+        axis.set_visible(False)
+    for axis, name in zip(panels.flat, names, strict=False):
+        _plain(axis, "FLOPs of the run", "mean squared error")
+        axis.set_title(name.rsplit("/", 1)[-1], fontsize=10, loc="left")
+        own = points[points["input"] == name]
+        axis.plot(own["cost_flops"], own["mse"], "o", color=OTHER, markersize=3, alpha=0.6)
+        one = own[own["seed"] == own["seed"].min()]
+        x, y = one["cost_flops"].to_numpy(), one["mse"].to_numpy()
+        best = one[on_front(x, y)].sort_values("cost_flops")
+        axis.step(best["cost_flops"], best["mse"], color="0.15", linewidth=1.2, where="post")
+        at = knee(x, y)
+        axis.plot(x[at], y[at], "*", color="k", markersize=12)
+    return drawn

@@ -1,0 +1,89 @@
+"""Measures the trade and writes its tables, figures and page."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import pandas as pd
+
+from analysis.command.cli import bad_input, full_disk
+from analysis.command.console import markdown
+from analysis.page.figures import save
+from analysis.storage.files import atomic, write_json, write_table
+from analysis.storage.summary import with_source
+from analysis.study.evaluation import broken, finished
+from analysis.study.farm import describe_failures
+from analysis.trade import plots
+from analysis.trade.knobs import KNOBS, chosen_knobs
+from analysis.trade.measuring import Measured, measure
+from analysis.trade.options import TradeOptions
+from analysis.trade.page import write_page
+from analysis.trade.shown import shown_tables
+from analysis.trade.tables import Relative, knees, knob_table, point_table, relative, sentences
+
+Tables = dict[str, pd.DataFrame]
+
+
+def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
+    """Runs what is missing and writes everything to ``options.out``.
+
+    Returns:
+        What is in ``summary.json``, and the tables.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    with bad_input():
+        knobs = chosen_knobs(options.knobs)
+    measured = measure(options, knobs)
+    for line in describe_failures({measured.keys[case]: reason for case, reason in measured.failures.items()}):
+        print(line, file=sys.stderr)
+    points = point_table(measured.results(), options.ledger)
+    front = relative(points, options.draws)
+    tables = {"knobs": knob_table(points, options.draws), "front": front.front, "knees": knees(points)}
+    out = options.out.resolve()
+    with full_disk(out):
+        write_table(out / "trade.csv", points)
+        for name, table in tables.items():
+            write_table(out / "tables" / f"{name}.csv", table)
+        with atomic(out / "tables.md") as file:
+            file.write_text(markdown(shown_tables(tables)), encoding="utf-8")
+        pictures = _figures(options, points, front, tables["knobs"])
+        summary = _summary(options, measured, tables)
+        write_page(out / "report.html", summary, tables, points, pictures, measured)
+        write_json(out / "summary.json", summary)
+    return summary, tables
+
+
+def _figures(options: TradeOptions, points: pd.DataFrame, front: Relative, knobs: pd.DataFrame) -> dict[str, str]:
+    """Writes the figures. Returns the names of their files, by caption."""
+    if not front.settings:
+        return {}
+    out = options.out.resolve()
+    made = {"Cost and error of all settings over those of the default, and their front": "front.png"}
+    save(plots.front(front, points), out / "front.png")
+    for policy in dict.fromkeys(KNOBS[name].policy for name in knobs["knob"]):
+        own = knobs[[KNOBS[name].policy == policy for name in knobs["knob"]]]
+        made[f"Each knob of {policy} alone"] = f"knobs_{policy}.png"
+        save(plots.knobs(own), out / f"knobs_{policy}.png")
+    made["Every input by itself"] = "inputs.png"
+    save(plots.inputs(points), out / "inputs.png")
+    return made
+
+
+def _summary(options: TradeOptions, measured: Measured, tables: Tables) -> dict[str, Any]:
+    summaries = {case: finished(key, measured.place) for case, key in measured.keys.items()}
+    made = [one for one in summaries.values() if one is not None]
+    found = {
+        "runs": len(summaries),
+        "runs_done": len(made),
+        "ledger": options.ledger,
+        "dropped": measured.dropped,
+        "sentences": sentences(tables["knobs"]),
+        "broken_invariants": broken(made),
+        "tables": {name: table.to_dict("records") for name, table in tables.items()},
+        "failures": {measured.keys[case]: reason for case, reason in measured.failures.items()},
+        "machine": {name: sum(one["machine"][name] for one in made) for name in ("run_s", "reference_s", "jod_s")},
+    }
+    return with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))

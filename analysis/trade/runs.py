@@ -1,0 +1,99 @@
+"""Which runs the measurement of the trade has."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from analysis.study.cases import INPUTS, SCALES, Case, Scale
+from analysis.trade.knobs import OWN, ROW, Knob, Setting, Value, Where, alone, case_of
+from analysis.trade.options import TradeOptions
+from tsar.config import ConfigError, TsarConfig
+
+SEARCH = "search"
+"""In place of a knob: all of them together."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A setting, and why it is measured.
+
+    Attributes:
+        knob: that is turned, or :data:`SEARCH`.
+        value: of the knob; of the search, the number of the trial.
+        setting: of all knobs.
+    """
+
+    knob: str
+    value: Value
+    setting: Setting
+
+
+@dataclass(frozen=True)
+class Run:
+    """A point at a place, as a case."""
+
+    point: Point
+    where: Where
+    case: Case
+
+
+def points_of(knobs: Iterable[Knob]) -> list[Point]:
+    """Every value of every knob, all others at their defaults; the default of the project's own policy is among
+    them."""
+    found = [Point(knob.name, value, setting) for knob in knobs for value, setting in alone(knob)]
+    if all(point.setting != Setting() for point in found):
+        found.insert(0, Point("policy", OWN, Setting()))
+    return found
+
+
+def places(options: TradeOptions) -> list[Where]:
+    """Every input at every repetition."""
+    return [
+        Where(
+            name,
+            "" if name in INPUTS or "." not in name else options.camera_path,
+            repetition,
+            repetition / options.repetitions if name in INPUTS else 0.0,
+        )
+        for repetition, name in itertools.product(range(options.repetitions), options.inputs)
+    ]
+
+
+def scale_of(options: TradeOptions) -> Scale:
+    """Sizes of the runs."""
+    return dataclasses.replace(SCALES[options.scale], seconds=options.seconds)
+
+
+def runs(options: TradeOptions, points: Iterable[Point]) -> tuple[list[Run], dict[str, str]]:
+    """Every point at every place.
+
+    Returns:
+        The runs; and of settings that do not fit the scale the reason, by what they are in words.
+
+    Raises:
+        ConfigError: the default does not fit.
+    """
+    scale, found, dropped = scale_of(options), list[Run](), dict[str, str]()
+    middle, half = 0.5 * scale.seconds, 0.5 * options.jod_s
+    base = Case(
+        input=INPUTS[0],
+        policy=OWN,
+        tsar=scale.config(ROW, TsarConfig()),
+        scale=scale,
+        ledger=options.ledger,
+        trace_segments=options.trace_segments,
+        jod_span_s=(middle - half, middle + half) if options.jod_s else None,
+        display=options.display,
+        stills_s=(middle,),
+    )
+    for point, where in itertools.product(points, places(options)):
+        try:
+            found.append(Run(point, where, case_of(point.setting, where, scale, base)))
+        except ConfigError as error:
+            if point.setting == Setting():
+                raise
+            dropped[point.setting.words] = str(error)
+    return found, dropped

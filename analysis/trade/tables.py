@@ -1,0 +1,194 @@
+"""From the results of the runs to the tables of the trade. The order in which runs were made does not matter."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.metrics.cost_model import RAYS, Ledger
+from analysis.metrics.front import Bands, bootstrap, interval, knee, means, on_front
+from analysis.trade.knobs import KNOBS, Setting, said
+from analysis.trade.runs import SEARCH, Run
+
+COLUMNS = (
+    *("input", "seed", "knob", "value", "cost_flops", "wall_s", "peak_bytes", "latency_s", "mse", "flip", "jod"),
+    "on_front",
+)
+"""The first columns of ``trade.csv``."""
+COSTS = {"cost_flops": "FLOPs", "wall_s": "wall seconds", "peak_bytes": "peak memory", "latency_s": "latency"}
+"""What a point costs, by column."""
+GRID = 64
+"""Budgets at which bands are computed."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What is on disk of a run: its place in the measurement, its summary, and its table over the reference times."""
+
+    run: Run
+    summary: Mapping[str, Any]
+    times: pd.DataFrame
+
+
+def point_table(results: Iterable[Result], ledger: Ledger) -> pd.DataFrame:
+    """A line a point and place: :data:`COLUMNS`, then the setting in words, as JSON and the name of the result.
+
+    Costs are those of the whole measured span. ``on_front`` says whether no other point of the same input and seed has
+    both less cost and less error (:func:`analysis.metrics.front.on_front`) by ``cost_flops`` and ``mse``.
+    """
+    lines = [_line(one, ledger) for one in results if one.summary["spent"]]
+    found = pd.DataFrame(lines, columns=pd.Index([*COLUMNS, "setting", "policy", "changes", "rays", "ssim", "result"]))
+    if len(found):
+        flags = found.groupby(["input", "seed"], sort=False, group_keys=False)[["cost_flops", "mse"]].apply(
+            lambda one: pd.Series(on_front(one["cost_flops"].to_numpy(), one["mse"].to_numpy()), one.index)
+        )
+        found["on_front"] = np.ravel(flags.to_numpy()) if flags.ndim > 1 else flags.reindex(found.index)
+    return found
+
+
+def _line(one: Result, ledger: Ledger) -> dict[str, Any]:
+    spent, machine, run = one.summary["spent"], one.summary["machine"], one.run
+    jod = one.summary["jod"]
+    return {
+        "input": run.where.input,
+        "seed": run.where.seed,
+        "knob": run.point.knob,
+        "value": said(run.point.value),
+        "cost_flops": spent["flops"][ledger],
+        "wall_s": machine["cycles_s"],
+        "peak_bytes": machine["run_memory_bytes"],
+        "latency_s": spent["latency_s"],
+        "mse": one.times["mse"].mean(),
+        "flip": one.times["flip"].mean(),
+        "jod": np.nan if jod is None else jod,
+        "setting": run.point.setting.words,
+        "policy": run.point.setting.policy,
+        "changes": json.dumps(dict(run.point.setting.changes)),
+        "rays": sum(spent["counters"].get(name, 0.0) for name in RAYS),
+        "ssim": one.times["ssim"].mean(),
+        "result": one.summary["key"],
+    }
+
+
+@dataclass(frozen=True)
+class Relative:
+    """Cost and error of every setting at every place, over those of the default at the same place.
+
+    Attributes:
+        settings: in words, in the order of the rows.
+        costs, errors: a row a setting and a column a place.
+        front: a line a setting: geometric means, whether it is on the front of these, and how often in the bootstrap.
+        bands: of the front.
+    """
+
+    settings: list[str]
+    costs: np.ndarray
+    errors: np.ndarray
+    front: pd.DataFrame
+    bands: Bands | None
+
+
+def relative(points: pd.DataFrame, draws: int, cost: str = "cost_flops", error: str = "mse") -> Relative:
+    """The front of all settings that were measured at every place at which the default was."""
+    pivots = [_by_place(points, column) for column in (cost, error)]
+    default = Setting().words
+    if default not in pivots[0].index:
+        return Relative([], np.empty((0, 0)), np.empty((0, 0)), pd.DataFrame(), None)
+    places = pivots[0].columns[pivots[0].loc[default].notna()]
+    kept = [name for name in pivots[0].index if all(one.loc[name, places].notna().all() for one in pivots)]
+    costs, errors = ((one.loc[kept, places] / one.loc[default, places]).to_numpy(np.float64) for one in pivots)
+    cost_means, error_means = means(costs), means(errors)
+    budgets = np.geomspace(cost_means.min(), cost_means.max(), GRID)
+    bands = bootstrap(costs, errors, budgets, draws)
+    front = pd.DataFrame(
+        {
+            "setting": kept,
+            "cost": cost_means,
+            "error": error_means,
+            "on_front": on_front(cost_means, error_means),
+            "knee": np.arange(len(kept)) == knee(cost_means, error_means),
+            "share_on_front": bands.on_front,
+            "share_at_knee": bands.at_knee,
+        }
+    )
+    for name, values in (("cost", costs), ("error", errors)):
+        spans = [interval(row, draws) for row in values]
+        front[f"{name}_low"], front[f"{name}_high"] = zip(*spans, strict=True)
+    return Relative(kept, costs, errors, front, bands)
+
+
+def _by_place(points: pd.DataFrame, column: str) -> pd.DataFrame:
+    """A line a setting and a column a place."""
+    once = points.drop_duplicates(["setting", "input", "seed"])
+    return once.pivot(index="setting", columns=["input", "seed"], values=column).reindex(once["setting"].unique())
+
+
+def knob_table(points: pd.DataFrame, draws: int) -> pd.DataFrame:
+    """A line a knob and value: geometric means over all places of every cost and of both errors, over those of the
+    knob's default there; and of JOD the mean difference. ``mse_low`` and ``mse_high`` are bounds of the bootstrap."""
+    lines = []
+    for knob, found in _groups(points[points["knob"] != SEARCH], "knob"):
+        standing = found[found["value"] == said(KNOBS[knob].default)].set_index(["input", "seed"])
+        for value, turned in _groups(found, "value"):
+            here = turned.set_index(["input", "seed"])
+            both = here.index.intersection(standing.index)
+            if not len(both):
+                continue
+            line: dict[str, Any] = {"knob": knob, "value": value, "places": len(both)}
+            for column in (*COSTS, "mse", "flip"):
+                ratio = (here.loc[both, column] / standing.loc[both, column]).to_numpy(np.float64)
+                line[column] = float(means(ratio[None])[0])
+                if column == "mse":
+                    line["mse_low"], line["mse_high"] = interval(ratio, draws)
+            line["jod"] = float((here.loc[both, "jod"] - standing.loc[both, "jod"]).mean())
+            lines.append(line)
+    return pd.DataFrame(lines)
+
+
+def _groups(frame: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
+    return [(str(name), one) for name, one in frame.groupby(by, sort=False)] if len(frame) else []
+
+
+def sentences(knobs: pd.DataFrame) -> dict[str, str]:
+    """For each knob what its values buy and cost, in one sentence."""
+    found = {}
+    for name, lines in _groups(knobs, "knob"):
+        default = said(KNOBS[name].default)
+        told = [_told(line) for line in lines.to_dict("records") if line["value"] != default]
+        if told:
+            found[name] = f"From {default}: {'; '.join(told)}."
+    return found
+
+
+def _told(line: Mapping[Any, Any]) -> str:
+    """What one value does: cost and error, and other costs that it changes by more than a tenth."""
+    low, high = line["mse_low"], line["mse_high"]
+    parts = [f"{_times(line['cost_flops'])} the FLOPs", f"{_times(line['mse'])} the error ({low:.2f}–{high:.2f})"]
+    parts += [
+        f"{_times(line[name])} the {words}"
+        for name, words in COSTS.items()
+        if name != "cost_flops" and abs(np.log(line[name])) > np.log(1.1 if name != "wall_s" else 1.5)
+    ]
+    return f"{line['value']} has {_listed(parts)}"
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2f} times" if ratio < 9.95 else f"{ratio:.0f} times"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def knees(points: pd.DataFrame) -> pd.DataFrame:
+    """A line an input and seed: the setting at the knee of its own front, its cost and its error."""
+    lines = []
+    for _, found in points.groupby(["input", "seed"], sort=False) if len(points) else ():
+        at = found.iloc[knee(found["cost_flops"].to_numpy(), found["mse"].to_numpy())]
+        lines.append({name: at[name] for name in ("input", "seed", "setting", "cost_flops", "mse")})
+    return pd.DataFrame(lines)

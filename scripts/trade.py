@@ -1,0 +1,14 @@
+"""Measure the trade of speed for accuracy: what every knob costs and what it does to the error."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.command.cli import run_process
+from analysis.command.later import command
+
+main = command("analysis.trade.command")
+
+if __name__ == "__main__":
+    run_process(main)
