@@ -111,6 +111,10 @@ def measure(
         viewers: each is told what all displays show at every reference time.
     """
     began_s = time.monotonic() if began_s is None else began_s
+    with first_imports(), bad_input():
+        from analysis.comparison.choosing import settled
+
+        options, chosen = settled(options)
     setup = prepare(options, scene)
     with first_imports():
         from analysis.command import progress
@@ -135,7 +139,7 @@ def measure(
         (options.out / "comparison.mp4").unlink(missing_ok=True)
         raise InputError(f"seconds: expected time for a cycle before the last reference image, got {options.seconds:g}")
     with full_disk(options.out):
-        return _write(options, setup, measured, first_cycle_s), measured
+        return _write(options, setup, measured, first_cycle_s, chosen), measured
 
 
 def _limits(options: RunOptions) -> RecordLimits:
@@ -183,6 +187,7 @@ def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, 
                 stages=options.stages,
                 threads=setup.renderer_of(1).threads,
                 on_record=recording.of(name),
+                parts=dict(options.parts) if name == options.policy else None,
             )
             for name in (options.policy, *options.rivals)
         }
@@ -259,9 +264,10 @@ def _truths(options: RunOptions, reference: Reference) -> Truths:
     return Truths(image, options.start_s, options.reference_rate_hz, reference.spec.count)
 
 
-def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: float) -> dict[str, Any]:
+def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: float, chosen: Any) -> dict[str, Any]:
     """Figures, report and summary."""
     from analysis.comparison import results
+    from analysis.comparison.choosing import what_came
     from analysis.comparison.rivalry import best_rival
     from analysis.comparison.summary import summarise
     from analysis.storage.provenance import provenance
@@ -283,6 +289,7 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
         "capacity_flops": options.capacity,
         **summarise(measured),
         **best_rival(measured),
+        "choice": what_came(chosen, measured, options.capacity, options.seconds) if chosen else None,
         "start": {"first_cycle_s": first_cycle_s},
         "cost_parameters": options.cost,
         "config": {**config, "resolved": derived},

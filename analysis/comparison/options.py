@@ -31,6 +31,10 @@ DEFAULT_RIVALS = ("framed", "thesis", "framed-super", "framed-quarter", "framed-
 somewhere and take little time."""
 
 
+CHOICES = ("preset", "budget_flops", "budget_seconds", "error_target")
+"""Options that choose a place on the measured front."""
+
+
 @dataclass(frozen=True)
 @closed_choices()
 class RunOptions:
@@ -71,6 +75,18 @@ class RunOptions:
     """Reference images per simulated second."""
     reference_samples_per_axis: int = 3
     """Samples along a pixel's side of the reference."""
+    preset: Literal["", "draft", "balanced", "accurate"] = ""
+    """A place on the measured front of cost and error: sets batch, speed of the machine and options of the policy
+    tsar. balanced is the knee."""
+    budget_flops: float | None = None
+    """Operations that the run may take in all by the ledger: the most accurate setting of the front within them."""
+    budget_seconds: float | None = None
+    """Wall seconds that the cycles of the policy may take in all: the most accurate setting of the front within
+    them."""
+    error_target: float | None = None
+    """Mean squared error that is good enough: the cheapest setting of the front that has it."""
+    parts: Annotated[tuple[tuple[str, bool | int | float], ...], tyro.conf.Suppress] = ()
+    """Options of the policy tsar that differ from its own; a preset or a budget sets them."""
     device: Device = "cpu"
     threads: Threads = 0
     stages: StagesName = "compiled"
@@ -104,6 +120,7 @@ class RunOptions:
         require(len(runs) == len(set(runs)), "rivals", "names that differ, and from the policy's", runs)
         for name in self.metrics:
             METRICS.require(name, "metrics")
+        self._check_choice()
         warmup = self.tsar.warmup_cycles
         require(warmup >= 4, "warmup_cycles", "at least 4 (the latency and one)", warmup)
         images = self.seconds * self.reference_rate_hz
@@ -115,6 +132,21 @@ class RunOptions:
             limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
             frame_s = float(nonadaptive_flops(self.cost, priced)) / self.capacity
             limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
+
+    def _check_choice(self) -> None:
+        """One of the four ways to choose a place on the front, beside nothing that it sets."""
+        asked = [name for name in CHOICES if getattr(self, name) not in ("", None)]
+        for name in asked[:1]:
+            require(len(asked) == 1, name, f"only one of {', '.join(CHOICES)}", getattr(self, name))
+            require(self.policy == DEFAULT_POLICY, "policy", f"{DEFAULT_POLICY} beside a {name}", self.policy)
+            require(
+                self.capacity == CAPACITY_DEFAULT, "capacity", f"none beside a {name}, which sets it", self.capacity
+            )
+            batch, default = self.tsar.batch_size, TsarConfig.batch_size
+            require(batch == default, "batch_size", f"none beside a {name}, which sets it", batch)
+            require(self.counted != "wall", "ledger", f"a modelled one beside a {name}", self.counted)
+        limits.within(self, budget_flops=(1.0, 1e30), budget_seconds=(1e-6, 1e9), error_target=(1e-12, 1.0))
+        require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
 
     @property
     def counted(self) -> Ledger:

@@ -1,6 +1,8 @@
 """Compare a policy, by default the best of the project's own, with its rivals at equal cost.
 
-Example: python scripts/run.py fly-by --seconds 2 --out out/fly-by
+Examples: python scripts/run.py fly-by --seconds 2 --out out/fly-by
+          python scripts/run.py chase --preset draft --resolution-px 256 --out out/draft
+          python scripts/run.py chase --budget-flops 1e11 --out out/cheap
 """
 
 from __future__ import annotations
@@ -41,5 +43,10 @@ def main() -> None:
         "non-finite values": str(sum(summary["nonfinite"].values())),
     }
     files = ", ".join(["summary.json", *summary["files"]])
-    show(Table(title, ("", ""), list(rows.items()), words=2), f"written to {options.out}: {files}")
+    parts = [Table(title, ("", ""), list(rows.items()), words=2)]
+    if summary["choice"]:
+        from analysis.comparison.choosing import choice_table
+
+        parts.append(choice_table(summary["choice"]))
+    show(*parts, f"written to {options.out}: {files}")
     require_unbroken([] if checked is None or checked["ok"] else [options.input])

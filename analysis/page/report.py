@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from analysis.command.console import Table
+from analysis.page import explorer as explored
 from analysis.page import player as played
+from analysis.page.explorer import Explorer
 from analysis.page.player import Player
 from analysis.storage.files import atomic
 
@@ -32,20 +34,22 @@ class Report:
     Attributes:
         title: of the page.
         lead: paragraphs that say what was compared and what came out.
-        key_numbers: table before the figures.
+        key_numbers: table before the figures; None for none.
         figures: caption and PNG bytes.
         player: pictures behind a slider, before everything else; None for a page without one.
         tables: in order, after the figures.
         details: nested mappings shown as lists of names and values (configuration, provenance).
+        explorer: points with settings and pictures, before everything else; None for a page without one.
     """
 
     title: str
     lead: Sequence[str]
-    key_numbers: Table
+    key_numbers: Table | None
     figures: Sequence[tuple[str, bytes]] = ()
     player: Player | None = None
     tables: Sequence[Table] = ()
     details: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    explorer: Explorer | None = None
 
 
 def write_report(path: Path, report: Report) -> None:
@@ -57,16 +61,20 @@ def write_report(path: Path, report: Report) -> None:
 
 def render(report: Report) -> str:
     """The page as text."""
-    script = played.SCRIPT.read_text(encoding="utf-8") if report.player else ""
+    used = [played] if report.player else []
+    used += [explored] if report.explorer else []
+    script = "".join(one.SCRIPT.read_text(encoding="utf-8") for one in used)
+    style = _STYLE + "".join(one.STYLE for one in used)
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
         f"<meta http-equiv='Content-Security-Policy' content=\"{_policy(script)}\">",
-        f"<title>{escape(report.title)}</title><style>{_STYLE}{played.STYLE if report.player else ''}</style></head>",
+        f"<title>{escape(report.title)}</title><style>{style}</style></head>",
         f"<body><h1>{escape(report.title)}</h1>",
         *(f"<p>{escape(paragraph)}</p>" for paragraph in report.lead),
         played.markup(report.player) if report.player else "",
-        _table(report.key_numbers),
+        explored.markup(report.explorer) if report.explorer else "",
+        _table(report.key_numbers) if report.key_numbers else "",
         *(_figure(caption, png) for caption, png in report.figures),
         *(_table(table) for table in report.tables),
         *(_details(title, values) for title, values in report.details.items()),

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from math import frexp
 from typing import Any
 
 from analysis.study.cases import ROWS, Case, Scale
@@ -130,7 +131,7 @@ def said(value: Value) -> str:
     """A value of a knob, as text."""
     if isinstance(value, bool):
         return "on" if value else "off"
-    if isinstance(value, float) and 0.0 < value < 0.1 and (1.0 / value).is_integer():
+    if isinstance(value, float) and 0.0 < value < 0.1 and frexp(value)[0] == 0.5:
         return f"1/{1.0 / value:g}"
     return f"{value:g}" if isinstance(value, float) else str(value)
 

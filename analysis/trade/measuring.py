@@ -102,7 +102,10 @@ def _by_place(measured: Measured, found: Sequence[Run], options: TradeOptions) -
     for run in found:
         result = measured.result(run)
         if result is not None and result.summary["spent"]:
-            pairs[run.where] = result.summary["spent"]["flops"][options.ledger], float(result.times["mse"].mean())
+            pairs[run.where] = (
+                result.summary["spent"]["flops"][options.ledger],
+                float(result.times["mse"].to_numpy().mean()),
+            )
     return pairs
 
 

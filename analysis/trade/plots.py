@@ -12,7 +12,7 @@ from analysis.metrics.front import knee, on_front
 from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
 from analysis.trade.knobs import KNOBS, said
 from analysis.trade.runs import SEARCH
-from analysis.trade.tables import Relative
+from analysis.trade.tables import Relative, lines
 
 _GRID = {"color": "0.88", "linewidth": 0.6}
 _LABELLED = 12
@@ -53,9 +53,9 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
     seen = np.isfinite(bands.high)
     axis.fill_between(bands.budgets[seen], bands.low[seen], bands.high[seen], color=ADAPTIVE, alpha=0.15, linewidth=0,
                       label="95 % of the draws", step="post")  # fmt: skip
-    best = table[table["on_front"]].sort_values("cost")
+    best = lines(table, table["on_front"]).sort_values("cost")
     axis.step(best["cost"], best["error"], color="0.15", linewidth=1.2, where="post", label="front")
-    at = table[table["knee"]]
+    at = lines(table, table["knee"])
     axis.plot(at["cost"], at["error"], "*", color="k", markersize=15, label="knee")
     axis.plot([1.0], [1.0], "s", markerfacecolor="none", markeredgecolor="k", markersize=10, label="default")
     shown = best.iloc[np.unique(np.linspace(0, len(best) - 1, min(_LABELLED, len(best))).round().astype(int))]
@@ -82,14 +82,14 @@ def knobs(table: pd.DataFrame) -> Figure:
         _plain(axis, "cost", "error")
         _short_ticks(axis)
         axis.set_title(name, fontsize=10, loc="left")
-        lines = table[table["knob"] == name].sort_values("cost_flops")
-        x, y = lines["cost_flops"].to_numpy(), lines["mse"].to_numpy()
-        spread = np.stack((y - lines["mse_low"].to_numpy(), lines["mse_high"].to_numpy() - y)).clip(min=0.0)
+        own = lines(table, table["knob"] == name).sort_values("cost_flops")
+        x, y = own["cost_flops"].to_numpy(), own["mse"].to_numpy()
+        spread = np.stack((y - own["mse_low"].to_numpy(), own["mse_high"].to_numpy() - y)).clip(min=0.0)
         axis.axhline(1.0, color="0.6", linewidth=0.8)
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         joined = "-" if name != "policy" else ""
         axis.errorbar(x, y, spread, fmt=f"o{joined}", color=ADAPTIVE, markersize=4, linewidth=1.0, capsize=2)
-        for value, place in zip(lines["value"], zip(x, y, strict=True), strict=True):
+        for value, place in zip(own["value"], zip(x, y, strict=True), strict=True):
             weight = "bold" if value == said(KNOBS[name].default) else "normal"
             axis.annotate(str(value), place, xytext=(4, 4), textcoords="offset points", fontsize=7, fontweight=weight)
         axis.set_xlim(low, high)
@@ -110,11 +110,11 @@ def inputs(points: pd.DataFrame) -> Figure:
     for axis, name in zip(panels.flat, names, strict=False):
         _plain(axis, "FLOPs of the run", "mean squared error")
         axis.set_title(name.rsplit("/", 1)[-1], fontsize=10, loc="left")
-        own = points[points["input"] == name]
+        own = lines(points, points["input"] == name)
         axis.plot(own["cost_flops"], own["mse"], "o", color=OTHER, markersize=3, alpha=0.6)
-        one = own[own["seed"] == own["seed"].min()]
+        one = lines(own, own["seed"] == own["seed"].min())
         x, y = one["cost_flops"].to_numpy(), one["mse"].to_numpy()
-        best = one[on_front(x, y)].sort_values("cost_flops")
+        best = lines(one, on_front(x, y)).sort_values("cost_flops")
         axis.step(best["cost_flops"], best["mse"], color="0.15", linewidth=1.2, where="post")
         at = knee(x, y)
         axis.plot(x[at], y[at], "*", color="k", markersize=12)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.console import markdown
+from analysis.comparison.front import STORED
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json, write_table
 from analysis.storage.summary import with_source
@@ -20,7 +21,8 @@ from analysis.trade.measuring import Measured, measure
 from analysis.trade.options import TradeOptions
 from analysis.trade.page import write_page
 from analysis.trade.shown import shown_tables
-from analysis.trade.tables import Relative, knees, knob_table, point_table, relative, sentences
+from analysis.trade.store import front_file
+from analysis.trade.tables import Relative, knees, knob_table, lines, point_table, relative, sentences
 
 Tables = dict[str, pd.DataFrame]
 
@@ -50,8 +52,11 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
         with atomic(out / "tables.md") as file:
             file.write_text(markdown(shown_tables(tables)), encoding="utf-8")
         pictures = _figures(options, points, front, tables["knobs"])
+        stored = front_file(points, options)
+        for path in (out / "front.json", *([STORED] if options.store else [])) if stored else ():
+            write_json(path, stored)
         summary = _summary(options, measured, tables)
-        write_page(out / "report.html", summary, tables, points, pictures, measured)
+        write_page(out / "report.html", summary, tables, points, pictures, measured.place)
         write_json(out / "summary.json", summary)
     return summary, tables
 
@@ -64,7 +69,7 @@ def _figures(options: TradeOptions, points: pd.DataFrame, front: Relative, knobs
     made = {"Cost and error of all settings over those of the default, and their front": "front.png"}
     save(plots.front(front, points), out / "front.png")
     for policy in dict.fromkeys(KNOBS[name].policy for name in knobs["knob"]):
-        own = knobs[[KNOBS[name].policy == policy for name in knobs["knob"]]]
+        own = lines(knobs, [KNOBS[name].policy == policy for name in knobs["knob"]])
         made[f"Each knob of {policy} alone"] = f"knobs_{policy}.png"
         save(plots.knobs(own), out / f"knobs_{policy}.png")
     made["Every input by itself"] = "inputs.png"

@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis.command.console import Table
 from analysis.trade.knobs import KNOBS, said
-from analysis.trade.tables import COSTS, sentences
+from analysis.trade.tables import COSTS, lines, sentences
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -28,7 +28,7 @@ def shown_tables(tables: Tables) -> list[Table]:
 def front_table(front: pd.DataFrame) -> Table:
     """Settings that nothing beats, by rising cost."""
     header = ["setting", "cost", "error", "95 % of its runs", "on the front", "at the knee", ""]
-    kept = front[front["on_front"]].sort_values("cost", kind="stable") if len(front) else front
+    kept = lines(front, front["on_front"]).sort_values("cost", kind="stable") if len(front) else front
     rows = [
         [
             line["setting"],
@@ -48,8 +48,10 @@ def front_table(front: pd.DataFrame) -> Table:
 def _knobs(knobs: pd.DataFrame) -> Table:
     header = ["knob", "value", *COSTS.values(), "MSE", "95 %", "FLIP", "JOD"]
     rows = [
-        [line["knob"], line["value"], *(_number(line[name]) for name in COSTS), _number(line["mse"])]
-        + [f"{line['mse_low']:.2f}–{line['mse_high']:.2f}", _number(line["flip"]), _signed(line["jod"])]
+        [
+            *(line["knob"], line["value"], *(_number(line[name]) for name in COSTS), _number(line["mse"])),
+            *(f"{line['mse_low']:.2f}–{line['mse_high']:.2f}", _number(line["flip"]), _signed(line["jod"])),
+        ]
         for line in knobs.to_dict("records")
         if line["value"] != said(KNOBS[line["knob"]].default)
     ]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.metrics.cost_model import RAYS, Ledger
+from analysis.metrics.cost_model import LEDGERS, RAYS, Ledger
 from analysis.metrics.front import Bands, bootstrap, interval, knee, means, on_front
 from analysis.trade.knobs import KNOBS, Setting, said
 from analysis.trade.runs import SEARCH, Run
@@ -22,6 +22,8 @@ COLUMNS = (
 """The first columns of ``trade.csv``."""
 COSTS = {"cost_flops": "FLOPs", "wall_s": "wall seconds", "peak_bytes": "peak memory", "latency_s": "latency"}
 """What a point costs, by column."""
+_MODELLED = tuple(ledger for ledger in LEDGERS if ledger != "wall")
+_FURTHER = ("setting", "policy", "changes", "rays", "ssim", "result", *(f"flops_{ledger}" for ledger in _MODELLED))
 GRID = 64
 """Budgets at which bands are computed."""
 
@@ -36,13 +38,14 @@ class Result:
 
 
 def point_table(results: Iterable[Result], ledger: Ledger) -> pd.DataFrame:
-    """A line a point and place: :data:`COLUMNS`, then the setting in words, as JSON and the name of the result.
+    """A line a point and place: :data:`COLUMNS`, then the setting in words and as JSON, and
+    more of its numbers.
 
     Costs are those of the whole measured span. ``on_front`` says whether no other point of the same input and seed has
     both less cost and less error (:func:`analysis.metrics.front.on_front`) by ``cost_flops`` and ``mse``.
     """
-    lines = [_line(one, ledger) for one in results if one.summary["spent"]]
-    found = pd.DataFrame(lines, columns=pd.Index([*COLUMNS, "setting", "policy", "changes", "rays", "ssim", "result"]))
+    made = [_line(one, ledger) for one in results if one.summary["spent"]]
+    found = pd.DataFrame(made, columns=pd.Index([*COLUMNS, *_FURTHER]))
     if len(found):
         flags = found.groupby(["input", "seed"], sort=False, group_keys=False)[["cost_flops", "mse"]].apply(
             lambda one: pd.Series(on_front(one["cost_flops"].to_numpy(), one["mse"].to_numpy()), one.index)
@@ -72,6 +75,7 @@ def _line(one: Result, ledger: Ledger) -> dict[str, Any]:
         "rays": sum(spent["counters"].get(name, 0.0) for name in RAYS),
         "ssim": one.times["ssim"].mean(),
         "result": one.summary["key"],
+        **{f"flops_{name}": spent["flops"][name] for name in _MODELLED},
     }
 
 
@@ -95,7 +99,7 @@ class Relative:
 
 def relative(points: pd.DataFrame, draws: int, cost: str = "cost_flops", error: str = "mse") -> Relative:
     """The front of all settings that were measured at every place at which the default was."""
-    pivots = [_by_place(points, column) for column in (cost, error)]
+    pivots = [by_place(points, column) for column in (cost, error)]
     default = Setting().words
     if default not in pivots[0].index:
         return Relative([], np.empty((0, 0)), np.empty((0, 0)), pd.DataFrame(), None)
@@ -122,8 +126,14 @@ def relative(points: pd.DataFrame, draws: int, cost: str = "cost_flops", error: 
     return Relative(kept, costs, errors, front, bands)
 
 
-def _by_place(points: pd.DataFrame, column: str) -> pd.DataFrame:
-    """A line a setting and a column a place."""
+def lines(frame: pd.DataFrame, flags: Any) -> pd.DataFrame:
+    """Those lines of a table that are flagged."""
+    found: Any = frame[flags]
+    return found
+
+
+def by_place(points: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Values of a column: a line a setting and a column a place."""
     once = points.drop_duplicates(["setting", "input", "seed"])
     return once.pivot(index="setting", columns=["input", "seed"], values=column).reindex(once["setting"].unique())
 
@@ -131,8 +141,8 @@ def _by_place(points: pd.DataFrame, column: str) -> pd.DataFrame:
 def knob_table(points: pd.DataFrame, draws: int) -> pd.DataFrame:
     """A line a knob and value: geometric means over all places of every cost and of both errors, over those of the
     knob's default there; and of JOD the mean difference. ``mse_low`` and ``mse_high`` are bounds of the bootstrap."""
-    lines = []
-    for knob, found in _groups(points[points["knob"] != SEARCH], "knob"):
+    made = []
+    for knob, found in _groups(lines(points, points["knob"] != SEARCH), "knob"):
         standing = found[found["value"] == said(KNOBS[knob].default)].set_index(["input", "seed"])
         for value, turned in _groups(found, "value"):
             here = turned.set_index(["input", "seed"])
@@ -146,8 +156,8 @@ def knob_table(points: pd.DataFrame, draws: int) -> pd.DataFrame:
                 if column == "mse":
                     line["mse_low"], line["mse_high"] = interval(ratio, draws)
             line["jod"] = float((here.loc[both, "jod"] - standing.loc[both, "jod"]).mean())
-            lines.append(line)
-    return pd.DataFrame(lines)
+            made.append(line)
+    return pd.DataFrame(made)
 
 
 def _groups(frame: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
@@ -157,9 +167,9 @@ def _groups(frame: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
 def sentences(knobs: pd.DataFrame) -> dict[str, str]:
     """For each knob what its values buy and cost, in one sentence."""
     found = {}
-    for name, lines in _groups(knobs, "knob"):
+    for name, own in _groups(knobs, "knob"):
         default = said(KNOBS[name].default)
-        told = [_told(line) for line in lines.to_dict("records") if line["value"] != default]
+        told = [_told(line) for line in own.to_dict("records") if line["value"] != default]
         if told:
             found[name] = f"From {default}: {'; '.join(told)}."
     return found
@@ -187,8 +197,8 @@ def _listed(parts: Sequence[str]) -> str:
 
 def knees(points: pd.DataFrame) -> pd.DataFrame:
     """A line an input and seed: the setting at the knee of its own front, its cost and its error."""
-    lines = []
+    made = []
     for _, found in points.groupby(["input", "seed"], sort=False) if len(points) else ():
         at = found.iloc[knee(found["cost_flops"].to_numpy(), found["mse"].to_numpy())]
-        lines.append({name: at[name] for name in ("input", "seed", "setting", "cost_flops", "mse")})
-    return pd.DataFrame(lines)
+        made.append({name: at[name] for name in ("input", "seed", "setting", "cost_flops", "mse")})
+    return pd.DataFrame(made)

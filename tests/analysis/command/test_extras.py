@@ -24,6 +24,8 @@ PACKAGES = ("tsar", "renderer", "analysis", "scenes")
 LACKING = [
     ("suitability.py", (), "distributed", "study"),
     ("ablation.py", (), "distributed", "study"),
+    ("trade.py", (), "optuna", "search"),
+    ("trade.py", ("--trials", "0"), "distributed", "study"),
     ("suitability.py", (), "pycvvdp", "perception"),
     ("sensitivity.py", (), "flip_evaluator", "perception"),
     ("tiles.py", ("glass",), "dask", "study"),

@@ -1,0 +1,69 @@
+"""The front that presets and budgets choose from, as a file."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.metrics.cost_model import LEDGERS
+from analysis.metrics.front import knee, means, on_front
+from analysis.study.cases import ROWS
+from analysis.trade.knobs import KNOBS, OWN, ROW, Setting
+from analysis.trade.options import TradeOptions
+from analysis.trade.runs import scale_of
+from analysis.trade.tables import by_place, lines
+
+_STORED = ("cost_flops", "mse", "wall_s", *(f"flops_{ledger}" for ledger in LEDGERS if ledger != "wall"))
+
+
+def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | None:
+    """The front of the settings that a run can be given: those of the policy ``tsar`` that turn its batch and its own
+    options alone. None where the default was not measured.
+
+    Source of its columns: :class:`analysis.comparison.front.Place`.
+    """
+    own = lines(points, (points["policy"] == OWN) & points["changes"].map(_can_be_given))
+    default = Setting().words
+    if default not in set(own["setting"]):
+        return None
+    tables = {name: by_place(own, name) for name in _STORED}
+    places = tables["mse"].columns[tables["mse"].loc[default].notna()]
+    kept = [name for name in tables["mse"].index if tables["mse"].loc[name, places].notna().all()]
+    mean = {name: means(table.loc[kept, places].to_numpy(np.float64)) for name, table in tables.items()}
+    scale, side = scale_of(options), ROWS[ROW][1]
+    per = (side // scale.divisor) ** 2 * scale.seconds
+    standing = kept.index(default)
+    front = np.flatnonzero(on_front(mean["cost_flops"], mean["mse"]))
+    at = knee(mean["cost_flops"], mean["mse"])
+    changes = dict(zip(own["setting"], own["changes"].map(json.loads), strict=True))
+    found = []
+    for number in sorted(front, key=lambda one: mean["cost_flops"][one]):
+        values = changes[kept[number]]
+        found.append(
+            {
+                "batch": values.pop("batch", KNOBS["batch"].default),
+                "parts": {KNOBS[name].part: value for name, value in values.items()},
+                "flops": {name[6:]: float(mean[name][number] / per) for name in _STORED if name.startswith("flops_")},
+                "wall_s": float(mean["wall_s"][number] / per),
+                "mse": float(mean["mse"][number]),
+                "cost": float(mean["cost_flops"][number] / mean["cost_flops"][standing]),
+                "error": float(mean["mse"][number] / mean["mse"][standing]),
+                "knee": bool(number == at),
+            }
+        )
+    made = {
+        "scale": options.scale,
+        "seconds": options.seconds,
+        "inputs": [name.rsplit("/", 1)[-1] for name in dict.fromkeys(own["input"])],
+        "seeds": sorted({int(seed) for seed in own["seed"]}),
+        "ledger": options.ledger,
+        "settings": len(kept),
+    }
+    return {"made": made, "places": found}
+
+
+def _can_be_given(changes: str) -> bool:
+    return all(name == "batch" or KNOBS[name].part for name in json.loads(changes))
