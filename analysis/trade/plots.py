@@ -49,7 +49,10 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
     inks = [FRAMED if name in of_policies else ADAPTIVE if name in of_search else OTHER for name in table["setting"]]
     for ink, label in ((OTHER, "a knob alone"), (ADAPTIVE, "the search"), (FRAMED, "another policy")):
         kept = [ink == one for one in inks]
-        axis.plot(table["cost"][kept], table["error"][kept], "o", color=ink, markersize=4.5, alpha=0.75, label=label)
+        if any(kept):
+            axis.plot(
+                table["cost"][kept], table["error"][kept], "o", color=ink, markersize=4.5, alpha=0.75, label=label
+            )
     seen = np.isfinite(bands.high)
     axis.fill_between(bands.budgets[seen], bands.low[seen], bands.high[seen], color=ADAPTIVE, alpha=0.15, linewidth=0,
                       label="95 % of the draws", step="post")  # fmt: skip
@@ -93,7 +96,7 @@ def knobs(table: pd.DataFrame) -> Figure:
             weight = "bold" if value == said(KNOBS[name].default) else "normal"
             axis.annotate(str(value), place, xytext=(4, 4), textcoords="offset points", fontsize=7, fontweight=weight)
         axis.set_xlim(low, high)
-        least, most = min(0.8, *(y / 1.15)), max(1.25, *(y * 1.2))
+        least, most = min(0.8, own["mse_low"].min() / 1.1), max(1.25, own["mse_high"].max() * 1.15)
         axis.set_ylim(least, most)
     return drawn
 

@@ -165,25 +165,25 @@ def _groups(frame: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
 
 
 def sentences(knobs: pd.DataFrame) -> dict[str, str]:
-    """For each knob what its values buy and cost, in one sentence."""
+    """For each knob in one sentence what the cheapest and the dearest of its other values buy and cost; of those that
+    cost alike, the least and the most accurate."""
     found = {}
     for name, own in _groups(knobs, "knob"):
         default = said(KNOBS[name].default)
-        told = [_told(line) for line in own.to_dict("records") if line["value"] != default]
-        if told:
-            found[name] = f"From {default}: {'; '.join(told)}."
+        others = [line for line in own.to_dict("records") if line["value"] != default]
+        if others:
+            order = sorted(others, key=lambda line: (round(line["cost_flops"], 1), -line["mse"]))
+            ends = [order[0], *order[1:][-1:]]
+            found[name] = f"Beside {default}, {'; '.join(map(_told, ends))}."
     return found
 
 
 def _told(line: Mapping[Any, Any]) -> str:
-    """What one value does: cost and error, and other costs that it changes by more than a tenth."""
+    """What one value does: cost and error, and the latency where that changes by more than a tenth."""
     low, high = line["mse_low"], line["mse_high"]
     parts = [f"{_times(line['cost_flops'])} the FLOPs", f"{_times(line['mse'])} the error ({low:.2f}–{high:.2f})"]
-    parts += [
-        f"{_times(line[name])} the {words}"
-        for name, words in COSTS.items()
-        if name != "cost_flops" and abs(np.log(line[name])) > np.log(1.1 if name != "wall_s" else 1.5)
-    ]
+    if abs(np.log(line["latency_s"])) > np.log(1.1):
+        parts.append(f"{_times(line['latency_s'])} the latency")
     return f"{line['value']} has {_listed(parts)}"
 
 
