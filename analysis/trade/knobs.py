@@ -131,7 +131,7 @@ def said(value: Value) -> str:
     """A value of a knob, as text."""
     if isinstance(value, bool):
         return "on" if value else "off"
-    if isinstance(value, float) and 0.0 < value < 0.1 and frexp(value)[0] == 0.5:
+    if isinstance(value, float) and 0.0 < value < 0.2 and frexp(value)[0] == 0.5:
         return f"1/{1.0 / value:g}"
     return f"{value:g}" if isinstance(value, float) else str(value)
 

@@ -13,7 +13,7 @@ from analysis.metrics.front import means
 from analysis.study.cases import Case
 from analysis.study.evaluation import Place, finished, times_of
 from analysis.study.farm import run_cases, run_study
-from analysis.trade.knobs import Knob, Setting
+from analysis.trade.knobs import Knob, Setting, chosen_knobs
 from analysis.trade.options import TradeOptions
 from analysis.trade.runs import Point, Run, points_of, runs
 from analysis.trade.search import search, searched
@@ -71,7 +71,7 @@ def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
     place, keys, failures = run_study(options, [run.case for run in planned], WRITTEN)
     measured = Measured(place, dropped=dropped)
     measured.keep(planned, keys, failures)
-    turned = searched(knobs)
+    turned = searched(chosen_knobs(options.search_knobs) if options.search_knobs else knobs)
     if options.trials and turned:
         with full_disk(place.results), bars() as shown:
             task = shown.task("search", options.trials)

@@ -33,6 +33,8 @@ class TradeOptions:
     """Runs of each: repetition r has seed r, and phase r / repetitions where the input has phases."""
     knobs: tuple[str, ...] = ()
     """Names of the knobs to turn; none turns all. A wrong name lists them."""
+    search_knobs: tuple[str, ...] = ()
+    """Of the knobs of tsar those that the search turns; none turns all that are named above."""
     trials: int = 48
     """Settings that the search tries; 0 makes no search."""
     at_once: int = 8

@@ -38,6 +38,7 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
     """
     with bad_input():
         knobs = chosen_knobs(options.knobs)
+        chosen_knobs(options.search_knobs)
     measured = measure(options, knobs)
     for line in describe_failures({measured.keys[case]: reason for case, reason in measured.failures.items()}):
         print(line, file=sys.stderr)

@@ -9,13 +9,15 @@ import numpy as np
 import pandas as pd
 
 from analysis.metrics.cost_model import LEDGERS
-from analysis.metrics.front import knee, means, on_front
+from analysis.metrics.front import means, on_front
 from analysis.study.cases import ROWS
 from analysis.trade.knobs import KNOBS, OWN, ROW, Setting
 from analysis.trade.options import TradeOptions
 from analysis.trade.runs import scale_of
-from analysis.trade.tables import by_place, lines
+from analysis.trade.tables import by_place, lines, relative
 
+NEAR = 0.05
+"""Where the default costs and errs as the knee does, up to this share, it is stored as the knee."""
 _STORED = ("cost_flops", "mse", "wall_s", *(f"flops_{ledger}" for ledger in LEDGERS if ledger != "wall"))
 
 
@@ -23,7 +25,9 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
     """The front of the settings that a run can be given: those of the policy ``tsar`` that turn its batch and its own
     options alone. None where the default was not measured.
 
-    Source of its columns: :class:`analysis.comparison.front.Place`.
+    Its columns are those of :class:`analysis.comparison.front.Place`. The knee is that of all settings that were
+    measured. The default is stored in its place where it is as good (:data:`NEAR`): no option is changed for a gain
+    that the runs hardly show.
     """
     own = lines(points, (points["policy"] == OWN) & points["changes"].map(_can_be_given))
     default = Setting().words
@@ -36,8 +40,8 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
     scale, side = scale_of(options), ROWS[ROW][1]
     per = (side // scale.divisor) ** 2 * scale.seconds
     standing = kept.index(default)
-    front = np.flatnonzero(on_front(mean["cost_flops"], mean["mse"]))
-    at = knee(mean["cost_flops"], mean["mse"])
+    at = _nearest(points, kept, standing, mean["cost_flops"], mean["mse"])
+    front = _front_through(at, mean["cost_flops"], mean["mse"])
     changes = dict(zip(own["setting"], own["changes"].map(json.loads), strict=True))
     found = []
     for number in sorted(front, key=lambda one: mean["cost_flops"][one]):
@@ -63,6 +67,23 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
         "settings": len(kept),
     }
     return {"made": made, "places": found}
+
+
+def _nearest(points: pd.DataFrame, kept: list[str], standing: int, costs: np.ndarray, errors: np.ndarray) -> int:
+    """The setting that is as good as the knee of all that was measured: the default within :data:`NEAR`, or else the
+    one whose logarithms lie nearest."""
+    front = relative(points, 10).front
+    best = front[front["knee"]].iloc[0]
+    away = [np.log(own / own[standing] / best[name]) for own, name in ((costs, "cost"), (errors, "error"))]
+    apart = np.hypot(*away)
+    near = max(abs(one[standing]) for one in away) <= np.log1p(NEAR)
+    return standing if near else int(np.argmin(apart))
+
+
+def _front_through(at: int, costs: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """The front, without what would beat one point, which is on it."""
+    kept = on_front(costs, errors) & ~((costs <= costs[at]) & (errors <= errors[at]))
+    return np.flatnonzero(kept | (np.arange(len(costs)) == at))
 
 
 def _can_be_given(changes: str) -> bool:

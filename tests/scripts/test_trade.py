@@ -20,7 +20,7 @@ from tests.scripts.commands import assert_refused, call_script
 TINY = Scale(4, seconds=0.2, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=4)
 SMALL = ("--inputs", "fly-by", "--repetitions", "1", "--seconds", "0.1", "--jod-s", "0", "--draws", "50")
 KNOBS = ("--knobs", "resolution", "depth", "tiles")
-SEARCH = ("--trials", "2", "--at-once", "2")
+SEARCH = ("--trials", "2", "--at-once", "2", "--search-knobs", "batch", "smoothing")
 
 
 @pytest.fixture

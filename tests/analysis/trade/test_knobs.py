@@ -193,6 +193,23 @@ def test_the_front_is_stored_for_each_pixel_and_second(tmp_path: Any) -> None:
             read_front(tmp_path / path)
 
 
+def test_a_default_as_good_as_the_knee_is_stored_in_its_place() -> None:
+    """A point near the default that beats it by 2 % is the knee; what is stored is the default."""
+    points = point_table(results(), "work")
+    steep = {"tsar, batch 16": 1e-3, "tsar, batch 32": 8e-4, "tsar, batch 64": 6e-4, "tsar": 1.02e-5}
+    points["mse"] = points["setting"].map(lambda name: steep.get(name, 9.9e-6))
+    at = points["setting"] == "tsar, batch 64, jitter off"
+    points.loc[at, ["mse", "cost_flops"]] = 1e-5, 0.98 * 144e6
+    front = relative(points, 10).front.set_index("setting")
+    assert front.loc["tsar, batch 64, jitter off", "knee"]
+    stored = front_file(points, OPTIONS)
+    assert stored is not None
+    middle = [place for place in stored["places"] if place["knee"]]
+    assert [(place["batch"], place["parts"], place["cost"]) for place in middle] == [(128, {}, 1.0)]
+    costs, errors = ([place[name] for place in stored["places"]] for name in ("cost", "error"))
+    assert costs == sorted(costs) and errors == sorted(errors, reverse=True) and len(costs) >= 4
+
+
 @given(st.floats(1e3, 1e10), st.floats(1e-9, 1.0))
 def test_budgets_buy_the_most_accurate_and_targets_the_cheapest(flops: float, mse: float) -> None:
     front = some_front()
