@@ -18,6 +18,8 @@ class PerspectiveCamera:
         lens_radius: of the aperture, scene units.
         focal_distance: from the lens to the plane in focus, along the viewing direction, positive.
         shutter_s: ``(open, close)`` offsets from the frame's time.
+        shift: how far the middle of the picture lies from the viewing direction, to the right and up, in widths and
+            heights of the picture. The renderer draws none; kept for conversion.
     """
 
     to_world: Matrix = field(default_factory=identity)
@@ -26,6 +28,7 @@ class PerspectiveCamera:
     focal_distance: float = 1.0
     track: RigidTrack | None = None
     shutter_s: tuple[float, float] = (0.0, 0.0)
+    shift: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.fov_deg < 180.0:

@@ -85,6 +85,7 @@ class Instance:
         name: for messages and reports.
         emission: radiance of an area light, linear RGB, or None. It leaves the side that the normal points to, of a
             :class:`Rectangle` or :class:`Sphere`.
+        one_sided: whether the back is black. Renderers draw both sides alike; kept for conversion.
     """
 
     shape: Shape
@@ -93,6 +94,7 @@ class Instance:
     track: RigidTrack | None = None
     name: str = ""
     emission: Rgb | None = None
+    one_sided: bool = False
 
     def __post_init__(self) -> None:
         if self.to_world.shape != (4, 4) or not np.isfinite(self.to_world).all():

@@ -51,6 +51,7 @@ from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.geometry.placing import lose_back
 from scenes.formats.losses import LossReport
 
 DEPTH_MAX = 8
@@ -73,6 +74,9 @@ class Approximation:
         if isinstance(camera, RealisticCamera):
             self.report.add("camera", "a camera with lenses", "a pinhole of 45 degrees")
             camera = PerspectiveCamera(camera.to_world)
+        if isinstance(camera, PerspectiveCamera) and camera.shift != (0.0, 0.0):
+            self.report.add("camera", "a picture off the viewing direction", "one about it")
+            camera = dataclasses.replace(camera, shift=(0.0, 0.0))
         assert isinstance(camera, PerspectiveCamera | OrthographicCamera | EnvironmentCamera)
         if depth < 0 or depth > DEPTH_MAX:
             self.report.add("integrator", f"{'endless' if depth < 0 else depth} bounces", f"{DEPTH_MAX}")
@@ -104,6 +108,7 @@ class Approximation:
     def instance(self, instance: Instance, number: int) -> list[Instance]:
         """Instances for a shape: lamps are rectangles and spheres, a cube is six of them, and others give no light."""
         name = instance.name or f"shape {number}"
+        lose_back(dataclasses.replace(instance, name=name), self.report)
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
         if instance.emission is None:
             if isinstance(instance.shape, Cube | Disk) and depends_on_uv(made.material):

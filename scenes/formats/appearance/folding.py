@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from scenes.canonical import (
+    Bumped,
     CheckerboardTexture,
     ConstantTexture,
     ImageTexture,
@@ -15,7 +16,7 @@ from scenes.canonical import (
     ScaleTexture,
     Texture,
 )
-from scenes.formats.appearance.spectra import rgb
+from scenes.formats.appearance.spectra import grey, rgb
 
 Change = Callable[[np.ndarray], np.ndarray]
 
@@ -98,6 +99,11 @@ def greatest_of(texture: Texture) -> float:
         return max(greatest_of(texture.even), greatest_of(texture.odd))
     parts = greatest_of(texture.first), greatest_of(texture.second)
     return parts[0] * parts[1] if isinstance(texture, ScaleTexture) else max(parts)
+
+
+def height_of(material: Bumped) -> Texture:
+    """The height of a bump map in scene units, with its scale."""
+    return product_of(material.height, ConstantTexture(grey(material.scale)))
 
 
 def mean_of(texture: Texture) -> Rgb:

@@ -26,6 +26,14 @@ from scenes.formats.losses import LossReport
 
 BLACK = Matte(ConstantTexture(grey(0.0)))
 
+NOTHING = Masked(BLACK, ConstantTexture(grey(0.0)))
+"""A surface that is not there, such as the border of a medium."""
+
+
+def is_nothing(material: Material) -> bool:
+    """Whether a surface is not there."""
+    return isinstance(material, Masked) and material.opacity == NOTHING.opacity
+
 
 def mixture_of(first: Material, second: Material, amount: Texture) -> Material:
     """A mixture, ``amount`` of it the second material; a metal mixed with black is a metal that reflects less."""

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.canonical import Material, SceneError, Texture
+from scenes.canonical import Material, SceneError
 from scenes.canonical.values import Matrix
+from scenes.formats.directives.names import Names
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of, parse_directives
 from scenes.formats.geometry.transform_stack import (
     TransformStack,
@@ -25,6 +26,7 @@ from scenes.formats.geometry.transform_stack import (
     translation,
 )
 from scenes.formats.losses import LossReport
+from scenes.formats.text.places import Place
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
 SAVED_MAX = 1024
@@ -42,6 +44,15 @@ class Attributes:
 
 
 @dataclass
+class Block:
+    """A block that is open: its kind, what it restores, and where its names begin."""
+
+    kind: str
+    attributes: Attributes | None
+    names: int
+
+
+@dataclass
 class DirectiveReader:
     """State while a file is read; a dialect adds the directives that describe a scene.
 
@@ -56,10 +67,9 @@ class DirectiveReader:
     left_handed: bool = True
     transforms: TransformStack = field(default_factory=TransformStack)
     attributes: Attributes = field(default_factory=Attributes)
-    textures: dict[str, Texture] = field(default_factory=dict)
-    materials: dict[str, Material] = field(default_factory=dict)
-    _saved: list[tuple[str, Attributes | None]] = field(default_factory=list)
-    _including: list[Path] = field(default_factory=list)
+    names: Names = field(default_factory=Names)
+    _saved: list[Block] = field(default_factory=list)
+    _file: Path | None = None
 
     def read(self, path: Path) -> None:
         """Reads a file and what it includes.
@@ -67,25 +77,28 @@ class DirectiveReader:
         Raises:
             SceneError: something in it is not as it must be; file, line, column.
         """
-        where = f"{self._including[-1]}" if self._including else str(path)
-        if path in self._including:
-            raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
-        if len(self._including) >= DEPTH_MAX:
-            raise SceneError(f"{where}: expected at most {DEPTH_MAX} files inside each other")
-        self._including.append(path)
-        for directive in parse_directives(self.files.text(path, where), path.name):
+        for directive in parse_directives(self.files.text(path, str(path)), path, self._open):
+            self._file = directive.file
             self._do(directive)
-        self._including.pop()
+
+    def _open(self, name: str, place: Place, inside: tuple[Path, ...]) -> tuple[str, Path]:
+        """Text and path of a file that another one includes."""
+        path, where = self.files.path(name, str(place), inside[-1]), str(inside[-1])
+        if path in inside:
+            raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
+        if len(inside) >= DEPTH_MAX:
+            raise SceneError(f"{where}: expected at most {DEPTH_MAX} files inside each other")
+        return self.files.text(path, where), path
 
     def finish(self) -> None:
         """Raises SceneError where a block is still open."""
         if self._saved:
-            raise SceneError(f"{self.files.main}: expected every block to end, {self._saved[-1][0]}Begin does not")
+            raise SceneError(f"{self.files.main}: expected every block to end, {self._saved[-1].kind}Begin does not")
 
     @property
     def beside(self) -> Path:
         """The file that is being read."""
-        return self._including[-1] if self._including else self.files.main
+        return self._file or self.files.main
 
     def dialect(self) -> dict[str, Callable[[Directive], None]]:
         """Directives of the dialect by name."""
@@ -100,7 +113,6 @@ class DirectiveReader:
     def _common(self) -> dict[str, Callable[[Directive], None]]:
         apply = self.transforms.apply
         return {
-            "Include": lambda d: self.read(self.files.path(word(d), str(d.place), self.beside)),
             "Identity": lambda d: self.transforms.replace(np.eye(4)),
             "Translate": lambda d: apply(translation(*numbers(d, 3))),
             "Scale": lambda d: apply(checked(d, scaling(*numbers(d, 3)))),
@@ -148,16 +160,29 @@ class DirectiveReader:
         if len(self._saved) >= SAVED_MAX:
             raise SceneError(f"{directive.place}: expected at most {SAVED_MAX} blocks inside each other")
         self.transforms.push()
-        self._saved.append((kind, copy.copy(self.attributes) if kind != "Transform" else None))
+        saved = copy.copy(self.attributes) if kind != "Transform" else None
+        self._saved.append(Block(kind, saved, self.names.mark()))
 
     def _end(self, kind: str, directive: Directive) -> None:
-        if not self._saved or self._saved[-1][0] != kind:
-            found = f"{self._saved[-1][0]}Begin" if self._saved else "none"
+        self._cross(kind, directive)
+        if not self._saved or self._saved[-1].kind != kind:
+            found = f"{self._saved[-1].kind}Begin" if self._saved else "none"
             raise SceneError(f"{directive.place}: {kind}End: expected a {kind}Begin before it, got {found}")
         self.transforms.pop()
-        _, attributes = self._saved.pop()
-        if attributes is not None:
-            self.attributes = attributes
+        block = self._saved.pop()
+        if block.attributes is not None:
+            self.attributes = block.attributes
+            self.names.forget(block.names)
+
+    def _cross(self, kind: str, directive: Directive) -> None:
+        """Blocks of attributes and objects that cross: the inner one ends, whatever its kind, as in PBRT."""
+        inner = self._saved[-1] if self._saved else None
+        if kind == "Transform" or inner is None or inner.kind in (kind, "Transform"):
+            return
+        other = next((block for block in reversed(self._saved) if block.kind == kind), None)
+        if other is not None:
+            self.report.add(str(directive.place), f"{kind}End inside {inner.kind}Begin", "the end of the inner block")
+            inner.kind, other.kind = other.kind, inner.kind
 
     def left_over(self, parameters: Parameters, what: str) -> None:
         """Reports parameters that nothing asked for."""

@@ -36,14 +36,16 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.canonical.values import Matrix
+from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import DirectiveReader, typed, word
 from scenes.formats.directives.shapes import ShapeReader
 from scenes.formats.directives.surfaces import Surfaces
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
+from scenes.formats.directives.textures import Pair
 from scenes.formats.geometry.conventions import FAR, duration_s
 from scenes.formats.geometry.recognition import shape_of
-from scenes.formats.geometry.transform_stack import inverse, motion, moved_by
+from scenes.formats.geometry.transform_stack import inverse, motion, moved_by, translation
 
 FORWARD = np.diag([1.0, 1.0, -1.0, 1.0])
 """From a camera that looks along +z with x to the right to the canonical one, which looks along -z."""
@@ -98,9 +100,12 @@ class SceneReader(DirectiveReader):
         self.report.add(str(directive.place), f"{directive.name}{named} (participating medium)")
 
     def read_texture(self, directive: Directive) -> None:
-        name, kind = word(directive), word(directive, 2)
-        parameters = parameters_of(directive, 3)
-        self.textures[name] = self.surfaces.made_texture(kind, parameters)
+        name, kind, wanted = word(directive), word(directive, 2), word(directive, 1)
+        parameters, of = parameters_of(directive, 3), "float" if wanted == "float" else "color"
+        if wanted not in ("float", "color", "spectrum"):
+            self.report.unknown(directive.place, f"texture {name!r} of type", wanted, "one of colours")
+        made = self.surfaces.made_texture(kind, parameters, of)
+        self.names.define(self.names.textures(of), name, made)
         self.left_over(parameters, f"texture {name!r}")
 
     def _read_material(self, directive: Directive) -> None:
@@ -110,14 +115,12 @@ class SceneReader(DirectiveReader):
 
     def _name_material(self, directive: Directive) -> None:
         name, parameters = typed(directive)
-        self.materials[name] = self.surfaces.material(parameters.text("type", ""), parameters)
+        made = self.surfaces.material(parameters.text("type", ""), parameters)
+        self.names.define(self.names.materials, name, made)
         self.left_over(parameters, f"material {name!r}")
 
     def _take_material(self, directive: Directive) -> None:
-        name = word(directive)
-        if name not in self.materials:
-            raise SceneError(f"{directive.place}: NamedMaterial: expected a material made before, got {name!r}")
-        self.attributes.material = self.materials[name]
+        self.attributes.material = self.surfaces.named(word(directive), str(directive.place))
 
     # --- camera, film --------------------------------------------------------------------------------------------
 
@@ -129,23 +132,28 @@ class SceneReader(DirectiveReader):
         shutter = parameters.number("shutteropen", 0.0), parameters.number("shutterclose", 1.0)
         if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
             shutter = 0.0, 0.0  # the default of a still
-        half, mirror = self._window(parameters, directive)
+        half, mirror, shift, middle = self._window(parameters, directive)
         placed = products(keys[0], FORWARD, mirror)
         if parameters.number("frameaspectratio", 0.0):
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
         if kind == "perspective":
             fov = self._field_of_view(parameters, half, directive)
             lens, focus = parameters.number("lensradius", 0.0), parameters.number("focaldistance", FAR)
-            self.camera = PerspectiveCamera(placed, fov, lens, focus, track, shutter)
+            if not focus > 0.0:
+                if lens > 0.0:
+                    self.report.add(str(directive.place), f"a lens in focus at {focus:g}", "a pinhole")
+                lens, focus = 0.0, FAR
+            self.camera = PerspectiveCamera(placed, fov, lens, focus, track, shutter, shift)
         elif kind == "orthographic":
-            self.camera = OrthographicCamera(placed, half, track)
+            self.camera = OrthographicCamera(product(placed, translation(*middle, 0.0)), half, track)
         elif kind == "environment":
             self.camera = EnvironmentCamera(placed)
         elif kind == "realistic":
             numbers = parameters.number("aperturediameter", 1.0), parameters.number("focusdistance", 10.0)
             self.camera = RealisticCamera(placed, parameters.text("lensfile", ""), *numbers)
         else:
-            raise SceneError(f"{directive.place}: expected a kind of camera, got {kind!r}")
+            self.report.unknown(directive.place, "camera", kind, "perspective")
+            self.camera = PerspectiveCamera(placed, self._field_of_view(parameters, half, directive), track=track)
         self.left_over(parameters, f"camera {kind!r}")
 
     def _field_of_view(self, parameters: Parameters, half: float, directive: Directive) -> float:
@@ -155,21 +163,22 @@ class SceneReader(DirectiveReader):
             raise SceneError(f"{directive.place}: fov: expected an angle in (0, 180), got {fov:g}")
         return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
 
-    def _window(self, parameters: Parameters, directive: Directive) -> tuple[float, Matrix]:
-        """Half of the window's shorter side, and its mirror where it runs from right to left.
+    def _window(self, parameters: Parameters, directive: Directive) -> tuple[float, Matrix, Pair, Pair]:
+        """Half of the window's shorter side, its mirror where it runs from right to left, and where its middle is.
 
-        A window off the middle is reported.
+        The middle is given in widths and heights of the picture, and in units of the window.
         """
         window = parameters.numbers("screenwindow", 4)
         if window is None:
-            return 1.0, np.eye(4)
-        left, right, bottom, top = window
-        signs = np.sign([right - left, top - bottom])
-        if abs(left + right) > 1e-6 * abs(right) or abs(bottom + top) > 1e-6 * abs(top):
-            self.report.add(str(directive.place), "a screen window off the middle", "one about the middle")
+            return 1.0, np.eye(4), (0.0, 0.0), (0.0, 0.0)
+        left, right, bottom, top = window.tolist()
+        sides, signs = (abs(right - left), abs(top - bottom)), np.sign([right - left, top - bottom])
         if not signs.all():
             raise SceneError(f"{directive.place}: screenwindow: expected left and right, bottom and top apart")
-        return 0.5 * float(min(abs(right - left), abs(top - bottom))), np.diag([*signs, 1.0, 1.0])
+        ends = zip((left + right, bottom + top), sides, signs.tolist(), strict=True)
+        across, up = (0.5 * sign * end if abs(end) > 1e-6 * side else 0.0 for end, side, sign in ends)
+        middle = across, up
+        return 0.5 * min(sides), np.diag([*signs, 1.0, 1.0]), (middle[0] / sides[0], middle[1] / sides[1]), middle
 
     def read_size(self, parameters: Parameters, width_px: int, height_px: int) -> None:
         """The size of the picture, by default the given one, and its file; the filter stays."""
@@ -234,12 +243,16 @@ class SceneReader(DirectiveReader):
         shape, local = made
         material = self.attributes.material or _DEFAULT
         if parameters.types.get("alpha") == "texture":
-            material = Masked(material, self.surfaces.texture(parameters, "alpha", grey(1.0)))
+            material = Masked(material, self.surfaces.texture(parameters, "alpha", grey(1.0), "float"))
         elif parameters.number("alpha", 1.0) != 1.0:
             material = Masked(material, ConstantTexture(grey(parameters.number("alpha", 1.0))))
         if "shadowalpha" in parameters:
             parameters.asked.add("shadowalpha")
             self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
+        if is_nothing(material) and self.attributes.emission is None:
+            self.report.add(str(directive.place), "the border of a medium, which is not seen")
+            self.left_over(parameters, f"shape {kind!r}")
+            return
         if isinstance(shape, Mesh):
             shape, local = shape_of(shape, material, str(directive.place), self.report)
         start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
@@ -259,7 +272,8 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
     reader.finish()
     camera = reader.camera
     if camera is None:
-        raise SceneError(f"{path}: expected a camera, found none")
+        reader.report.add(str(path), "no camera", "one of 90 degrees along z")
+        camera = PerspectiveCamera(FORWARD, 90.0)
     return Scene(
         camera,
         tuple(reader.instances),
@@ -267,7 +281,7 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         reader.film,
         reader.sampler,
         reader.integrator,
-        materials=dict(reader.materials),
+        materials=dict(reader.names.materials),
         name=Path(path).stem,
         duration_s=duration_s(camera, reader.instances),
     )

@@ -20,7 +20,7 @@ from scenes.canonical import (
 )
 from scenes.formats.directives.surface_writer import SurfaceWriter
 from scenes.formats.geometry.conventions import FAR, aspect_of
-from scenes.formats.geometry.placing import PartKey, part_key, shared_parts
+from scenes.formats.geometry.placing import PartKey, lose_back, part_key, shared_parts
 from scenes.formats.text.numbers import listed, number
 
 INLINE_MAX = 64
@@ -50,6 +50,7 @@ class SceneWriter(SurfaceWriter):
         for light in scene.lights:
             self.write_light(light)
         for instance in scene.instances:
+            lose_back(instance, self.report)
             self.write_instance(instance)
         self.lines.append("WorldEnd")
 
@@ -87,11 +88,12 @@ class SceneWriter(SurfaceWriter):
         self.report.add("integrator", "paths without a limit", f"{_ENDLESS} bounces")
         return _ENDLESS
 
-    def window(self, half: float, mirrored: bool = False) -> str:
-        """The screen window of an image whose shorter side is twice ``half``."""
+    def window(self, half: float, mirrored: bool = False, shift: tuple[float, float] = (0.0, 0.0)) -> str:
+        """The screen window of an image whose shorter side is twice ``half``, its middle off the axis by ``shift``."""
         width, height = (half * side for side in self.aspect)
-        left = width if mirrored else -width
-        return f' "float screenwindow" {listed((left, -left, -height, height))}'
+        width = -width if mirrored else width
+        across, up = 2.0 * width * shift[0], 2.0 * height * shift[1]
+        return f' "float screenwindow" {listed((across - width, across + width, up - height, up + height))}'
 
     def camera_line(self, camera: Camera) -> str:
         """What a camera is, without its place."""
@@ -104,6 +106,8 @@ class SceneWriter(SurfaceWriter):
             if camera.shutter_s != (0.0, 0.0):
                 line += f' "float shutteropen" [ {number(camera.shutter_s[0])} ]'
                 line += f' "float shutterclose" [ {number(camera.shutter_s[1])} ]'
+            if camera.shift != (0.0, 0.0):
+                line += self.window(1.0, shift=camera.shift)
         elif isinstance(camera, OrthographicCamera):
             line = 'Camera "orthographic"'
             if camera.half_width != 1.0:

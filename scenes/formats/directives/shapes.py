@@ -38,6 +38,9 @@ class ShapeReader:
         where = str(parameters.place)
         if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
             mesh = self._ply(parameters, beside) if kind == "plymesh" else self._triangles(parameters)
+            if mesh is None:
+                parameters.asked.update(parameters.given)
+                return None
             if kind == "loopsubdiv":
                 parameters.asked.update(parameters.given)
                 self.report.add(where, "a subdivision surface", "its control mesh")
@@ -96,17 +99,28 @@ class ShapeReader:
         self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
         return (turned(mesh) if turn_over else mesh), place
 
-    def _ply(self, parameters: Parameters, beside: Path) -> Mesh:
-        where = str(parameters.place)
-        path = self.files.path(parameters.text("filename", ""), where, beside)
+    def _ply(self, parameters: Parameters, beside: Path) -> Mesh | None:
+        where, name = str(parameters.place), parameters.text("filename", "")
+        path = self.files.known(name, where, self.report, f"the mesh {name!r}", "left out", beside)
+        if path is None:
+            return None
         if path not in self._meshes:
             self._meshes[path] = facing_normals(read_ply(self.files.read(path, where), str(path)))
         return self._meshes[path]
 
+    def _indices(self, parameters: Parameters) -> np.ndarray | None:
+        """Corners of triangles; LuxRender's quads are two each."""
+        found = [parameters.numbers(name) for name in ("indices", "triindices")]
+        kept = [part for part in found if part is not None][:1]
+        quads = parameters.numbers("quadindices")
+        if quads is not None:
+            if len(quads) % 4:
+                raise SceneError(f"{parameters.place}: quadindices: expected fours")
+            kept.append(quads.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].ravel())
+        return np.concatenate(kept) if kept else None
+
     def _triangles(self, parameters: Parameters) -> Mesh:
-        points, indices = parameters.numbers("P"), parameters.numbers("indices")
-        if indices is None:
-            indices = parameters.numbers("triindices")
+        points, indices = parameters.numbers("P"), self._indices(parameters)
         where = str(parameters.place)
         if points is None or indices is None or len(points) % 3 or len(indices) % 3 or not len(indices):
             raise SceneError(f"{where}: expected points P and indices, in threes")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from scenes.canonical import ConstantTexture, Material, Matte, SceneError
+from scenes.canonical import Bumped, ConstantTexture, Material, Matte
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import TextureReader
@@ -27,7 +27,13 @@ class Surfaces(TextureReader):
         raise NotImplementedError
 
     def material(self, kind: str, parameters: Parameters) -> Material:
-        """The material of a kind; a kind that is not known is reported."""
+        """The material of a kind, bumped where it has a bump map; a kind that is not known is reported."""
+        made = self._plain(kind, parameters)
+        if parameters.types.get("bumpmap") == "texture":
+            return Bumped(made, self.texture(parameters, "bumpmap", grey(0.0), "float"))
+        return made
+
+    def _plain(self, kind: str, parameters: Parameters) -> Material:
         where, makers, base_colors = str(parameters.place), self.makers(), self.base_colors()
         parameters.text("type", kind)
         if kind in makers:
@@ -46,15 +52,13 @@ class Surfaces(TextureReader):
         return Matte(self.texture(parameters, "Kd", grey(0.5)), self.scalar(parameters, "sigma", 0.0))
 
     def mixed(self, parameters: Parameters) -> list[Material]:
-        """The two materials that a mixture names.
+        """The two materials that a mixture names."""
+        names = ("namedmaterial1", "namedmaterial2")
+        return [self.named(parameters.text(name, ""), str(parameters.place)) for name in names]
 
-        Raises:
-            SceneError: a name is that of no material.
-        """
-        parts = []
-        for name in ("namedmaterial1", "namedmaterial2"):
-            wanted = parameters.text(name, "")
-            if wanted not in self.materials:
-                raise SceneError(f"{parameters.place}: {name}: expected a named material, got {wanted!r}")
-            parts.append(self.materials[wanted])
-        return parts
+    def named(self, name: str, where: str) -> Material:
+        """The material of a name; one that nothing defines is grey, which is reported."""
+        if name not in self.names.materials:
+            self.report.add(where, f"material {name!r}, which nothing defines", "grey, matte")
+            return Matte(ConstantTexture(grey(0.5)))
+        return self.names.materials[name]

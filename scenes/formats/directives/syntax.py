@@ -8,9 +8,10 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); LuxRender 1.x 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,6 +43,9 @@ _PIECE = 1 << 20  # characters of a list of numbers that are read at a time
 
 Values = NDArray[np.float64] | tuple[str, ...]
 
+Opener = Callable[[str, Place, tuple[Path, ...]], tuple[str, Path]]
+"""Text and path of an included file: its name, where it is named, and the files that are open, the innermost last."""
+
 
 @lru_cache(maxsize=1)
 def _lexer() -> lark.Lark:
@@ -53,11 +57,12 @@ def _lexer() -> lark.Lark:
 
 @dataclass(frozen=True)
 class Directive:
-    """A directive: its name, and its strings and numbers in their order."""
+    """A directive: its name, its strings and numbers in their order, and the file that it begins in."""
 
     name: str
     values: tuple[Values, ...]
     place: Place
+    file: Path
 
 
 @dataclass
@@ -144,24 +149,43 @@ class Parameters:
         return [name for name in self.given if name not in self.asked]
 
 
-def parse_directives(text: str, file: str) -> Iterator[Directive]:
-    """Directives of a text.
+def parse_directives(text: str, file: Path, opener: Opener) -> Iterator[Directive]:
+    """Directives of a text and of what it includes.
+
+    An included text stands in the place of ``Include``, so that parameters behind it belong to its last directive.
 
     Raises:
         SceneError: the text is not one of directives; the message has file, line and column.
     """
-    head, values = None, []
-    for token in _tokens(text, file):
+    head, begun, values = None, file, []
+    for token, within in _spliced(text, (file,), opener):
         if token.type == "NAME":
             if head is not None:
-                yield _directive(head, values, file)
-            head, values = token, []
+                yield _directive(head, values, begun)
+            head, begun, values = token, within, []
         elif head is None:
-            raise SceneError(f"{Place(file, token.line, token.column)}: expected a directive, got {str(token)[:20]!r}")
+            place = Place(within.name, token.line, token.column)
+            raise SceneError(f"{place}: expected a directive, got {str(token)[:20]!r}")
         else:
-            values.append(_values(token, file))
+            values.append(_values(token, within.name))
     if head is not None:
-        yield _directive(head, values, file)
+        yield _directive(head, values, begun)
+
+
+def _spliced(text: str, inside: tuple[Path, ...], opener: Opener) -> Iterator[tuple[Any, Path]]:
+    """Tokens of a text and of what it includes, each with the file that it is in."""
+    file = inside[-1]
+    tokens = _tokens(text, file.name)
+    for token in tokens:
+        if token.type != "NAME" or str(token) != "Include":
+            yield token, file
+            continue
+        place, name = Place(file.name, token.line, token.column), next(tokens, None)
+        found = _values(name, file.name) if name is not None and name.type in ("STRING", "STRINGS") else ()
+        if not isinstance(found, tuple) or len(found) != 1:
+            raise SceneError(f"{place}: Include: expected a string")
+        included, path = opener(found[0], place, inside)
+        yield from _spliced(included, (*inside, path), opener)
 
 
 def _tokens(text: str, file: str) -> Iterator[Any]:
@@ -176,8 +200,8 @@ def _tokens(text: str, file: str) -> Iterator[Any]:
         raise SceneError(f"{place}: expected a directive, string or number, got {got!r}") from None
 
 
-def _directive(head: Any, values: list[Values], file: str) -> Directive:
-    return Directive(str(head), tuple(values), Place(file, head.line, head.column))
+def _directive(head: Any, values: list[Values], file: Path) -> Directive:
+    return Directive(str(head), tuple(values), Place(file.name, head.line, head.column), file)
 
 
 def _values(token: Any, file: str) -> Values:

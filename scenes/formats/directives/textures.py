@@ -5,7 +5,6 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on tex
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,6 @@ import numpy as np
 from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
-    Material,
     MixTexture,
     Rgb,
     SceneError,
@@ -22,6 +20,7 @@ from scenes.canonical import (
 )
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb, sampled_rgb, xyz_to_rgb
+from scenes.formats.directives.names import Names, Of
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import SceneFiles
@@ -39,13 +38,12 @@ class TextureReader:
     Attributes:
         files: for images.
         report: of what could not be kept.
-        textures, materials: by name; filled by the reader.
+        names: of textures and materials; filled by the reader.
     """
 
     files: SceneFiles
     report: LossReport
-    textures: Mapping[str, Texture]
-    materials: Mapping[str, Material]
+    names: Names
 
     def color(self, parameters: Parameters, name: str, default: Rgb) -> Rgb:
         """A colour, given in any of the ways of the format.
@@ -69,10 +67,10 @@ class TextureReader:
         if kind == "float":
             return rgb(np.full(3, parameters.number(name, 0.0)))
         if kind == "spectrum":
-            return self._spectrum(parameters, name)
+            return self._spectrum(parameters, name, default)
         raise SceneError(f"{place}: expected a colour, got the type {kind!r}")
 
-    def _spectrum(self, parameters: Parameters, name: str) -> Rgb:
+    def _spectrum(self, parameters: Parameters, name: str, default: Rgb) -> Rgb:
         given = parameters.given[name]
         if not isinstance(given, tuple):
             values = _pairs(parameters, name)
@@ -83,7 +81,9 @@ class TextureReader:
         if known is not None and parts[-1] in ("eta", "k"):
             return known[0] if parts[-1] == "eta" else known[1]
         where = str(parameters.place)
-        path = self.files.path(file, where)
+        path = self.files.known(file, where, self.report, f"the spectrum {file!r}", f"the colour {default}")
+        if path is None:
+            return default
         numbers = " ".join(line.split("#")[0] for line in self.files.text(path, where).splitlines()).split()
         try:
             values = np.array([float(number) for number in numbers]).reshape(-1, 2)
@@ -93,13 +93,13 @@ class TextureReader:
             raise SceneError(f"{path}: expected pairs of finite numbers")
         return sampled_rgb(values[:, 0], values[:, 1])
 
-    def texture(self, parameters: Parameters, name: str, default: Rgb) -> Texture:
-        """A texture by name, or a constant."""
+    def texture(self, parameters: Parameters, name: str, default: Rgb, of: Of = "color") -> Texture:
+        """A texture by name, of colours or of numbers, or a constant."""
         if parameters.types.get(name) != "texture":
             return ConstantTexture(self.color(parameters, name, default))
-        found = self.textures.get(parameters.text(name, ""))
+        found = self.names.textures(of).get(parameters.text(name, ""))
         if found is None:
-            wanted = f"{name}: texture {parameters.text(name, '')!r}, which nothing defines"
+            wanted = f"{name}: texture {parameters.text(name, '')!r} of type {of}, which nothing defines"
             self.report.add(str(parameters.place), wanted, f"the constant {default}")
             return ConstantTexture(default)
         return found
@@ -108,12 +108,12 @@ class TextureReader:
         """A number; a texture becomes its mean, which is reported."""
         if parameters.types.get(name) != "texture":
             return parameters.number(name, default)
-        value = float(np.mean(mean_of(self.texture(parameters, name, grey(default)))))
+        value = float(np.mean(mean_of(self.texture(parameters, name, grey(default), "float"))))
         self.report.add(str(parameters.place), f"{name}: a texture", f"its mean, {value:g}")
         return value
 
-    def made_texture(self, kind: str, parameters: Parameters) -> Texture:
-        """The texture that a ``Texture`` directive makes."""
+    def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
+        """The texture that a ``Texture`` directive makes, of colours or of numbers."""
         where = str(parameters.place)
         scale = (parameters.number("uscale", 1.0), parameters.number("vscale", 1.0))
         offset = (parameters.number("udelta", 0.0), parameters.number("vdelta", 0.0))
@@ -121,12 +121,12 @@ class TextureReader:
         if mapping != "uv":
             self.report.add(where, f"mapping {mapping!r} of a texture", "the mapping uv")
         if kind == "constant":
-            return self.texture(parameters, "value", (1.0, 1.0, 1.0))
+            return self.texture(parameters, "value", (1.0, 1.0, 1.0), of)
         if kind == "scale":
-            return product_of(*(self.texture(parameters, f"tex{n}", (1.0, 1.0, 1.0)) for n in (1, 2)))
+            return product_of(*(self.texture(parameters, f"tex{n}", (1.0, 1.0, 1.0), of) for n in (1, 2)))
         if kind == "mix":
             amount = self.scalar(parameters, "amount", 0.5)
-            parts = self.texture(parameters, "tex1", grey(0.0)), self.texture(parameters, "tex2", grey(1.0))
+            parts = self.texture(parameters, "tex1", grey(0.0), of), self.texture(parameters, "tex2", grey(1.0), of)
             return MixTexture(*parts, amount)
         if kind == "checkerboard":
             if parameters.whole("dimension", 2, 2, 3) == 3:
@@ -135,7 +135,7 @@ class TextureReader:
                 self.report.add(where, "antialiasing of the checkerboard", "that of the renderer")
             if offset != (0.0, 0.0):
                 self.report.add(where, "udelta, vdelta of a checkerboard", "none")
-            parts = self.texture(parameters, "tex1", grey(1.0)), self.texture(parameters, "tex2", grey(0.0))
+            parts = self.texture(parameters, "tex1", grey(1.0), of), self.texture(parameters, "tex2", grey(0.0), of)
             return CheckerboardTexture(*parts, scale)
         if kind == "imagemap":
             return self.image(parameters, scale, offset)
@@ -150,10 +150,12 @@ class TextureReader:
         """The texture of a picture, by the rules of the dialect."""
         raise NotImplementedError
 
-    def image_path(self, parameters: Parameters) -> tuple[Path, str]:
-        """The file of a picture, and what lies beyond its edges."""
-        where = str(parameters.place)
-        path = self.files.path(parameters.text("filename", ""), where)
+    def image_path(self, parameters: Parameters) -> tuple[Path | None, str]:
+        """The file of a picture, None where it is missing, and what lies beyond its edges."""
+        where, name = str(parameters.place), parameters.text("filename", "")
+        path = self.files.known(name, where, self.report, f"the picture {name!r}", "the constant 0.5")
+        if path is None:
+            parameters.asked.update(parameters.given)
         wrap = parameters.text("wrap", "repeat")
         if wrap not in _WRAPS:
             raise SceneError(f"{where}: wrap: expected one of {', '.join(_WRAPS)}, got {wrap!r}")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from scenes.arithmetic import product
-from scenes.canonical import Mesh
+from scenes.canonical import Cube, Mesh, Shape, Sphere
 
 FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
 """Mirrors z; a sphere stays, and its texture coordinate ``v`` is reversed."""
@@ -20,6 +22,20 @@ def turned(mesh: Mesh) -> Mesh:
     """The mesh with its inside out."""
     normals = None if mesh.normals is None else -mesh.normals
     return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
+
+
+@lru_cache(maxsize=64)
+def is_closed(shape: Shape) -> bool:
+    """Whether a shape has an inside that its faces turn their backs to, which are not seen from without."""
+    if not isinstance(shape, Mesh):
+        return isinstance(shape, Sphere | Cube)
+    points, corner = np.unique(shape.vertices, axis=0, return_inverse=True)
+    faces = corner.reshape(-1)[shape.faces].astype(np.int64)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = (np.sort(edges @ [len(points), 1][::step]) for step in (1, -1))
+    corners = points[faces].astype(np.float64)
+    volume = (corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum()
+    return bool(volume > 0.0) and np.array_equal(there, back)
 
 
 def facing_normals(mesh: Mesh) -> Mesh:

@@ -8,21 +8,28 @@ from scenes.animation import pose_at
 from scenes.arithmetic import product
 from scenes.canonical import Emissive, Instance, Mesh, Scene
 from scenes.canonical.values import Matrix, Rgb, RigidTrack
+from scenes.formats.geometry.orientation import is_closed
 from scenes.formats.geometry.transform_stack import track_times
 from scenes.formats.losses import LossReport
 
-PartKey = tuple[int, int]
+PartKey = tuple[int, int, bool]
 
 
 def part_key(instance: Instance) -> PartKey:
-    """Equal for instances of one shape and one material."""
-    return id(instance.shape), id(instance.material)
+    """Equal for instances of one shape and one material with as many sides."""
+    return id(instance.shape), id(instance.material), instance.one_sided
 
 
 def shared_parts(scene: Scene) -> frozenset[PartKey]:
     """Meshes that several instances place and that do not shine; lamps cannot be placed as objects."""
     counts = Counter(part_key(one) for one in scene.instances if isinstance(one.shape, Mesh) and not shines(one))
     return frozenset(key for key, count in counts.items() if count > 1)
+
+
+def lose_back(instance: Instance, report: LossReport) -> None:
+    """Reports a black back, where it can be seen: that of a closed shape lies inside."""
+    if instance.one_sided and not is_closed(instance.shape):
+        report.add(instance.name or "shape", "a surface with a black back", "the same on both sides")
 
 
 def shines(instance: Instance) -> bool:

@@ -79,7 +79,7 @@ class LuxReader(SceneReader):
     _motion_key: int | None = None
 
     def make_surfaces(self) -> LuxSurfaces:
-        return LuxSurfaces(self.files, self.report, self.textures, self.materials)
+        return LuxSurfaces(self.files, self.report, self.names)
 
     def dialect(self) -> dict[str, Callable[[Directive], None]]:
         return {
@@ -134,7 +134,8 @@ class LuxReader(SceneReader):
             return
         parameters = parameters_of(directive, 3)
         assert isinstance(self.surfaces, LuxSurfaces)
-        self.surfaces.fresnel[word(directive)] = self.surfaces.make_fresnel(word(directive, 2), parameters)
+        made = self.surfaces.make_fresnel(word(directive, 2), parameters)
+        self.names.define(self.names.indices, word(directive), made)
         self.left_over(parameters, f"texture {word(directive)!r}")
 
     def _move_object(self, directive: Directive) -> None:
@@ -183,7 +184,7 @@ class LuxReader(SceneReader):
 
     def _light_texture(self, parameters: Parameters) -> Rgb:
         name = parameters.text("L", "")
-        found = self.surfaces.textures.get(name)
+        found = self.names.colors.get(name)
         if found is None:
             self.report.add(str(parameters.place), f"light texture {name!r}, which is not known", "white")
             return grey(1.0)
@@ -247,7 +248,9 @@ class LuxReader(SceneReader):
             self.report.add(where, f"mapping {mapping!r} of an environment map", "latlong")
         if not file:
             return lights.even_environment(strength)
-        path = self.files.path(file, where)
+        path = self.files.known(file, where, self.report, f"the picture {file!r}", "even light")
+        if path is None:
+            return lights.even_environment(strength)
         return lights.environment_map(lux_image(path, gamma, 1.0, where), self.transforms.current[0], strength, path)
 
     def _read_area_light(self, directive: Directive) -> None:

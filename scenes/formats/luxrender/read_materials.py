@@ -5,8 +5,6 @@ Source: LuxRender scene file format 1.0 (wiki of LuxRender), sections on materia
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,6 @@ from scenes.canonical import (
     ImageTexture,
     Masked,
     Material,
-    Matte,
     Metal,
     Mirror,
     Rgb,
@@ -30,23 +27,23 @@ from scenes.canonical import (
 )
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.indices import index_of_reflectance
-from scenes.formats.appearance.mixtures import mixture_of
+from scenes.formats.appearance.mixtures import NOTHING, is_nothing, mixture_of
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb
+from scenes.formats.directives.names import Of
 from scenes.formats.directives.surfaces import Maker, Surfaces
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 from scenes.formats.geometry.conventions import first_row_below
 
 
-@dataclass
 class LuxSurfaces(Surfaces):
-    """Textures and materials of LuxRender; ``fresnel`` are its textures of complex indices."""
-
-    fresnel: dict[str, tuple[Rgb, Rgb]] = dataclasses.field(default_factory=dict)
+    """Textures and materials of LuxRender."""
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         where = str(parameters.place)
         path, wrap = self.image_path(parameters)
+        if path is None:
+            return ConstantTexture(grey(0.5))
         image = lux_image(path, parameters.number("gamma", 2.2), parameters.number("gain", 1.0), where)
         kind = parameters.text("filtertype", "bilinear")
         kinds = {"nearest": "nearest", "bilinear": "bilinear", "mipmap_trilinear": "mipmap", "mipmap_ewa": "mipmap"}
@@ -55,13 +52,13 @@ class LuxSurfaces(Surfaces):
         size, start = first_row_below(scale, offset)
         return ImageTexture(image, size, start, wrap, kinds[kind], str(path))  # type: ignore[arg-type]
 
-    def made_texture(self, kind: str, parameters: Parameters) -> Texture:
+    def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
         """A texture; in LuxRender the spectra of lamps are textures too."""
         if kind == "blackbody":
             return ConstantTexture(blackbody_rgb(min(max(parameters.number("temperature", 6500.0), 100.0), 1e6), 1.0))
         if kind == "equalenergy":
             return ConstantTexture(grey(parameters.number("energy", 1.0)))
-        return super().made_texture(kind, parameters)
+        return super().made_texture(kind, parameters, of)
 
     def make_fresnel(self, kind: str, parameters: Parameters) -> tuple[Rgb, Rgb]:
         """Index of refraction of a fresnel texture."""
@@ -90,15 +87,12 @@ class LuxSurfaces(Surfaces):
             "matte": self.matte, "mirror": self._mirror, "glass": self._glass, "glass2": self._glass,
             "roughglass": self._glass, "metal": self._named_metal, "metal2": self._metal, "glossy": self._glossy,
             "shinymetal": self._glossy, "mix": self._mix, "mattetranslucent": self._mattetranslucent,
-            "null": self._null,
+            "null": lambda _: NOTHING,
         }  # fmt: skip
 
     def base_colors(self) -> dict[str, str]:
         kinds = ("carpaint", "velvet", "cloth", "glossytranslucent", "scatter", "layered", "glossycoating")
         return dict.fromkeys((*kinds, "doubleside"), "Kd")
-
-    def _null(self, parameters: Parameters) -> Material:
-        return Masked(Matte(ConstantTexture(grey(0.0))), ConstantTexture(grey(0.0)))
 
     def _mirror(self, parameters: Parameters) -> Material:
         return Mirror(self.texture(parameters, "Kr", grey(1.0)))
@@ -110,7 +104,7 @@ class LuxSurfaces(Surfaces):
         parts = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
         rough = parameters.text("type", "glass") == "roughglass"
         alphas = self._alphas(parameters, 0.001) if rough else (0.0, 0.0)
-        if parameters.number("cauchyb", 0.0):
+        if "cauchyb" in parameters and self.scalar(parameters, "cauchyb", 0.0):
             self.report.add(str(parameters.place), "dispersion (cauchyb)", "one index for all colours")
         thin = parameters.truth("architectural", False)
         return Glass(*parts, self.scalar(parameters, "index", 1.5), alphas, thin)
@@ -126,7 +120,7 @@ class LuxSurfaces(Surfaces):
 
     def _metal(self, parameters: Parameters) -> Material:
         name = parameters.text("fresnel", "")
-        index = self.fresnel.get(name)
+        index = self.names.indices.get(name)
         if index is None:
             self.report.add(str(parameters.place), f"fresnel texture {name!r}, which nothing defines", "aluminium")
             index = metal("Al")
@@ -144,8 +138,8 @@ class LuxSurfaces(Surfaces):
 
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)
-        amount = self.texture(parameters, "amount", grey(0.5))
-        return Masked(second, amount) if _nothing(first) else mixture_of(first, second, amount)
+        amount = self.texture(parameters, "amount", grey(0.5), "float")
+        return Masked(second, amount) if is_nothing(first) else mixture_of(first, second, amount)
 
     def _mattetranslucent(self, parameters: Parameters) -> Material:
         sides = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
@@ -156,11 +150,6 @@ class LuxSurfaces(Surfaces):
         self.report.add(str(parameters.place), "energyconserving with a texture", "its mean")
         rest = ConstantTexture(rgb(1.0 - np.array(mean_of(sides[0]))))
         return Translucent(sides[0], product_of(sides[1], rest))
-
-
-def _nothing(material: Material) -> bool:
-    """Whether a surface is not there."""
-    return isinstance(material, Masked) and material.opacity == ConstantTexture(grey(0.0))
 
 
 def lux_image(path: Path, gamma: float, gain: float, where: str) -> np.ndarray:

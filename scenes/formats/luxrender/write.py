@@ -94,9 +94,14 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
             camera = dataclasses.replace(camera, lens_radius=lens, focal_distance=size * focus if focus != FAR else FAR)
         self.lines += _in_motion([_looking(pose) for pose in poses], times_s)
         half = camera.half_width if isinstance(camera, OrthographicCamera) else 1.0
-        plain = dataclasses.replace(camera, half_width=1.0) if isinstance(camera, OrthographicCamera) else camera
+        shift = camera.shift if isinstance(camera, PerspectiveCamera) else (0.0, 0.0)
+        plain = camera
+        if isinstance(camera, OrthographicCamera):
+            plain = dataclasses.replace(camera, half_width=1.0)
+        elif isinstance(camera, PerspectiveCamera):
+            plain = dataclasses.replace(camera, shift=(0.0, 0.0))
         # without a window LuxCore takes the field of view across, not along the shorter side
-        self.lines.append(self.camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0)))
+        self.lines.append(self.camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0), shift))
 
     # --- lights --------------------------------------------------------------------------------------------------
 

@@ -26,7 +26,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
-from scenes.formats.appearance.folding import mean_of, product_of
+from scenes.formats.appearance.folding import height_of, mean_of, product_of
 from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.mixtures import added_coat, dimmed, lobes_of
 from scenes.formats.appearance.spectra import METALS, rgb
@@ -54,9 +54,7 @@ class LuxSurfaceWriter(SurfaceWriter):
     def material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"
         if isinstance(material, Bumped):
-            if material.scale != 1.0:
-                self.report.add(where, "the scale of a bump map", "1")
-            return f"{self.material_line(material.base, name)} {self.texture(material.height, 'bumpmap', 'float')}"
+            return f"{self.material_line(material.base, name)} {self.texture(height_of(material), 'bumpmap', 'float')}"
         if isinstance(material, Uber):
             material = lobes_of(material, where, self.report, schlick=True)
         if isinstance(material, Masked):

@@ -30,9 +30,13 @@ from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_lights import MitsubaLights
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
-from scenes.formats.mitsuba.read_shapes import MitsubaShapes
+from scenes.formats.mitsuba.read_shapes import MitsubaShapes, seeing_all
+from scenes.formats.mitsuba.read_textures import MISSING
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.text.xml_tree import Node, parse_xml
+
+TEXT_MAX = 1 << 16
+"""Most characters of a value with its parameters."""
 
 FORWARD = np.diag([-1.0, 1.0, -1.0, 1.0])
 """From a camera that looks along +z with x to the left to the canonical one."""
@@ -55,6 +59,7 @@ class MitsubaReader:
         self.files, self.report = files, report
         self.names: dict[str, Node] = {}
         self.defaults: dict[str, str] = {}
+        self._missing: dict[str, Node] = {}
         self.surfaces = MitsubaSurfaces(files, report, self.find)
         self.shapes = MitsubaShapes(files, report, self.surfaces, self.find)
         self.materials: dict[str, Material] = {}
@@ -99,14 +104,36 @@ class MitsubaReader:
     def _filled(self, node: Node) -> None:
         """Replaces ``$name`` by the parameter, and notes elements with names."""
         for key, value in node.attributes.items():
-            if value.startswith("$"):
-                if value[1:] not in self.defaults:
-                    raise SceneError(f"{node.place}: expected a parameter with a default, got {value!r}")
-                node.attributes[key] = self.defaults[value[1:]]
+            if "$" in value:
+                node.attributes[key] = self._with_parameters(value, node)
+        if node.tag == "spectrum" and "filename" in node.attributes:
+            self._sample(node)
         if node.tag not in ("ref", "alias") and "id" in node.attributes:
             self.names[node.get("id")] = node
         for child in node.children:
             self._filled(child)
+
+    def _with_parameters(self, text: str, node: Node) -> str:
+        """A value with its parameters, wherever they stand in it; of two that fit the longer one is meant."""
+        for name in sorted(self.defaults, key=len, reverse=True):
+            text = text.replace(f"${name}", self.defaults[name])
+            if len(text) > TEXT_MAX:
+                raise SceneError(f"{node.place}: expected at most {TEXT_MAX:,} characters with parameters")
+        if "$" in text:
+            raise SceneError(f"{node.place}: expected a parameter with a default, got {text[:40]!r}")
+        return text
+
+    def _sample(self, node: Node) -> None:
+        """Puts the samples of a spectrum's file in the place of its name; none where it is missing."""
+        name, where = node.attributes.pop("filename"), str(node.place)
+        path = self.files.known(name, where, self.report, f"the spectrum {name!r}", "the constant 0.5")
+        if path is None:
+            node.attributes["value"] = "0.5"
+            return
+        words = " ".join(line.split("#")[0] for line in self.files.text(path, where).splitlines()).split()
+        if not words or len(words) % 2:
+            raise SceneError(f"{path}: expected pairs of a wavelength and a value")
+        node.attributes["value"] = ", ".join(f"{a}:{b}" for a, b in zip(words[::2], words[1::2], strict=True))
 
     def _named(self, node: Node, name: str) -> Node:
         if name not in self.names:
@@ -114,12 +141,15 @@ class MitsubaReader:
         return self.names[name]
 
     def find(self, reference: Node) -> Node:
-        """The element that a reference names.
-
-        Raises:
-            SceneError: no element has the name.
-        """
-        return self._named(reference, reference.get("id"))
+        """The element that a reference names; where nothing has the name, a grey one, which is reported."""
+        name = reference.get("id")
+        if name in self.names:
+            return self.names[name]
+        self.report.add(str(reference.place), f"{name!r}, which nothing is named before it", "grey")
+        if name not in self._missing:
+            tag = "texture" if reference.get("name") else "bsdf"
+            self._missing[name] = Node(tag, {"type": MISSING if tag == "texture" else "diffuse"}, reference.place)
+        return self._missing[name]
 
     def _node(self, node: Node) -> None:
         if node.tag == "integrator":
@@ -140,7 +170,7 @@ class MitsubaReader:
         elif node.tag in ("sampler", "film"):
             (self._sampler if node.tag == "sampler" else self._film)(node)
         else:
-            raise SceneError(f"{node.place}: expected an element of a scene, got {node.tag!r}")
+            self.report.unknown(node.place, "element", node.tag)
 
     # --- camera, film, sampling ----------------------------------------------------------------------------------
 
@@ -186,13 +216,18 @@ class MitsubaReader:
         if kind in ("perspective", "thinlens"):
             lens = properties.number("apertureRadius", 0.0) if kind == "thinlens" else 0.0
             focus = properties.number("focusDistance", FAR)
+            if not focus > 0.0:
+                if lens > 0.0:
+                    self.report.add(properties.where, f"a lens in focus at {focus:g}", "a pinhole")
+                lens, focus = 0.0, FAR
             self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, track, shutter)
         elif kind == "orthographic":
             self.camera = OrthographicCamera(to_world, track=track)
         elif kind == "spherical":
             self.camera = EnvironmentCamera(to_world)
         else:
-            raise SceneError(f"{node.place}: expected a kind of sensor, got {kind!r}")
+            self.report.unknown(node.place, "sensor", kind, "perspective")
+            self.camera = PerspectiveCamera(to_world, self._field(properties), 0.0, FAR, track, shutter)
         properties.left_over()
 
     def _field(self, properties: Properties) -> float:
@@ -235,7 +270,8 @@ def load_mitsuba(path: Path, root: Path | None, report: LossReport) -> Scene:
         raise SceneError(f"{path}: expected a scene file, found none")
     reader.read(main)
     if reader.camera is None:
-        raise SceneError(f"{path}: expected a sensor, found none")
+        report.add(str(path), "no sensor", "one that sees the shapes along z")
+        reader.camera = seeing_all(reader.instances)
     parts = tuple(reader.instances), tuple(reader.lights.lights), reader.film, reader.sampler, reader.integrator
     lasts = duration_s(reader.camera, reader.instances)
     return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem, duration_s=lasts)

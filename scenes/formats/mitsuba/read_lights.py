@@ -62,10 +62,11 @@ class MitsubaLights:
             radiance = properties.color("radiance", grey(1.0))
             self.lights.append(EnvironmentLight(np.array([[list(radiance)]], np.float32)))
         elif kind == "envmap":
-            path = self.files.path(properties.text("filename", ""), properties.where)
+            name, scale = properties.text("filename", ""), properties.number("scale", 1.0)
+            path = self.files.known(name, properties.where, self.report, f"the picture {name!r}", "even light")
             matrix[:3, 3] = 0.0
-            image = loading.read_image(path)
-            self.lights.append(EnvironmentLight(image, matrix, properties.number("scale", 1.0), str(path)))
+            image = np.ones((1, 1, 3), np.float32) if path is None else loading.read_image(path)
+            self.lights.append(EnvironmentLight(image, matrix, scale, str(path or "")))
         elif kind in ("sun", "sky", "sunsky"):
             self._daylight(kind, properties, matrix)
         elif kind == "area":

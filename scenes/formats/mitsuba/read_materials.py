@@ -27,13 +27,15 @@ from scenes.canonical import (
     Translucent,
 )
 from scenes.formats.appearance.folding import mean_of
-from scenes.formats.appearance.mixtures import plastic_of
+from scenes.formats.appearance.mixtures import NOTHING, plastic_of
 from scenes.formats.appearance.spectra import grey, metal
 from scenes.formats.mitsuba.properties import Properties, ior
 from scenes.formats.mitsuba.read_textures import MitsubaTextures
 from scenes.formats.text.xml_tree import Node
 
 _NESTED_MAX = 32
+_ONE_SIDED = ("diffuse", "roughdiffuse", "conductor", "roughconductor", "plastic", "roughplastic", "phong", "ward")
+_AROUND = ("mask", "blendbsdf", "mixturebsdf", "bump", "bumpmap", "coating", "roughcoating")
 
 
 @dataclass
@@ -62,7 +64,9 @@ class MitsubaSurfaces(MitsubaTextures):
         if kind in makers:
             made = makers[kind](properties)
             properties.left_over()
-        elif kind in ("null", "hk", "irawan", "sssbrdf", "normalmap", "rmbrdf", "dipole"):
+        elif kind == "null":
+            made = NOTHING
+        elif kind in ("hk", "irawan", "sssbrdf", "normalmap", "rmbrdf", "dipole"):
             self.report.add(properties.where, f"material {kind!r}", "grey, matte")
             made = Matte(ConstantTexture(grey(0.5)))
         else:
@@ -71,6 +75,15 @@ class MitsubaSurfaces(MitsubaTextures):
         self._deep -= 1
         self.made[id(node)] = made
         return made
+
+    def one_sided(self, node: Node, deep: int = 0) -> bool:
+        """Whether what an element makes is black behind: what is opaque has one side in Mitsuba, unless it is told."""
+        if node.get("type") in _ONE_SIDED:
+            return True
+        if node.get("type") not in _AROUND or deep > _NESTED_MAX:
+            return False
+        parts = [self.find(child) if child.tag == "ref" else child for child in node.children if child.tag != "alias"]
+        return all(self.one_sided(part, deep + 1) for part in parts if part.tag == "bsdf")
 
     def inner(self, properties: Properties) -> list[Material]:
         """Materials inside a material, of elements or references."""

@@ -6,11 +6,12 @@ Source: Mitsuba 0.5 documentation, section on shapes.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
 
-from scenes.arithmetic import norm, product
+from scenes.arithmetic import norm, product, tan
 from scenes.canonical import (
     ConstantTexture,
     Cube,
@@ -19,6 +20,7 @@ from scenes.canonical import (
     Material,
     Matte,
     Mesh,
+    PerspectiveCamera,
     Rectangle,
     Rgb,
     SceneError,
@@ -26,6 +28,7 @@ from scenes.canonical import (
     Sphere,
 )
 from scenes.canonical.values import Matrix
+from scenes.formats.appearance.mixtures import NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
 from scenes.formats.geometry.mesh_files import read_obj, read_serialized
@@ -71,12 +74,18 @@ class MitsubaShapes:
             return []
         keys, times_s = properties.motion()
         track = motion(keys, times_s, properties.where, self.report)
-        material, emission = self._inside(properties)
-        shape, local = self._made(kind, properties, material)
+        material, emission, one_sided = self._inside(properties)
+        if is_nothing(material) and emission is None:
+            self.report.add(properties.where, "the border of a medium, which is not seen")
+            return []
+        made = self._made(kind, properties, material)
+        if made is None:
+            return []
+        shape, local = made
         if properties.truth("flipNormals", False):
             shape = turned(as_mesh(shape))
         properties.left_over()
-        return [Instance(shape, material, product(keys[0], local), track, node.get("id"), emission)]
+        return [Instance(shape, material, product(keys[0], local), track, node.get("id"), emission, one_sided)]
 
     def _instances(self, properties: Properties) -> list[Instance]:
         keys, times_s = properties.motion()
@@ -98,13 +107,13 @@ class MitsubaShapes:
                 ]
         raise SceneError(f"{properties.where}: instance: expected a reference to a shapegroup before it")
 
-    def _inside(self, properties: Properties) -> tuple[Material, Rgb | None]:
-        """Material and emission of a shape."""
-        material, emission = None, None
+    def _inside(self, properties: Properties) -> tuple[Material, Rgb | None, bool]:
+        """Material and emission of a shape, and whether its back is black; one with a medium alone is not there."""
+        material, emission, one_sided, default = None, None, True, _DEFAULT
         for child in properties.rest:
             node = self.find(child) if child.tag == "ref" else child
             if node.tag == "bsdf":
-                material = self.surfaces.material(node)
+                material, one_sided = self.surfaces.material(node), self.surfaces.one_sided(node)
             elif node.tag == "emitter" and node.get("type") == "area":
                 inner = Properties(node, self.report)
                 emission = inner.color("radiance", grey(1.0))
@@ -113,12 +122,13 @@ class MitsubaShapes:
                     inner.asked.add("samplingWeight")
                 inner.left_over()
             elif node.tag in ("medium", "subsurface"):
+                default = NOTHING if node.tag == "medium" else default
                 self.report.add(str(node.place), f"{node.tag} (participating medium)")
             elif node.tag not in ("texture",):
                 raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
-        return material or _DEFAULT, emission
+        return material or default, emission, one_sided
 
-    def _made(self, kind: str, properties: Properties, material: Material) -> tuple[Shape, Matrix]:
+    def _made(self, kind: str, properties: Properties, material: Material) -> tuple[Shape, Matrix] | None:
         where, place = properties.where, np.eye(4)
         if kind == "sphere":
             radius = properties.number("radius", 1.0)
@@ -136,7 +146,8 @@ class MitsubaShapes:
             return mesh, place
         if kind == "cylinder":
             return self._cylinder(properties)
-        return shape_of(self._file(kind, properties), material, where, self.report)
+        mesh = self._file(kind, properties)
+        return None if mesh is None else shape_of(mesh, material, where, self.report)
 
     def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
         first, last = properties.vector("p0", grey(0.0)), properties.vector("p1", (0.0, 0.0, 1.0))
@@ -152,8 +163,11 @@ class MitsubaShapes:
         self.report.add(properties.where, "shape 'cylinder'", f"a mesh of {len(mesh.faces)} triangles")
         return mesh, place
 
-    def _file(self, kind: str, properties: Properties) -> Mesh:
-        path = self.files.path(properties.text("filename", ""), properties.where)
+    def _file(self, kind: str, properties: Properties) -> Mesh | None:
+        name = properties.text("filename", "")
+        path = self.files.known(name, properties.where, self.report, f"the mesh {name!r}", "left out")
+        if path is None:
+            return None
         index = properties.whole("shapeIndex", 0, 0, 1 << 20)
         faceted, flipped = properties.truth("faceNormals", False), properties.truth("flipTexCoords", kind == "obj")
         if properties.number("maxSmoothAngle", 0.0):
@@ -171,3 +185,17 @@ class MitsubaShapes:
             mesh = facing_normals(mesh) if not faceted else mesh
             self._meshes[key] = Mesh(mesh.vertices, mesh.faces, None if faceted else mesh.normals, uvs, str(path))
         return self._meshes[key]
+
+
+def seeing_all(instances: list[Instance]) -> PerspectiveCamera:
+    """The camera of a scene that has none: along z, 45 degrees, as far away as the shapes are wide."""
+    corners = [
+        product(as_mesh(one.shape).vertices.astype(np.float64), one.to_world[:3, :3].T) + one.to_world[:3, 3]
+        for one in instances
+    ]
+    points = np.concatenate(corners) if corners else np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    away = float((high - low)[:2].max()) / (2.0 * tan(math.radians(22.5)))
+    to_world = np.diag([-1.0, 1.0, -1.0, 1.0])
+    to_world[:3, 3] = *(0.5 * (low + high))[:2], low[2] - max(away, 1e-3)
+    return PerspectiveCamera(to_world, 45.0)

@@ -22,6 +22,9 @@ from scenes.formats.text.scene_files import SceneFiles
 from scenes.formats.text.xml_tree import Node
 
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "zero": "black", "mirror": "repeat", "one": "clamp"}
+MISSING = "missing"
+"""Kind of a texture that stands in the place of one that is not there; it has been reported."""
+
 _FILTERS = {"nearest": "nearest", "trilinear": "mipmap", "ewa": "mipmap"}
 
 
@@ -74,6 +77,8 @@ class MitsubaTextures:
             base = self.made_texture(self.find(inner) if inner.tag == "ref" else inner) if inner else None
             factor = ConstantTexture(properties.color("scale", grey(1.0)))
             return factor if base is None else product_of(base, factor)
+        if kind == MISSING:
+            return ConstantTexture(grey(0.5))
         if kind == "bitmap":
             return self._bitmap(properties, scale, offset)
         properties.asked.update(properties.given)
@@ -82,7 +87,11 @@ class MitsubaTextures:
 
     def _bitmap(self, properties: Properties, scale: tuple[float, float], offset: tuple[float, float]) -> Texture:
         where = properties.where
-        path = self.files.path(properties.text("filename", ""), where)
+        name = properties.text("filename", "")
+        path = self.files.known(name, where, self.report, f"the picture {name!r}", "the constant 0.5")
+        if path is None:
+            properties.asked.update(properties.given)
+            return ConstantTexture(grey(0.5))
         image = loading.read_image(path)
         gamma = properties.number("gamma", -1.0)
         if gamma > 0.0 and not loading.is_linear(path):

@@ -5,7 +5,6 @@ Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Ha
 
 from __future__ import annotations
 
-import dataclasses
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 
@@ -15,25 +14,17 @@ from scenes.arithmetic import product
 from scenes.canonical import (
     Camera,
     Cube,
-    DirectionalLight,
     Disk,
     EnvironmentCamera,
     Instance,
-    Light,
     Mesh,
     OrthographicCamera,
     PerspectiveCamera,
-    PointLight,
     Rectangle,
     Scene,
     Sphere,
-    SpotLight,
-    SunSky,
 )
 from scenes.canonical.values import Matrix
-from scenes.daylight import facing_up
-from scenes.formats.appearance.spectra import grey, rgb
-from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.orientation import FLIPPED, upright
@@ -41,7 +32,7 @@ from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radi
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read import FILTERS, FORWARD
 from scenes.formats.mitsuba.write_elements import Element
-from scenes.formats.mitsuba.write_materials import MitsubaSurfaceWriter
+from scenes.formats.mitsuba.write_lights import MitsubaLightWriter
 from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
 
@@ -53,7 +44,7 @@ _INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidire
 
 
 @dataclass
-class MitsubaWriter(MitsubaSurfaceWriter):
+class MitsubaWriter(MitsubaLightWriter):
     """Elements of a scene, as they are made; ``modern`` is Mitsuba 3."""
 
     shared: frozenset[PartKey] = frozenset()
@@ -66,10 +57,11 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         self.root.set("version", "3.0.0" if self.modern else "0.5.0")
         self._integrator(scene)
         self._sensor(scene)
+        one_sided = {id(one.material) for one in scene.instances if one.one_sided}
         for name, material in scene.materials.items():
-            self.material(material, name)
+            self.material(material, name, id(material) in one_sided)
         for light in (*scene.lights, *([scene.background] if scene.background is not None else [])):
-            self._emitter(light)
+            self.emitter(light)
         if scene.background is not None:
             self.report.add(scene.name or "scene", "a background that is seen and does not light", "one that lights")
         if scene.ambient != (0.0, 0.0, 0.0):
@@ -121,6 +113,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
             made = self.plugin("sensor", "thinlens" if camera.lens_radius > 0.0 else "perspective")
             self.put(made, "float", "fov", number(camera.fov_deg))
             self.put(made, "string", "fovAxis", "smaller")
+            self._shift(made, camera)
             if camera.lens_radius > 0.0:
                 self.put(made, "float", "apertureRadius", number(camera.lens_radius))
             if camera.lens_radius > 0.0 or (camera.focal_distance != FAR and not self.modern):
@@ -139,64 +132,17 @@ class MitsubaWriter(MitsubaSurfaceWriter):
         self._placing(made, [product(key, local) for key in keys], times_s, "camera", True)
         return made
 
-    # --- lights and shapes ---------------------------------------------------------------------------------------
+    def _shift(self, made: Element, camera: PerspectiveCamera) -> None:
+        """Where the axis meets the picture, from its middle, to the right and down, with the sign turned."""
+        if camera.shift == (0.0, 0.0):
+            return
+        if not self.modern or camera.lens_radius > 0.0:
+            self.report.add("camera", "a picture off the viewing direction", "one about it")
+            return
+        for axis, offset in zip("XY", (camera.shift[0], -camera.shift[1]), strict=True):
+            self.put(made, "float", f"principalPointOffset{axis}", number(offset))
 
-    def _emitter(self, light: Light) -> None:
-        if isinstance(light, PointLight):
-            made = self.plugin("emitter", "point", self.root)
-            place = {axis: number(value) for axis, value in zip("xyz", light.position, strict=True)}
-            ElementTree.SubElement(made, "point", {"name": "position", **place})
-            self.color(made, "intensity", light.intensity)
-        elif isinstance(light, SpotLight):
-            light = reshaped(light, "linear", self.report)
-            made = self.plugin("emitter", "spot", self.root)
-            holder = ElementTree.SubElement(made, "transform", {"name": self.name("toWorld")})
-            ends = {name: ", ".join(number(value) for value in point) for name, point in
-                    (("origin", light.position), ("target", light.target))}  # fmt: skip
-            forward = np.subtract(light.target, light.position)
-            up = np.eye(3)[int(np.abs(forward).argmin())]
-            ElementTree.SubElement(holder, "lookat", {**ends, "up": ", ".join(number(value) for value in up)})
-            self.color(made, "intensity", light.intensity)
-            self.put(made, "float", "cutoffAngle", number(light.outer_deg))
-            self.put(made, "float", "beamWidth", number(light.inner_deg))
-        elif isinstance(light, DirectionalLight):
-            if light.angle_deg:
-                self.report.add("light", f"a sun of {light.angle_deg:g} degrees", "a parallel light")
-            made = self.plugin("emitter", "directional", self.root)
-            way = {axis: number(value) for axis, value in zip("xyz", light.direction, strict=True)}
-            ElementTree.SubElement(made, "vector", {"name": "direction", **way})
-            self.color(made, "irradiance", light.irradiance)
-        elif isinstance(light, SunSky):
-            self._daylight(light)
-        elif light.image.shape[:2] == (1, 1):
-            made = self.plugin("emitter", "constant", self.root)
-            self.color(made, "radiance", rgb(light.scale * light.image[0, 0].astype(np.float64)))
-        else:
-            made = self.plugin("emitter", "envmap", self.root)
-            self.put(made, "string", "filename", self.output.picture(light.image, light.source))
-            self.put(made, "float", "scale", number(light.scale))
-            self.matrix(made, "toWorld", light.to_world)
-
-    def _daylight(self, light: SunSky) -> None:
-        """Writes sun and sky in directions of the world; the transform turns the zenith (y, in Mitsuba 3 z)."""
-        kind = "sunsky" if self.modern or light.part == "both" else light.part
-        made = self.plugin("emitter", kind, self.root)
-        way = {axis: number(value) for axis, value in zip("xyz", light.sun_direction, strict=True)}
-        ElementTree.SubElement(made, "vector", {"name": self.name("sunDirection"), **way})
-        air = light
-        if self.modern and not 1.0 <= light.turbidity <= 10.0:
-            air = dataclasses.replace(light, turbidity=min(max(light.turbidity, 1.0), 10.0))
-            self.report.add("light", f"a turbidity of {light.turbidity:g}", f"{air.turbidity:g}")
-        self.put(made, "float", "turbidity", number(air.turbidity))
-        self.color(made, "albedo", grey(light.ground_albedo))
-        if self.modern:
-            for part in ("sun", "sky"):
-                self.put(made, "float", f"{part}Scale", number(light.scale if light.part in (part, "both") else 0.0))
-        else:
-            self.put(made, "float", "scale", number(light.scale))
-        turn = facing_up(light.up, 2 if self.modern else 1)
-        if not np.array_equal(turn, np.eye(4)):
-            self.matrix(made, "toWorld", turn)
+    # --- shapes ------------------------------------------------------------------------------------------------------
 
     def _instance(self, instance: Instance) -> None:
         """Writes a shape in its place; shared and moving shapes are instances of a group, which alone may move."""
@@ -256,7 +202,7 @@ class MitsubaWriter(MitsubaSurfaceWriter):
                 became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
                 self.report.add(instance.name or "shape", what, became)
             shape = as_mesh(shape)
-        label, local = self.material(material), np.eye(4)
+        label, local = self.material(material, "", instance.one_sided), np.eye(4)
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
         made = self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):

@@ -32,7 +32,7 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
-from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.folding import height_of, mean_of
 from scenes.formats.appearance.mixtures import added_metal, lobes_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.mitsuba.write_elements import Element, ElementWriter
@@ -46,20 +46,24 @@ BLUNT = 0.002
 class MitsubaSurfaceWriter(ElementWriter):
     """Elements of a scene, as they are made."""
 
-    _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
+    _materials: dict[tuple[int, bool], tuple[Material, str]] = field(default_factory=dict)
+    _one_sided: bool = False
 
-    def material(self, material: Material, name: str = "") -> str:
+    def material(self, material: Material, name: str = "", one_sided: bool = False) -> str:
         """Identifier of a material, written before where it is new."""
-        if id(material) not in self._materials:
+        key = id(material), one_sided
+        if key not in self._materials:
             label = self.label(re.sub(r"[^\w.-]", "_", name) or "m")
+            self._one_sided = one_sided
             made = self.bsdf(material, f"material {name or type(material).__name__!r}")
+            self._one_sided = False
             made.set("id", label)
             self.root.append(made)
-            self._materials[id(material)] = material, label
-        return self._materials[id(material)][1]
+            self._materials[key] = material, label
+        return self._materials[key][1]
 
     def bsdf(self, material: Material, where: str) -> Element:
-        """The element of a material; opaque ones have two sides."""
+        """The element of a material; opaque ones have two sides, unless an instance has one."""
         if isinstance(material, Masked):
             made = self.plugin("bsdf", "mask")
             self.texture(made, material.opacity, "opacity")
@@ -83,7 +87,7 @@ class MitsubaSurfaceWriter(ElementWriter):
             return made
         if isinstance(material, Bumped):
             made = self.plugin("bsdf", "bumpmap" if self.modern else "bump")
-            self.texture(made, material.height, "map")
+            self.texture(made, height_of(material), "map")
             if isinstance(material.height, ConstantTexture):
                 return self.bsdf(material.base, where)
             made.append(self.bsdf(material.base, where))
@@ -95,6 +99,8 @@ class MitsubaSurfaceWriter(ElementWriter):
             return self._glass(material, where)
         if isinstance(material, Translucent):
             return self._translucent(material, where)
+        if self._one_sided:
+            return self._opaque(material, where)
         both = self.plugin("bsdf", "twosided")
         both.append(self._opaque(material, where))
         return both

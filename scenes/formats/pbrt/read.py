@@ -35,7 +35,7 @@ class PbrtReader(SceneReader):
     """State of a PBRT file while it is read."""
 
     def make_surfaces(self) -> PbrtSurfaces:
-        return PbrtSurfaces(self.files, self.report, self.textures, self.materials)
+        return PbrtSurfaces(self.files, self.report, self.names)
 
     def dialect(self) -> dict[str, Callable[[Directive], None]]:
         return {
@@ -93,7 +93,9 @@ class PbrtReader(SceneReader):
         file = parameters.text("mapname", "")
         if not file:
             return lights.even_environment(strength)
-        path = self.files.path(file, where)
+        path = self.files.known(file, where, self.report, f"the picture {file!r}", "even light")
+        if path is None:
+            return lights.even_environment(strength)
         return lights.environment_map(loading.read_image(path), self.transforms.current[0], strength, path)
 
     def _read_area_light(self, directive: Directive) -> None:

@@ -11,13 +11,11 @@ import numpy as np
 from scenes import loading
 from scenes.arithmetic import log
 from scenes.canonical import (
-    Bumped,
     ConstantTexture,
     Glass,
     Glossy,
     ImageTexture,
     Material,
-    Matte,
     Metal,
     Mirror,
     Plastic,
@@ -27,7 +25,7 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.formats.appearance.folding import mean_of, product_of
-from scenes.formats.appearance.mixtures import mixture_of
+from scenes.formats.appearance.mixtures import NOTHING, mixture_of
 from scenes.formats.appearance.spectra import METALS, grey
 from scenes.formats.directives.surfaces import Maker, Surfaces
 from scenes.formats.directives.syntax import Parameters
@@ -48,6 +46,8 @@ class PbrtSurfaces(Surfaces):
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         path, wrap = self.image_path(parameters)
+        if path is None:
+            return ConstantTexture(grey(0.5))
         image = loading.read_image(path)
         encoded = not loading.is_linear(path)
         if not parameters.truth("gamma", encoded) and encoded:
@@ -62,22 +62,12 @@ class PbrtSurfaces(Surfaces):
         return {
             "matte": self.matte, "mirror": self._mirror, "glass": self._glass, "metal": self._metal,
             "substrate": self._substrate, "plastic": self._plastic, "translucent": self._translucent,
-            "uber": self._uber, "mix": self._mix, "": self._border, "none": self._border,
+            "uber": self._uber, "mix": self._mix, "": lambda _: NOTHING,
+            "none": lambda _: NOTHING,
         }  # fmt: skip
 
     def base_colors(self) -> dict[str, str]:
         return {"disney": "color", **dict.fromkeys(("fourier", "hair", "kdsubsurface", "subsurface"), "Kd")}
-
-    def material(self, kind: str, parameters: Parameters) -> Material:
-        made = super().material(kind, parameters)
-        if "bumpmap" in parameters and parameters.types["bumpmap"] == "texture":
-            made = Bumped(made, self.texture(parameters, "bumpmap", (0.0, 0.0, 0.0)))
-        return made
-
-    def _border(self, parameters: Parameters) -> Material:
-        what = "a surface without a material (the border of a medium)"
-        self.report.add(str(parameters.place), what, "black")
-        return Matte(ConstantTexture((0.0, 0.0, 0.0)))
 
     def _alphas(self, parameters: Parameters, default: float) -> tuple[float, float]:
         even = self.scalar(parameters, "roughness", default)

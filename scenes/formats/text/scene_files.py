@@ -6,10 +6,12 @@ refused. The bytes that are read and the depth of includes are bounded.
 
 from __future__ import annotations
 
+import codecs
 import gzip
 from pathlib import Path
 
 from scenes.canonical import SceneError
+from scenes.formats.losses import LossReport
 
 DEPTH_MAX = 16
 """Greatest depth of files that include each other."""
@@ -47,21 +49,37 @@ class SceneFiles:
         Raises:
             SceneError: the name is absolute, leads outside, or names no file.
         """
+        found = self._found(name, where, beside)
+        if found is None:
+            wanted = self.folder / name.replace("\\", "/")
+            raise SceneError(f"{where}: expected a file at {wanted}, found none")
+        return found
+
+    def known(
+        self, name: str, where: str, report: LossReport, what: str, became: str, beside: Path | None = None
+    ) -> Path | None:
+        """The file of a name, or None where it is missing, which is reported.
+
+        Raises:
+            SceneError: the name is absolute or leads outside.
+        """
+        found = self._found(name, where, beside)
+        if found is None:
+            report.add(where, f"{what}, which is missing", became)
+        return found
+
+    def _found(self, name: str, where: str, beside: Path | None) -> Path | None:
         text = name.replace("\\", "/")
         if not text or "\0" in text or Path(text).is_absolute() or text[1:2] == ":":
             raise SceneError(f"{where}: expected a relative file name, got {name!r}")
         places = [self.folder] + ([beside.resolve().parent] if beside is not None else [])
-        found = None
         for place in places:
             path = (place / text).resolve()
             if not path.is_relative_to(self.root):
                 raise SceneError(f"{where}: expected a file inside {self.root}, got {name!r} (the root can be set)")
             if path.is_file():
-                found = path
-                break
-        if found is None:
-            raise SceneError(f"{where}: expected a file at {self.folder / text}, found none")
-        return found
+                return path
+        return None
 
     def read(self, path: Path, where: str) -> bytes:
         """Content of a file, decompressed where its name ends in ``.gz``.
@@ -85,8 +103,10 @@ class SceneFiles:
         return content
 
     def text(self, path: Path, where: str) -> str:
-        """Content of a text file; raises SceneError where it is not UTF-8."""
+        """Content of a text file: UTF-8, UTF-16 with a mark of its byte order, or else Latin-1."""
+        content = self.read(path, where)
         try:
-            return self.read(path, where).decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise SceneError(f"{path}: expected UTF-8 text, byte {error.start} is none") from None
+            marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+            return content.decode("utf-16" if marked else "utf-8-sig")
+        except UnicodeDecodeError:
+            return content.decode("latin-1")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import xml.sax
 from dataclasses import dataclass, field
@@ -66,6 +67,11 @@ def parse_xml(content: bytes, file: str) -> Node:
     import defusedxml.expatreader
 
     builder = _Builder(file)
+    if not content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and b"encoding" not in content[:200]:
+        try:
+            content.decode("utf-8")
+        except UnicodeDecodeError:  # not declared: most often Latin-1
+            content = content.decode("latin-1").encode()
     parser = defusedxml.expatreader.create_parser(forbid_dtd=True)
     parser.setContentHandler(builder)
     try:

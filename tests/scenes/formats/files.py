@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from scenes.formats.conversion import load_scene_file
+from analysis.conversion.peers import rendered
+from scenes.canonical import Scene
+from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
 from scenes.loading import ASSETS
 
@@ -41,3 +44,26 @@ def mitsuba(folder: Path, body: str, sensor: str = SENSOR):
     (folder / "a.xml").write_text(f'<scene version="0.5.0">\n{sensor}\n{body}</scene>')
     report = LossReport()
     return load_scene_file(folder / "a.xml", None, report), [str(loss) for loss in report.losses]
+
+
+def case(name: str, file: str = "scene.pbrt") -> tuple[Scene, list[str]]:
+    """The scene of a case, and what it lost."""
+    report = LossReport()
+    return load_scene_file(CASES / name / file, None, report), [str(loss) for loss in report.losses]
+
+
+def reflectances(scene: Scene) -> list[tuple[float, ...]]:
+    return [one.material.reflectance.value for one in scene.instances]  # type: ignore[union-attr]
+
+
+def seen(program: str, file: Path, size: int, samples: int) -> np.ndarray:
+    pytest.importorskip({"mitsuba": "mitsuba", "luxcore": "pyluxcore"}[program])
+    picture = rendered(program, file, file.with_suffix(".npy"), (size, size), samples, 300.0)
+    assert not isinstance(picture, str), picture
+    return picture
+
+
+def drawn(scene: Scene, program: str, folder: Path, size: int = 32, samples: int = 16) -> np.ndarray:
+    to, ending = {"mitsuba": ("mitsuba3", ".xml"), "luxcore": ("luxrender", ".lxs")}[program]
+    save_scene_file(scene, folder / f"a{ending}", to)
+    return seen(program, folder / f"a{ending}", size, samples)

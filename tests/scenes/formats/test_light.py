@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.conversion.peers import rendered
 from scenes.canonical import (
     ConstantTexture,
     EnvironmentLight,
@@ -34,24 +33,10 @@ from scenes.formats.appearance.spectra import planck, radiant_rgb
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.write_materials import BLUNT
-from tests.scenes.formats.files import CASES, HEAD, mitsuba
+from tests.scenes.formats.files import CASES, HEAD, drawn, mitsuba, seen
 
 LUX = CASES / "lux-point-and-spot-units"
 ENDINGS = {"mitsuba": ".xml", "luxcore": ".lxs"}
-
-
-def seen(program: str, file: Path, size: int = 32, samples: int = 64) -> np.ndarray:
-    pytest.importorskip({"mitsuba": "mitsuba", "luxcore": "pyluxcore"}[program])
-    picture = rendered(program, file, file.with_suffix(".npy"), (size, size), samples, 300.0)
-    assert not isinstance(picture, str), picture
-    return picture
-
-
-def drawn(scene: Scene, program: str, folder: Path, samples: int = 64) -> np.ndarray:
-    """The picture of a scene as written for a renderer."""
-    file = folder / f"{program}{ENDINGS[program]}"
-    save_scene_file(scene, file, {"mitsuba": "mitsuba3", "luxcore": "luxrender"}[program])
-    return seen(program, file, 32, samples)
 
 
 def middle(picture: np.ndarray) -> float:
@@ -77,10 +62,10 @@ def test_the_power_of_a_point_light_is_reported() -> None:
 @pytest.mark.parametrize("case", ["a", "e"])
 def test_lamps_of_luxrender_shine_alike_in_both_renderers(case: str, tmp_path: Path) -> None:
     scene = load_scene_file(LUX / f"{case}.lxs")
-    wanted = middle(seen("luxcore", _copied(LUX / f"{case}.lxs", tmp_path)))
+    wanted = middle(seen("luxcore", _copied(LUX / f"{case}.lxs", tmp_path), 32, 64))
     assert wanted == pytest.approx(0.0314 if case == "a" else 0.3957, rel=0.01)
     for program in ENDINGS:
-        assert middle(drawn(scene, program, tmp_path / program)) == pytest.approx(wanted, rel=0.01)
+        assert middle(drawn(scene, program, tmp_path / program, 32, 64)) == pytest.approx(wanted, rel=0.01)
 
 
 def _copied(file: Path, folder: Path) -> Path:
@@ -135,11 +120,11 @@ def mirrored_lamps() -> Scene:
 @pytest.mark.parametrize("program", ["mitsuba", "luxcore"])
 def test_mirrored_lamps_shine_to_their_own_side(program: str, tmp_path: Path) -> None:
     scene = mirrored_lamps()
-    picture = drawn(scene, program, tmp_path, 4)
+    picture = drawn(scene, program, tmp_path, 32, 4)
     assert [picture[y, x].tolist() for y in (8, 24) for x in (8, 24)] == [[1.0] * 3] * 4
     ending = ENDINGS[program]
-    again = load_scene_file(tmp_path / f"{program}{ending}") if program == "luxcore" else scene
-    assert (drawn(again, "luxcore", tmp_path / "b", 4)[8::16, 8::16] == 1.0).all()
+    again = load_scene_file(tmp_path / f"a{ending}") if program == "luxcore" else scene
+    assert (drawn(again, "luxcore", tmp_path / "b", 32, 4)[8::16, 8::16] == 1.0).all()
 
 
 def test_a_mirrored_lamp_of_luxrender_shines_the_other_way(tmp_path: Path) -> None:
@@ -204,7 +189,7 @@ def test_the_plastic_of_a_file_is_as_bright_as_it_says(tmp_path: Path) -> None:
     scene = load_scene_file(CASES / "plastic" / "plasticrgbd040.pbrt")
     assert scene.instances[0].material.layered is False  # type: ignore[union-attr]
     for program in ENDINGS:
-        assert drawn(scene, program, tmp_path).mean() == pytest.approx(0.4, abs=0.004)
+        assert drawn(scene, program, tmp_path, 32, 64).mean() == pytest.approx(0.4, abs=0.004)
 
 
 def test_plastic_comes_back_from_mitsuba_and_pbrt(tmp_path: Path) -> None:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from scenes.canonical import SceneError
 from scenes.formats.directives.syntax import parameters_of, parse_directives
+from scenes.formats.text.places import Place
+
+
+def no_files(name: str, place: Place, inside: tuple[Path, ...]) -> tuple[str, Path]:
+    raise SceneError(f"{place}: no files, got {name}")
 
 
 def only(text: str):
-    (directive,) = parse_directives(text, "a.pbrt")
+    (directive,) = parse_directives(text, Path("a.pbrt"), no_files)
     return directive
 
 
@@ -50,7 +57,7 @@ def test_what_is_not_asked_for_is_told() -> None:
 )
 def test_faults_of_text_have_their_place(text: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
-        list(parse_directives(text, "a.pbrt"))
+        list(parse_directives(text, Path("a.pbrt"), no_files))
 
 
 @pytest.mark.parametrize(
