@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from analysis.perception.peer import peer_fit
@@ -52,10 +53,7 @@ def fits(trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -
 
 def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> dict[str, Any]:
     """One fit as a row; a reason instead of numbers where there is none."""
-    samples, right = np.asarray(part["samples"], np.int64), np.asarray(part["correct"], bool)
-    levels = np.unique(samples)
-    asked = [int((samples == level).sum()) for level in levels]
-    correct = [int(right[samples == level].sum()) for level in levels]
+    levels, correct, asked = counts(part)
     try:
         found = fit(levels.tolist(), correct, asked, bootstraps, seed)
     except FitError as error:
@@ -63,13 +61,27 @@ def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) 
     low, high = found.interval or (np.nan, np.nan)
     beside = {}
     if peer and found.status == "within":
-        other = peer_fit(levels.tolist(), correct, asked)
+        other = peer_fit(levels.tolist(), correct.sum(axis=0).tolist(), asked.sum(axis=0).tolist())
         beside = {"psignifit_jnd": other.jnd, "psignifit_low": other.interval[0], "psignifit_high": other.interval[1]}
     return {
         **beside,
         "jnd": found.jnd, "low": low, "high": high, "status": found.status, "mu": found.mu, "sigma": found.sigma,
         "lapse": found.lapse, "trials": found.trials, "observers": part["observer"].nunique(),
     }  # fmt: skip
+
+
+def counts(
+    part: pd.DataFrame,
+) -> tuple[NDArray[np.int64], Int[NDArray[np.int64], "observers levels"], Int[NDArray[np.int64], "observers levels"]]:
+    """Levels, and right answers and answers of every observer at each."""
+    levels, level = np.unique(np.asarray(part["samples"], np.int64), return_inverse=True)
+    names, person = np.unique(np.asarray(part["observer"], str), return_inverse=True)
+    shape = len(names), len(levels)
+    right = np.zeros(shape, np.int64)
+    asked = np.zeros(shape, np.int64)
+    np.add.at(asked, (person, level), 1)
+    np.add.at(right, (person, level), np.asarray(part["correct"], bool).astype(np.int64))
+    return levels, right, asked
 
 
 _TESTED = (
@@ -79,8 +91,13 @@ _STRONGEST = ("of", "first", "second", "samples", "t", "degrees", "p", "mean_dif
 
 
 def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
-    """Paired t-tests level by level: of scenes over observers, sets and filters, of sets over observers, scenes and
-    filters, of filters over observers, scenes and sets. No rows where there is one of each.
+    """Paired t-tests level by level, of scenes, of sets and of filters, an entry an observer.
+
+    An entry is the mean over what the two conditions have in common, such as sets and filters where scenes are
+    compared. No rows where there is one of each. ``pairs`` counts observers.
+
+    Deviation: the thesis counts every combination of observer, set and filter as an entry of its own. An observer's
+    answers are alike, so that tests of equal conditions find too many differences.
     """
     rows = []
     for column in CONDITIONS:
@@ -88,7 +105,7 @@ def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
         shares = trials.pivot_table("correct", [column, "observer", *others], "samples")
         for first, second in itertools.combinations(sorted(set(trials[column])), 2):
             for samples in sorted(trials["samples"].unique()):
-                both = _side_by_side(shares, first, second, samples)
+                both = _by_observer(shares, first, second, samples)
                 found = paired(*both.T.tolist()) if len(both) else None
                 expected = THESIS_P.get((first, second), THESIS_P.get((second, first), {}))
                 rows.append(
@@ -118,10 +135,11 @@ def strongest(tested: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(_STRONGEST))
 
 
-def _side_by_side(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:
-    """Shares ``(cells, 2)`` of two conditions at one level, for the cells that have both."""
-    found = [dict(shares[samples].xs(name).dropna().items()) for name in (first, second)]
-    return np.array([(found[0][cell], found[1][cell]) for cell in found[0] if cell in found[1]]).reshape(-1, 2)
+def _by_observer(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:
+    """Shares ``(observers, 2)`` of two conditions at one level, means of the cells that have both."""
+    one, other = (shares[samples].xs(name).dropna() for name in (first, second))
+    both = pd.concat({"first": one, "second": other}, axis=1, join="inner")
+    return both.groupby("observer")[["first", "second"]].mean().to_numpy(np.float64)
 
 
 def recovery(
@@ -129,17 +147,19 @@ def recovery(
     jnd: float,
     sigma: float,
     lapse: float,
-    trials: int,
+    spread: float,
+    people: tuple[int, int],
     experiments: int,
     bootstraps: int,
     seed: int,
 ) -> dict[str, Any]:
-    """How well fits give back a known threshold.
+    """How well fits give back a known threshold, of observers that differ.
 
     Args:
         levels: samples per pixel.
-        jnd, sigma, lapse: of the true function: threshold, width in octaves, lapse rate.
-        trials: answers at each level.
+        jnd, sigma, lapse: threshold of the mean of all observers' functions; width in octaves and lapse rate of each.
+        spread: standard deviation of the observers' thresholds, octaves; every experiment has observers of its own.
+        people: observers, and answers of each at each level.
         experiments: studies simulated.
         bootstraps: of each interval.
         seed: of all.
@@ -150,23 +170,35 @@ def recovery(
     """
     from scipy.stats import binomtest
 
-    mu = np.log2(jnd) - np.log2(threshold_samples(0.0, sigma, lapse))
-    share = correct_share(np.asarray(levels, np.float64), mu, sigma, lapse)
-    asked = [trials] * len(levels)
+    mu = population_mu(jnd, sigma, lapse, spread)
+    asked = np.full((people[0], len(levels)), people[1])
     held, ratios, widths = 0, [], []
     for number in range(experiments):
-        drawn = np.random.default_rng([seed, number]).binomial(trials, share).tolist()
-        found = fit(levels, drawn, asked, bootstraps, seed + number)
+        rng = np.random.default_rng([seed, number])
+        share = _shares_of(rng.normal(mu, spread, people[0]), levels, sigma, lapse)
+        found = fit(levels, rng.binomial(asked, share), asked, bootstraps, seed + number)
         low, high = found.interval or (0.0, np.inf)
         held += low <= jnd <= high
         ratios.append(found.jnd / jnd)
         widths.append(high / max(low, 1e-9))
     between = binomtest(held, experiments).proportion_ci(method="wilson")
     return {
-        "jnd": jnd, "sigma": sigma, "lapse": lapse, "coverage": held / experiments, "coverage_low": between.low,
-        "coverage_high": between.high, "jnd_ratio_median": float(np.median(ratios)),
+        "jnd": jnd, "sigma": sigma, "lapse": lapse, "spread": spread, "coverage": held / experiments,
+        "coverage_low": between.low, "coverage_high": between.high, "jnd_ratio_median": float(np.median(ratios)),
         "interval_ratio_median": float(np.median(widths)),
     }  # fmt: skip
+
+
+def population_mu(jnd: float, sigma: float, lapse: float, spread: float) -> float:
+    """Mean ``μ`` of observers whose mean function, of width ``√(σ² + spread²)``, has this threshold."""
+    return float(np.log2(jnd) - np.log2(threshold_samples(0.0, float(np.hypot(sigma, spread)), lapse)))
+
+
+def _shares_of(
+    mus: NDArray[np.float64], levels: Sequence[int], sigma: float, lapse: float
+) -> Float[NDArray[np.float64], "observers levels"]:
+    x = np.asarray(levels, np.float64)
+    return np.stack([correct_share(x, float(mu), sigma, lapse) for mu in mus])
 
 
 def power(
@@ -177,11 +209,12 @@ def power(
     repetitions: Sequence[int],
     experiments: int,
     seed: int,
+    spread: float = 0.0,
 ) -> pd.DataFrame:
     """How often two conditions of given thresholds are told apart, by observers and answers per level.
 
-    Two conditions count as told apart where the 95 % intervals of their thresholds, from as many answers, do not
-    overlap. Observers are taken to be alike, so this is the best that can be hoped for.
+    Two conditions count as told apart where the 95 % intervals of their thresholds, from as many answers of the same
+    observers, do not overlap.
 
     Args:
         levels: samples per pixel.
@@ -190,18 +223,17 @@ def power(
         observers, repetitions: numbers to tabulate.
         experiments: simulated for each cell.
         seed: of those.
+        spread: standard deviation of the observers' thresholds, octaves.
     """
     rows = []
-    x = np.asarray(levels, np.float64)
     for people, answers in itertools.product(observers, repetitions):
         rng = np.random.default_rng([seed, people, answers])
-        trials = np.full(len(x), people * answers)
+        asked = np.full((people, len(levels)), answers)
         apart, widths = 0, []
         for number in range(experiments):
-            found = [
-                fit(levels, rng.binomial(trials, correct_share(x, np.log2(jnd), sigma, 0.0)).tolist(), trials.tolist(),
-                    100, number) for jnd in jnds
-            ]  # fmt: skip
+            away = rng.normal(0.0, spread, people)
+            shares = [_shares_of(np.log2(jnd) + away, levels, sigma, 0.0) for jnd in jnds]
+            found = [fit(levels, rng.binomial(asked, share), asked, 100, number) for share in shares]
             (low_a, high_a), (low_b, high_b) = (one.interval or (0.0, np.inf) for one in found)
             apart += high_a < low_b or high_b < low_a
             widths.append(high_a / max(low_a, 1e-9))

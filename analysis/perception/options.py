@@ -108,16 +108,20 @@ class AnalyseOptions:
     """Also fit with psignifit, where it is installed (an extra), and show its thresholds beside ours."""
     power_repetitions: int = 40
     """Experiments simulated for each cell of the table of power; 0 leaves it out."""
+    power_spread: float = 0.5
+    """Standard deviation of the thresholds of its observers, octaves."""
     out: Path = Path("out/perception-analysis")
     """Folder for fits.csv, tests.csv, power.csv, figures and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(self, bootstraps=(0, 100_000), power_repetitions=(0, 10_000), seed=limits.SEEDS)
+        limits.within(self, power_spread=(0.0, 6.0))
 
 
 @dataclass(frozen=True)
 class RecoverOptions:
-    """Draws answers from known psychometric functions; counts how often the fits' intervals hold their thresholds."""
+    """Draws answers of observers with known psychometric functions; counts how often the fits' intervals hold the
+    threshold of their mean function."""
 
     jnds: tuple[float, ...] = (40.0, 100.0)
     """True thresholds, samples per pixel; the thesis' are about 40 and 100."""
@@ -125,9 +129,13 @@ class RecoverOptions:
     """Widths of the functions, octaves."""
     lapses: tuple[float, ...] = (0.0, 0.03)
     """Lapse rates."""
-    trials: int = 144
-    """Answers at each of the eight levels; 12 observers with 4 answers in 3 point sets are 144."""
-    experiments: int = 300
+    spreads: tuple[float, ...] = (0.0, 0.5, 1.0)
+    """Standard deviations of the observers' thresholds, octaves; each experiment draws its observers."""
+    observers: int = 12
+    """How many observers."""
+    answers: int = 12
+    """Answers of each at each of the eight levels; 4 in each of 3 point sets are 12."""
+    experiments: int = 100
     """Studies simulated for each function."""
     bootstraps: int = 400
     """Data sets drawn for each interval."""
@@ -139,9 +147,11 @@ class RecoverOptions:
     def __post_init__(self) -> None:
         for jnd in self.jnds:
             require(1.0 < jnd < 512.0, "jnds", "between 1 and 512", jnd)
-        limits.within(self, sigmas=(0.25, 6.0), lapses=(0.0, 0.08), trials=(1, 1_000_000), seed=limits.SEEDS)
+        limits.within(self, sigmas=(0.25, 6.0), lapses=(0.0, 0.08), spreads=(0.0, 4.0), seed=limits.SEEDS)
+        limits.within(self, observers=(1, 1000), answers=(1, 1000))
         limits.within(self, experiments=(1, 100_000), bootstraps=(20, 100_000))
-        fits = len(self.jnds) * len(self.sigmas) * len(self.lapses) * self.experiments * self.bootstraps
+        functions = len(self.jnds) * len(self.sigmas) * len(self.lapses) * len(self.spreads)
+        fits = functions * self.experiments * self.bootstraps
         limits.require_count("experiments", self.experiments, fits, "fits", most=10**8)
 
 

@@ -3,7 +3,11 @@
 The share of correct answers falls with the samples per pixel ``n`` from nearly 1 to the guess rate:
 ``p(n) = 1/2 + (1/2 - λ) Φ((μ - log2 n) / σ)``. The just-noticeable difference is the ``n`` at which ``p = 0.75``.
 
-Source: motion-blur perception thesis, chapter 5; Wichmann and Hill 2001, "The psychometric function".
+Observers differ, and an observer's answers are alike: intervals resample observers, and tests count one entry an
+observer.
+
+Source: motion-blur perception thesis, chapter 5; Wichmann and Hill 2001, "The psychometric function"; Hesterberg 2015,
+"What teachers should know about the bootstrap" (the expanded percentile interval).
 """
 
 from __future__ import annotations
@@ -41,7 +45,7 @@ class Fit:
         sigma: width, octaves.
         lapse: rate of answers that do not depend on the stimulus.
         jnd: samples per pixel at the threshold; infinite where it lies above the levels, 0 where below.
-        interval: of ``jnd``, 95 %, from a bootstrap; None without one.
+        interval: of ``jnd``, 95 %, from a bootstrap; it holds ``jnd``. None without one.
         status: ``within`` the levels, ``above`` or ``below`` them.
         log_likelihood: of the data.
         trials: how many.
@@ -71,23 +75,29 @@ def threshold_samples(mu: float, sigma: float, lapse: float) -> float:
 
 def fit(
     levels: Sequence[float],
-    correct: Sequence[int],
-    trials: Sequence[int],
+    correct: Sequence[int] | Int[NDArray[np.int64], "observers levels"],
+    trials: Sequence[int] | Int[NDArray[np.int64], "observers levels"],
     bootstraps: int = 0,
     seed: int = 0,
 ) -> Fit:
-    """Fits by maximum likelihood; the interval is that of a parametric bootstrap.
+    """Fits the answers of all observers together, by maximum likelihood.
+
+    The interval is that of a bootstrap whose data sets have as many observers, drawn with replacement, each with all of
+    its answers. Its percentiles are moved outwards as far as those of Student's distribution lie beyond those of the
+    normal one, for few observers vary less than many would. With one observer, answers are drawn from the fit: such an
+    interval says nothing of other observers.
 
     Args:
         levels: samples per pixel.
-        correct, trials: right answers, and answers, at each level.
-        bootstraps: how many data sets are drawn from the fit for the interval; 0 leaves it out.
+        correct, trials: right answers, and answers, at each level; with a row an observer, where there are several.
+        bootstraps: how many data sets are drawn for the interval; 0 leaves it out.
         seed: of those.
 
     Raises:
         FitError: fewer than two levels with answers, more right answers than answers, or a level below 1.
     """
-    x, k, n = _checked(levels, correct, trials)
+    x, by_observer, asked = _checked(levels, correct, trials)
+    k, n = by_observer.sum(axis=0), asked.sum(axis=0)
     grid = _grid(tuple(x))
     mu, sigma, lapse = _polished(x, k, n, *_best(grid, k[None], n[None])[0])
     jnd, status = _placed(threshold_samples(mu, sigma, lapse), x)
@@ -95,29 +105,53 @@ def fit(
     log_likelihood = float((k * np.log(share) + (n - k) * np.log1p(-share)).sum())
     interval = None
     if bootstraps:
-        drawn = np.random.default_rng(seed).binomial(n, share, (bootstraps, len(x)))
-        found = _best(grid, drawn, np.broadcast_to(n, drawn.shape))
+        people = int((asked.sum(axis=1) > 0).sum())
+        rng = np.random.default_rng(seed)
+        if people > 1:
+            chosen = rng.multinomial(len(asked), np.full(len(asked), 1.0 / len(asked)), bootstraps)
+            drawn, counts = chosen @ by_observer, chosen @ asked
+        else:
+            drawn = rng.binomial(n, share, (bootstraps, len(x)))
+            counts = np.broadcast_to(n, drawn.shape)
+        found = _best(grid, drawn, counts)
         jnds = np.array([_placed(threshold_samples(*row), x)[0] for row in found])
-        low, high = np.quantile(jnds, [0.025, 0.975], method="nearest")
-        interval = float(low), float(high)
+        tail = tail_share(people)
+        low, high = np.quantile(jnds, [tail, 1.0 - tail], method="nearest")
+        interval = min(float(low), jnd), max(float(high), jnd)
     return Fit(mu, sigma, lapse, jnd, interval, status, log_likelihood, int(n.sum()))
 
 
+def tail_share(observers: int) -> float:
+    """Share of a bootstrap's data sets beyond each end of a 95 % interval of so many observers.
+
+    ``Φ(-√(n / (n - 1)) t)`` with ``t`` the 97.5th percentile of Student's distribution of ``n - 1`` degrees (Hesterberg
+    2015, sec. 4.3); 0.025 for a single observer.
+    """
+    if observers < 2:
+        return 0.025
+    away = math.sqrt(observers / (observers - 1.0)) * stats.t.ppf(0.975, observers - 1.0)
+    return float(stats.norm.cdf(-away))
+
+
 def _checked(
-    levels: Sequence[float], correct: Sequence[int], trials: Sequence[int]
+    levels: Sequence[float],
+    correct: Sequence[int] | NDArray[np.int64],
+    trials: Sequence[int] | NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Levels in order, and counts ``(observers, levels)``, of the levels that have answers."""
     x, k, n = np.asarray(levels, np.float64), np.asarray(correct, np.int64), np.asarray(trials, np.int64)
-    if not x.shape == k.shape == n.shape or x.ndim != 1:
+    if not x.shape == k.shape[-1:] == n.shape[-1:] or k.shape != n.shape or x.ndim != 1 or k.ndim > 2:
         raise FitError(f"fit: expected as many levels as counts, got {x.shape}, {k.shape} and {n.shape}")
     if (x < 1.0).any() or not np.isfinite(x).all():
         raise FitError(f"fit: expected levels of at least 1 sample, got {x.min()}")
     if (k < 0).any() or (k > n).any():
         raise FitError("fit: expected between 0 and all answers right at every level")
-    asked = n > 0
+    k, n = np.atleast_2d(k), np.atleast_2d(n)
+    asked = n.sum(axis=0) > 0
     if len(np.unique(x[asked])) < 2:
         raise FitError(f"fit: expected answers at two levels at least, got {len(np.unique(x[asked]))}")
     order = np.argsort(x[asked])
-    return x[asked][order], k[asked][order], n[asked][order]
+    return x[asked][order], k[:, asked][:, order], n[:, asked][:, order]
 
 
 def _placed(jnd: float, x: NDArray[np.float64]) -> tuple[float, str]:
@@ -149,8 +183,10 @@ def _best(
 ) -> Float[NDArray[np.float64], "sets 3"]:
     """The most likely parameters of the grid for each data set."""
     rows, log_right, log_wrong = grid
-    likelihood = correct @ log_right + (trials - correct) @ log_wrong
-    return rows[likelihood.argmax(axis=1)]
+    counts = np.concatenate([correct, trials - correct], axis=1).astype(
+        np.float64
+    )  # whole numbers miss the fast product
+    return rows[(counts @ np.concatenate([log_right, log_wrong])).argmax(axis=1)]
 
 
 def _polished(

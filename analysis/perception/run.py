@@ -157,16 +157,17 @@ def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
 
 def recover(options: RecoverOptions, bars: Bars) -> Found:
     """Fits answers drawn from known functions."""
-    cases = list(product(options.jnds, options.sigmas, options.lapses))
+    cases = list(product(options.jnds, options.sigmas, options.lapses, options.spreads))
     task, rows = bars.task("functions", len(cases)), []
     for case in cases:
-        sizes = options.trials, options.experiments, options.bootstraps
-        rows.append(analyses.recovery(LEVELS, *case, *sizes, options.seed))
+        people, sizes = (options.observers, options.answers), (options.experiments, options.bootstraps)
+        rows.append(analyses.recovery(LEVELS, *case, people, *sizes, options.seed))
         task.advance()
     table = pd.DataFrame(rows)
     write_table(options.out / "recovery.csv", table)
     lines = [
-        f"JND {row['jnd']:g}, width {row['sigma']:g} octaves, lapses {row['lapse']:g}: the 95 % interval holds it in "
+        f"JND {row['jnd']:g}, width {row['sigma']:g} octaves, lapses {row['lapse']:g}, observers "
+        f"{row['spread']:g} octaves apart: the 95 % interval holds it in "
         f"{100 * row['coverage']:.1f} % ({100 * row['coverage_low']:.1f} – {100 * row['coverage_high']:.1f}), "
         f"median of the fits over it {row['jnd_ratio_median']:.3f}"
         for row in rows
@@ -195,8 +196,9 @@ def analyse(options: AnalyseOptions, bars: Bars) -> Found:
         jnds = (analyses.THESIS_JND["planescene"], analyses.THESIS_JND["spheresscene"])
         width = float(np.nanmedian(fitted["sigma"].to_numpy(np.float64))) if "sigma" in fitted else 1.5
         tables["power"] = analyses.power(
-            levels, jnds, width, POWER_OBSERVERS, POWER_ANSWERS, options.power_repetitions, options.seed
-        )
+            levels, jnds, width, POWER_OBSERVERS, POWER_ANSWERS, options.power_repetitions, options.seed,
+            options.power_spread,
+        )  # fmt: skip
     task.advance()
     for name, rows in tables.items():
         write_table(options.out / f"{name}.csv", rows)

@@ -109,7 +109,20 @@ def test_one_condition_is_analysed(tmp_path: Path, monkeypatch, capsys, levels: 
 
 
 def test_known_thresholds_are_given_back(tmp_path: Path, monkeypatch, capsys) -> None:
-    short = ("--experiments", "12", "--bootstraps", "60", "--sigmas", "1", "--lapses", "0", "--jnds", "40")
+    short = (
+        "--experiments",
+        "12",
+        "--bootstraps",
+        "60",
+        "--sigmas",
+        "1",
+        "--lapses",
+        "0",
+        "--jnds",
+        "40",
+        "--spreads",
+        "0.5",
+    )
     assert call_script("perception.py", monkeypatch, "recover", *short, "--out", str(tmp_path)) == 0
     (row,) = summary(tmp_path)["rows"]
     assert row["coverage_low"] < 0.95 and row["jnd_ratio_median"] == pytest.approx(1.0, abs=0.15)
