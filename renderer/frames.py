@@ -25,12 +25,31 @@ TILE_PX = 16
 """Side of a tile. Tiles are always traced whole, also where they hang over the picture: which samples share a packet
 must not depend on the picture's size."""
 
+Crop = tuple[int, int, int, int]
+"""Part of a picture: its left column, its upper row, its width and its height, pixels."""
+
 _SAMPLES_AT_ONCE = 1 << 18
 
 
 def tile_count(width_px: int, height_px: int) -> int:
     """Tiles that cover a picture; they are numbered row by row."""
     return -(-width_px // TILE_PX) * -(-height_px // TILE_PX)
+
+
+def tiles_of(crop: Crop, width_px: int) -> list[int]:
+    """Numbers of the tiles that a part of a picture touches, row by row."""
+    left, top, width, height = crop
+    across = -(-width_px // TILE_PX)
+    columns = range(left // TILE_PX, -(-(left + width) // TILE_PX))
+    return [row * across + column for row in range(top // TILE_PX, -(-(top + height) // TILE_PX)) for column in columns]
+
+
+def cut(image: Float[Tensor, "h w 3"], crop: Crop | None) -> Float[Tensor, "h w 3"]:
+    """A part of a picture; all of it where there is no crop."""
+    if crop is None:
+        return image
+    left, top, width, height = crop
+    return image[top : top + height, left : left + width].contiguous()
 
 
 def tile_pixels(
@@ -127,15 +146,18 @@ def render_image(
     frame: int = 0,
     done: Callable[[int], None] = lambda tiles: None,
     counters: Counter[str] | None = None,
+    crop: Crop | None = None,
 ) -> Float[Tensor, "h w 3"]:
     """A whole frame, linear radiance; see :func:`render_tiles`. ``done`` is told how many tiles are,
-    and ``counters`` receives the rays they took.
+    and ``counters`` receives the rays they took. With ``crop``, only that part, and only the tiles that it touches.
     """
     image = torch.zeros(height_px, width_px, 3)
-    count = tile_count(width_px, height_px)
+    wanted = tiles_of(crop or (0, 0, width_px, height_px), width_px)
+    count = len(wanted)
     at_once = _tiles_at_once(plan)
     size = width_px, height_px
-    chunks = [range(first, min(first + at_once, count)) for first in range(0, count, at_once)]
+    chunks = [wanted[first : first + at_once] for first in range(0, count, at_once)]
+    finished = 0
     with ThreadPoolExecutor(1) as ahead:  # places the next samples while these are traced
         waiting = ahead.submit(_tile_samples, plan, chunks[0], size, frame_time_s, shutter_s, frame)
         for tiles, following in zip(chunks, [*chunks[1:], None], strict=True):
@@ -146,12 +168,13 @@ def render_image(
             place_tiles(image, tiles, colors)
             if counters is not None:
                 counters.update(rays)
-            done(tiles.stop)
-    return image
+            finished += len(tiles)
+            done(finished)
+    return cut(image, crop)
 
 
 def pictures(
-    renderer: Renderer, sampling: SamplePlan | int, width_px: int, height_px: int
+    renderer: Renderer, sampling: SamplePlan | int, width_px: int, height_px: int, crop: Crop | None = None
 ) -> Callable[[int, float], Float[Tensor, "h w 3"]]:
     """Makes the frame of a number at a time, over the time that the scene's shutter is open.
 
@@ -159,8 +182,9 @@ def pictures(
         renderer: the scene.
         sampling: a plan; or a whole number, of the samples along a pixel's side of a regular grid at one time.
         width_px, height_px: of every frame.
+        crop: part of every frame that is made. A regular grid is traced as a whole, and then cut.
     """
     if not isinstance(sampling, SamplePlan):
-        return lambda number, time_s: renderer.render_frame(time_s, width_px, height_px, sampling)
-    size = width_px, height_px
-    return lambda number, time_s: render_image(renderer, sampling, *size, time_s, renderer.shutter_s, number)
+        return lambda number, time_s: cut(renderer.render_frame(time_s, width_px, height_px, sampling), crop)
+    size, shutter_s = (width_px, height_px), renderer.shutter_s
+    return lambda number, time_s: render_image(renderer, sampling, *size, time_s, shutter_s, number, crop=crop)

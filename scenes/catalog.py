@@ -5,15 +5,21 @@ A package offers scenes through entry points of the group ``tsar.scenes``; ``SCE
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from scenes.canonical import Scene, SceneError
+from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from scenes.driving import animations
 from scenes.effects import report_images as report
 from scenes.effects import scenes as effects
 from scenes.loading import asset
 from tsar.named import Named
+
+if TYPE_CHECKING:
+    from scenes.viewing import Up
 
 MakeScene = Callable[[float], Scene]
 """Makes a scene; takes its phase, a fraction in [0, 1) by which a repetition of an animation is ahead."""
@@ -101,6 +107,53 @@ def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]
     if camera_path:
         scene = on_a_path(scene, camera_path)  # type: ignore[arg-type]
     return scene, tuple(str(loss) for loss in losses.losses)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a scene is looked at and lit, instead of as its file or name says.
+
+    Attributes:
+        up: upward axis of the world; None for that of the file of a model, or the nearer to the camera's.
+        smooth_deg: edges of meshes without normals that turn by at most this are smooth, degrees.
+        camera: eye and target of a camera at rest, six numbers.
+        fov_deg: its full angle along the shorter image axis; None keeps that of the scene.
+        environment: picture that lights the scene from all around, see :func:`scenes.viewing.with_environment`.
+    """
+
+    up: Up | None = None
+    smooth_deg: float = 0.0
+    camera: tuple[float, ...] | None = None
+    fov_deg: float | None = None
+    environment: Path | None = None
+
+
+def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[str, ...]]:
+    """A scene as :func:`load_any` loads it, looked at and lit as asked for.
+
+    Raises:
+        SceneError: as :func:`load_any`; or the picture cannot be read, or the camera looks nowhere.
+    """
+    from scenes.loading import read_image
+    from scenes.models import MODEL_ENDINGS
+    from scenes.models.smoothing import smoothed
+    from scenes.viewing import framed, up_of, with_camera, with_environment
+
+    found, losses = load_any(scene, phase)
+    if look.smooth_deg > 0.0:
+        found = dataclasses.replace(found, instances=smoothed(found.instances, look.smooth_deg))
+    if look.up and str(scene) not in SCENES and Path(scene).suffix.lower() in MODEL_ENDINGS:
+        found = framed(found.instances, look.up, found.name)
+    up = look.up or up_of(found)
+    if look.environment is not None:
+        found = with_environment(found, read_image(look.environment), up, str(look.environment))
+    if look.camera is not None:
+        found = with_camera(found, look.camera[:3], look.camera[3:], up, look.fov_deg)
+    elif look.fov_deg is not None:
+        if not isinstance(found.camera, PerspectiveCamera):
+            raise SceneError(f"fov_deg: expected a perspective camera, got {type(found.camera).__name__}")
+        found = dataclasses.replace(found, camera=dataclasses.replace(found.camera, fov_deg=look.fov_deg))
+    return found, losses
 
 
 def load_any(scene: str | Path | Scene, phase: float = 0.0, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:

@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from analysis.suitability.options import SuitabilityOptions
-from analysis.tracer.options import RenderOptions
+from analysis.tracer.render_options import RenderOptions
 from tsar.config import ConfigError, ErrorConfig, ReconstructionConfig, ResponseConfig, closed_choices
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -1,15 +1,17 @@
-"""Render a frame or a sequence of a scene.
+"""Render a frame or a sequence of a scene or a model.
 
 Examples: python scripts/render.py fly-by --time-s 1 --out out/still
           python scripts/render.py chase --frames 60 --format mp4 --out out/chase
           python scripts/render.py moving-object --samples 125 --point-set stratified --out out/blur
+          python scripts/render.py car.glb --size 800x600 --samples 64 --out out/car
+          python scripts/render.py car.glb --camera 3 1 4 0 0.5 0 --environment sky.hdr --out out/car
           python scripts/render.py glass --explain
 """
 
 from __future__ import annotations
 
 from analysis.command.cli import parse
-from analysis.tracer.options import RenderOptions
+from analysis.tracer.render_options import RenderOptions
 
 
 def main() -> None:

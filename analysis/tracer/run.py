@@ -16,9 +16,9 @@ from analysis.tracer.options import (
     GalleryOptions,
     JobOptions,
     PointSetOptions,
-    RenderOptions,
     TileOptions,
 )
+from analysis.tracer.render_options import RenderOptions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
     from scenes import catalog
 
     with bad_input():
-        scene, losses = catalog.load_any(options.scene, options.phase)
+        scene, losses = catalog.load_seen(options.scene, options.look, options.phase)
         return scene, tuple(map(str, losses))
 
 
@@ -66,7 +66,8 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
     from renderer.trace import Renderer
 
     with bad_input():
-        check_frame_size(options.width_px, options.height_px, 1 if options.samples else options.samples_per_axis)
+        size = options.size_px((scene.film.width_px, scene.film.height_px))
+        check_frame_size(*size, 1 if options.samples else options.samples_per_axis)
         own_results(options.out, ["film.mp4"] if options.format == "mp4" else [])
         renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
         kinds = options.point_set, options.seed, options.space_filter
@@ -75,7 +76,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
             if options.samples
             else None
         )
-        picture = pictures(renderer, plan or options.samples_per_axis, options.width_px, options.height_px)
+        picture = pictures(renderer, plan or options.samples_per_axis, *size, options.crop)
     added = brought((POINT_SETS, options.point_set)) if options.samples else []
     key = content_hash((options.job, scene, code_hash(Renderer, pictures, render_stills), *added))
     out, ending = options.out, options.still_ending

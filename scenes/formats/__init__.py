@@ -21,5 +21,6 @@ FORMATS: Named[Format] = Named(
         "luxrender": "scenes.formats.luxrender.declared:LUXRENDER",
         "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
+        "model": "scenes.models.scenes_of_models:MODEL",
     },
 )

@@ -73,7 +73,7 @@ def test_commands_take_the_scene_and_the_format_of_an_installed_package(site: Pa
     assert done.returncode == 0 and "sphere" in done.stdout, done.stdout + done.stderr
     done = run(convert, "a.balls", "b.lxss")
     assert done.returncode == 2
-    assert "ends in .pbrt, .lxs, .xml, .balls, got '.lxss' (nearest: .lxs)" in " ".join(done.stderr.split())
+    assert ".glb, .gltf, .balls, got '.lxss' (nearest: .lxs)" in " ".join(done.stderr.split())
     script = "from scenes.catalog import SCENES, load, load_any; "
     script += "print(len(load_any('a.balls')[0].instances), load('juggled', 0.5).instances[0].shape.radius); "
     script += "found = SCENES.origin('juggled'); print(found.module, found.distribution, found.version)"
@@ -111,7 +111,7 @@ def test_what_python_adds_is_found_by_name_and_ending(tmp_path: Path, monkeypatc
         (lambda: catalog.load("glass", 0.5), "phase: expected 0 for the scene glass, which has no phases, got 0.5"),
         (
             lambda: save_scene_file(Scene(PerspectiveCamera(), ()), Path("a.xml"), "mitsubba"),
-            "scene format: expected one of pbrt, luxrender, mitsuba, mitsuba3, got 'mitsubba' (nearest: mitsuba)",
+            "scene format: expected one of pbrt, .*, got 'mitsubba' (nearest: mitsuba)",
         ),
     ],
 )

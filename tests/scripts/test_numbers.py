@@ -31,9 +31,9 @@ from analysis.tracer.options import (
     GalleryOptions,
     JobOptions,
     PointSetOptions,
-    RenderOptions,
     TileOptions,
 )
+from analysis.tracer.render_options import RenderOptions
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -33,6 +33,9 @@ SCENE = """<scene version="0.5.0"><integrator type="direct"/><sensor type="persp
 <shape type="obj"><string name="filename" value="cube.obj"/><boolean name="faceNormals" value="true"/>
 <bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="paint.png"/></texture>
 </bsdf></shape><include filename="lamp.xml"/></scene>"""
+CUBE = Path(__file__).parents[1] / "scenes" / "models" / "cases" / "cube-without-normals.gltf"
+SKY = bytes((128, 128, 128, 127)) * 2 + bytes((32, 32, 32, 127)) * 2
+"""Four pixels of a Radiance picture: 0.25 above, 0.0625 below."""
 SIZE = ("--width-px", "48", "--height-px", "32", "--samples-per-axis", "1")
 
 
@@ -152,6 +155,66 @@ def test_an_upgraded_renderer_renders_again(render, monkeypatch: pytest.MonkeyPa
     real = analysis.storage.source.version_of
     monkeypatch.setattr(analysis.storage.source, "version_of", lambda name: "9" if name == "warp" else real(name))
     assert render("plain", *SIZE) == 1 and render("plain", *SIZE) == 0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--samples", "4"), ("--samples-per-axis", "2"), ("--environment", "sky.hdr", "--up", "z", "--samples", "4")],
+)
+def test_a_model_is_rendered_whole_and_in_part(
+    render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...]
+) -> None:
+    """A bare model in the middle of its picture, or lit by a Radiance picture; the part of a crop is that of it."""
+    (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\n\n-Y 2 +X 2\n" + SKY)
+    monkeypatch.chdir(tmp_path)
+    arguments = (str(CUBE), "--size", "80x60", *arguments)
+    assert render(*arguments) == 1
+    whole = picture(tmp_path / "out" / "frame00000.png")
+    assert whole.shape == (60, 80, 3)
+    middle, corner = whole[20:40, 30:50].astype(float), whole[:6, :6].astype(float)
+    assert np.abs(middle.mean() - corner.mean()) > 5.0 and middle.mean() > 20.0
+    if "sky.hdr" in arguments:
+        assert 60 < corner.min() <= corner.max() < 140  # sRGB of 0.0625 to 0.25
+    assert render(*arguments, "--crop", "30", "20", "25", "20") == 1
+    np.testing.assert_array_equal(picture(tmp_path / "out" / "frame00000.png"), whole[20:40, 30:55])
+
+
+def test_faces_without_normals_have_one_shade_each(render, tmp_path: Path) -> None:
+    """Two faces of a cube and the background: three colours, but for pixels that edges cross."""
+    assert render(str(CUBE), "--size", "96x96", "--samples", "4", "--space-filter", "box") == 1
+    colors = picture(tmp_path / "out" / "frame00000.png").reshape(-1, 3)
+    counts = np.unique(colors, axis=0, return_counts=True)[1]
+    assert np.sort(counts)[-3:].sum() > 0.95 * 96 * 96 and np.sort(counts)[-3] > 2000
+
+
+def test_a_camera_straight_above_gives_a_picture(render, tmp_path: Path) -> None:
+    assert render(str(CUBE), "--camera", "0", "9", "0", "0", "0", "0", *SIZE) == 1
+    assert picture(tmp_path / "out" / "frame00000.png").std() > 1.0
+
+
+def test_the_film_of_a_scene_file_is_obeyed(render, tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(MESH)
+    (tmp_path / "lamp.xml").write_text('<scene version="0.5.0"/>')
+    Image.new("RGB", (2, 2), (200, 100, 50)).save(tmp_path / "paint.png")
+    (tmp_path / "in.xml").write_text(SCENE)
+    assert render(str(tmp_path / "in.xml")) == 1
+    assert picture(tmp_path / "out" / "frame00000.png").shape == (120, 160, 3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(("--size", "800"), "size: expected such as 800x600, got '800'"), (("--size", "0x9"), "sides_px: expected"),
+     (("--size", "9x9", "--width-px", "9"), "size: expected none beside width_px and height_px"),
+     (("--size", "9x9", "--crop", "5", "5", "5", "4"), "crop: expected a part of 9 x 9 pixels"),
+     (("--environment", "gone.hdr"), "gone.hdr: expected an image file, found none"),
+     (("--camera", "0", "0", "0", "0", "0", "0"), "expected finite points that differ")],
+)  # fmt: skip
+def test_looks_that_cannot_be(
+    arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    status = call_script("render.py", monkeypatch, "plain", *arguments, "--out", str(tmp_path / "out"))
+    shown = capsys.readouterr()
+    assert status == 2 and one_line(shown.err) and message in shown.err
 
 
 def test_exr_is_linear_and_png_its_encoding(render, tmp_path: Path) -> None:

@@ -1,0 +1,144 @@
+"""Options of the command that renders stills; imports little, so that ``--help`` is quick."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from analysis.command import limits
+from analysis.command.options import Device, Seed, Threads
+from renderer.sampling import POINT_SETS
+from tsar.config import closed_choices, require
+
+if TYPE_CHECKING:
+    from scenes.catalog import Look
+
+_NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class RenderOptions:
+    """A still, or a sequence of stills at a constant rate, of a scene or a model."""
+
+    scene: Annotated[str, tyro.conf.Positional]
+    """Built-in scene, by name or number; a scene file; or a model (OBJ, PLY, STL, GLB, glTF), which a camera in front
+    sees as a whole."""
+    size: str = ""
+    """Width and height, pixels, such as 800x600; by default those of the scene's film."""
+    width_px: int = 0
+    """Width, pixels, instead; the field of view spans the shorter side."""
+    height_px: int = 0
+    """Height, pixels, instead."""
+    crop: tuple[int, int, int, int] | None = None
+    """Part of the picture that is made: left column, upper row, width and height, pixels."""
+    camera: tuple[float, float, float, float, float, float] | None = None
+    """A camera at rest instead of the scene's: where it stands and what it looks at, in the scene's coordinates."""
+    fov_deg: float | None = None
+    """Field of view along the shorter side, degrees; by default the scene's."""
+    environment: Path | None = None
+    """Picture (.hdr, .exr, …) of all directions that lights the scene, in place of sky, sun and ambient light."""
+    up: Literal["y", "z"] | None = None
+    """Upward axis of the world, for the camera and the environment; by default y for OBJ and glTF, z for PLY and STL,
+    and in a scene that of its camera."""
+    smooth_deg: float = 0.0
+    """Edges of meshes without normals that turn by at most this are smooth, degrees; 0 keeps faces flat."""
+    samples_per_axis: int = 2
+    """Samples along a pixel's side, all at the frame's time."""
+    samples: int = 0
+    """Instead of that regular grid, this many samples of a point set per pixel, spread over the time the shutter is
+    open as well."""
+    point_set: str = "hammersley"
+    """The point set; stratified takes cubes of samples only."""
+    shift: Literal["white", "blue"] = "white"
+    """How far each pixel shifts it: independently of its neighbours, or by spatiotemporal blue noise."""
+    space_filter: Literal["box", "gaussian"] = "gaussian"
+    """Reconstruction filter over the picture, of point sets."""
+    time_filter: Literal["box", "triangle"] = "box"
+    """Reconstruction filter over the time the shutter is open, of point sets."""
+    seed: Seed = 0
+    time_s: float = 0.0
+    """Animation time of the first frame, seconds."""
+    frames: int = 1
+    """How many frames."""
+    fps: float = 30.0
+    """Frames per second of animation time."""
+    format: Literal["png", "exr", "ppm", "mp4"] = "png"
+    """Of the stills (EXR is linear, the others are sRGB); mp4 writes PNG stills and joins them into film.mp4."""
+    phase: float = 0.0
+    """Phase of the animation, a fraction of a wheel's turn."""
+    device: Device = "cpu"
+    threads: Threads = 0
+    explain: bool = False
+    """Print what the scene requires of the kernels, and why, instead of rendering."""
+    out: Path = Path("out/render")
+    """Folder for the results; frames that an interrupted run of the same job left there are kept."""
+
+    def __post_init__(self) -> None:
+        POINT_SETS.require(self.point_set, "point_set")
+        limits.within(
+            self,
+            width_px=(0, limits.SIDES_PX[1]),
+            height_px=(0, limits.SIDES_PX[1]),
+            camera=(-1e12, 1e12),
+            fov_deg=(1e-3, 179.0),
+            smooth_deg=(0.0, 180.0),
+            samples_per_axis=(1, 64),
+            samples=(0, 1 << 16),
+            frames=(1, 10**6),
+            fps=(1e-6, 1e5),
+            time_s=limits.TIMES_S,
+            phase=(0.0, 1.0),
+            seed=limits.SEEDS,
+            threads=limits.THREADS,
+        )
+
+        require(not self.size or len(self.sides_px) == 2, "size", "such as 800x600", self.size)
+        limits.within(self, sides_px=limits.SIDES_PX)
+        two = self.size and (self.width_px or self.height_px)
+        require(not two, "size", "none beside width_px and height_px", self.size)
+
+    @property
+    def sides_px(self) -> tuple[int, ...]:
+        """Width and height of ``size``; empty where it is none."""
+        parts = self.size.lower().split("x")
+        return tuple(int(part) for part in parts) if all(part.isdecimal() for part in parts) else ()
+
+    @property
+    def look(self) -> Look:
+        """How the scene is looked at and lit."""
+        from scenes.catalog import Look
+
+        return Look(self.up, self.smooth_deg, self.camera, self.fov_deg, self.environment)
+
+    def size_px(self, film_px: tuple[int, int]) -> tuple[int, int]:
+        """Width and height of the picture, given those of the scene's film.
+
+        Raises:
+            ConfigError: the crop does not lie in it.
+        """
+        width, height = self.sides_px or (self.width_px or film_px[0], self.height_px or film_px[1])
+        if self.crop is not None:
+            left, top, across, down = self.crop
+            inside = min(left, top) >= 0 and min(across, down) >= 1 and left + across <= width and top + down <= height
+            require(inside, "crop", f"a part of {width} x {height} pixels", self.crop)
+        return width, height
+
+    @property
+    def times_s(self) -> list[float]:
+        """Animation time of every frame."""
+        return [self.time_s + number / self.fps for number in range(self.frames)]
+
+    @property
+    def still_ending(self) -> str:
+        """Ending of a still's name."""
+        return ".png" if self.format == "mp4" else f".{self.format}"
+
+    @property
+    def job(self) -> dict[str, Any]:
+        """What decides the content of the stills, beside the content of the scene and the code."""
+        return {name: value for name, value in dataclasses.asdict(self).items() if name not in _NOT_OF_THE_STILLS}

@@ -1,0 +1,42 @@
+"""Models as scenes of their own, so that a file of a model can stand wherever one of a scene can."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scenes.canonical import Scene
+from scenes.formats.losses import LossReport
+from scenes.formats.text.format import Format
+from scenes.models import MODEL_ENDINGS, read_model
+from scenes.models.smoothing import smoothed
+from scenes.viewing import Up, framed
+
+_Y_UP = (".obj", ".gltf", ".glb")
+"""Endings of formats whose files have y upwards: glTF by its specification, OBJ by custom."""
+
+
+def model_up(path: Path) -> Up:
+    """The upward axis of a model, by its ending."""
+    return "y" if path.suffix.lower() in _Y_UP else "z"
+
+
+def model_scene(path: Path, report: LossReport, up: Up | None = None, smooth_deg: float = 0.0) -> Scene:
+    """A model with a camera that sees all of it, and light (:func:`scenes.viewing.framed`).
+
+    Args:
+        path: see :func:`scenes.models.read_model`.
+        report: receives what the file holds and is not kept.
+        up: the upward axis; by default :func:`model_up`.
+        smooth_deg: see :func:`scenes.models.place_model`.
+
+    Raises:
+        SceneError: it cannot be read.
+    """
+    return framed(smoothed(read_model(path, report), smooth_deg), up or model_up(path), path.stem)
+
+
+def _read(path: Path, root: Path | None, report: LossReport) -> Scene:
+    return model_scene(path, report)
+
+
+MODEL = Format("a model", MODEL_ENDINGS, _read)

@@ -1,0 +1,140 @@
+"""How a scene is looked at and lit where its file does not say, or the user says otherwise."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.animation import look_at
+from scenes.arithmetic import norm, product, tan
+from scenes.canonical import (
+    DirectionalLight,
+    EnvironmentLight,
+    Instance,
+    Matrix,
+    Mesh,
+    PerspectiveCamera,
+    Scene,
+    SceneError,
+    SunSky,
+)
+from scenes.formats.geometry.meshed import as_mesh
+from scenes.loading import Picture
+
+Up = Literal["y", "z"]
+
+FOV_DEG = 40.0
+"""Of a camera that is placed here."""
+
+_FROM = (0.5, -1.0, 0.45)
+"""Where a camera stands from what it looks at, with z upwards: in front, to the right and above."""
+
+_MARGIN = 1.08
+_KEY, _FILL, _AMBIENT, _BACKGROUND = 2.2, 0.6, 0.18, 0.75
+
+
+def turned_up(up: Up) -> Matrix:
+    """World from a world whose z is upwards ``(4, 4)``; +y there, the depth, is -z where y is upwards."""
+    matrix = np.eye(4)
+    if up == "y":
+        matrix[:3, :3] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+    return matrix
+
+
+def camera_at(eye: Sequence[float], target: Sequence[float], up: Up) -> Matrix:
+    """Camera to world ``(4, 4)`` of a camera that sees a target in the centre, upright.
+
+    Raises:
+        SceneError: both are the same point, or not finite.
+    """
+    turn = turned_up(up)
+    eye_in, target_in = (product(turn[:3, :3].T, np.asarray(point, np.float64)) for point in (eye, target))
+    matrix = np.eye(4)
+    matrix[:3, :3] = product(turn[:3, :3], look_at(eye_in, target_in).as_matrix())
+    matrix[:3, 3] = eye
+    return matrix
+
+
+def up_of(scene: Scene) -> Up:
+    """Which of y and z is upwards in a scene: the nearer to the upward direction of its camera."""
+    above = np.abs(scene.camera.to_world[:3, 1])
+    return "y" if above[1] > above[2] else "z"
+
+
+def with_camera(
+    scene: Scene, eye: Sequence[float], target: Sequence[float], up: Up, fov_deg: float | None = None
+) -> Scene:
+    """The scene from a camera at rest that sees a target in the centre.
+
+    Args:
+        scene: of which the shutter, and the field of view unless it is given, are kept.
+        eye, target: in the world.
+        up: the upward axis of the world.
+        fov_deg: full angle of the shorter image axis.
+    """
+    before = scene.camera if isinstance(scene.camera, PerspectiveCamera) else PerspectiveCamera(fov_deg=FOV_DEG)
+    camera = PerspectiveCamera(
+        camera_at(eye, target, up), before.fov_deg if fov_deg is None else fov_deg, shutter_s=before.shutter_s
+    )
+    return dataclasses.replace(scene, camera=camera)
+
+
+def with_environment(scene: Scene, picture: Picture, up: Up, source: str = "") -> Scene:
+    """The scene lit by a picture of all directions around it, whose top is upwards.
+
+    It takes the place of what lights the scene from infinity: environment maps, sky, directional lights, the ambient
+    light and the background. Lamps stay.
+    """
+    turn = product(turned_up(up), turned_up("y").T)
+    light = EnvironmentLight(picture, turn, source=source)
+    far = EnvironmentLight | SunSky | DirectionalLight
+    kept = tuple(one for one in scene.lights if not isinstance(one, far))
+    return dataclasses.replace(scene, lights=(*kept, light), background=None, ambient=(0.0, 0.0, 0.0))
+
+
+def framed(instances: tuple[Instance, ...], up: Up, name: str = "") -> Scene:
+    """A scene of things alone: a camera that sees all of them, and light from behind it.
+
+    The camera stands in front, to the right and above. A key light comes from its upper left, a weaker one from its
+    right, and ambient light fills the shadows; the background is an even grey, and lights nothing.
+
+    Raises:
+        SceneError: there is nothing to see.
+    """
+    points = np.concatenate([_points(instance) for instance in instances]) if instances else np.zeros((0, 3))
+    if not len(points):
+        raise SceneError(f"{name or 'scene'}: expected something to look at, found nothing")
+    turn = turned_up(up)[:3, :3]
+    back = product(turn, np.array(_FROM) / norm(np.array(_FROM)))
+    axes = camera_at(back, (0.0, 0.0, 0.0), up)[:3, :3]
+    seen = product(points, axes)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    middle = 0.5 * (low + high)
+    half = _MARGIN * np.abs(seen - middle)[:, :2].max(axis=1)
+    away = float((half / tan(math.radians(FOV_DEG) / 2.0) + seen[:, 2] - middle[2]).max()) or 1.0
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes
+    matrix[:3, 3] = product(axes, middle + np.array([0.0, 0.0, away]))
+    lights = tuple(
+        DirectionalLight(_direction(-product(axes, np.array(towards))), (strength,) * 3)
+        for towards, strength in (((-0.5, 0.8, 0.7), _KEY), ((0.8, 0.1, 0.6), _FILL))
+    )
+    background = EnvironmentLight(np.full((1, 1, 3), _BACKGROUND, np.float32))
+    camera = PerspectiveCamera(matrix, FOV_DEG)
+    return Scene(camera, instances, lights, ambient=(_AMBIENT,) * 3, name=name, background=background)
+
+
+def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (float(part) for part in vector)
+    return x, y, z
+
+
+def _points(instance: Instance) -> NDArray[np.float64]:
+    mesh = instance.shape if isinstance(instance.shape, Mesh) else as_mesh(instance.shape)
+    used = mesh.vertices[np.unique(mesh.faces)].astype(np.float64)
+    return product(used, instance.to_world[:3, :3].T) + instance.to_world[:3, 3]
