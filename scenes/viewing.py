@@ -121,12 +121,12 @@ def framed(instances: tuple[Instance, ...], up: Up, name: str = "") -> Scene:
     matrix[:3, :3] = axes
     matrix[:3, 3] = product(axes, middle + np.array([0.0, 0.0, away]))
     lights = tuple(
-        DirectionalLight(_direction(-product(axes, np.array(towards))), (strength,) * 3)
+        DirectionalLight(_direction(-product(axes, np.array(towards))), (strength, strength, strength))
         for towards, strength in (((-0.5, 0.8, 0.7), _KEY), ((0.8, 0.1, 0.6), _FILL))
     )
     background = EnvironmentLight(np.full((1, 1, 3), _BACKGROUND, np.float32))
     camera = PerspectiveCamera(matrix, FOV_DEG)
-    return Scene(camera, instances, lights, ambient=(_AMBIENT,) * 3, name=name, background=background)
+    return Scene(camera, instances, lights, ambient=(_AMBIENT, _AMBIENT, _AMBIENT), name=name, background=background)
 
 
 def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
