@@ -29,7 +29,7 @@ def advanced(
     return moved(estimates.later(rate, seconds), surfels, view)
 
 
-def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Estimates, Surfels]:
+def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint, points: bool = False) -> tuple[Estimates, Surfels]:
     """Estimates and surfels as the poses of a view show them.
 
     A surfel serves the four pixels whose centres are nearest. A pixel prefers surfels that lie within it, the nearest
@@ -37,10 +37,15 @@ def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Esti
     pixels from its centre; then those beside it, the farthest from the camera first, so that surfaces do not grow.
     Every pixel keeps its surfel's true place, so nothing is blurred however often it moves. Then surfels go that show
     through gaps of a surface in front: six of their eight neighbours are nearer to the camera by 6 %.
+
+    Args:
+        estimates, surfels: as they were.
+        view: new poses.
+        points: whether a surfel serves no more than the pixel in which it lies.
     """
     side = estimates.color.shape[-1]
-    position, depth = _projected(surfels, view, side)
-    source = _sources(estimates, surfels, position, depth)
+    position, depth = projected(surfels, view, side)
+    source = _sources(estimates, surfels, position, depth, points)
     found = source >= 0
     kept, here = found & ~_behind(torch.where(found, depth[source.clamp(min=0)], inf)), source.clamp(min=0)
     kept = kept.reshape(1, side, side)
@@ -65,7 +70,7 @@ def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint) -> tuple[Esti
     ), new
 
 
-def _projected(
+def projected(
     surfels: Surfels, view: Viewpoint, side: int
 ) -> tuple[Float64[Tensor, "pixels 2"], Float64[Tensor, " pixels"]]:
     """Where surfels are now, pixels, and their depth; NaN or at most 0 where nothing is seen."""
@@ -75,20 +80,24 @@ def _projected(
 
 
 def _sources(
-    estimates: Estimates, surfels: Surfels, position: Float64[Tensor, "pixels 2"], depth: Float64[Tensor, " pixels"]
+    estimates: Estimates,
+    surfels: Surfels,
+    position: Float64[Tensor, "pixels 2"],
+    depth: Float64[Tensor, " pixels"],
+    points: bool,
 ) -> Int64[Tensor, " pixels"]:
     """The surfel of each pixel, by number; -1 where there is none."""
     side, count = estimates.color.shape[-1], depth.numel()
     seen = (depth > 0.0) & (position > -1.0).all(1) & (position < side + 1.0).all(1)
     at = torch.where(seen[:, None], position, -9.0)
     near = depth.to(torch.float32).clamp(min=0.0).contiguous().view(torch.int32).to(torch.int64) >> DEPTH_SHIFT
-    first = (at - 0.5).floor()
+    first = at.floor() if points else (at - 0.5).floor()
     none = torch.iinfo(torch.int64).max
     least = torch.full((count,), none, dtype=torch.int64)
     number = torch.arange(count)
     variance, roughness = estimates.variance.reshape(-1), estimates.roughness.reshape(-1)
-    for down in (0, 1):
-        for right in (0, 1):
+    for down in (0,) if points else (0, 1):
+        for right in (0,) if points else (0, 1):
             cell = first + torch.tensor([right, down], dtype=torch.float64)
             away = (cell + 0.5 - at).abs().amax(1).to(torch.float32)
             beside = (away > 0.5).to(torch.int64)

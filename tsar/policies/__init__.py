@@ -21,6 +21,7 @@ POLICIES: Named[Make] = Named(
         "tsar-densities": "tsar.policies.densities:ByDensities",
         "tsar-wavelets": "tsar.policies.densities:by_wavelets",
         "tsar-densities-wavelets": "tsar.policies.densities:dense_by_wavelets",
+        "surfel": "tsar.policies.surfel:Surfel",
         "thesis": "tsar.policies.thesis:Thesis",
         "framed": "tsar.policies.framed:Framed",
         "framed-1": "tsar.policies.framed:PromptlyFramed",

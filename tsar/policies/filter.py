@@ -110,7 +110,6 @@ class Filter(Policy[State]):
         self._places = tiles.places(self._side)
         level = max(0, (self._side // self.config.framelet_side).bit_length() - 1)
         self._level = torch.full((self._side, self._side), level)
-        self._every = max(1, _TILES_A_PROBE // self._tiles)  # cycles from one probe to the next
 
     @property
     def latency_cycles(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -143,6 +142,12 @@ class Filter(Policy[State]):
         """Moves the estimates to the start of the cycle and asks for what they need."""
         state = self._advanced(state, moment)
         state, (x, y, spacing) = self._chosen(state, moment)
+        if self._probes(moment):
+            spacing[0] = tiles.spacings(self._side)[0]
+            width = TILE_SIDE * float(spacing[0])
+            across = int(self._side / width)
+            number = moment.cycle // self._every % across**2
+            x[0], y[0] = number % across * width, number // across * width
         place = torch.stack((x, y), dim=1)
         offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
         if self._options.jitter:
@@ -202,7 +207,6 @@ class Filter(Policy[State]):
         self, state: State, moment: Moment
     ) -> tuple[State, tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]]:
         """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
-        kinds = tiles.spacings(self._side)
         state, chosen = self._picked(state, moment)
         found = torch.cat([level.reshape(-1) for level in chosen]).nonzero().squeeze(1)
         tile = self._places[found]
@@ -211,11 +215,6 @@ class Filter(Policy[State]):
         middle = ((tile[:, :2] + 0.5 * TILE_SIDE * tile[:, 2:]) / ELEMENT_PX).to(torch.int64)
         order = torch.argsort(state.rate[0][middle[:, 0], middle[:, 1]], stable=True)
         y, x, spacing = tile[order].unbind(1)
-        if self._probes(moment):
-            width = TILE_SIDE * kinds[0]
-            across = int(self._side / width)
-            number = moment.cycle // self._every % across**2
-            x[0], y[0], spacing[0] = number % across * width, number // across * width, kinds[0]
         return state, (x, y, spacing)
 
     def _picked(self, state: State, moment: Moment) -> tuple[State, list[Bool[Tensor, "_ _"]]]:
@@ -230,6 +229,11 @@ class Filter(Policy[State]):
     def _probes(self, moment: Moment) -> bool:
         """Whether the first tile of a cycle looks where nothing is expected."""
         return self._options.probes and self._options.by_gain and moment.cycle % self._every == 0
+
+    @property
+    def _every(self) -> int:
+        """Cycles from one probe to the next."""
+        return max(1, _TILES_A_PROBE // self._tiles)
 
     def _in_turn(self, kinds: tuple[float, ...], cycle: int) -> list[Tensor]:
         """Tiles of one sample a pixel, in Morton order."""

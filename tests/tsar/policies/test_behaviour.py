@@ -26,7 +26,7 @@ SIDE = 64
 CONFIG = TsarConfig(
     batch_size=4, resolution_px=SIDE, sdf_side=32, cache_size=64, warmup_cycles=8, tiling=TilingConfig(level_min=1)
 )
-VARIANTS = ("tsar-densities", "tsar-wavelets")
+VARIANTS = ("tsar-densities", "tsar-wavelets", "surfel")
 ALL = ("tsar", "filter", *VARIANTS, "frameless", "afr", "afr-simple", "interruptible", "thesis")
 ADAPTIVE = ("tsar", "filter", *VARIANTS, "afr", "interruptible")
 

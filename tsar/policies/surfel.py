@@ -1,0 +1,134 @@
+"""Reprojected surfels under the control of the dissertation: a point a pixel, errors after reprojection.
+
+A cycle moves the points to where new poses show them, takes in the new samples, and draws them. What is left of the
+error after reprojection is told to the response of ``thesis``: in space the variance of an estimate, in time what
+change has added to it. All elements have an error in every cycle, not only those that were sampled. Transport, tiling
+and selection are those of ``thesis``. How estimates are kept is as in :mod:`tsar.policies.filter`.
+
+Deviation: what is tolerated follows the picture's mean, where the dissertation has a fixed template. By a fixed one all
+elements of a fast pan need more, so none gives, and densities stay what they were.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, Float64
+from torch import Tensor
+
+from tsar.clock import StageTimer
+from tsar.config import TsarConfig
+from tsar.filtering import splats
+from tsar.filtering.records import DEFAULT, ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX, FilterOptions
+from tsar.morton import deinterleave, morton_to_raster
+from tsar.policies.filter import SAMPLE_FLOPS, Filter, State
+from tsar.policy import Moment, Price, Setting
+from tsar.response import initial_densities
+from tsar.selection import initial_history
+from tsar.types import Densities, Errors
+
+PIXEL_FLOPS = 435.0
+"""Operations per output pixel and cycle, as a test counts them: aging, moving, errors, points and smoothing."""
+ELEMENT_FLOPS = 147.0
+"""Of response, tiling and selection for an element of the field. Source: Stephens 2011, table 7.1; about 136 are
+counted."""
+SPATIAL = 2.0**-12
+TEMPORAL = 2.0**-11
+"""Variances that are tolerated in any picture, in space and in time."""
+
+
+@dataclass(frozen=True)
+class SurfelState(State):
+    """With what the response keeps.
+
+    Attributes:
+        densities: of samples.
+        history: credit of every element.
+    """
+
+    densities: Densities
+    history: Float64[Tensor, " elements"]
+
+
+class Surfel(Filter):
+    """Points, sampled where densities of space and time say."""
+
+    def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
+        super().__init__(setting, options)
+        within = self.config.samples // TILE_SIDE**2
+        self.config = _smaller(self.config, max(1, self._tiles // within))
+        self._tiles = within * self.config.batch_size
+        self._stages = replace(self._stages, advanced=splats.advanced)
+        self._decide = setting.stages_of(self.config).decide
+
+    @property
+    def price(self) -> Price:
+        elements = self.config.sdf_side**2 / self._side**2
+        return Price(
+            self._tiles * TILE_SIDE**2, pixel_flops=PIXEL_FLOPS + ELEMENT_FLOPS * elements, sample_flops=SAMPLE_FLOPS
+        )
+
+    def start(self) -> SurfelState:
+        return SurfelState(
+            **vars(super().start()), densities=initial_densities(self.config), history=initial_history(self.config)
+        )
+
+    def _chosen(
+        self, state: State, moment: Moment
+    ) -> tuple[State, tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]]:
+        """Framelets, each as tiles of 8 x 8 samples."""
+        assert isinstance(state, SurfelState)
+        made = self._decide(state.densities, self._errors(state, moment), state.history, self.config, StageTimer())
+        across = self.config.framelet_side // TILE_SIDE
+        part_x, part_y = deinterleave(torch.arange(across**2))
+        column, row = deinterleave(made.due.index)
+        tiles = torch.exp2(made.due.level.to(torch.float64)) * across  # along the image's side, of the size of each
+        width = (self._side / tiles)[:, None].expand(-1, across**2).reshape(-1)
+        x, y = ((of[:, None] * across + part).reshape(-1) * width for of, part in ((column, part_x), (row, part_y)))
+        return replace(state, densities=made.densities, history=made.due.history), (x, y, width / TILE_SIDE)
+
+    def _displayed(self, state: State, moment: Moment) -> State:
+        later = state.estimates.later(state.rate, moment.cycle_s)
+        depth = torch.ones_like(later.time_s) if state.view is None else splats.depths(state.surfels, state.view)
+        shown, remaining = splats.drawn(later, state.surfels, depth)
+        return replace(state, shown=shown, remaining=remaining)
+
+    def _errors(self, state: State, moment: Moment) -> Errors:
+        """Errors of all elements of the field: ``(S - T) / (S + T)`` of the variances ``S`` that are left and those
+        that are tolerated. A pixel that nothing is known of has the variance of one sample in space, and all that there
+        can be in time: a coarse look is what it needs first.
+
+        ``T`` is the mean over the picture of the sum of both, at least :data:`SPATIAL` or :data:`TEMPORAL`. So there
+        are elements that give in every picture, and where all need more, space is traded for time or time for space.
+        """
+        estimates = state.estimates
+        left = torch.where(estimates.known, estimates.observed, 0.5 * estimates.roughness).clamp(max=VARIANCE_MAX)
+        space = F.avg_pool2d(left[None], ELEMENT_PX)[0]
+        time = F.avg_pool2d(estimates.aged[None], ELEMENT_PX)[0] + state.rate * moment.cycle_s
+        usual = float((space + time).reshape(-1).cumsum(0)[-1]) / space.numel()
+        pairs = (space, max(SPATIAL, usual)), (time, max(TEMPORAL, usual))
+        return Errors(*(self._field((signal - least) / (signal + least)) for signal, least in pairs))
+
+    def _field(self, plane: Float[Tensor, "1 e e"]) -> Float[Tensor, " elements"]:
+        """On the field of the densities, Morton order."""
+        side, wide = self.config.sdf_side, plane.shape[-1]
+        if wide > side:
+            plane = F.avg_pool2d(plane[None], wide // side)[0]
+        elif wide < side:
+            plane = plane.repeat_interleave(side // wide, 1).repeat_interleave(side // wide, 2)
+        return plane.reshape(-1)[morton_to_raster(side)]
+
+
+def _smaller(config: TsarConfig, batch_size: int) -> TsarConfig:
+    """A configuration of smaller batches and of as many tiles, which fall due as often, of spacings that the filter
+    knows: from :data:`tsar.filtering.records.SPACINGS`."""
+    pixels = config.resolution_px // config.framelet_side
+    fine = min(config.level_max, int(pixels / SPACINGS[-1]).bit_length() - 1)
+    coarse = min(max(config.level_min, int(pixels / SPACINGS[0]).bit_length() - 1), fine)
+    share = batch_size / config.batch_size / 4 ** (coarse - config.level_min)
+    count = min(max(config.tile_count_max, 4**coarse), 4**fine)
+    tiling = replace(config.tiling, level_min=coarse, level_max=fine, rate_max=0, tile_count_max=count)
+    response = replace(config.response, temporal_min=max(config.response.temporal_min * share, 1e-6))
+    return replace(config, batch_size=batch_size, tiling=tiling, response=response)
