@@ -34,7 +34,7 @@ def convert(options: ConvertOptions) -> dict[str, Any]:
         seconds = {"read": read - begun, "written": time.perf_counter() - read}
         found = {"losses": report.rows(), "instances": len(scene.instances), "lights": len(scene.lights)}
         write_json(options.report_file, with_source({**found, "seconds": seconds}, options, seed=0))
-    return {**found, "lines": [str(loss) for loss in report.losses]}
+    return {**found, "lines": report.lines()}
 
 
 def check(options: CheckOptions) -> list[Table]:

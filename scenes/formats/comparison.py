@@ -10,27 +10,34 @@ import numpy as np
 _NOT_COMPARED = ("source", "name", "materials", "filename")
 
 
-def difference(first: Any, second: Any, tolerance: float = 1e-5, where: str = "scene") -> str | None:
+def difference(
+    first: Any, second: Any, tolerance: float = 1e-5, where: str = "scene", alike: set[tuple[int, int]] | None = None
+) -> str | None:
     """The first place where two scenes, or parts of them, differ; None where they do not.
 
     Names, files that parts came from, and named materials that nothing uses do not count. Numbers may differ by
-    ``tolerance`` of their size, or of that of the array they are in.
+    ``tolerance`` of their size, or of that of the array they are in. ``alike`` are pairs that have been compared.
     """
+    alike = set() if alike is None else alike
     if dataclasses.is_dataclass(first) and not isinstance(first, type):
         if type(first) is not type(second):
             return f"{where}: {type(first).__name__} and {type(second).__name__}"
+        if (id(first), id(second)) in alike:
+            return None
         for part in dataclasses.fields(first):
             if part.name not in _NOT_COMPARED:
                 values = getattr(first, part.name), getattr(second, part.name)
-                found = difference(*values, tolerance, f"{where}.{part.name}")
+                found = difference(*values, tolerance, f"{where}.{part.name}", alike)
                 if found:
                     return found
+        alike.add((id(first), id(second)))
         return None
     if isinstance(first, tuple) and isinstance(second, tuple) and not _numeric(first):
         if len(first) != len(second):
             return f"{where}: {len(first)} and {len(second)} parts"
         found = (
-            difference(a, b, tolerance, f"{where}[{n}]") for n, (a, b) in enumerate(zip(first, second, strict=True))
+            difference(a, b, tolerance, f"{where}[{n}]", alike)
+            for n, (a, b) in enumerate(zip(first, second, strict=True))
         )
         return next(filter(None, found), None)
     if (first is None) != (second is None):

@@ -5,10 +5,13 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
+import numpy as np
+
 from scenes.canonical import Scene, SceneError
 from scenes.formats import FORMATS
 from scenes.formats.losses import LossReport
 from scenes.formats.text.output import Output
+from scenes.loading import one_line
 
 
 def format_of(path: Path) -> str:
@@ -43,7 +46,10 @@ def load_scene_file(path: Path, root: Path | None = None, report: LossReport | N
     found = FORMATS[format_of(path)]
     if found.read is None:
         raise SceneError(f"{path}: expected a format that can be read, {found.name} can be written only")
-    return found.read(Path(path), root, report or LossReport())
+    try:
+        return found.read(Path(path), root, report or LossReport())
+    except (ArithmeticError, np.linalg.LinAlgError, RecursionError, MemoryError) as error:
+        raise SceneError(f"{path}: expected a scene of usual size and numbers ({one_line(error)[:100]})") from error
 
 
 def save_scene_file(

@@ -67,6 +67,7 @@ class Approximation:
     def __init__(self, report: LossReport) -> None:
         self.report = report
         self._materials: dict[int, tuple[Material, Material]] = {}
+        self._textures: dict[int, tuple[Texture, Texture]] = {}
 
     def scene(self, scene: Scene) -> Scene:
         """The scene with everything replaced that cannot be drawn."""
@@ -129,12 +130,17 @@ class Approximation:
 
     def texture(self, texture: Texture, where: str) -> Texture:
         """A plain texture; products and mixtures that are not plain become their means."""
-        texture = folded(texture)
+        if id(texture) not in self._textures:
+            self._textures[id(texture)] = texture, self._texture(folded(texture), where)
+        return self._textures[id(texture)][1]
+
+    def _texture(self, texture: Texture, where: str) -> Texture:
         if isinstance(texture, ConstantTexture | ImageTexture):
             return texture
         if isinstance(texture, CheckerboardTexture):
             parts = self.texture(texture.even, where), self.texture(texture.odd, where)
-            return texture if parts == (texture.even, texture.odd) else CheckerboardTexture(*parts, texture.uv_scale)
+            same = parts[0] is texture.even and parts[1] is texture.odd
+            return texture if same else CheckerboardTexture(*parts, texture.uv_scale)
         self.report.add(where, f"texture {type(texture).__name__}", "its mean")
         return ConstantTexture(mean_of(texture))
 

@@ -7,6 +7,12 @@ from dataclasses import asdict, dataclass
 
 from scenes.canonical import SceneError
 
+SAME_PICTURE = frozenset(
+    "path volpath volpath_simple bdpt bidirectional mlt pssmlt erpt metropolis photonmapper photonmap ppm sppm "
+    "exphotonmap ptracer adaptive irrcache vpl distributedpath igi".split()
+)
+"""Integrators of files that take all light into account: they differ in how soon the picture is good."""
+
 
 @dataclass(frozen=True)
 class Loss:
@@ -16,11 +22,14 @@ class Loss:
         where: file and line, or the name of the part of the scene.
         what: that could not be kept.
         became: what stands in its place; ``left out`` where nothing does.
+        picture: whether the picture that a renderer converges to changes; otherwise it was a hint to a renderer about
+            how to get there.
     """
 
     where: str
     what: str
     became: str
+    picture: bool = True
 
     def __str__(self) -> str:
         return f"{self.where}: {self.what}: {self.became}"
@@ -32,12 +41,16 @@ class LossReport:
     def __init__(self) -> None:
         self._losses: dict[Loss, None] = {}
 
-    def add(self, where: str, what: str, became: str = "left out") -> None:
+    def add(self, where: str, what: str, became: str = "left out", picture: bool = True) -> None:
         """Adds a loss."""
-        self._losses.setdefault(Loss(where, what, became))
+        self._losses.setdefault(Loss(where, what, became, picture))
 
-    def kind(self, table: Mapping[str, str], wanted: str, what: str, where: object) -> str:
-        """The canonical kind for the kind of a file.
+    def hint(self, where: str, what: str, became: str = "left out") -> None:
+        """Adds the loss of a hint to a renderer, without which the picture is the same."""
+        self.add(where, what, became, picture=False)
+
+    def kind(self, table: Mapping[str, str], wanted: str, what: str, where: object, picture: bool = True) -> str:
+        """The canonical kind for the kind of a file; ``picture`` says whether a known one changes the picture.
 
         Several kinds of files may become one canonical kind; all but the first of them are reported. A kind that the
         table lacks becomes the first canonical kind and is reported.
@@ -48,7 +61,7 @@ class LossReport:
             return found
         found = table[wanted]
         if first_of(table)[found] != wanted:
-            self.add(str(where), f"{what} {wanted!r}", found)
+            self.add(str(where), f"{what} {wanted!r}", found, picture)
         return found
 
     def unknown(self, where: object, what: str, wanted: str, became: str = "left out") -> None:
@@ -64,15 +77,30 @@ class LossReport:
         """The losses as JSON objects."""
         return [asdict(loss) for loss in self._losses]
 
+    def lines(self) -> list[str]:
+        """What changes the picture, then the hints; equal losses at several places in one line."""
+        made = []
+        for picture, title in ((True, "changes the picture"), (False, "hints to the renderer, which it does not need")):
+            places: dict[tuple[str, str], list[str]] = {}
+            for loss in self._losses:
+                if loss.picture == picture:
+                    places.setdefault((loss.what, loss.became), []).append(loss.where)
+            made += [f"{title}:"] if places else []
+            for (what, became), found in places.items():
+                more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+                made.append(f"  {found[0]}{more}: {what}: {became}")
+        return made
+
     def text(self) -> str:
         """The losses, one a line."""
         return "\n".join(map(str, self._losses))
 
     def refuse_any(self) -> None:
-        """Raises SceneError where something was lost."""
-        if self._losses:
-            rest = f" (and {len(self._losses) - 1} more)" if len(self._losses) > 1 else ""
-            raise SceneError(f"expected a conversion without losses, got {next(iter(self._losses))}{rest}")
+        """Raises SceneError where something was lost that changes the picture."""
+        found = [loss for loss in self._losses if loss.picture]
+        if found:
+            rest = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+            raise SceneError(f"expected a conversion without losses, got {found[0]}{rest}")
 
 
 def first_of(table: Mapping[str, str]) -> dict[str, str]:

@@ -16,20 +16,27 @@ from scenes.canonical import (
     ScaleTexture,
     Texture,
 )
+from scenes.formats.appearance.graphs import once_a_node
 from scenes.formats.appearance.spectra import grey, rgb
 
 Change = Callable[[np.ndarray], np.ndarray]
+Join = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Pairs = Callable[[Texture, Texture], Texture | None]
 
 
 def folded(texture: Texture) -> Texture:
     """The texture without its products and mixtures, where one part is constant or both parts repeat alike."""
+    return once_a_node(_fold, texture)
+
+
+def _fold(texture: Texture, again: Callable[[Texture], Texture]) -> Texture:
     if isinstance(texture, CheckerboardTexture):
-        parts = folded(texture.even), folded(texture.odd)
+        parts = again(texture.even), again(texture.odd)
         same = parts[0] is texture.even and parts[1] is texture.odd
         return texture if same else CheckerboardTexture(*parts, texture.uv_scale)
     if not isinstance(texture, ScaleTexture | MixTexture):
         return texture
-    first, second = folded(texture.first), folded(texture.second)
+    first, second = again(texture.first), again(texture.second)
     made = _of_two(first, second, _product if isinstance(texture, ScaleTexture) else _mixture(texture.amount))
     return texture if made is None else made
 
@@ -38,12 +45,24 @@ def _product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return first * second
 
 
-def _mixture(amount: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+def _mixture(amount: float) -> Join:
     return lambda first, second: (1.0 - amount) * first + amount * second
 
 
-def _of_two(first: Texture, second: Texture, join: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Texture | None:
+def _of_two(first: Texture, second: Texture, join: Join) -> Texture | None:
     """Two textures joined point by point, or None where the result is not a plain texture."""
+    found: dict[tuple[int, int], Texture | None] = {}
+
+    def again(first: Texture, second: Texture) -> Texture | None:
+        key = id(first), id(second)
+        if key not in found:
+            found[key] = _joined(first, second, join, again)
+        return found[key]
+
+    return again(first, second)
+
+
+def _joined(first: Texture, second: Texture, join: Join, again: Pairs) -> Texture | None:
     if isinstance(first, ConstantTexture):
         value = np.array(first.value)
         return _changed(second, lambda other: join(value, other))
@@ -53,7 +72,7 @@ def _of_two(first: Texture, second: Texture, join: Callable[[np.ndarray, np.ndar
     if isinstance(first, CheckerboardTexture) and isinstance(second, CheckerboardTexture):
         if first.uv_scale != second.uv_scale:
             return None
-        parts = _of_two(first.even, second.even, join), _of_two(first.odd, second.odd, join)
+        parts = again(first.even, second.even), again(first.odd, second.odd)
         return None if parts[0] is None or parts[1] is None else CheckerboardTexture(parts[0], parts[1], first.uv_scale)
     if isinstance(first, ImageTexture) and isinstance(second, ImageTexture):
         placed = [(one.uv_scale, one.uv_offset, one.wrap, one.filter, one.image.shape) for one in (first, second)]
@@ -66,11 +85,15 @@ def _of_two(first: Texture, second: Texture, join: Callable[[np.ndarray, np.ndar
 
 def _changed(texture: Texture, change: Change) -> Texture | None:
     """A texture with every colour changed, or None where it is not plain."""
+    return once_a_node(lambda node, again: _change(node, change, again), texture)
+
+
+def _change(texture: Texture, change: Change, again: Callable[[Texture], Texture | None]) -> Texture | None:
     if isinstance(texture, ConstantTexture):
         value: Rgb = rgb(change(np.array(texture.value)))
         return ConstantTexture(value)
     if isinstance(texture, CheckerboardTexture):
-        parts = _changed(texture.even, change), _changed(texture.odd, change)
+        parts = again(texture.even), again(texture.odd)
         return None if parts[0] is None or parts[1] is None else CheckerboardTexture(*parts, texture.uv_scale)  # type: ignore[arg-type]
     if isinstance(texture, ImageTexture) and texture.wrap != "black":
         image = change(texture.image.astype(np.float64)).astype(np.float32)
@@ -91,13 +114,17 @@ def product_of(first: Texture, second: Texture) -> Texture:
 
 def greatest_of(texture: Texture) -> float:
     """The greatest value of any channel of a texture, or a bound on it where two textures are multiplied."""
+    return once_a_node(_greatest, texture)
+
+
+def _greatest(texture: Texture, again: Callable[[Texture], float]) -> float:
     if isinstance(texture, ConstantTexture):
         return max(texture.value)
     if isinstance(texture, ImageTexture):
         return float(texture.image.max())
     if isinstance(texture, CheckerboardTexture):
-        return max(greatest_of(texture.even), greatest_of(texture.odd))
-    parts = greatest_of(texture.first), greatest_of(texture.second)
+        return max(again(texture.even), again(texture.odd))
+    parts = again(texture.first), again(texture.second)
     return parts[0] * parts[1] if isinstance(texture, ScaleTexture) else max(parts)
 
 
@@ -108,13 +135,17 @@ def height_of(material: Bumped) -> Texture:
 
 def mean_of(texture: Texture) -> Rgb:
     """Mean colour of a texture over the unit square of its coordinates."""
+    return once_a_node(_mean, texture)
+
+
+def _mean(texture: Texture, again: Callable[[Texture], Rgb]) -> Rgb:
     if isinstance(texture, ConstantTexture):
         return texture.value
     if isinstance(texture, ImageTexture):
         return rgb(texture.image.reshape(-1, 3).mean(axis=0, dtype=np.float64))
     if isinstance(texture, CheckerboardTexture):
-        return rgb(0.5 * (np.array(mean_of(texture.even)) + mean_of(texture.odd)))
+        return rgb(0.5 * (np.array(again(texture.even)) + again(texture.odd)))
     if isinstance(texture, ScaleTexture):
-        return rgb(np.multiply(mean_of(texture.first), mean_of(texture.second)))
+        return rgb(np.multiply(again(texture.first), again(texture.second)))
     weights = 1.0 - texture.amount, texture.amount
-    return rgb(weights[0] * np.array(mean_of(texture.first)) + weights[1] * np.array(mean_of(texture.second)))
+    return rgb(weights[0] * np.array(again(texture.first)) + weights[1] * np.array(again(texture.second)))

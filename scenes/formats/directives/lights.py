@@ -65,4 +65,4 @@ def lose_hints(parameters: Parameters, report: LossReport) -> None:
     for hint in ("samples", "nsamples", "importance"):
         if hint in parameters:
             parameters.number(hint, 1.0)
-            report.add(str(parameters.place), f"{hint} of a light", "the renderer's own choice")
+            report.hint(str(parameters.place), f"{hint} of a light", "the renderer's own choice")

@@ -36,6 +36,7 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.canonical.values import Matrix
+from scenes.formats.appearance.graphs import check_depth
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import DirectiveReader, typed, word
@@ -105,6 +106,7 @@ class SceneReader(DirectiveReader):
         if wanted not in ("float", "color", "spectrum"):
             self.report.unknown(directive.place, f"texture {name!r} of type", wanted, "one of colours")
         made = self.surfaces.made_texture(kind, parameters, of)
+        check_depth(made, str(directive.place))
         self.names.define(self.names.textures(of), name, made)
         self.left_over(parameters, f"texture {name!r}")
 
@@ -116,6 +118,7 @@ class SceneReader(DirectiveReader):
     def _name_material(self, directive: Directive) -> None:
         name, parameters = typed(directive)
         made = self.surfaces.material(parameters.text("type", ""), parameters)
+        check_depth(made, str(directive.place))
         self.names.define(self.names.materials, name, made)
         self.left_over(parameters, f"material {name!r}")
 
@@ -250,7 +253,7 @@ class SceneReader(DirectiveReader):
             parameters.asked.add("shadowalpha")
             self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
         if is_nothing(material) and self.attributes.emission is None:
-            self.report.add(str(directive.place), "the border of a medium, which is not seen")
+            self.report.hint(str(directive.place), "the border of a medium, which is not seen")
             self.left_over(parameters, f"shape {kind!r}")
             return
         if isinstance(shape, Mesh):

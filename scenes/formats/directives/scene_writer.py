@@ -85,7 +85,7 @@ class SceneWriter(SurfaceWriter):
         """Greatest number of bounces; a finite one where there is no limit, which is reported."""
         if scene.integrator.depth >= 0:
             return scene.integrator.depth
-        self.report.add("integrator", "paths without a limit", f"{_ENDLESS} bounces")
+        self.report.hint("integrator", "paths without a limit", f"{_ENDLESS} bounces")
         return _ENDLESS
 
     def window(self, half: float, mirrored: bool = False, shift: tuple[float, float] = (0.0, 0.0)) -> str:

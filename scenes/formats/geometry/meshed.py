@@ -8,6 +8,7 @@ from -z to +z, as in the canonical scene; on disks and cubes all have coordinate
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -27,6 +28,7 @@ from scenes.canonical import (
     Sphere,
     Texture,
 )
+from scenes.formats.appearance.graphs import once_a_node, parts_of
 from scenes.formats.geometry.orientation import area_normals, turned
 from scenes.formats.geometry.revolution import partial_sphere, ring
 
@@ -39,13 +41,16 @@ def depends_on_uv(part: Material | Texture) -> bool:
 
     A texture makes it so, and so does a roughness that differs between the two directions of the surface.
     """
+    return once_a_node(_depends, part)
+
+
+def _depends(part: Material | Texture, again: Callable[[Material | Texture], bool]) -> bool:
     if isinstance(part, ImageTexture | CheckerboardTexture | HeightField):
         return True
     roughness = getattr(part, "roughness", 0.0)
     if isinstance(roughness, tuple) and roughness[0] != roughness[1]:
         return True
-    values = (getattr(part, field.name) for field in dataclasses.fields(part))
-    return any(depends_on_uv(value) for value in values if dataclasses.is_dataclass(value))  # type: ignore[arg-type]
+    return any(map(again, parts_of(part)))
 
 
 @lru_cache(maxsize=1)

@@ -38,7 +38,7 @@ from scenes.formats.directives.syntax import Directive, Parameters, parameters_o
 from scenes.formats.geometry.meshed import as_mesh, turned_over
 from scenes.formats.geometry.revolution import area
 from scenes.formats.geometry.transform_stack import KEYS_MAX
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import SAME_PICTURE, LossReport
 from scenes.formats.luxrender.read_materials import LuxSurfaces, lux_image
 from scenes.formats.text.scene_files import SceneFiles
 
@@ -155,7 +155,7 @@ class LuxReader(SceneReader):
 
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        name = self.report.kind(_SAMPLERS, kind, "sampler", directive.place)
+        name = self.report.kind(_SAMPLERS, kind, "sampler", directive.place, picture=False)
         if kind in ("metropolis", "erpt"):
             parameters.asked.update(parameters.given)
         count = parameters.whole("pixelsamples", self._halt_samples or 4, 1, 1 << 24)
@@ -164,7 +164,7 @@ class LuxReader(SceneReader):
 
     def _read_integrator(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place)
+        name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place, kind not in SAME_PICTURE)
         depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
         parameters.whole("lightdepth", depth, 0, 1 << 20)
         # edges of a path, as measured with LuxCore

@@ -60,7 +60,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
         kind = _INTEGRATORS[integrator.kind]
         if integrator.kind in ("whitted", "metropolis"):
-            self.report.add("integrator", integrator.kind, kind)
+            self.report.add("integrator", integrator.kind, kind, integrator.kind != "metropolis")
         edges = depth + 1  # LuxCore counts the edges of a path
         limit = f'"integer eyedepth" [ {edges} ] "integer lightdepth" [ {edges} ]'
         if kind != "bidirectional":
@@ -68,7 +68,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         self.lines.append('Renderer "sampler"')
         self.lines.append(f'SurfaceIntegrator "{kind}" {limit}')
         if sampler.kind in ("halton", "hammersley", "stratified"):
-            self.report.add("sampler", sampler.kind, "lowdiscrepancy")
+            self.report.hint("sampler", sampler.kind, "lowdiscrepancy")
         count = sampler.samples_per_pixel
         self.lines.append(f'Sampler "{_SAMPLERS[sampler.kind]}" "integer pixelsamples" [ {count} ]')
         radius = number(film.filter_radius_px)

@@ -6,6 +6,7 @@ Source: Mitsuba 0.5 documentation; conventions measured with Mitsuba 3; Hagemann
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from scenes.canonical import (
 )
 from scenes.formats.geometry.conventions import FAR, duration_s
 from scenes.formats.geometry.transform_stack import motion
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import SAME_PICTURE, LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_lights import MitsubaLights
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
@@ -86,6 +87,9 @@ class MitsubaReader:
         root = parse_xml(self.files.read(path, where), path.name)
         if root.tag != "scene":
             raise SceneError(f"{root.place}: expected a scene, got {root.tag!r}")
+        version = root.get("version", "0.5.0")
+        if not re.fullmatch(r"0(\.\d+)*", version):
+            raise SceneError(f"{root.place}: expected a scene of Mitsuba 0.5 or before, got one of version {version!r}")
         found = []
         for node in root.children:
             if node.tag == "default":
@@ -176,7 +180,7 @@ class MitsubaReader:
 
     def _integrator(self, node: Node) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
-        name = self.report.kind(INTEGRATORS, kind, "integrator", node.place)
+        name = self.report.kind(INTEGRATORS, kind, "integrator", node.place, kind not in SAME_PICTURE)
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
         # it counts the edges of a path, the canonical scene its bounces
         self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
@@ -200,7 +204,7 @@ class MitsubaReader:
 
     def _sampler(self, node: Node) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
-        name = self.report.kind(SAMPLERS, kind, "sampler", node.place)
+        name = self.report.kind(SAMPLERS, kind, "sampler", node.place, picture=False)
         self.sampler = Sampler(name, properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
         properties.left_over()
 

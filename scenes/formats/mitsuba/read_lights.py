@@ -75,7 +75,7 @@ class MitsubaLights:
             properties.asked.update(properties.given)
             self.report.unknown(node.place, "emitter", kind)
         if "samplingWeight" in properties:
-            self.report.add(properties.where, "samplingWeight of a light", "the renderer's own choice")
+            self.report.hint(properties.where, "samplingWeight of a light", "the renderer's own choice")
             properties.asked.add("samplingWeight")
         properties.left_over()
 

@@ -62,6 +62,10 @@ class MitsubaShapes:
         kind, properties = node.get("type"), Properties(node, self.report)
         if kind == "shapegroup":
             parts = [child for child in properties.rest if child.tag == "shape"]
+            nested = [part for part in parts if part.get("type") in ("instance", "shapegroup")]
+            for part in nested:  # as in Mitsuba; groups in groups would multiply
+                self.report.add(str(part.place), f"{part.get('type')} inside a shapegroup")
+            parts = [part for part in parts if part not in nested]
             self.groups[id(node)] = [found for part in parts for found in self.read(part)]
             return []
         if kind == "instance":
@@ -76,7 +80,7 @@ class MitsubaShapes:
         track = motion(keys, times_s, properties.where, self.report)
         material, emission, one_sided = self._inside(properties)
         if is_nothing(material) and emission is None:
-            self.report.add(properties.where, "the border of a medium, which is not seen")
+            self.report.hint(properties.where, "the border of a medium, which is not seen")
             return []
         made = self._made(kind, properties, material)
         if made is None:
@@ -118,7 +122,7 @@ class MitsubaShapes:
                 inner = Properties(node, self.report)
                 emission = inner.color("radiance", grey(1.0))
                 if "samplingWeight" in inner:
-                    self.report.add(inner.where, "samplingWeight of a light", "the renderer's own choice")
+                    self.report.hint(inner.where, "samplingWeight of a light", "the renderer's own choice")
                     inner.asked.add("samplingWeight")
                 inner.left_over()
             elif node.tag in ("medium", "subsurface"):

@@ -14,6 +14,7 @@ from scenes import loading
 from scenes.arithmetic import power
 from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture, Rgb, SceneError, Texture
 from scenes.formats.appearance.folding import product_of
+from scenes.formats.appearance.graphs import NESTED_MAX, check_depth
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.losses import LossReport
@@ -42,6 +43,7 @@ class MitsubaTextures:
     report: LossReport
     find: Callable[[Node], Node]
     textures: dict[int, Texture] = field(default_factory=dict)
+    _inside: int = 0
 
     def texture(self, properties: Properties, name: str, default: Rgb) -> Texture:
         """A texture, a reference to one, or a colour."""
@@ -57,8 +59,13 @@ class MitsubaTextures:
         """The texture of an element, made once."""
         if id(node) not in self.textures:
             properties = Properties(node, self.report)
+            self._inside += 1
+            if self._inside > NESTED_MAX:
+                raise SceneError(f"{node.place}: expected at most {NESTED_MAX} textures inside each other")
             self.textures[id(node)] = self._texture(properties)
+            self._inside -= 1
             properties.left_over()
+            check_depth(self.textures[id(node)], properties.where)
         return self.textures[id(node)]
 
     def _texture(self, properties: Properties) -> Texture:

@@ -73,7 +73,7 @@ class MitsubaWriter(MitsubaLightWriter):
     def _integrator(self, scene: Scene) -> None:
         kind, depth = _INTEGRATORS[scene.integrator.kind], scene.integrator.depth
         if self.modern and kind in ("bdpt", "photonmapper", "pssmlt"):
-            self.report.add("integrator", scene.integrator.kind, "path")
+            self.report.hint("integrator", scene.integrator.kind, "path")
             kind = "path"
         if scene.integrator.kind == "whitted":
             kind = "path"  # follows mirrors and glass
@@ -90,7 +90,7 @@ class MitsubaWriter(MitsubaLightWriter):
         self.root.append(made)
         kind = _SAMPLERS[scene.sampler.kind]
         if self.modern and kind in ("sobol", "halton", "hammersley"):
-            self.report.add("sampler", kind, "independent")
+            self.report.hint("sampler", kind, "independent")
             kind = "independent"
         sampler = self.plugin("sampler", kind, made)
         self.put(sampler, "integer", "sampleCount", str(scene.sampler.samples_per_pixel))

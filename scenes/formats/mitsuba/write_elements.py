@@ -31,6 +31,7 @@ class ElementWriter:
     modern: bool = False
     root: Element = field(default_factory=lambda: Element("scene"))
     _folded: dict[int, tuple[Texture, Texture]] = field(default_factory=dict)
+    _parts: dict[int, tuple[Texture, str]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
 
     def name(self, text: str) -> str:
@@ -81,12 +82,28 @@ class ElementWriter:
             self._uv(made, *first_row_below(texture.uv_scale, texture.uv_offset))
         elif isinstance(texture, CheckerboardTexture):
             made = self.plugin("texture", "checkerboard", parent, name=self.name(name))
-            self.texture(made, texture.even, "color0")
-            self.texture(made, texture.odd, "color1")
+            self._part(made, texture.even, "color0")
+            self._part(made, texture.odd, "color1")
             self._uv(made, (0.5 * texture.uv_scale[0], 0.5 * texture.uv_scale[1]), (0.0, 0.0))
         else:
             self.report.add(name, f"texture {type(texture).__name__}", "its mean")
             self.color(parent, name, mean_of(texture))
+
+    def _part(self, made: Element, texture: Texture, name: str) -> None:
+        """A texture inside a texture: by name, so that one that several share is written once."""
+        if id(texture) not in self._parts:
+            holder = Element("part")
+            self.texture(holder, texture, name)
+            (element,) = holder
+            if element.tag != "texture":
+                made.append(element)
+                return
+            del element.attrib["name"]
+            label = self.label("t")
+            element.set("id", label)
+            self.root.append(element)
+            self._parts[id(texture)] = texture, label
+        ElementTree.SubElement(made, "ref", {"name": self.name(name), "id": self._parts[id(texture)][1]})
 
     def _uv(self, made: Element, scale: tuple[float, float], offset: tuple[float, float]) -> None:
         if self.modern:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -54,9 +55,9 @@ class MitsubaSurfaceWriter(ElementWriter):
         key = id(material), one_sided
         if key not in self._materials:
             label = self.label(re.sub(r"[^\w.-]", "_", name) or "m")
-            self._one_sided = one_sided
+            before, self._one_sided = self._one_sided, one_sided
             made = self.bsdf(material, f"material {name or type(material).__name__!r}")
-            self._one_sided = False
+            self._one_sided = before
             made.set("id", label)
             self.root.append(made)
             self._materials[key] = material, label
@@ -83,7 +84,10 @@ class MitsubaSurfaceWriter(ElementWriter):
             else:
                 self.texture(made, amount, "weight")
             for part in (material.first, material.second):
-                made.append(self.bsdf(self._blunt(part, where) if self.modern else part, where))
+                if isinstance(part, MixMaterial):  # by name: it may have been written before
+                    ElementTree.SubElement(made, "ref", {"id": self.material(part, "", self._one_sided)})
+                else:
+                    made.append(self.bsdf(self._blunt(part, where) if self.modern else part, where))
             return made
         if isinstance(material, Bumped):
             made = self.plugin("bsdf", "bumpmap" if self.modern else "bump")

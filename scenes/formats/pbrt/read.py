@@ -18,7 +18,7 @@ from scenes.formats.directives import lights
 from scenes.formats.directives.reader import typed
 from scenes.formats.directives.scene_reader import SceneReader, scene_of
 from scenes.formats.directives.syntax import Directive, Parameters
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import SAME_PICTURE, LossReport
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
 from scenes.formats.text.scene_files import SceneFiles
 
@@ -52,7 +52,7 @@ class PbrtReader(SceneReader):
 
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        name = self.report.kind(SAMPLERS, kind, "sampler", directive.place)
+        name = self.report.kind(SAMPLERS, kind, "sampler", directive.place, picture=False)
         count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         if kind == "stratified":
             count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
@@ -61,7 +61,7 @@ class PbrtReader(SceneReader):
 
     def _read_integrator(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        name = self.report.kind(INTEGRATORS, kind, "integrator", directive.place)
+        name = self.report.kind(INTEGRATORS, kind, "integrator", directive.place, kind not in SAME_PICTURE)
         self.integrator = Integrator(name, parameters.whole("maxdepth", _DEPTH, 0, 1 << 20))  # type: ignore[arg-type]
         self.left_over(parameters, f"integrator {kind!r}")
 

@@ -77,7 +77,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
             count = sampler.samples_per_pixel
             self.lines.append(f'Sampler "{_SAMPLERS[sampler.kind]}" "integer pixelsamples" [ {count} ]')
             if sampler.kind == "hammersley":
-                self.report.add("sampler", "hammersley", "halton")
+                self.report.hint("sampler", "hammersley", "halton")
         radius = number(film.filter_radius_px)
         self.lines.append(
             f'PixelFilter "{_FILTERS[film.filter]}" "float xwidth" [ {radius} ] "float ywidth" [ {radius} ]'

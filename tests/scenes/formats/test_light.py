@@ -181,6 +181,7 @@ def test_materials_keep_their_brightness(program: str, via: str, tmp_path: Path)
     save_scene_file(scene, file, {"mitsuba": "mitsuba3", "luxcore": "luxrender"}[program])
     picture, side = seen(program, file, 40, 256), 40 / len(ALBEDOS)
     found = [picture[17:23, int(at * side) + 2 : int((at + 1) * side) - 1].mean() for at in range(len(ALBEDOS))]
+    print(program, via or "direct", " ".join(f"{value:.3f}" for value in found))
     np.testing.assert_allclose(found, [albedo for _, albedo in ALBEDOS], atol=0.026)
     assert found[1] == pytest.approx(0.4, abs=0.004 if program == "mitsuba" else 0.015)
 
