@@ -110,10 +110,13 @@ class Properties:
         return [transform_of(step) for step in steps], times_s
 
     def left_over(self) -> None:
-        """Reports properties that nothing asked for."""
+        """Reports properties, and textures with a name, that nothing asked for."""
         for name in self.given:
             if name not in self.asked:
                 self.report.add(self.where, f"{self.node.get('type')}: property {name!r}")
+        for child in self.rest:
+            if child.tag in ("texture", "ref") and child.get("name") and child.get("name") not in self.asked:
+                self.report.add(str(child.place), f"{self.node.get('type')}: texture {child.get('name')!r}")
 
 
 def numbers(node: Node, text: str, count: int | None) -> list[float]:

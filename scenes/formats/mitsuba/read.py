@@ -36,6 +36,8 @@ from scenes.formats.mitsuba.read_textures import MISSING
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.text.xml_tree import Node, parse_xml
 
+_FILE_SETTINGS = ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod",
+                  "key", "burn")  # fmt: skip
 TEXT_MAX = 1 << 16
 """Most characters of a value with its parameters."""
 
@@ -182,6 +184,8 @@ class MitsubaReader:
         kind, properties = node.get("type"), Properties(node, self.report)
         name = self.report.kind(INTEGRATORS, kind, "integrator", node.place, kind not in SAME_PICTURE)
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
+        for child in properties.rest:
+            self.report.add(str(child.place), f"{child.tag} {child.get('type')!r} inside an integrator")
         # it counts the edges of a path, the canonical scene its bounces
         self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
         properties.left_over()
@@ -198,8 +202,10 @@ class MitsubaReader:
                 inner.left_over()
         width = _RADII[name] if radius is None else radius
         self.film = Film(*size, name, width, properties.text("filename", ""))  # type: ignore[arg-type]
-        for setting in ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod"):
-            properties.asked.add(setting)
+        for setting in _FILE_SETTINGS:
+            if setting in properties:
+                properties.asked.add(setting)
+                self.report.hint(properties.where, f"{setting} of the film", "linear radiance")
         properties.left_over()
 
     def _sampler(self, node: Node) -> None:
@@ -215,7 +221,12 @@ class MitsubaReader:
                 self._node(child)
         keys, times_s = properties.motion()
         to_world, track = product(keys[0], FORWARD), motion(keys, times_s, properties.where, self.report)
-        properties.asked.update(("nearClip", "farClip"))
+        for plane in ("nearClip", "farClip"):
+            if plane in properties:
+                properties.asked.add(plane)
+                self.report.hint(properties.where, f"{plane} of the sensor", "nothing is cut")
+        if self.camera is not None:
+            self.report.add(properties.where, "another sensor", "the last one")
         shutter = properties.number("shutterOpen", 0.0), properties.number("shutterClose", 0.0)
         if kind in ("perspective", "thinlens"):
             lens = properties.number("apertureRadius", 0.0) if kind == "thinlens" else 0.0

@@ -49,6 +49,7 @@ class MitsubaLights:
             ends = rgb(matrix[:3, 3]), rgb(matrix[:3, 3] + matrix[:3, 2] / norm(matrix[:3, 2]))
             if any(child.tag in ("texture", "ref") for child in properties.rest):
                 self.report.add(properties.where, "a picture in a spot light", "none")
+                properties.asked.update(child.get("name") for child in properties.rest)
             self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
         elif kind in ("directional", "collimated"):
             direction = properties.vector("direction", rgb(matrix[:3, 2]))

@@ -175,7 +175,10 @@ class MitsubaSurfaces(MitsubaTextures):
             self.report.add(properties.where, "colour shifts by bounces inside (nonlinear)", "none")
         alpha = 0.0
         if properties.node.get("type") == "roughplastic":
-            alpha = self._alphas(properties)[0]
+            alphas = self._alphas(properties)
+            alpha = math.sqrt(alphas[0] * alphas[1])
+            if alphas[0] != alphas[1]:
+                self.report.add(properties.where, "a coat of two roughnesses", f"one of alpha {alpha:.3g}")
             self._distribution(properties)
         return Plastic(*parts, index, alpha)
 
@@ -233,6 +236,7 @@ class MitsubaSurfaces(MitsubaTextures):
     def _bump(self, properties: Properties) -> Material:
         maps = [child for child in properties.rest if child.tag in ("texture", "ref")]
         nodes = [self.find(child) if child.tag == "ref" else child for child in maps]
+        properties.asked.update(child.get("name") for child in maps)
         heights = [node for node in nodes if node.tag == "texture"]
         if not heights:
             raise SceneError(f"{properties.where}: bump: expected a texture inside")

@@ -28,6 +28,7 @@ from scenes.canonical import (
     Sphere,
 )
 from scenes.canonical.values import Matrix
+from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.mixtures import NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
@@ -116,11 +117,17 @@ class MitsubaShapes:
         material, emission, one_sided, default = None, None, True, _DEFAULT
         for child in properties.rest:
             node = self.find(child) if child.tag == "ref" else child
+            properties.asked.add(child.get("name"))
             if node.tag == "bsdf":
+                if material is not None:
+                    self.report.add(str(node.place), "several materials for one mesh", "the last")
                 material, one_sided = self.surfaces.material(node), self.surfaces.one_sided(node)
             elif node.tag == "emitter" and node.get("type") == "area":
                 inner = Properties(node, self.report)
-                emission = inner.color("radiance", grey(1.0))
+                radiance = self.surfaces.texture(inner, "radiance", grey(1.0))
+                emission = mean_of(radiance)
+                if not isinstance(radiance, ConstantTexture):
+                    self.report.add(inner.where, "a lamp with a texture", "its mean")
                 if "samplingWeight" in inner:
                     self.report.hint(inner.where, "samplingWeight of a light", "the renderer's own choice")
                     inner.asked.add("samplingWeight")

@@ -49,6 +49,7 @@ class MitsubaTextures:
         """A texture, a reference to one, or a colour."""
         for child in properties.rest:
             if child.tag in ("texture", "ref") and child.get("name") == name:
+                properties.asked.add(name)
                 node = self.find(child) if child.tag == "ref" else child
                 if node.tag != "texture":
                     raise SceneError(f"{child.place}: {name}: expected a texture, got {node.tag!r}")
@@ -81,6 +82,7 @@ class MitsubaTextures:
             return CheckerboardTexture(*parts, (2.0 * scale[0], 2.0 * scale[1]))
         if kind == "scale":
             inner = next((child for child in properties.rest if child.tag in ("texture", "ref")), None)
+            properties.asked.update(child.get("name") for child in properties.rest if child is inner)
             base = self.made_texture(self.find(inner) if inner.tag == "ref" else inner) if inner else None
             factor = ConstantTexture(properties.color("scale", grey(1.0)))
             return factor if base is None else product_of(base, factor)

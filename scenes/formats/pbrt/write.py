@@ -177,6 +177,8 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     def _alpha(self, material: Masked) -> str:
         opacity = material.opacity
         if isinstance(opacity, ConstantTexture):
+            if len(set(opacity.value)) > 1:
+                self.report.add("shape", "holes of each colour by themselves", "by their mean")
             return f'"float alpha" [ {number(float(np.mean(opacity.value)))} ]'
         return self.texture(opacity, "alpha", "float")
 

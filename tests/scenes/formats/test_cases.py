@@ -203,3 +203,36 @@ def test_parameters_inside_values_are_filled_in(tmp_path: Path) -> None:
     body = '<default name="a" value="' + "$b" * 1000 + '"/><default name="b" value="' + "x" * 1000 + '"/>'
     with pytest.raises(SceneError, match="expected at most 65,536 characters with parameters"):
         mitsuba(tmp_path, body + '<bsdf type="$a"/>')
+
+
+# --- nothing is lost in silence --------------------------------------------------------------------------------------
+
+SILENT = [
+    ('<shape type="sphere"><bsdf type="diffuse"><texture type="checkerboard" name="reflectence"/></bsdf></shape>',
+     "diffuse: texture 'reflectence': left out"),
+    ('<shape type="rectangle"><emitter type="area"><texture type="checkerboard" name="radiance"/></emitter></shape>',
+     "a lamp with a texture: its mean"),
+    ('<shape type="sphere"><bsdf type="diffuse" name="a"/><bsdf type="plastic" name="b"/></shape>',
+     "several materials for one mesh: the last"),
+    ('<shape type="sphere"><bsdf type="roughplastic"><float name="alphaU" value="0.1"/>'
+     '<float name="alphaV" value="0.4"/></bsdf></shape>', "a coat of two roughnesses: one of alpha 0.2"),
+    ('<integrator type="path"><integrator type="direct"/></integrator>', "integrator 'direct' inside an integrator"),
+    ('<sensor type="perspective"/>', "another sensor: the last one"),
+    ('<film type="ldrfilm"><float name="exposure" value="2"/></film>', "exposure of the film: linear radiance"),
+    ('<sensor type="perspective"><float name="nearClip" value="3"/></sensor>',
+     "nearClip of the sensor: nothing is cut"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "loss"), SILENT, ids=[row[1] for row in SILENT])
+def test_what_cannot_be_kept_is_said(body: str, loss: str, tmp_path: Path) -> None:
+    _, lost = mitsuba(tmp_path, body)
+    assert any(loss in one for one in lost)
+
+
+def test_holes_of_each_colour_are_a_loss_in_pbrt(tmp_path: Path) -> None:
+    opacity = '<rgb name="opacity" value="0.2 0.5 0.8"/>'
+    body = f'<shape type="rectangle"><bsdf type="mask">{opacity}<bsdf type="diffuse"/></bsdf></shape>'
+    report = LossReport()
+    save_scene_file(mitsuba(tmp_path, body)[0], tmp_path / "b.pbrt", None, report)
+    assert "holes of each colour by themselves" in report.text()

@@ -90,6 +90,9 @@ def test_every_shape_and_light_of_the_feature_scene() -> None:
     assert [loss.what for loss in report.losses] == [
         "path: property 'rrDepth'",
         "sampler 'ldsampler'",
+        "banner of the film",
+        "nearClip of the sensor",
+        "farClip of the sensor",
         "shape 'cylinder'",
         "a textured disk",
     ]
