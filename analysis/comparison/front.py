@@ -17,8 +17,6 @@ from typing import Any, Literal
 STORED = Path(__file__).with_name("front.json")
 PresetName = Literal["draft", "balanced", "accurate"]
 PRESETS: tuple[PresetName, ...] = ("draft", "balanced", "accurate")
-APART = 4.0
-"""A draft costs at most one part in so many of the knee; an accurate setting costs at most so many times as much."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +66,8 @@ class Front:
         return next(one for one in self.places if one.knee)
 
     def preset(self, name: PresetName) -> Place:
-        """The knee (``balanced``), or the most accurate place that costs at most a quarter of it (``draft``) or four
-        times as much (``accurate``)."""
-        if name == "balanced":
-            return self.knee
-        return self._most_accurate(self.knee.cost * (APART if name == "accurate" else 1.0 / APART), lambda p: p.cost)
+        """The knee (``balanced``), or an end of the front: the cheapest place (``draft``), or the most accurate."""
+        return {"draft": self.places[0], "balanced": self.knee, "accurate": self.places[-1]}[name]
 
     def within_flops(self, flops: float, ledger: str) -> Place:
         """The most accurate place of at most so many operations a pixel and second; the cheapest where there is

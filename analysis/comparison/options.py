@@ -77,7 +77,7 @@ class RunOptions:
     """Samples along a pixel's side of the reference."""
     preset: Literal["", "draft", "balanced", "accurate"] = ""
     """A place on the measured front of cost and error: sets batch, speed of the machine and options of the policy
-    tsar. balanced is the knee."""
+    tsar. draft is its cheapest end, balanced its knee, accurate the other end."""
     budget_flops: float | None = None
     """Operations that the run may take in all by the ledger: the most accurate setting of the front within them."""
     budget_seconds: float | None = None

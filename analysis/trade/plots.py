@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -15,8 +17,8 @@ from analysis.trade.runs import SEARCH
 from analysis.trade.tables import Relative, lines
 
 _GRID = {"color": "0.88", "linewidth": 0.6}
-_LABELLED = 12
-"""Points of the front that have their setting beside them at most."""
+_LABELS_APART = 0.15
+"""Least distance of points that have their setting beside them: sum of both differences of natural logarithms."""
 
 
 def _plain(axis: Axes, xlabel: str, ylabel: str) -> None:
@@ -61,14 +63,23 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
     at = lines(table, table["knee"])
     axis.plot(at["cost"], at["error"], "*", color="k", markersize=15, label="knee")
     axis.plot([1.0], [1.0], "s", markerfacecolor="none", markeredgecolor="k", markersize=10, label="default")
-    shown = best.iloc[np.unique(np.linspace(0, len(best) - 1, min(_LABELLED, len(best))).round().astype(int))]
-    for line in shown.to_dict("records"):
+    for line in _apart(best.to_dict("records")):
         text = line["setting"].removeprefix("tsar, ")
         text = text if len(text) <= 44 else text[:43] + "…"
         axis.annotate(text, (line["cost"], line["error"]), xytext=(5, 6), textcoords="offset points", fontsize=7,
                       color="0.25")  # fmt: skip
     axis.legend(frameon=False, fontsize=8, loc="upper right")
     return drawn
+
+
+def _apart(best: list[dict[Any, Any]]) -> list[dict[Any, Any]]:
+    """Points of the front that are far enough from each other to have a label, the knee among them."""
+    kept: list[dict[Any, Any]] = [line for line in best if line["knee"]]
+    for line in best:
+        near = (abs(np.log(line["cost"] / one["cost"])) + abs(np.log(line["error"] / one["error"])) for one in kept)
+        if min(near, default=np.inf) > _LABELS_APART:
+            kept.append(line)
+    return kept
 
 
 def knobs(table: pd.DataFrame) -> Figure:
@@ -92,9 +103,13 @@ def knobs(table: pd.DataFrame) -> Figure:
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         joined = "-" if name != "policy" else ""
         axis.errorbar(x, y, spread, fmt=f"o{joined}", color=ADAPTIVE, markersize=4, linewidth=1.0, capsize=2)
-        for value, place in zip(own["value"], zip(x, y, strict=True), strict=True):
+        for number, (value, place) in enumerate(zip(own["value"], zip(x, y, strict=True), strict=True)):
             weight = "bold" if value == said(KNOBS[name].default) else "normal"
-            axis.annotate(str(value), place, xytext=(4, 4), textcoords="offset points", fontsize=7, fontweight=weight)
+            left = name == "policy" and number % 2 == 0
+            axis.annotate(
+                str(value), place, xytext=(-4 if left else 4, 4), textcoords="offset points", fontweight=weight,
+                fontsize=5.5 if name == "policy" else 7, ha="right" if left else "left",
+            )  # fmt: skip
         axis.set_xlim(low, high)
         least, most = min(0.8, own["mse_low"].min() / 1.1), max(1.25, own["mse_high"].max() * 1.15)
         axis.set_ylim(least, most)

@@ -218,10 +218,7 @@ def test_budgets_buy_the_most_accurate_and_targets_the_cheapest(flops: float, ms
     assert bought == (min(affordable, key=lambda one: one.mse) if affordable else front.places[0])
     good = [place for place in front.places if place.mse <= mse]
     assert front.at_error(mse) == (min(good, key=lambda one: one.cost) if good else front.places[-1])
-    draft, accurate = front.preset("draft"), front.preset("accurate")
-    assert draft.cost <= front.knee.cost / 4.0 or draft == front.places[0]
-    assert front.knee.mse <= draft.mse and accurate.mse <= front.knee.mse
-    assert accurate.cost <= 4.0 * front.knee.cost * (1.0 + 1e-9)
+    assert front.preset("draft") == front.places[0] and front.preset("accurate") == front.places[-1]
 
 
 def some_front() -> Front:
