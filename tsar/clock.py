@@ -30,6 +30,22 @@ def checked(clock: CycleSeconds, counters: Mapping[str, int], wall_s: float) -> 
     return seconds
 
 
+def end_of_cycle(time_s: float, cycle_s: float) -> float:
+    """The time at the end of a cycle.
+
+    Args:
+        time_s: at its start, seconds.
+        cycle_s: its length, seconds.
+
+    Raises:
+        ValueError: float64 holds no such time between the two: the run would never end.
+    """
+    end_s = time_s + cycle_s
+    if not end_s > time_s:
+        raise ValueError(f"clock: expected cycles that move time on from {time_s:g} s, got {cycle_s:g} s")
+    return end_s
+
+
 class Timed:
     """A context that adds its duration to an entry of a table, also where it ends with an error."""
 

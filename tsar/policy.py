@@ -14,7 +14,7 @@ from typing import ClassVar, Generic, TypeVar
 from jaxtyping import Float
 from torch import Tensor
 
-from tsar.clock import CycleSeconds, StageTimer, checked
+from tsar.clock import CycleSeconds, StageTimer, checked, end_of_cycle
 from tsar.config import TsarConfig
 from tsar.stages import REFERENCE, Stages
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, ShownImage, Spent, StepRecord, Trace, Viewpoint
@@ -214,7 +214,7 @@ def run(
         start_s, end_s: span of animation time to cover, seconds.
 
     Raises:
-        ValueError: the clock returned a value that is not finite and positive.
+        ValueError: the clock returned a value that is not finite and positive, or so small that time stands still.
     """
     cycle_s = checked(cycle_seconds, *policy.probe(trace, start_s))
     state, cycle = policy.start(), -policy.warmup_cycles
@@ -228,7 +228,7 @@ def run(
         spent = Spent(cycle, cycle_s, dict(done.timer.seconds), done.counters)
         display_s = time_s + policy.latency_cycles * cycle_s
         yield record, ShownImage(display_s, time_s, shown.image, shown.sample_map, shown.maps, spent, shown.carried)
-        state, cycle, time_s = done.after, cycle + 1, time_s + cycle_s
+        state, cycle, time_s = done.after, cycle + 1, end_of_cycle(time_s, cycle_s)
 
 
 def step(policy: Policy[State], state: State, trace: Trace, moment: Moment) -> Cycle[State]:

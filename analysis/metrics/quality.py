@@ -155,13 +155,13 @@ def pixel_errors(
 
 
 def ratio(adaptive: Floats, framed: Floats) -> Floats:
-    """``mse_adaptive / mse_framed``; 1 where both are 0, inf where only the framed one is.
+    """``mse_adaptive / mse_framed``; 1 where both are 0, inf where only the framed one is, NaN where either is NaN.
 
     Source: Stephens 2011, eq. 7.2.
     """
     adaptive, framed = np.asarray(adaptive, np.float64), np.asarray(framed, np.float64)
     quotient = np.full(adaptive.shape, np.inf)
-    np.divide(adaptive, framed, out=quotient, where=framed > 0)
+    np.divide(adaptive, framed, out=quotient, where=framed != 0)
     quotient[(adaptive == 0) & (framed == 0)] = 1.0
     return quotient
 

@@ -23,7 +23,7 @@ from scenes.canonical import (
 )
 from tests.renderer.builders import WHITE, colors, look_at, place, sphere_mesh
 
-SCALES = (1e-3, 1.0, 1e3)
+SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)
 
 _FACES = "013 032 467 475 045 051 237 276 026 064 157 173"
 BOX = Mesh(

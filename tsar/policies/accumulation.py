@@ -21,6 +21,10 @@ from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen
 from tsar.roots import square_root
 from tsar.types import Viewpoint
 
+BRIGHTEST = 1e4
+"""Samples are clipped here before they are accumulated: of what is much brighter the square does not fit into float32,
+and a sum of nine colours loses the others."""
+
 
 @dataclass(frozen=True)
 class Accumulation:
@@ -72,6 +76,7 @@ def accumulated(
         history: after that frame.
         constants: of the accumulation.
     """
+    color = color.clamp(-BRIGHTEST, BRIGHTEST)
     if history is None or before is None:
         return History(color, torch.ones(color.shape[:2]))
     side = color.shape[0]

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.config import require
+from tsar.error import replace_nonfinite
 from tsar.morton import raster_to_morton
 from tsar.policies.resampling import widened
 from tsar.policy import Moment, Picture, Policy, Price, Setting
@@ -91,7 +92,8 @@ class Framed(Policy[Frame]):
         self, state: Frame, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
     ) -> Frame:
         with timer("reconstruction"):
-            return Frame(frame_image(samples.color, self._side, self.config.resolution_px), moment.time_s)
+            color = replace_nonfinite(samples.color, self._framelet_side)[0]
+            return Frame(frame_image(color, self._side, self.config.resolution_px), moment.time_s)
 
     def image(self, state: Frame, moment: Moment) -> Picture:
         assert state.image is not None

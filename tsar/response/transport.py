@@ -41,8 +41,9 @@ def fill(direction: Field, bound: Field, target: float) -> Field:
         return torch.where(active, bound, 0.0)
     knee, order = torch.sort(vessel / weight, stable=True)
     full = torch.cumsum(vessel[order], 0)
-    open_weight = total(weight) - torch.cumsum(weight[order], 0)
-    at_knee = full + knee * open_weight.clamp(min=0.0)
+    # Summed from the far end: a difference of sums would lose weights that are many decades below the others.
+    open_weight = F.pad(torch.cumsum(weight[order].flip(0), 0).flip(0)[1:], (0, 1))
+    at_knee = full + torch.where(open_weight > 0, knee * open_weight, 0.0)
     segment = int(torch.searchsorted(at_knee, torch.tensor(target, dtype=at_knee.dtype)))
     segment = min(segment, knee.numel() - 1)
     before_full = full[segment - 1] if segment > 0 else full.new_zeros(())

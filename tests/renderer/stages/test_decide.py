@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle, product
+
 import jaxtyping
 import pytest
 import torch
@@ -18,12 +20,14 @@ from tests.renderer.stages.alike import (
     same_tiling,
 )
 from tests.renderer.stages.builders import small
+from tests.tsar.response import extremes
+from tests.tsar.response.test_extremes import RESPONSES, assert_kept, configured
 from tsar import response
 from tsar.choices import SOLVERS
 from tsar.clock import StageTimer
 from tsar.config import ResponseConfig, TilingConfig, TsarConfig
 from tsar.decision import Decision
-from tsar.response import initial_densities
+from tsar.response import initial_densities, respond
 from tsar.selection import initial_history
 from tsar.stages import REFERENCE
 from tsar.tiling import build
@@ -109,15 +113,29 @@ def test_decisions_agree(seed: int, kind: str, surplus_max: float, bias: float) 
         assert torch.equal(ours.spatial, densities.spatial) and ours.surplus == densities.surplus
 
 
+@pytest.mark.parametrize("response", RESPONSES, ids=lambda r: f"{r.gain:g} {r.bias:g} {r.surplus_max:g}")
+def test_decisions_agree_at_the_ends(response: ResponseConfig) -> None:
+    """Densities at their least and greatest, errors one-sided, along an axis and a step from it."""
+    config = configured("waterfill", response)
+    control, history = Control(config), initial_history(config)
+    starts = extremes.densities(config.sdf_side**2, *config.spatial_bounds, *config.temporal_bounds)
+    surplus = cycle((0.0, response.surplus_max * config.budget))
+    for (spatial, temporal), phi in product(starts.values(), extremes.errors(config.sdf_side**2).values()):
+        before, errors = Densities(spatial, temporal, next(surplus)), Errors(phi[0], phi[1])
+        found = control.decide(before, errors, history, config, StageTimer()).densities
+        assert_kept(before, found, config)
+        assert_same_densities(found, respond(before, errors, config), config)
+
+
 def test_five_thousand_decisions_do_not_drift(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
     config = TsarConfig(sdf_side=16, resolution_px=128, batch_size=16)
     control, g = Control(config), torch.Generator().manual_seed(11)
     densities, history = initial_densities(config), initial_history(config)
     (low_s, high_s), (low_t, high_t) = config.spatial_bounds, config.temporal_bounds
-    for cycle in range(5000):
+    for turn in range(5000):
         noise = torch.rand(3, 256, generator=g)
-        drift = 0.3 * torch.sin(torch.tensor(cycle / 500.0))
+        drift = 0.3 * torch.sin(torch.tensor(turn / 500.0))
         field = torch.where(noise[2] < 0.4, (2 * noise[:2] - 1 + drift).clamp(-1, 1), 0.0)
         decision = control.decide(densities, Errors(field[0], field[1]), history, config, StageTimer())
         densities, history = decision.densities, decision.due.history

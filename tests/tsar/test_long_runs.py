@@ -1,0 +1,187 @@
+"""Long runs: how far single and double precision come apart, and that nothing drifts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+
+import jaxtyping
+import pytest
+import torch
+from torch import Tensor
+
+from renderer.stages.control import Control
+from tests.oracles.screens import Layer, Screen
+from tests.tsar.policies.every import made, share_of_a_batch
+from tests.tsar.policies.test_behaviour import CYCLE_S, SIDE, disk, grey, stripes
+from tsar.clock import StageTimer, fixed_clock
+from tsar.config import TsarConfig
+from tsar.policy import Moment, Picture, Policy, Setting, run, step
+from tsar.response import initial_densities
+from tsar.roots import encoded
+from tsar.selection import initial_history
+from tsar.types import Errors, FrameletBatch, SampleBatch
+
+
+@contextmanager
+def in_double() -> Iterator[None]:
+    """The reference in float64 throughout, where it says float32 too."""
+    single = torch.float32
+    torch.float32 = torch.float64  # type: ignore[misc]
+    torch.set_default_dtype(torch.float64)
+    try:
+        yield
+    finally:
+        torch.set_default_dtype(single)
+        torch.float32 = single  # type: ignore[misc]
+
+
+SCREEN = Screen(
+    (Layer(stripes, disk, lambda t: (3.0 * t, 0.2 * torch.sin(t), 0.1 * torch.cos(2.0 * t))), Layer(grey(0.3)))
+)
+"""A disk of stripes that turns and wanders."""
+
+
+def played(policy: str, cycles: int) -> tuple[list[Tensor], list[Tensor], list[float]]:
+    """Places of the samples, pictures, and their mean squared errors at the time that they show, cycle by cycle."""
+    found = made(policy, "reference", SCREEN)
+    state, cycle_s = found.start(), CYCLE_S * share_of_a_batch(found)
+    places, pictures, errors = [], [], []
+
+    def trace(batch: FrameletBatch) -> SampleBatch:
+        places.append(batch.position.to(torch.float64))
+        return SCREEN.trace(batch)
+
+    for cycle in range(cycles):
+        done = step(found, state, trace, Moment(cycle * cycle_s, cycle, cycle_s))
+        state, image = done.after, done.shown.image.to(torch.float64)
+        pictures.append(image)
+        if cycle % 50 == 49:
+            truth = SCREEN.picture(cycle * cycle_s, SIDE, 2).to(torch.float64)
+            errors.append(float((encoded(image) - encoded(truth)).square().mean()))
+    return places, pictures, errors
+
+
+@dataclass(frozen=True)
+class Apart:
+    """How far two runs are apart: cycle of the first other decision, greatest difference of pictures before it and
+    mean difference after, and the mean errors of both."""
+
+    first: int
+    before: float
+    after: float
+    errors: tuple[float, float]
+
+
+def apart(policy: str, cycles: int) -> Apart:
+    single = played(policy, cycles)
+    with in_double():
+        double = played(policy, cycles)
+    first = next((n for n in range(cycles) if not torch.equal(single[0][n], double[0][n])), cycles)
+    off = [(one - other).abs() for one, other in zip(single[1], double[1], strict=True)]
+    before = max((float(one.max()) for one in off[:first]), default=0.0)
+    after = sum(float(one.mean()) for one in off[first:]) / max(cycles - first, 1)
+    return Apart(first, before, after, (sum(single[2]) / len(single[2]), sum(double[2]) / len(double[2])))
+
+
+@pytest.mark.parametrize(
+    ("policy", "cycles"),
+    [
+        ("filter", 60),
+        ("thesis", 60),
+        pytest.param("filter", 2000, marks=pytest.mark.slow),
+        pytest.param("thesis", 2000, marks=pytest.mark.slow),
+    ],
+)
+def test_single_precision_decides_as_double_does_or_as_well(policy: str, cycles: int) -> None:
+    """Until a decision differs pictures are apart by rounding alone; from there on errors are as large."""
+    found = apart(policy, cycles)
+    print(policy, cycles, found)
+    assert found.first >= 8 and found.before < 1e-4
+    assert abs(found.errors[0] / found.errors[1] - 1.0) < 0.05
+
+
+class Idle(Policy[int]):
+    """Does nothing."""
+
+    @property
+    def warmup_cycles(self) -> int:
+        return 0
+
+    def start(self) -> int:
+        return 0
+
+    def request(self, state: int, moment: Moment) -> tuple[int, FrameletBatch]:
+        return state, BATCH
+
+    def observe(self, state: int, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer) -> int:
+        return state + 1
+
+    def image(self, state: int, moment: Moment) -> Picture:
+        return Picture(IMAGE)
+
+
+BATCH = FrameletBatch(torch.zeros(1, dtype=torch.int64), torch.zeros(1, dtype=torch.int64), torch.zeros(1, 1, 2), 0.0)
+IMAGE = torch.zeros(1, 1, 3)
+
+
+@pytest.mark.parametrize("cycles", [3_000, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("start_s", [0.0, 1e6])
+def test_the_clock_of_many_cycles(start_s: float, cycles: int) -> None:
+    """Times are sums: each addition rounds by half a step of float64 at most, and no more."""
+    cycle_s = 1.0 / 60.0
+    policy, answer = Idle(Setting(TsarConfig())), SampleBatch(torch.zeros(1, 1, 3), {})
+    pictures = run(policy, lambda batch: answer, fixed_clock(cycle_s), start_s, 1e9)
+    _, shown = next(islice(pictures, cycles, None))
+    exact = start_s + cycles * cycle_s
+    assert abs(shown.sample_time_s - exact) <= cycles * 0.5 * math.ulp(exact)
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_decisions_do_not_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled; the errors lean to one side and back again every few thousand cycles."""
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+    config = TsarConfig(sdf_side=16, resolution_px=128, batch_size=16)
+    control, g = Control(config), torch.Generator().manual_seed(11)
+    densities, history = initial_densities(config), initial_history(config)
+    worst = 0.0
+    for cycle in range(100_000):
+        noise = torch.rand(3, 256, generator=g)
+        field = torch.where(noise[2] < 0.4, (2 * noise[:2] - 1 + 0.3 * math.sin(cycle / 500.0)).clamp(-1, 1), 0.0)
+        decision = control.decide(densities, Errors(field[0], field[1]), history, config, StageTimer())
+        densities, history = decision.densities, decision.due.history
+        if cycle % 1000 == 999:
+            whole = float(densities.combined().sum()) + densities.surplus
+            worst = max(worst, abs(whole / config.budget - 1.0))
+            for (low, high), one in (
+                (config.spatial_bounds, densities.spatial),
+                (config.temporal_bounds, densities.temporal),
+            ):
+                assert low * (1 - 1e-12) <= float(one.min()) and float(one.max()) <= high * (1 + 1e-12)
+            assert float(history.abs().max()) < 1e3
+    print(f"conservation is off by {worst:.2g} at most")
+    # a step of 2^-52 of the budget a cycle, all to one side
+    assert worst <= 100_000 * 2.0**-52
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("policy", ["tsar", "thesis"])
+def test_a_hundred_thousand_cycles_show_what_ten_thousand_do(policy: str) -> None:
+    """Of a still scene: no picture fades, no age stands still, and no decision wears out."""
+    screen = Screen((Layer(stripes),))
+    found = made(policy, "compiled", screen)
+    state, cycle_s, truth = found.start(), 2.0**-9, encoded(screen.picture(0.0, SIDE))
+    errors = []
+    for cycle in range(100_000):
+        done = step(found, state, screen.trace, Moment(cycle * cycle_s, cycle, cycle_s))
+        state = done.after
+        if cycle % 10_000 == 9_999:
+            assert bool(done.shown.image.isfinite().all()) and done.shown.sample_map is not None
+            newest_s = done.shown.sample_map.newest_s
+            assert float(newest_s.max()) >= cycle * cycle_s and float(newest_s.min()) > (cycle - 5_000) * cycle_s
+            errors.append(float((encoded(done.shown.image) - truth).square().mean()))
+    print(policy, errors)
+    assert max(errors[1:]) <= 1.05 * errors[0] + 1e-6
