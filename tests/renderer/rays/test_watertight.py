@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 
 from renderer.rays.queries import RayQueries
 from renderer.rays.single_rays import SingleRays
+from renderer.trace import Renderer
+from scenes.canonical import Emissive, Instance, Matte, Mesh, PerspectiveCamera, Scene, Sphere
+from tests.renderer.builders import WHITE, batch, look_at, place, sphere_mesh
 from tests.renderer.rays.test_queries import bumpy
+from tests.renderer.test_scale import _edge_positions
 
 Points = NDArray[np.float64]
 FACING = 0.1
@@ -172,3 +176,23 @@ def test_coincident_faces_and_needles() -> None:
     through = hits.face < len(faces)
     assert through.mean() > 0.99 and set(hits.face[through]) <= {0, 1}
     np.testing.assert_allclose(hits.t[through], 3.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("distance", [2.0, 300.0, 1e4])
+@pytest.mark.parametrize("packets", [True, False])
+def test_pictures_of_closed_meshes_show_nothing_of_what_is_within(distance: float, packets: bool) -> None:
+    """A lamp in a dark ball, seen through the very edges of the ball's faces."""
+    smooth = sphere_mesh(32)
+    ball = Mesh(np.round(smooth.vertices, 6) + np.float32(0.0), smooth.faces)  # closes the seam
+    matrix = place((0.3, -0.2, 0.1), (0.3, 0.5, 0.1))
+    middle = matrix[:3, 3]
+    camera = PerspectiveCamera(
+        look_at(middle + distance * np.array([0.48, 0.6, 0.64]), middle), 2.0 * np.degrees(np.arctan(1.1 / distance))
+    )
+    lamp = Instance(Sphere(0.9), Emissive((1.0, 1.0, 1.0)), matrix)
+    renderer = Renderer(Scene(camera, (Instance(ball, Matte(WHITE), matrix), lamp)), packets=packets)
+    position = _edge_positions(ball, camera, matrix)
+    assert len(position) > 10_000
+    found = renderer.trace(batch(position)).color
+    assert bool((found == 0.0).all())
+    renderer.close()

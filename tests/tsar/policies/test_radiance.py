@@ -63,7 +63,7 @@ def test_a_place_without_any_number_is_dark_at_worst(policy: str, kind: StagesNa
     assert float((pictures[-1, :, 48:] - GREY).abs().mean()) < 0.1
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-30, 1e30])
+@pytest.mark.parametrize("value", [pytest.param(0.0, marks=pytest.mark.slow), 1e-30, 1e30])
 @pytest.mark.parametrize(("policy", "kind"), CASES)
 def test_constant_frames(policy: str, kind: StagesName, value: float) -> None:
     """Black is black, next to nothing is next to nothing, and what is brighter than any display is white."""

@@ -57,8 +57,17 @@ def assert_kept(before: Densities, after: Densities, config: TsarConfig) -> None
     assert 0.0 <= after.surplus <= most + ROUNDING * config.budget
 
 
-@pytest.mark.parametrize("response", RESPONSES, ids=lambda r: f"{r.gain:g} {r.bias:g} {r.surplus_max:g}")
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("solver", "response"),
+    [
+        pytest.param(
+            solver, one, id=f"{solver} {one.gain:g} {one.bias:g} {one.surplus_max:g}",
+            marks=[] if solver == "waterfill" or number < 3 else [pytest.mark.slow],
+        )
+        for solver in SOLVERS
+        for number, one in enumerate(RESPONSES)
+    ],
+)  # fmt: skip
 def test_decisions_at_the_ends_conserve_and_stay_in_bounds(solver: str, response: ResponseConfig) -> None:
     config = configured(solver, response)
     count = config.sdf_side**2
