@@ -25,6 +25,8 @@ TransportSolver = Callable[[Field, Field, float, float], Field]
 
 _DIFFUSION_STEPS = 32
 """Explicit steps of diffusion: density travels about the square root of that many elements a decision."""
+_EXACT_SHARE = 1e-4
+"""Of all weights: above it a difference of sums is exact to a trillionth."""
 
 
 def fill(direction: Field, bound: Field, target: float) -> Field:
@@ -41,8 +43,11 @@ def fill(direction: Field, bound: Field, target: float) -> Field:
         return torch.where(active, bound, 0.0)
     knee, order = torch.sort(vessel / weight, stable=True)
     full = torch.cumsum(vessel[order], 0)
-    # Summed from the far end: a difference of sums would lose weights that are many decades below the others.
-    open_weight = F.pad(torch.cumsum(weight[order].flip(0), 0).flip(0)[1:], (0, 1))
+    whole = total(weight)
+    open_weight = whole - torch.cumsum(weight[order], 0)
+    # A difference loses weights that are many decades below the whole: what is left of it is summed from the far end.
+    left = F.pad(torch.cumsum(weight[order].flip(0), 0).flip(0)[1:], (0, 1))
+    open_weight = torch.where(open_weight > _EXACT_SHARE * whole, open_weight, left)
     at_knee = full + torch.where(open_weight > 0, knee * open_weight, 0.0)
     segment = int(torch.searchsorted(at_knee, torch.tensor(target, dtype=at_knee.dtype)))
     segment = min(segment, knee.numel() - 1)
