@@ -69,7 +69,7 @@ def play(policy: str, renderer: Renderer, start_s: float, kind: StagesName = "re
     return list(run(made, renderer.trace, fixed_clock(cycle_s), start_s, start_s + min(CYCLES * cycle_s, MOST_S)))
 
 
-STAGED = ("tsar", "filter", "tsar-densities", "tsar-wavelets", "tsar-densities-wavelets", "thesis")
+STAGED = ("tsar", "filter", "tsar-densities", "tsar-wavelets", "tsar-densities-wavelets", "surfel", "thesis")
 CASES = [
     pytest.param(
         name, kind, marks=[pytest.mark.slow] if name not in ("thesis", "filter") and kind != "compiled" else []

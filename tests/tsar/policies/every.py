@@ -17,7 +17,7 @@ from tsar.policies import POLICIES
 from tsar.policy import Policy, Setting
 from tsar.types import FrameletBatch, SampleBatch, Trace
 
-STAGED = ("tsar", "filter", "tsar-densities", "tsar-wavelets", "tsar-densities-wavelets", "thesis")
+STAGED = ("tsar", "filter", "tsar-densities", "tsar-wavelets", "tsar-densities-wavelets", "surfel", "thesis")
 """Policies whose stages are compiled too."""
 BOTH = ("tsar", "filter", "thesis")
 """Of these, those that both sets are tried with; the others are made of the same stages."""
