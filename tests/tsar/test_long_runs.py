@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,15 +29,25 @@ from tsar.types import Errors, FrameletBatch, SampleBatch
 
 @contextmanager
 def in_double() -> Iterator[None]:
-    """The reference in float64 throughout, where it says float32 too."""
+    """The reference in float64 throughout, where it says float32 too; tables are made anew, before and after."""
     single = torch.float32
     torch.float32 = torch.float64  # type: ignore[misc]
     torch.set_default_dtype(torch.float64)
+    _forget_tables()
     try:
         yield
     finally:
         torch.set_default_dtype(single)
         torch.float32 = single  # type: ignore[misc]
+        _forget_tables()
+
+
+def _forget_tables() -> None:
+    for name, module in list(sys.modules.items()):
+        if name.startswith("tsar."):
+            for entry in list(vars(module).values()):
+                if hasattr(entry, "cache_clear"):
+                    entry.cache_clear()
 
 
 SCREEN = Screen(
