@@ -137,11 +137,11 @@ def strongest(tested: pd.DataFrame) -> pd.DataFrame:
 
 def _by_observer(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:
     """Shares ``(observers, 2)`` of two conditions at one level, means of the cells that have both."""
-    both = [dict(shares[samples].xs(name).dropna().items()) for name in (first, second)]
+    both: list[dict[Any, Any]] = [dict(shares[samples].xs(name).dropna().items()) for name in (first, second)]
     found: dict[str, list[tuple[float, float]]] = {}
     for cell in both[0]:
         if cell in both[1]:  # of observer, and of the other conditions
-            found.setdefault(cell[0], []).append((both[0][cell], both[1][cell]))
+            found.setdefault(cell[0], []).append((float(both[0][cell]), float(both[1][cell])))
     return np.array([np.mean(entries, axis=0) for entries in found.values()]).reshape(-1, 2)
 
 

@@ -103,7 +103,7 @@ class TileOptions:
     """One picture of a scene, in tiles over processes or machines."""
 
     scene: Annotated[str, tyro.conf.Positional]
-    """Built-in scene by name."""
+    """Built-in scene by name, a scene file or a model, which all workers can read."""
     width_px: int = 0
     """Width, pixels; 0 takes that of the scene's film."""
     height_px: int = 0

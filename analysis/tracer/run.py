@@ -40,6 +40,18 @@ def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
         return scene, tuple(map(str, losses))
 
 
+def losses_of(scene: str) -> tuple[str, ...]:
+    """What of a scene's file could not be carried over.
+
+    Raises:
+        InputError: there is no such scene, or its file cannot be read.
+    """
+    from scenes import catalog
+
+    with bad_input():
+        return catalog.load_any(scene)[1]
+
+
 def explained(scene: Scene) -> list[str]:
     """What a scene requires of the kernels, and why."""
     from renderer.tables.requirements import explanation
@@ -120,7 +132,7 @@ def tiles(options: TileOptions) -> dict[str, Any]:
     farm = ClusterOptions(workers=max(options.study)) if options.study else options.farm
     with bad_input():
         picture = picture_of(options, 1 if options.study else farm.threads)
-        own_results(options.out, [f"{picture.scene}.png", f"{picture.scene}.exr"])
+        own_results(options.out, [f"{picture.name}.png", f"{picture.name}.exr"])
     chunks = chunks_of(picture, options.chunk_tiles)
     with bad_input(), connected(farm) as client, full_disk(options.out, FilmError), bars() as shown:
         if options.study:
@@ -128,8 +140,8 @@ def tiles(options: TileOptions) -> dict[str, Any]:
             found = study(client, picture, chunks, options.study, options.repetitions, task)
         else:
             image, facts = render_resumed(client, picture, options, shown.task("chunks", len(chunks)))
-            found = {**facts, "nonfinite": write_image(options.out / f"{picture.scene}.png", image)}
-            write_image(options.out / f"{picture.scene}.exr", image)
+            found = {**facts, "nonfinite": write_image(options.out / f"{picture.name}.png", image)}
+            write_image(options.out / f"{picture.name}.exr", image)
         return write_summary(options.out, found, options, scene=picture.scene, seed=options.seed)
 
 

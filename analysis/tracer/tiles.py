@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,6 +46,11 @@ class Picture:
     """:func:`source_of` the scene."""
 
     @property
+    def name(self) -> str:
+        """Of its files: that of the scene, without folder and ending where it is one of a file."""
+        return Path(self.scene).stem
+
+    @property
     def content(self) -> dict[str, Any]:
         """What decides the bits: all but the threads."""
         return {name: value for name, value in dataclasses.asdict(self).items() if name != "threads"}
@@ -61,7 +67,7 @@ def source_of(scene: str, point_set: str) -> str:
     from scenes import catalog
 
     added = brought((POINT_SETS, point_set))
-    return content_hash((catalog.load(scene), code_hash(render_chunk), *added))
+    return content_hash((catalog.load_any(scene)[0], code_hash(render_chunk), *added))
 
 
 def picture_of(options: TileOptions, threads: int) -> Picture:
@@ -75,7 +81,7 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
     from renderer.tables.checks import check_frame_size
     from scenes import catalog
 
-    film = catalog.load(options.scene).film
+    film = catalog.load_any(options.scene)[0].film
     point_set(options.point_set, options.samples)
     size = options.width_px or film.width_px, options.height_px or film.height_px
     check_frame_size(*size, 1)
@@ -99,7 +105,7 @@ def _renderer(scene: str, seed: int, threads: int) -> Renderer:
     from renderer.trace import Renderer
     from scenes import catalog
 
-    return Renderer(catalog.load(scene), threads=threads, seed=seed)
+    return Renderer(catalog.load_any(scene)[0], threads=threads, seed=seed)
 
 
 def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:

@@ -1,6 +1,7 @@
 """Render a picture in tiles over processes or machines, or measure how much faster more workers are.
 
 Examples: python scripts/tiles.py report-one --out out/tiles
+          python scripts/tiles.py car.glb --samples 256 --out out/car
           python scripts/tiles.py glass --farm.scheduler tcp://host:8786 --out out/far
           python scripts/tiles.py report-one --study 1 2 4 --out out/speedup
 """
@@ -19,9 +20,10 @@ def main() -> None:
     import pandas as pd
 
     from analysis.command.console import frame_table, show
-    from analysis.tracer.run import tiles
+    from analysis.tracer.run import losses_of, tiles
     from analysis.tracer.tile_speedup import described
 
+    show(*losses_of(options.scene))
     found = tiles(options)
     if options.study:
         show(frame_table(pd.DataFrame(found["rows"])), described(found))
