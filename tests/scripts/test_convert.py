@@ -33,7 +33,8 @@ def test_a_scene_is_converted_and_its_losses_are_reported(source: Path, tmp_path
     assert call_script("convert.py", monkeypatch, str(source), str(target)) == 0, capsys.readouterr().err
     assert len(load_scene_file(target).instances) == 2
     report = json.loads((tmp_path / "out" / "b.lxs.losses.json").read_text())
-    assert {"where": "a.pbrt:7:1", "what": "shape 'cone'", "became": "a mesh of 64 triangles"} in report["losses"]
+    cone = {"where": "a.pbrt:7:1", "what": "shape 'cone'", "became": "a mesh of 64 triangles", "picture": True}
+    assert cone in report["losses"] and [row["picture"] for row in report["losses"]].count(False) == 1
     assert report["provenance"]["commit"] and report["config"]["strict"] is False
     printed = capsys.readouterr().out
     assert "a.pbrt:7:1: shape 'cone': a mesh of 64 triangles" in printed and "2 shapes, 0 lights" in printed
