@@ -14,6 +14,14 @@ SAME_PICTURE = frozenset(
 """Integrators of files that take all light into account: they differ in how soon the picture is good."""
 
 
+HINTS = frozenset(
+    "rrDepth rrstrategy rrcontinueprob rrthreshold eyerrthreshold lightrrthreshold lightsamplestrategy strategy "
+    "lightpathstrategy lightstrategy shadowraycount strictNormals samplesPerPass directsamples indirectsamples "
+    "usevariance largemutationprob maxconsecrejects scramble diagonal".split()
+)
+"""Parameters that say how a renderer gets to its picture."""
+
+
 @dataclass(frozen=True)
 class Loss:
     """Something that a format has and the target does not have.

@@ -25,7 +25,7 @@ from scenes.formats.geometry.transform_stack import (
     scaling,
     translation,
 )
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import HINTS, LossReport
 from scenes.formats.text.places import Place
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
@@ -187,7 +187,7 @@ class DirectiveReader:
     def left_over(self, parameters: Parameters, what: str) -> None:
         """Reports parameters that nothing asked for."""
         for name in parameters.unasked():
-            self.report.add(str(parameters.place), f"{what}: parameter {name!r}")
+            self.report.add(str(parameters.place), f"{what}: parameter {name!r}", picture=name not in HINTS)
 
 
 def word(directive: Directive, at: int = 0) -> str:

@@ -147,7 +147,7 @@ class LuxReader(SceneReader):
         self._halt_samples = parameters.whole("haltspp", 0, 0, 1 << 24)
         self.read_size(parameters, 800, 600)
         if parameters.unasked():
-            self.report.add(
+            self.report.hint(
                 str(directive.place), f"{len(parameters.unasked())} settings of the film", "linear radiance"
             )
         if self._halt_samples:

@@ -12,7 +12,7 @@ from scenes.canonical import Rgb, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import grey, radiant_rgb, rgb, sampled_rgb, xyz_to_rgb
 from scenes.formats.geometry.transform_stack import KEYS_MAX, invertible, looking, rotation, scaling, translation
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import HINTS, LossReport
 from scenes.formats.text.numbers import NUMBER_MAX
 from scenes.formats.text.xml_tree import Node
 from scenes.loading import decode_srgb
@@ -113,7 +113,8 @@ class Properties:
         """Reports properties, and textures with a name, that nothing asked for."""
         for name in self.given:
             if name not in self.asked:
-                self.report.add(self.where, f"{self.node.get('type')}: property {name!r}")
+                what = f"{self.node.get('type')}: property {name!r}"
+                self.report.add(self.where, what, picture=name not in HINTS)
         for child in self.rest:
             if child.tag in ("texture", "ref") and child.get("name") and child.get("name") not in self.asked:
                 self.report.add(str(child.place), f"{self.node.get('type')}: texture {child.get('name')!r}")

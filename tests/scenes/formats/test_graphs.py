@@ -114,16 +114,20 @@ def test_files_of_mitsuba_3_are_refused_not_misread(tmp_path: Path) -> None:
 
 def test_hints_are_no_reason_to_refuse(tmp_path: Path) -> None:
     """A sampler and the samples of a light do not change the picture; a shape that is left out does."""
-    head = 'Sampler "stratified"\n' + HEAD + 'LightSource "infinite" "integer nsamples" 4\n'
+    head = (
+        'Sampler "stratified"\nIntegrator "path" "float rrthreshold" 2\n'
+        + HEAD
+        + 'LightSource "infinite" "integer nsamples" 4\n'
+    )
     shape = 'Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0]'
     (tmp_path / "a.pbrt").write_text(f'{head}Material "matte"\n{shape}\n')
     report = LossReport()
     scene = load_scene_file(tmp_path / "a.pbrt", None, report)
     save_scene_file(scene, tmp_path / "b.lxs", None, report, strict=True)
-    assert [loss.picture for loss in report.losses] == [False, False] and len(report.lines()) == 3
+    assert [loss.picture for loss in report.losses] == [False] * 3 and len(report.lines()) == 4
     report.add("a", "b")
     report.add("c", "b")
     assert report.lines()[:2] == ["changes the picture:", "  a (and 1 more): b: left out"]
-    assert [row["picture"] for row in report.rows()] == [False, False, True, True]
+    assert [row["picture"] for row in report.rows()] == [False, False, False, True, True]
     with pytest.raises(SceneError, match=r"got a: b: left out \(and 1 more\)"):
         report.refuse_any()
