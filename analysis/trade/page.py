@@ -14,6 +14,7 @@ from analysis.page.explorer import Explorer, Point
 from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
 from analysis.page.report import Report, write_report
 from analysis.study.evaluation import Place
+from analysis.trade.knobs import OWN
 from analysis.trade.runs import SEARCH
 from analysis.trade.shown import shown_tables
 from analysis.trade.tables import lines
@@ -31,7 +32,7 @@ _QUANTITIES = {
     "JOD": "jod",
 }
 _ERRORS = 3
-_ALONE, _SEARCHED, _OTHERS = "a knob alone", "the search", "another policy"
+_ALONE, _SEARCHED, _OTHERS = "a knob of tsar alone", "the search", "another policy"
 
 
 def write_page(
@@ -83,7 +84,7 @@ def _explorer(points: pd.DataFrame, place: Place) -> Explorer:
             truths[group] = f"reference of {group}"
             pictures[truths[group]] = _webp(place.still(key, "reference", 0))
         values = {name: float(line[column]) for name, column in _QUANTITIES.items()}
-        kind = _SEARCHED if line["knob"] == SEARCH else _OTHERS if line["knob"] == "policy" else _ALONE
+        kind = _SEARCHED if line["knob"] == SEARCH else _OTHERS if line["policy"] != OWN else _ALONE
         found.append(Point(group, kind, line["setting"], values, key))
     names = list(_QUANTITIES)
     return Explorer(

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 
 from analysis.metrics.front import knee, on_front
 from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
-from analysis.trade.knobs import KNOBS, said
+from analysis.trade.knobs import KNOBS, OWN, said
 from analysis.trade.runs import SEARCH
 from analysis.trade.tables import Relative, lines
 
@@ -45,11 +45,11 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
     _plain(axis, "cost over that of the default (log scale)", "mean squared error over that of the default (log scale)")
     _short_ticks(axis)
     of_search = set(points["setting"][points["knob"] == SEARCH])
-    of_policies = set(points["setting"][points["knob"] == "policy"])
+    of_policies = set(points["setting"][points["policy"] != OWN])
     table, bands = found.front, found.bands
     assert bands is not None
     inks = [FRAMED if name in of_policies else ADAPTIVE if name in of_search else OTHER for name in table["setting"]]
-    for ink, label in ((OTHER, "a knob alone"), (ADAPTIVE, "the search"), (FRAMED, "another policy")):
+    for ink, label in ((OTHER, "a knob of tsar alone"), (ADAPTIVE, "the search"), (FRAMED, "another policy")):
         kept = [ink == one for one in inks]
         if any(kept):
             axis.plot(
