@@ -59,7 +59,7 @@ def read_model(path: Path, report: LossReport | None = None) -> tuple[Instance, 
     if len(_kept) > _KEPT_MAX:
         del _kept[next(iter(_kept))]
     for loss in losses:
-        report.add(loss.where, loss.what, loss.became)
+        report.add(loss.where, loss.what, loss.became, loss.picture)
     return kept
 
 
