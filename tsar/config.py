@@ -9,6 +9,7 @@ from typing import Literal
 
 from tsar.checks import ConfigError, closed_choices, require
 from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
+from tsar.window import Window
 
 __all__ = [
     "ConfigError",
@@ -23,6 +24,10 @@ __all__ = [
     "tiles_at_least",
     "tiles_at_most",
 ]
+
+RESOLUTION_DEFAULT = 512
+SIDE_MOST = 16384
+"""Greatest side of an output image, pixels."""
 
 StagesName = Literal["compiled", "reference"]
 """What runs the stages around tracing: kernels on the CPU, or the tensor operations they are checked against."""
@@ -152,8 +157,13 @@ class TsarConfig:
 
     batch_size: int = 128
     """Framelets rendered per cycle."""
-    resolution_px: int = 512
-    """Output image width and height, pixels, a power of two."""
+    resolution_px: int = RESOLUTION_DEFAULT
+    """Output image width and height, pixels, a power of two; not beside width_px and height_px, from which it follows:
+    the least that holds both."""
+    width_px: int = 0
+    """Output image width, pixels, 16 to 16384, of a picture of any shape; 0 for a square of resolution_px."""
+    height_px: int = 0
+    """Output image height; given where width_px is."""
     framelet_side: int = 16
     """Samples along a framelet's side, 16 or 32."""
     sdf_side: int = 128
@@ -172,7 +182,9 @@ class TsarConfig:
 
     def __post_init__(self) -> None:
         require(1 <= self.batch_size <= 8192, "batch_size", "between 1 and 8192 framelets", self.batch_size)
-        for name, low, high in (("resolution_px", 64, 8192), ("sdf_side", 16, 512)):
+        if self.width_px or self.height_px:
+            self._follow_shape()
+        for name, low, high in (("resolution_px", 64, SIDE_MOST if self.width_px else 8192), ("sdf_side", 16, 512)):
             value = getattr(self, name)
             ok = low <= value <= high and value & (value - 1) == 0
             require(ok, name, f"a power of two in [{low}, {high}]", value)
@@ -192,6 +204,16 @@ class TsarConfig:
         require(support < self.resolution_px, "reconstruction.age_support_px", "less than resolution_px", support)
         require(self.cache_size >= self.batch_size, "cache_size", "at least one batch", self.cache_size)
 
+    def _follow_shape(self) -> None:
+        """Sets the resolution to the least power of two that holds the picture's sides."""
+        for name in ("width_px", "height_px"):
+            value = getattr(self, name)
+            require(16 <= value <= SIDE_MOST, name, f"between 16 and {SIDE_MOST}, as both sides are given", value)
+        side = max(64, 1 << (max(self.width_px, self.height_px) - 1).bit_length())
+        given = self.resolution_px
+        require(given in (RESOLUTION_DEFAULT, side), "resolution_px", "none beside width_px and height_px", given)
+        object.__setattr__(self, "resolution_px", side)
+
     def _require_room_for_a_batch(self, coarse: int, fine: int) -> None:
         """Refuses tilings too small for a full batch, and densities whose least sum exceeds the budget."""
         count, size = self.tile_count_max, self.batch_size
@@ -202,6 +224,21 @@ class TsarConfig:
         rate = self.response.temporal_min
         needs = f"at most {size / coarse:g} (a batch of {size} for the {coarse} tiles of the coarsest level)"
         require(rate * coarse <= size, "response.temporal_min", needs, rate)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the output image, pixels."""
+        return self.height_px or self.resolution_px, self.width_px or self.resolution_px
+
+    @property
+    def pixels(self) -> int:
+        """Of the output image."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def window(self) -> Window:
+        """Where the output image lies on the square plane that policies work on."""
+        return Window(*self.shape[::-1], self.resolution_px)
 
     @property
     def field_level(self) -> int:

@@ -95,6 +95,14 @@ def raster_to_morton(side: int) -> Int64[Tensor, " cells"]:
     return interleave(row[None, :].expand(side, side).reshape(-1), row[:, None].expand(side, side).reshape(-1))
 
 
+@lru_cache(maxsize=8)
+def curve(height: int, width: int) -> Int64[Tensor, " cells"]:
+    """Raster indices ``y * width + x`` of the cells of a rectangle, as the Morton curve over a square around it meets
+    them; of a square of a power of two it is :func:`morton_to_raster`."""
+    row, column = torch.arange(height)[:, None], torch.arange(width)[None, :]
+    return torch.argsort(interleave(column.expand(height, width).reshape(-1), row.expand(height, width).reshape(-1)))
+
+
 @lru_cache(maxsize=32)
 def morton_to_raster(side: int) -> Int64[Tensor, " cells"]:
     """For each cell in Morton order, its raster index ``y * side + x``."""

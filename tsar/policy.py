@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Generic, TypeVar
 
 from jaxtyping import Float
 from torch import Tensor
 
 from tsar.clock import CycleSeconds, StageTimer, checked, end_of_cycle
-from tsar.config import TsarConfig
+from tsar.config import TsarConfig, require
 from tsar.stages import REFERENCE, Stages
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, ShownImage, Spent, StepRecord, Trace, Viewpoint
+from tsar.window import Window
 
 State = TypeVar("State")
 
@@ -76,6 +77,17 @@ class Moment:
     cycle_s: float
 
 
+def require_square(config: TsarConfig, policy: str) -> None:
+    """Refuses a picture that is no square of a power of two, for policies that know no other.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    height, width = config.shape
+    expected = f"a square of resolution_px for the policy {policy}"
+    require(config.window.whole, "width_px, height_px", expected, (width, height))
+
+
 class WhenAsked(Mapping[str, MapShown]):
     """Maps that are made when somebody draws them: most cycles are never looked at."""
 
@@ -98,8 +110,8 @@ class Picture:
     """What a policy puts on the display.
 
     Attributes:
-        image: ``(height, width, 3)`` float32 linear RGB.
-        sample_map: age and density of its samples; None where the policy cannot tell.
+        image: ``(height, width, 3)`` float32 linear RGB, of the picture, or of the whole plane of which it is a window.
+        sample_map: age and density of its samples, likewise; None where the policy cannot tell.
         counters: work done for it, by name; ``framelet_pixels`` are the pixels of all framelets that were accumulated.
         maps: what else the policy knows of every place, by name, for a page.
         carried: see :class:`tsar.types.ShownImage`.
@@ -186,6 +198,10 @@ class Policy(ABC, Generic[State]):
     def image(self, state: State, moment: Moment) -> Picture:
         """The image at the end of a cycle."""
 
+    def fitted(self, shown: Picture) -> Picture:
+        """What goes onto the display, of the shape of the output: the window of a picture of the whole plane."""
+        return cropped(shown, self.config.window)
+
     def probe(self, trace: Trace, time_s: float) -> tuple[Mapping[str, int], float]:
         """What a cycle takes, from throw-away ones before a run: work counted, and wall seconds."""
         state = self.start()
@@ -227,8 +243,29 @@ def run(
         shown = done.shown
         spent = Spent(cycle, cycle_s, dict(done.timer.seconds), done.counters)
         display_s = time_s + policy.latency_cycles * cycle_s
-        yield record, ShownImage(display_s, time_s, shown.image, shown.sample_map, shown.maps, spent, shown.carried)
+        fit = policy.fitted(shown)
+        yield record, ShownImage(display_s, time_s, fit.image, fit.sample_map, fit.maps, spent, fit.carried)
         state, cycle, time_s = done.after, cycle + 1, end_of_cycle(time_s, cycle_s)
+
+
+def cropped(shown: Picture, window: Window) -> Picture:
+    """The picture of one that may be of the whole plane."""
+    if window.whole:
+        return shown
+    samples, carried = shown.sample_map, shown.carried
+    if samples is not None:
+        samples = SampleMap(window.parts(samples.newest_s), window.parts(samples.level))
+
+    def of_part(one: MapShown) -> MapShown:
+        return replace(one, values=window.parts(one.values))
+
+    def carried_part(image: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
+        assert carried is not None
+        return window.cropped(carried(window.enlarged(image)))
+
+    maps = WhenAsked({name: lambda name=name: of_part(shown.maps[name]) for name in shown.maps})
+    image = window.cropped(shown.image)
+    return replace(shown, image=image, sample_map=samples, maps=maps, carried=carried_part if carried else None)
 
 
 def step(policy: Policy[State], state: State, trace: Trace, moment: Moment) -> Cycle[State]:

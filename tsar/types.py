@@ -44,7 +44,7 @@ class FrameletBatch:
     Attributes:
         level, index: the tile of each framelet, as in :class:`Tiling`.
         position: sample positions on the image plane, ``(x, y)`` in ``[0, 1)`` from the top left corner, Morton order
-            within a framelet. Multiples of ``1 / 65536``, so exact in float32.
+            within a framelet. Multiples of ``1 / 65536`` where the image is a square, so exact in float32.
         time_s: animation time of each sample, seconds, float64 (float32 is 4 ms off at 1e5 s); one number where they
             have the same.
         cycle: pipeline cycle that asked for it.
@@ -168,15 +168,15 @@ class Errors:
 
 @dataclass(frozen=True)
 class SampleMap:
-    """What the samples shown in each part of an image are, raster order; the parts are equal squares.
+    """What the samples shown in each part of an image are, raster order; the parts are equal squares, or the image.
 
     Attributes:
         newest_s: animation time of the newest sample, seconds; ``-inf`` where nothing has been sampled yet.
         level: quad level of the framelet it came in, which tells how densely it was sampled there.
     """
 
-    newest_s: Float64[Tensor, "side side"]
-    level: Int64[Tensor, "side side"]
+    newest_s: Float64[Tensor, "rows columns"]
+    level: Int64[Tensor, "rows columns"]
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class MapShown:
         unit: of the values, in words.
     """
 
-    values: Float[Tensor, "side side"]
+    values: Float[Tensor, "rows columns"]
     bounds: tuple[float, float]
     unit: str
 

@@ -53,8 +53,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
         InputError: something asked for cannot be had.
     """
     with bad_input():
-        need = options.tsar.resolution_px**2 * _BYTES_PER_PIXEL * (1 + len(options.rivals))
-        require_memory(need, f"resolution_px: {options.tsar.resolution_px}")
+        require_memory(options.pixels_held * _BYTES_PER_PIXEL, options.size)
         slots = options.tsar.cache_slots
         require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
         own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
@@ -76,7 +75,7 @@ def _renderer(options: RunOptions, scene: Scene, axis: float) -> Renderer:
     with first_imports():
         from renderer.trace import Renderer
 
-    side = options.tsar.resolution_px * axis
+    side = min(options.tsar.shape) * axis
     return Renderer(scene, options.device, options.threads or None, footprint_resolution_px=side)
 
 
@@ -152,7 +151,7 @@ def _limits(options: RunOptions) -> RecordLimits:
 def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:
     from analysis.storage.reference import ReferenceSpec, content_hash, obtain, renderer_hash
 
-    side, axis = options.tsar.resolution_px, options.reference_samples_per_axis
+    (height, width), axis = options.tsar.shape, options.reference_samples_per_axis
     spec = ReferenceSpec(
         scene=f"{options.input} phase {options.phase:g}",
         scene_hash=content_hash(setup.scene),
@@ -160,13 +159,14 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
         start_s=options.start_s,
         rate_hz=options.reference_rate_hz,
         count=count,
-        resolution_px=side,
+        width_px=width,
+        height_px=height,
         samples_per_axis=axis,
     )
     task = bars.task("reference", count)
     with bad_input():
         renderer = setup.renderer_of(1)
-        return obtain(options.cache, spec, lambda t: renderer.render_frame(t, side, side, axis), task)
+        return obtain(options.cache, spec, lambda t: renderer.render_frame(t, width, height, axis), task)
 
 
 def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, PolicyRun]:
@@ -212,7 +212,7 @@ def _compare(
     scales = Scales(options.tsar.spatial_bounds, options.tsar.temporal_bounds)
     stride = max(1, round(options.reference_rate_hz / 60.0))
     span_s = options.start_s, options.start_s + options.seconds
-    side_px = min(options.tsar.resolution_px, 512)
+    side_px = min(options.tsar.shape[1], 512)
     filming = [Filming(options.policy, scales, side_px, options.out, stride)] if options.film else []
     steps, task = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
 

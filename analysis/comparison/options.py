@@ -30,6 +30,9 @@ DEFAULT_RIVALS = ("framed", "thesis", "framed-super", "framed-quarter", "framed-
 """The plain framed renderer, the policy of the dissertation, and framed renderers that are the best of their kind
 somewhere and take little time."""
 
+OF_PICTURE = ("framed", "frameless")
+"""Beginnings of the names of policies that hold the pixels of the picture alone."""
+
 
 CHOICES = ("preset", "budget_flops", "budget_seconds", "error_target")
 """Options that choose a place on the measured front."""
@@ -147,6 +150,20 @@ class RunOptions:
             require(self.counted != "wall", "ledger", f"a modelled one beside a {name}", self.counted)
         limits.within(self, budget_flops=(1.0, 1e30), budget_seconds=(1e-6, 1e9), error_target=(1e-12, 1.0))
         require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
+
+    @property
+    def size(self) -> str:
+        """What the user said of the picture's size."""
+        c = self.tsar
+        return (
+            f"width_px x height_px: {c.width_px} x {c.height_px}" if c.width_px else f"resolution_px: {c.resolution_px}"
+        )
+
+    @property
+    def pixels_held(self) -> int:
+        """Pixels that all runs hold: of the picture, or, for most, of the square around it."""
+        squares = sum(name.partition("-")[0] not in OF_PICTURE for name in (self.policy, *self.rivals))
+        return squares * self.tsar.resolution_px**2 + (1 + len(self.rivals) - squares) * self.tsar.pixels
 
     @property
     def counted(self) -> Ledger:

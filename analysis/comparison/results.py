@@ -20,13 +20,17 @@ from analysis.page.report import Report, write_report
 from analysis.storage.records import density_quantiles, read_limits
 
 
+def _size(tsar: Mapping[str, Any]) -> str:
+    return f"{tsar['width_px']} x {tsar['height_px']}" if tsar["width_px"] else f"{tsar['resolution_px']}²"
+
+
 def _title(summary: Mapping[str, Any]) -> str:
     config = summary["config"]
     tsar = config["tsar"]
     others = ", ".join(summary["rivals"])
     beside = f" beside {others}" if others else ""
     return (
-        f"{config['input']}: {summary['policy']} (batch {tsar['batch_size']}){beside} at {tsar['resolution_px']}², "
+        f"{config['input']}: {summary['policy']} (batch {tsar['batch_size']}){beside} at {_size(tsar)}, "
         f"equal cost by ledger {summary['ledger']}"
     )
 

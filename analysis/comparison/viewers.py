@@ -111,8 +111,10 @@ class Filming:
 
     def film(self, panels: Panels, span_s: tuple[float, float]) -> ComparisonFilm:
         """What composes its frames."""
-        labels = list(panels.arranged(self._frames[0][1]))
-        return ComparisonFilm(self.side_px, span_s, list(self._errors), self.own, labels, len(panels.runs) + 1)
+        first = panels.arranged(self._frames[0][1])
+        height_px = next(iter(first.values()))[2][0]
+        runs, row = list(self._errors), len(panels.runs) + 1
+        return ComparisonFilm(self.side_px, span_s, runs, self.own, list(first), row, height_px)
 
     def write(
         self, panels: Panels, film: ComparisonFilm, sink: FrameSink, advance: Callable[[], None] = lambda: None

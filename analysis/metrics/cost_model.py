@@ -254,7 +254,7 @@ def parameters_of(config: TsarConfig, trace_segments: float) -> CostParameters:
         batch_size=config.batch_size,
         sdf_size=config.sdf_side**2,
         framelet_size=config.samples,
-        recon_res=config.resolution_px**2,
+        recon_res=config.pixels,
         cache_size=config.cache_slots,
         recon_age_support=config.reconstruction.age_support_px,
         trace_segments=trace_segments,

@@ -107,24 +107,25 @@ def density_image(
 
 
 def age_image(
-    newest_s: Float[Tensor, "s s"], time_s: float, bounds_s: tuple[float, float], resolution_px: int
+    newest_s: Float[Tensor, "h w"], time_s: float, bounds_s: tuple[float, float], width_px: int, height_px: int = 0
 ) -> Pixels:
     """Age at ``time_s`` of the newest samples, on a logarithmic colour scale; ``NEVER`` where there are none."""
     age_s = time_s - newest_s.numpy().astype(np.float64)
     image = colour(np.where(np.isfinite(age_s), age_s, bounds_s[1]), bounds_s, AGE_MAP)
     image[~np.isfinite(age_s)] = NEVER
-    return enlarge(image, resolution_px)
+    return enlarge(image, width_px, height_px)
 
 
-def enlarge(image: Pixels, side_px: int) -> Pixels:
-    """A square picture at another size: whole pixels when it grows by a whole number, a smooth average otherwise."""
-    old = image.shape[0]
-    if old == side_px:
+def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
+    """A picture at another size, by default a square: whole pixels when it grows by whole numbers, a smooth average
+    otherwise."""
+    size, (height, width) = (height_px or width_px, width_px), image.shape[:2]
+    if (height, width) == size:
         return image
-    if side_px % old == 0:
-        return image.repeat(side_px // old, 0).repeat(side_px // old, 1)
-    how = Image.Resampling.BOX if side_px < old else Image.Resampling.BICUBIC
-    return np.asarray(Image.fromarray(image).resize((side_px, side_px), how))
+    if size[0] % height == 0 and size[1] % width == 0:
+        return image.repeat(size[0] // height, 0).repeat(size[1] // width, 1)
+    how = Image.Resampling.BOX if size[1] < width else Image.Resampling.BICUBIC
+    return np.asarray(Image.fromarray(image).resize(size[::-1], how))
 
 
 def with_scale(image: Pixels, bounds: tuple[float, float], unit: str, name: str) -> Pixels:

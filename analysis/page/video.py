@@ -65,13 +65,22 @@ def to_pixels(image: Tensor) -> Pixels:
 def photographs(view: View, side_px: int) -> dict[str, Pixels]:
     """The reference and what every display shows, by name."""
     images = {REFERENCE: view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
-    return {label: enlarge(to_pixels(image), side_px) for label, image in images.items()}
+    size = side_px, height_of(view, side_px)
+    return {label: enlarge(to_pixels(image), *size) for label, image in images.items()}
+
+
+def height_of(view: View, width_px: int) -> int:
+    """Height of pictures that are so wide: even, in the proportions of the reference; of very long ones, from a quarter
+    of the width to four times."""
+    height, width = view.reference.shape[:2]
+    return width_px if height == width else 2 * round(0.5 * width_px * min(max(height / width, 0.25), 4.0))
 
 
 def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels]:
     """What runs say of their decisions, by label: what the run ``own`` knows of every place, how old its samples are,
     and tiling and densities of every run that records its cycles. The labels of other runs begin with their names."""
     found: dict[str, Pixels] = {}
+    size = side_px, height_of(view, side_px)
     for name in (own, *(name for name in view.shown if name != own)):
         record, display = view.shown[name]
         before = "" if name == own else f"{name}: "
@@ -81,15 +90,16 @@ def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels
             spatial = density_image(densities.spatial, scales.spatial, side_px)
             temporal = density_image(rates, scales.temporal, side_px, RATE_MAP)
             rate = scales.temporal, "refreshes per cycle", RATE_MAP
-            found[f"{before}tiling by refresh rate"] = with_scale(tiling, *rate)
-            found[f"{before}spatial density"] = with_scale(spatial, scales.spatial, "samples per element", DENSITY_MAP)
-            found[f"{before}temporal density"] = with_scale(temporal, *rate)
+            found[f"{before}tiling by refresh rate"] = with_scale(enlarge(tiling, *size), *rate)
+            fields = scales.spatial, "samples per element", DENSITY_MAP
+            found[f"{before}spatial density"] = with_scale(enlarge(spatial, *size), *fields)
+            found[f"{before}temporal density"] = with_scale(enlarge(temporal, *size), *rate)
         if name == own:
             for label, one in display.maps.items():
-                drawn = enlarge(colour(one.values.numpy().astype(np.float64), one.bounds, RATE_MAP), side_px)
+                drawn = enlarge(colour(one.values.numpy().astype(np.float64), one.bounds, RATE_MAP), *size)
                 found[label] = with_scale(drawn, one.bounds, one.unit, RATE_MAP)
             if display.sample_map is not None:
-                age = age_image(display.sample_map.newest_s, view.time_s, scales.age_s, side_px)
+                age = age_image(display.sample_map.newest_s, view.time_s, scales.age_s, *size)
                 bounds_ms = 1e3 * scales.age_s[0], 1e3 * scales.age_s[1]
                 found["age of samples"] = with_scale(age, bounds_ms, "ms", AGE_MAP)
     return found
@@ -104,18 +114,27 @@ class ComparisonFilm:
     """
 
     def __init__(
-        self, side_px: int, span_s: tuple[float, float], runs: Sequence[str], own: str, labels: Sequence[str], row: int
+        self,
+        side_px: int,
+        span_s: tuple[float, float],
+        runs: Sequence[str],
+        own: str,
+        labels: Sequence[str],
+        row: int,
+        height_px: int = 0,
     ) -> None:
-        """Takes the width of a panel, the span of time on the error panel's axis, the runs whose errors are drawn, the
-        labels of all panels but that of the errors, and how many panels are best seen side by side."""
+        """Takes the width of a panel and, where that differs, its height, the span of time on the error panel's axis,
+        the runs whose errors are drawn, the labels of all panels but that of the errors, and how many panels are best
+        seen side by side."""
         self._side = side_of(side_px)
+        self._height = height_px or self._side
         self._strip = 2 * max(9, self._side // 24)
         self._span, self._labels = span_s, list(labels)
         self._inks = dict(zip(runs, inks(runs, own), strict=True))
         self._columns = min(max(row, _COLUMNS[0]), _COLUMNS[1])
         rows = len(self._labels) // self._columns + 1
         self._errors = (rows * self._columns - len(self._labels)) * self._side
-        self.width_px, self.height_px = self._columns * self._side, rows * (self._side + self._strip)
+        self.width_px, self.height_px = self._columns * self._side, rows * (self._height + self._strip)
 
     def frame(
         self,
@@ -136,12 +155,12 @@ class ComparisonFilm:
             self._label(draw, left, top, label if pixels is not None else f"{label}: missing")
         left, top = self._corner(len(self._labels))
         self._label(draw, left, top, f"squared error, t = {time_s:.3f} s")
-        box = (left, top + self._strip, left + self._errors, top + self._strip + self._side)
+        box = (left, top + self._strip, left + self._errors, top + self._strip + self._height)
         draw_errors(draw, box, self._span, times_s, {name: (errors[name], ink) for name, ink in self._inks.items()})
         return np.asarray(canvas)
 
     def _corner(self, slot: int) -> tuple[int, int]:
-        return slot % self._columns * self._side, slot // self._columns * (self._side + self._strip)
+        return slot % self._columns * self._side, slot // self._columns * (self._height + self._strip)
 
     def _label(self, draw: ImageDraw.ImageDraw, left: int, top: int, text: str) -> None:
         size = self._strip * 2 // 3

@@ -42,7 +42,7 @@ class ReferenceSpec:
         start_s: time of the first image, seconds.
         rate_hz: images per second.
         count: number of images.
-        resolution_px: width and height, pixels.
+        width_px, height_px: size of the images.
         samples_per_axis: the average of a grid of this many samples squared is one pixel.
     """
 
@@ -52,11 +52,12 @@ class ReferenceSpec:
     start_s: float
     rate_hz: float
     count: int
-    resolution_px: int
+    width_px: int
+    height_px: int
     samples_per_axis: int
 
     def __post_init__(self) -> None:
-        for name in ("rate_hz", "count", "resolution_px", "samples_per_axis"):
+        for name in ("rate_hz", "count", "width_px", "height_px", "samples_per_axis"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"reference {name}: expected a positive number, got {getattr(self, name)!r}")
 
@@ -68,7 +69,7 @@ class ReferenceSpec:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        return self.count, self.resolution_px, self.resolution_px, 3
+        return self.count, self.height_px, self.width_px, 3
 
     @property
     def bytes(self) -> int:

@@ -196,6 +196,7 @@ class Case:
         span = self.jod_span_s
         ok = span is None or 0 <= span[0] < span[1] <= self.scale.seconds
         require(ok, "jod_span_s", f"from and to within the {self.scale.seconds:g} s of a run", span)
+        require(not self.tsar.width_px, "width_px", "none in a study, whose pictures are squares", self.tsar.width_px)
         require(self.scale.reference_px % self.tsar.resolution_px == 0, "resolution_px", "a divisor of the reference's",
                 self.tsar.resolution_px)  # fmt: skip
         shown = self.shown_px

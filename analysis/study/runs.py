@@ -189,15 +189,18 @@ def begin(
     """
     from renderer.stages.control import stages as stages_of
 
+    height, width = config.shape
+    aspect = width / height
     setting = Setting(
         config,
         lambda config: stages_of(config, stages, threads),
         truth,
-        lambda batch: renderer_of(1).trace(batch),
-        lambda time_s: renderer_of(1).viewpoint(time_s),
+        lambda batch: renderer_of(1).trace(batch, aspect),
+        lambda time_s: renderer_of(1).viewpoint(time_s, aspect),
     )
     policy = _changed(setting, parts) if parts else POLICIES[name](setting)
-    meter, totals = Meter(renderer_of(policy.footprint).trace), Totals(config)
+    renderer = renderer_of(policy.footprint)
+    meter, totals = Meter(lambda batch: renderer.trace(batch, aspect)), Totals(config)
     clock = machine.clock(policy.price)
     images = _noted(policy, meter, clock, span_s, totals, on_record)
     return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)

@@ -58,7 +58,7 @@ def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
         decide=control.decide,
         reconstruct=reconstructor.reconstruct,
         account=control.account,
-        filtering=filter_stages(config.resolution_px, threads),
+        filtering=filter_stages(config.resolution_px, threads, config.shape),
     )
 
 

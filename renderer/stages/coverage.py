@@ -15,7 +15,7 @@ _KNOWN: Mapping[str, Mapping[str, tuple[str, ...] | None]] = {
     "": dict.fromkeys(
         (
             *("batch_size", "resolution_px", "framelet_side", "sdf_side", "cache_size", "seed", "warmup_cycles"),
-            *("tiling", "error", "response", "reconstruction"),
+            *("width_px", "height_px", "tiling", "error", "response", "reconstruction"),
         )
     ),
     "tiling": dict.fromkeys(("level_min", "level_max", "rate_max", "tile_count_max", "threshold_samples")),

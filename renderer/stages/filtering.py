@@ -34,17 +34,19 @@ _APART = 320
 """Bytes between planes, which are read and written together: addresses that differ by whole pages alone take turns."""
 
 
-def filter_stages(side: int, threads: int = 1) -> FilterStages:
-    """Kernels for a picture of ``side`` pixels, a power of two of at least 16."""
-    made = _Compiled(side, threads)
+def filter_stages(side: int, threads: int = 1, picture: tuple[int, int] | None = None) -> FilterStages:
+    """Kernels for a plane of ``side`` pixels, a power of two of at least 16, and the height and width of the part of it
+    that is the picture, by default all."""
+    made = _Compiled(side, threads, picture or (side, side))
     return FilterStages(made.advanced, made.chosen, made.taken_in, made.drifted, made.displayed)
 
 
 class _Compiled:
     """Recorded launches and working memory for one size, nothing of a run."""
 
-    def __init__(self, side: int, threads: int) -> None:
+    def __init__(self, side: int, threads: int, picture: tuple[int, int]) -> None:
         self._side, self._pixels, self._memory = side, side * side, Memory()
+        self._height, self._width = picture
         room = self._memory.room
         self._plans = [kernels.FilterPlan() for _ in range(2)]
         motion, depth = room("motion", 4 * self._pixels), room("depth", self._pixels, _F64)
@@ -56,6 +58,7 @@ class _Compiled:
         pixel = room("pixel", self._pixels * PIXEL_WORDS, _I64)  # more than the image has are never hit
         for perspective, plan in enumerate(self._plans):
             plan.side, plan.perspective = side, perspective
+            plan.height, plan.width = picture
             plan.motion, plan.aged, plan.depth, plan.source, plan.front = motion, aged, depth, source, front
             plan.slot, plan.pixel = slot, pixel
         self._rows = _shares(side, threads)
@@ -166,6 +169,7 @@ class _Compiled:
         for command in self._gain:
             command.set(*where, *lengths)
         TEAM.run(self._gain)
+        self._gains[: self._unfit] = 0.0
         self._best(count)
         found = self._split(self._taken.clone())
         if int(self._found[0]) == count:
@@ -207,15 +211,18 @@ class _Compiled:
         self._picture[:] = [
             at["color"], at["roughness"], variance,
             at["aged"], at["inverse"], at["roughness"], self._elements(rate), at.get("position", 0),
-            levels, where, where + 4 * 3 * self._pixels,
+            levels, where, where + 4 * 3 * self._pixels, self._width, self._height,
         ]  # fmt: skip
         for command in self._shrink:
             command.set(seconds)
         TEAM.run(self._shrink)
         self._smooth()
         TEAM.run(self._show)
-        color, remaining = block.split([3 * self._pixels, self._pixels])
-        return color.view(self._side, self._side, 3).permute(2, 0, 1), remaining.view(1, self._side, self._side)
+        found, remaining = block.split([3 * self._pixels, self._pixels])
+        color, remaining = found.view(self._side, self._side, 3), remaining.view(1, self._side, self._side)
+        for plane in (color, remaining[0]):
+            plane[self._height :] = plane[:, self._width :] = 0.0
+        return color.permute(2, 0, 1), remaining
 
     def _prepare_batch(self, threads: int) -> None:
         room, pixels = self._memory.room, self._pixels
@@ -237,6 +244,8 @@ class _Compiled:
         self._spacings = spacings(self._side)
         sides = [int(self._side / (TILE_SIDE * spacing)) for spacing in self._spacings]
         self._sides, total = sides, sum(side * side for side in sides)
+        fit = len(spacings(min(self._height, self._width)))  # those of the levels before are too wide
+        self._unfit = sum(side * side for side in sides[: len(sides) - fit])
         self._gains, self._taken = torch.zeros(total, dtype=_F64), torch.zeros(total, dtype=torch.bool)
         self._found = np.zeros(1, np.int32)
         gains, taken = address("gains", self._gains, _F64, total), address("taken", self._taken, torch.bool, total)
@@ -249,15 +258,17 @@ class _Compiled:
     def _prepare_picture(self, threads: int) -> None:
         side, pixels = self._side, self._pixels
         self._pictures = Recycled(4 * 4 * pixels)
-        self._picture = np.zeros(11, np.int64)  # pyramid::Picture
+        self._picture = np.zeros(13, np.int64)  # pyramid::Picture
         levels = sum(5 * 4**level for level in range(side.bit_length() - 1))
         self._room = self._memory.room("variance", pixels), self._memory.room("levels", levels)
-        picture = address("picture", self._picture, _I64, 11)
+        picture = address("picture", self._picture, _I64, 13)
         spare = [self._memory.room(f"spare {number}", 16 * side) for number in range(threads)]
-        rows = list(enumerate(_shares(side // 2, threads)))
+        rows = list(enumerate(_shares(-(-self._height // 2), threads)))
         self._shrink = [Command(picture_kernels.shrink, picture, side, *share, spare[number]) for number, share in rows]
         self._show = [Command(picture_kernels.show, picture, side, *share, spare[number]) for number, share in rows]
-        self._smooth = Command(picture_kernels.smooth, self._room[1], side // 2, spare[0]).launch
+        self._smooth = Command(
+            picture_kernels.smooth, self._room[1], side // 2, -(-self._width // 2), -(-self._height // 2), spare[0]
+        ).launch
 
     def _split(self, values: Tensor) -> list[Tensor]:
         sizes = [side * side for side in self._sides]

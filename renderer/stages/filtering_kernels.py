@@ -14,9 +14,12 @@ wp.set_module_options(module_options("batches.h", "shadows.h", given=sizes.FILTE
 
 @wp.struct
 class FilterPlan:
-    """Size of the picture, and addresses of working memory for each of its pixels."""
+    """Sides of the plane and of the picture, its upper left part, and addresses of working memory for each of the
+    plane's pixels."""
 
     side: wp.int32
+    width: wp.int32
+    height: wp.int32
     perspective: wp.int32
     motion: wp.uint64
     """float32, where surfels are and how far they moved, pixels: x, y, x, y."""

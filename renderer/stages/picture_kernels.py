@@ -58,8 +58,8 @@ def native_shrink(
 ): ...
 
 
-@wp.func_native("pyramid::smooth((float*)levels, side, (float*)spare);")
-def native_smooth(levels: Address, side: wp.int32, spare: Address): ...
+@wp.func_native("pyramid::smooth((float*)levels, side, width, height, (float*)spare);")
+def native_smooth(levels: Address, side: wp.int32, width: wp.int32, height: wp.int32, spare: Address): ...
 
 
 @wp.func_native("pyramid::show(*(const pyramid::Picture*)picture, side, first, last, (float*)spare);")
@@ -111,9 +111,9 @@ def shrink(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, sp
 
 
 @wp.kernel
-def smooth(levels: Address, side: wp.int32, spare: Address):
-    """The coarser levels, from the second finest on, in place."""
-    native_smooth(levels, side, spare)
+def smooth(levels: Address, side: wp.int32, width: wp.int32, height: wp.int32, spare: Address):
+    """The coarser levels, from the second finest on, in place; ``width`` and ``height`` are the picture's there."""
+    native_smooth(levels, side, width, height, spare)
 
 
 @wp.kernel

@@ -42,7 +42,12 @@ class Traced:
 
 
 def taken_in(
-    estimates: Estimates, surfels: Surfels, known: Change, traced: Traced, options: FilterOptions
+    estimates: Estimates,
+    surfels: Surfels,
+    known: Change,
+    traced: Traced,
+    options: FilterOptions,
+    picture: tuple[int, int] | None = None,
 ) -> tuple[Estimates, Surfels, Change]:
     """Estimates, surfels and change after a batch.
 
@@ -53,13 +58,14 @@ def taken_in(
         known: change observed so far.
         traced: the batch.
         options: of the filter.
+        picture: height and width of the part of the plane beyond which samples are left out; None for all of it.
     """
     side, now_s, hits, view = estimates.color.shape[-1], traced.now_s, traced.hits, traced.view
     position: Tensor = traced.position.reshape(-1, 2)
     if view is not None and hits is not None:
         place, depth = project(view, hits.instance.reshape(-1), hits.point.reshape(-1, 3))
         position = torch.where((depth > 0.0)[:, None], place * side, -1.0)
-    pixel = samples.pixels_of(position, side)
+    pixel = samples.pixels_of(position, side, picture)
     color = encoded(traced.color)
     rough = wavelets.semivariance_of(color) if options.wavelets else samples.semivariance_of(color)
     seen = samples.gathered(traced.color, traced.time_s, traced.spacing, pixel, now_s, estimates.roughness, rough)

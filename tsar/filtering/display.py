@@ -12,16 +12,26 @@ from tsar.policies.resampling import double_width
 
 
 def displayed(
-    estimates: Estimates, surfels: Surfels | None, rate: Float[Tensor, "1 e e"], seconds: float
+    estimates: Estimates,
+    surfels: Surfels | None,
+    rate: Float[Tensor, "1 e e"],
+    seconds: float,
+    picture: tuple[int, int] | None = None,
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
     """Picture and variance of its errors some seconds later, :func:`smoothed`; surfels are those of the estimates, None
-    where nothing is reprojected. Pixels of the greatest variance do not count in their surroundings."""
+    where nothing is reprojected. Pixels of the greatest variance do not count in their surroundings. Both are 0 outside
+    ``picture``, its height and width where it is not the whole plane, and it takes nothing from there."""
     later = estimates.later(rate, seconds)
     if surfels is not None:
         later = later.beside(surfels)
     variance = later.variance
     variance = torch.where(variance < VARIANCE_MAX, variance, NOTHING_KNOWN)
-    return smoothed(later.color, variance, later.roughness)
+    if picture is None:
+        return smoothed(later.color, variance, later.roughness)
+    (height, width), side = picture, variance.shape[-1]
+    shown, remaining = smoothed(*(plane[:, :height, :width] for plane in (later.color, variance, later.roughness)))
+    beyond = (0, side - width, 0, side - height)
+    return F.pad(shown, beyond), F.pad(remaining, beyond)
 
 
 def smoothed(
@@ -31,21 +41,22 @@ def smoothed(
 
     With ``s_l = g 2^l / 2`` at level ``l``, up: a parent is the mean of its children, weighted with
     ``w = 1 / (P_l + s_l)``, and ``P_(l+1) = 1 / sum(w)``. Down: with ``J = P_l / (P_l + s_l)`` and the coarser level
-    enlarged bilinearly to ``x', V'``, ``x = m_l + J (x' - m_l)`` and ``V = P_l + J² (V' - P_l - s_l)``.
+    enlarged bilinearly to ``x', V'``, ``x = m_l + J (x' - m_l)`` and ``V = P_l + J² (V' - P_l - s_l)``. Of an odd
+    number of rows or columns the last has parents of fewer children.
     """
     levels = [(color, variance, roughness)]
-    while levels[-1][0].shape[-1] > 1:
+    while max(levels[-1][0].shape[1:]) > 1:
         color, variance, roughness = levels[-1]
         weight = 1.0 / (variance + _between(roughness, len(levels) - 1))
         total = 4.0 * _halved(weight)
-        levels.append((4.0 * _halved(color * weight) / total, 1.0 / total, _halved(roughness)))
+        levels.append((4.0 * _halved(color * weight) / total, 1.0 / total, _halved(roughness, "replicate")))
     shown, remaining, _ = levels[-1]
     for level in range(len(levels) - 2, -1, -1):
         color, variance, roughness = levels[level]
         between = _between(roughness, level)
         share = variance / (variance + between)
-        shown = color + share * (_doubled(shown) - color)
-        remaining = variance + share * share * (_doubled(remaining) - variance - between)
+        shown = color + share * (_doubled(shown, color) - color)
+        remaining = variance + share * share * (_doubled(remaining, color) - variance - between)
     return shown, remaining
 
 
@@ -53,9 +64,13 @@ def _between(roughness: Float[Tensor, "1 h w"], level: int) -> Float[Tensor, "1 
     return 0.5 * 2.0**level * roughness
 
 
-def _halved(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h2 w2"]:
+def _halved(plane: Float[Tensor, "c h w"], beyond: str = "constant") -> Float[Tensor, "c h2 w2"]:
+    height, width = plane.shape[1:]
+    if height % 2 or width % 2:
+        plane = F.pad(plane, (0, width % 2, 0, height % 2), mode=beyond)
     return F.avg_pool2d(plane[None], 2)[0]
 
 
-def _doubled(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h2 w2"]:
-    return double_width(double_width(plane).transpose(1, 2)).transpose(1, 2)
+def _doubled(plane: Float[Tensor, "c h w"], finer: Float[Tensor, "_ h2 w2"]) -> Float[Tensor, "c h2 w2"]:
+    height, width = finer.shape[1:]
+    return double_width(double_width(plane).transpose(1, 2)).transpose(1, 2)[:, :height, :width]

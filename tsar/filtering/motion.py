@@ -23,13 +23,24 @@ BESIDE = 0.5  # variance per roughness and pixel of distance
 
 
 def advanced(
-    estimates: Estimates, surfels: Surfels, rate: Float[Tensor, "1 e e"], seconds: float, view: Viewpoint
+    estimates: Estimates,
+    surfels: Surfels,
+    rate: Float[Tensor, "1 e e"],
+    seconds: float,
+    view: Viewpoint,
+    picture: tuple[int, int] | None = None,
 ) -> tuple[Estimates, Surfels]:
     """Estimates some seconds later, at a rate of change, and :func:`moved` to the poses of that time."""
-    return moved(estimates.later(rate, seconds), surfels, view)
+    return moved(estimates.later(rate, seconds), surfels, view, picture)
 
 
-def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint, points: bool = False) -> tuple[Estimates, Surfels]:
+def moved(
+    estimates: Estimates,
+    surfels: Surfels,
+    view: Viewpoint,
+    picture: tuple[int, int] | None = None,
+    points: bool = False,
+) -> tuple[Estimates, Surfels]:
     """Estimates and surfels as the poses of a view show them.
 
     A surfel serves the four pixels whose centres are nearest. A pixel prefers surfels that lie within it, the nearest
@@ -41,11 +52,15 @@ def moved(estimates: Estimates, surfels: Surfels, view: Viewpoint, points: bool 
     Args:
         estimates, surfels: as they were.
         view: new poses.
+        picture: height and width of the part of the plane beyond which nothing is kept; None for all of it.
         points: whether a surfel serves no more than the pixel in which it lies.
     """
     side = estimates.color.shape[-1]
     position, depth = projected(surfels, view, side)
     source = _sources(estimates, surfels, position, depth, points)
+    if picture is not None:
+        at = torch.arange(side * side)
+        source = torch.where((at // side < picture[0]) & (at % side < picture[1]), source, -1)
     found = source >= 0
     kept, here = found & ~_behind(torch.where(found, depth[source.clamp(min=0)], inf)), source.clamp(min=0)
     kept = kept.reshape(1, side, side)

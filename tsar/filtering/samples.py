@@ -46,9 +46,13 @@ class Seen:
         return self.count > 0.0
 
 
-def pixels_of(position: Float[Tensor, "samples 2"], side: int) -> Int64[Tensor, " samples"]:
-    """Raster index of the pixel under positions in pixels; ``side²`` outside the image."""
-    inside = (position >= 0.0).all(1) & (position < side).all(1)
+def pixels_of(
+    position: Float[Tensor, "samples 2"], side: int, picture: tuple[int, int] | None = None
+) -> Int64[Tensor, " samples"]:
+    """Raster index of the pixel under positions in pixels; ``side²`` outside the image, or outside the part of it whose
+    height and width are given."""
+    end = side if picture is None else position.new_tensor(picture[::-1])
+    inside = (position >= 0.0).all(1) & (position < end).all(1)
     cell = torch.where(inside[:, None], position, 0.0).floor().to(torch.int64)
     return torch.where(inside, cell[:, 1] * side + cell[:, 0], side * side)
 

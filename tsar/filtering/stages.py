@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from torch import Tensor
 
@@ -14,6 +15,7 @@ from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
 from tsar.filtering.shadows import drifted
 from tsar.filtering.tiles import chosen
 from tsar.types import Hits, Viewpoint
+from tsar.window import Window
 
 
 @dataclass(frozen=True)
@@ -39,3 +41,17 @@ class FilterStages:
 
 REFERENCE = FilterStages()
 """Tensor operations throughout."""
+
+
+def reference(window: Window) -> FilterStages:
+    """Tensor operations throughout, for a picture that is a window of the plane: nothing is known, taken in or sampled
+    beyond it."""
+    if window.whole:
+        return REFERENCE
+    shape = window.height_px, window.width_px
+    return FilterStages(
+        partial(advanced, picture=shape),
+        partial(chosen, picture=shape),
+        partial(taken_in, picture=shape),
+        displayed=partial(displayed, picture=shape),
+    )

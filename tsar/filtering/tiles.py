@@ -78,8 +78,10 @@ def chosen(
     cycle_s: float,
     count: int,
     options: FilterOptions,
+    picture: tuple[int, int] | None = None,
 ) -> list[Bool[Tensor, "_ _"]]:
     """The ``count`` tiles that gain most, for every spacing whether each is one of them; fewer where none is free.
+    Tiles that do not fit into ``picture``, its height and width where it is not the whole plane, gain nothing.
 
     Arguments are those of :func:`gains`, but for the rate by elements and the surfels, None where nothing moves. What
     was not seen yet lies where much moves, and is not of use for long.
@@ -88,6 +90,10 @@ def chosen(
     if surfels is not None:
         speed = torch.where(surfels.instance == UNSEEN, torch.inf, surfels.step.abs().amax(0, keepdim=True) / cycle_s)
     gain = gains(variance, roughness, by_pixels(rate), speed, cycle_s, options)
+    if picture is not None:
+        for level, spacing in zip(gain, spacings(variance.shape[-1]), strict=True):
+            if TILE_SIDE * spacing > min(picture):
+                level.zero_()
     return filled_up(best(gain, count), gain, spacings(variance.shape[-1]).index(1.0), count)
 
 

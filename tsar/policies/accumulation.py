@@ -17,7 +17,7 @@ from jaxtyping import Float, Float64
 from torch import Tensor
 
 from tsar.policies.resampling import CUBIC_FLOPS, cubic, nearest
-from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen
+from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen, within
 from tsar.roots import square_root
 from tsar.types import Viewpoint
 
@@ -49,8 +49,8 @@ class History:
         count: samples that it is made of.
     """
 
-    color: Float[Tensor, "side side 3"]
-    count: Float[Tensor, "side side"]
+    color: Float[Tensor, "h w 3"]
+    count: Float[Tensor, "h w"]
 
 
 ACCUMULATE_FLOPS = 2 * PROJECT_FLOPS + 8.0 + 6.0 + CUBIC_FLOPS + 21.0 + 9.0 * 9.0 + 21.0 + 30.0 + 22.0
@@ -59,7 +59,7 @@ reading; luminance and chroma of both; sums of nine colours and squares; mean an
 
 
 def accumulated(
-    color: Float[Tensor, "side side 3"],
+    color: Float[Tensor, "h w 3"],
     surfaces: Surfaces,
     now: Viewpoint,
     before: Viewpoint | None,
@@ -79,9 +79,8 @@ def accumulated(
     color = color.clamp(-BRIGHTEST, BRIGHTEST)
     if history is None or before is None:
         return History(color, torch.ones(color.shape[:2]))
-    side = color.shape[0]
-    place = centres(side) + _motion(surfaces, now, before)
-    inside = ((place >= -0.5) & (place < side - 0.5)).all(-1)
+    place = centres(*color.shape[:2]) + _motion(surfaces, now, before)
+    inside = within(place)
     found = _clipped(cubic(history.color, place).clamp(min=0.0), color, constants.deviations)
     count = torch.where(inside, nearest(history.count, place), 0.0)
     count = (count + 1.0).clamp(max=constants.count_most)
@@ -89,27 +88,26 @@ def accumulated(
     return History(torch.where(inside[..., None], found + share * (color - found), color), count)
 
 
-def _motion(surfaces: Surfaces, now: Viewpoint, before: Viewpoint) -> Float64[Tensor, "side side 2"]:
+def _motion(surfaces: Surfaces, now: Viewpoint, before: Viewpoint) -> Float64[Tensor, "h w 2"]:
     """From each pixel's centre to where what it shows was before, pixels; the motion of the nearest of nine pixels, so
     that edges move with what is in front."""
     _, depth = seen(surfaces, now)
     place, _ = seen(surfaces, before)
-    side = depth.shape[0]
-    motion = F.pad(place - centres(side), (0, 0, 1, 1, 1, 1), value=torch.nan)
+    height, width = depth.shape
+    moved = place - centres(height, width)
+    motion = F.pad(moved, (0, 0, 1, 1, 1, 1), value=torch.nan)
     depths = F.pad(depth, (1, 1, 1, 1), value=torch.inf)
-    nearest_depth, found = depth, place - centres(side)
+    nearest_depth, found = depth, moved
     for row in range(3):
         for column in range(3):
-            there = depths[row : row + side, column : column + side]
+            there = depths[row : row + height, column : column + width]
             nearer = (there < nearest_depth) & (there > 0)
             nearest_depth = torch.where(nearer, there, nearest_depth)
-            found = torch.where(nearer[..., None], motion[row : row + side, column : column + side], found)
+            found = torch.where(nearer[..., None], motion[row : row + height, column : column + width], found)
     return found
 
 
-def _clipped(
-    found: Float[Tensor, "side side 3"], color: Float[Tensor, "side side 3"], deviations: float
-) -> Float[Tensor, "side side 3"]:
+def _clipped(found: Float[Tensor, "h w 3"], color: Float[Tensor, "h w 3"], deviations: float) -> Float[Tensor, "h w 3"]:
     """What was found, moved towards the mean of the nine colours around until it is in their box."""
     planes = _luma_chroma(color).permute(2, 0, 1)[None]
     padded = F.pad(planes, (1, 1, 1, 1), mode="replicate")

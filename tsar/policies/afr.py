@@ -40,6 +40,7 @@ from tsar.policies.tiles import Tree
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.prediction import foretold
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
+from tsar.window import GRID
 
 LEAVES = 1024
 SAMPLES_KEPT_PER_PIXEL = 4
@@ -96,8 +97,8 @@ class Afr(Policy[Sampled]):
         return 2 * (self.config.resolution_px.bit_length() - 1)
 
     def start(self) -> Sampled:
-        room = SAMPLES_KEPT_PER_PIXEL * self.config.resolution_px**2
-        return Sampled(tiles.initial(self._depth, LEAVES, 6), DeepBuffer.empty(room))
+        room = SAMPLES_KEPT_PER_PIXEL * self.config.pixels
+        return Sampled(tiles.initial(self._depth, LEAVES, 6, self.config.window), DeepBuffer.empty(room))
 
     def request(self, state: Sampled, moment: Moment) -> tuple[Sampled, FrameletBatch]:
         """Crosshairs in tiles in turn, and at random places of the picture as many as are left over."""
@@ -119,14 +120,14 @@ class Afr(Policy[Sampled]):
         self, state: Sampled, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
     ) -> Sampled:
         assert state.asked is not None
-        side, buffer = self.config.resolution_px, state.buffer
+        shape, buffer = self.config.shape, state.buffer
         view = foretold(self._view, moment.time_s, moment.cycle_s) if self._view is not None else None
         color = pixel_colors(samples, self.config).clamp(max=COLOR_MAX)
         with timer("cache"):
             buffer.add(color, moment.time_s, state.asked.place, samples.hits)
-            placed = buffer.seen(view, side)
+            placed = buffer.seen(view, shape)
         with timer("error"):
-            values = _values(buffer, placed, state.asked, color, moment.time_s, side)
+            values = _values(buffer, placed, state.asked, color, moment.time_s, shape)
         with timer("response"):
             node = state.asked.node.repeat(len(_CROSSHAIR))
             tree = tiles.adapt(tiles.gather(state.tree, node, values, _MEMORY_CYCLES), self._depth)
@@ -134,18 +135,19 @@ class Afr(Policy[Sampled]):
 
     def image(self, state: Sampled, moment: Moment) -> Picture:
         assert state.placed is not None
-        config, side = self.config, self.config.resolution_px
-        extent_s = tiles.per_pixel(extents(state.tree, self._depth, config, moment.cycle_s), state.tree, self._depth)
+        config, shape, pixels = self.config, self.config.shape, self.config.pixels
+        extent_s = extents(state.tree, self._depth, config, moment.cycle_s)
+        extent_s = tiles.per_pixel(extent_s, state.tree, self._depth, config.window)
         sample, pixel = state.placed.sample, state.placed.pixel
         time_s = state.buffer.time_s[sample]
         weight = torch.exp((time_s - moment.time_s) / extent_s[pixel]).to(torch.float32)
-        total = torch.zeros(side * side).index_add_(0, pixel, weight)
-        color = torch.zeros(side * side, 3).index_add_(0, pixel, state.buffer.color[sample] * weight[:, None])
-        color = (color / total.clamp(min=1e-12)[:, None]).T.reshape(3, side, side).contiguous()
-        image = pull_push(color, total.clamp(max=1.0).reshape(1, side, side)).permute(1, 2, 0).contiguous()
-        newest_s = torch.full((side * side,), -inf, dtype=torch.float64).scatter_reduce(0, pixel, time_s, "amax")
-        level = torch.full((side, side), int(log2(side / config.framelet_side)))
-        return Picture(image, SampleMap(newest_s.reshape(side, side), level))
+        total = torch.zeros(pixels).index_add_(0, pixel, weight)
+        color = torch.zeros(pixels, 3).index_add_(0, pixel, state.buffer.color[sample] * weight[:, None])
+        color = (color / total.clamp(min=1e-12)[:, None]).T.reshape(3, *shape).contiguous()
+        image = pull_push(color, total.clamp(max=1.0).reshape(1, *shape)).permute(1, 2, 0).contiguous()
+        newest_s = torch.full((pixels,), -inf, dtype=torch.float64).scatter_reduce(0, pixel, time_s, "amax")
+        level = torch.full(shape, int(log2(config.resolution_px / config.framelet_side)))
+        return Picture(image, SampleMap(newest_s.reshape(shape), level))
 
 
 def draw(
@@ -158,17 +160,22 @@ def draw(
     """
     side, count = config.resolution_px, int(config.budget)
     crosshairs, random = count // len(_CROSSHAIR), generator(config, cycle)
-    leaves = tree.leaves
+    leaves = tree.sampled
     turn = cycle * crosshairs + torch.arange(crosshairs, dtype=torch.float64)
     node = leaves[((turn * _GOLDEN) % 1.0 * leaves.numel()).to(torch.int64)]
-    area = tiles.area_px(node, depth)
-    within = (torch.rand(crosshairs, generator=random, dtype=torch.float64) * area).to(torch.int64)
-    pixel = morton_to_raster(side)[tiles.first_cell(node, depth) + within]
-    centre = torch.stack((pixel % side, pixel // side), dim=1) + torch.rand(crosshairs, 2, generator=random)
-    arms = (centre + _CROSSHAIR[:, None]).reshape(-1, 2)
-    arms = torch.where(arms < 0.0, arms + 2.0, torch.where(arms >= side, arms - 2.0, arms))
-    single = torch.rand(count - len(arms), 2, generator=random) * side
-    return node, (torch.cat((arms, single)) * (65536 // side)).floor() / 65536.0
+    height, width = config.shape
+    share = torch.rand(crosshairs, generator=random, dtype=torch.float64)
+    if config.window.whole:
+        within = (share * tiles.area_px(node, depth)).to(torch.int64)
+        pixel = morton_to_raster(side)[tiles.first_cell(node, depth) + within]
+    else:
+        pixel = tiles.place(node, share, depth, config.window)
+    centre = torch.stack((pixel % width, pixel // width), dim=1) + torch.rand(crosshairs, 2, generator=random)
+    arms, size = (centre + _CROSSHAIR[:, None]).reshape(-1, 2), centre.new_tensor((width, height))
+    arms = torch.where(arms < 0.0, arms + 2.0, torch.where(arms >= size, arms - 2.0, arms))
+    single = torch.rand(count - len(arms), 2, generator=random) * size
+    places = (torch.cat((arms, single)) * (GRID // side)).floor() / GRID
+    return node, config.window.of_picture(places)
 
 
 def extents(tree: Tree, depth: int, config: TsarConfig, cycle_s: float) -> Float64[Tensor, " leaves"]:
@@ -177,7 +184,7 @@ def extents(tree: Tree, depth: int, config: TsarConfig, cycle_s: float) -> Float
     sums = tree.sums[:, leaves].to(torch.float64)
     spatial = sums[3] / sums[0].clamp(min=1e-9) + _LEAST_GRADIENT[0]
     temporal = torch.where(sums[5] > 0.0, sums[4].clamp(min=0.0) / sums[5].clamp(min=1e-12), 1.0) + _LEAST_GRADIENT[1]
-    interval_s = tiles.area_px(leaves, depth).to(torch.float64) * leaves.numel() / config.budget * cycle_s
+    interval_s = tree.size_px(leaves, depth).to(torch.float64) * tree.sampled.numel() / config.budget * cycle_s
     least = _LEAST_INTERVALS * interval_s.clamp(min=cycle_s)
     return (spatial / temporal * interval_s).pow(1.0 / 3.0).clamp(max=_EXTENT_S).maximum(least)
 
@@ -188,7 +195,7 @@ def _values(
     asked: Crosshairs,
     color: Float[Tensor, "samples 3"],
     now_s: float,
-    side: int,
+    shape: tuple[int, int],
 ) -> Float[Tensor, "6 arms"]:
     """What tiles gather of the samples of crosshairs: weight, luminance and its square; squared spatial gradient; and
     squared change since the newest sample that the buffer held in the pixel, and the square of that sample's age."""
@@ -198,9 +205,11 @@ def _values(
     across = torch.maximum((right - centre).abs(), (left - centre).abs())
     down = torch.maximum((below - centre).abs(), (above - centre).abs())
     spatial = (0.5 * (across.square() + down.square())).repeat(len(_CROSSHAIR))
-    column, row = (asked.place[:arms] * side).to(torch.int64).unbind(1)
+    place = asked.place[:arms]
+    column, row = (place * place.new_tensor(shape[::-1])).to(torch.int64).unbind(1)
     rank = (buffer.time_s[placed.sample] < now_s).nonzero().squeeze(1)
-    newest = torch.full((side * side,), -1).scatter_reduce(0, placed.pixel[rank], rank, "amax")[row * side + column]
+    newest = torch.full((shape[0] * shape[1],), -1).scatter_reduce(0, placed.pixel[rank], rank, "amax")
+    newest = newest[row * shape[1] + column]
     held = newest >= 0
     change, age_s = torch.zeros(arms), torch.zeros(arms)
     before = placed.sample[newest[held]]

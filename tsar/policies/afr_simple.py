@@ -63,7 +63,7 @@ class AfrSimple(Policy[Scattered]):
         return 2 * (self.config.resolution_px.bit_length() - 1)
 
     def start(self) -> Scattered:
-        return Scattered(tiles.initial(self._depth, LEAVES, 3), PixelBuffer.empty(self.config))
+        return Scattered(tiles.initial(self._depth, LEAVES, 3, self.config.window), PixelBuffer.empty(self.config))
 
     def request(self, state: Scattered, moment: Moment) -> tuple[Scattered, FrameletBatch]:
         node, pixel = draw(state.tree, int(self.config.budget), self._depth, self.config, moment.cycle)
@@ -91,9 +91,11 @@ def draw(
     tree: Tree, count: int, depth: int, config: TsarConfig, cycle: int
 ) -> tuple[Int64[Tensor, " samples"], Int64[Tensor, " samples"]]:
     """Leaf and raster pixel of each sample: leaves in turn, a uniformly random pixel within each."""
-    leaves = tree.leaves
+    leaves = tree.sampled
     node = leaves[torch.arange(count) % leaves.numel()]
     uniform = torch.rand(count, generator=generator(config, cycle), dtype=torch.float64)
+    if not config.window.whole:
+        return node, tiles.place(node, uniform, depth, config.window)
     cell = tiles.first_cell(node, depth) + (uniform * tiles.area_px(node, depth)).to(torch.int64)
     return node, morton_to_raster(config.resolution_px)[cell]
 
@@ -103,8 +105,8 @@ def _image(
 ) -> Float[Tensor, "h w 3"]:
     """Newest samples weighted by ``exp(-age / refresh interval of the leaf)``, filled by pull and push."""
     leaves = tree.leaves
-    interval_s = tiles.area_px(leaves, depth).to(torch.float64) * leaves.numel() / config.budget * cycle_s
-    weight = torch.exp((buffer.time_s - now_s) / tiles.per_pixel(interval_s, tree, depth)).to(torch.float32)
-    side = config.resolution_px
-    color = buffer.color.reshape(side, side, 3).permute(2, 0, 1)
-    return pull_push(color, weight.reshape(1, side, side)).permute(1, 2, 0).contiguous()
+    interval_s = tree.size_px(leaves, depth).to(torch.float64) * tree.sampled.numel() / config.budget * cycle_s
+    span_s = tiles.per_pixel(interval_s, tree, depth, config.window)
+    weight = torch.exp((buffer.time_s - now_s) / span_s).to(torch.float32)
+    color = buffer.color.reshape(*config.shape, 3).permute(2, 0, 1)
+    return pull_push(color, weight.reshape(1, *config.shape)).permute(1, 2, 0).contiguous()

@@ -82,9 +82,9 @@ class DeepBuffer:
             self.point[place] = hits.point.reshape(-1, 3)[keep]
         self.head[0] = (self.head + place.numel()) % room
 
-    def seen(self, view: Viewpoint | None, side: int) -> Placed:
-        """Samples that are seen, by the poses of a view, in a picture of ``side²`` pixels; without poses, all that are
-        stored, where they were sampled."""
+    def seen(self, view: Viewpoint | None, shape: tuple[int, int]) -> Placed:
+        """Samples that are seen, by the poses of a view, in a picture of so many rows and columns; without poses,
+        all that are stored, where they were sampled."""
         room = self.time_s.numel()
         order = (self.head + torch.arange(room)) % room
         order = order[self.time_s[order].isfinite()]
@@ -94,18 +94,19 @@ class DeepBuffer:
             place = torch.where(found.isnan(), place, found) if view.kind == "parallel" else found
         inside = ((place >= 0.0) & (place < 1.0)).all(1)
         order, place = order[inside], place[inside]
-        column, row = (place * side).to(torch.int64).unbind(1)
-        pixel = row * side + column
+        column, row = (place * place.new_tensor(shape[::-1])).to(torch.int64).unbind(1)
+        pixel = row * shape[1] + column
         if depth is None:
             return Placed(order, pixel)
-        seen = ~_hidden(depth[inside], pixel, side)
+        seen = ~_hidden(depth[inside], pixel, shape)
         return Placed(order[seen], pixel[seen])
 
 
-def _hidden(depth: Float64[Tensor, " n"], pixel: Int64[Tensor, " n"], side: int) -> Bool[Tensor, " n"]:
-    nearest = torch.full((side * side,), torch.inf, dtype=torch.float64).scatter_reduce(0, pixel, depth, "amin")
-    around = F.pad(nearest.reshape(side, side), (1, 1, 1, 1), value=torch.inf).reshape(-1)
-    centre = (pixel // side + 1) * (side + 2) + pixel % side + 1
-    steps = [row * (side + 2) + column for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column]
+def _hidden(depth: Float64[Tensor, " n"], pixel: Int64[Tensor, " n"], shape: tuple[int, int]) -> Bool[Tensor, " n"]:
+    height, width = shape
+    nearest = torch.full((height * width,), torch.inf, dtype=torch.float64).scatter_reduce(0, pixel, depth, "amin")
+    around = F.pad(nearest.reshape(shape), (1, 1, 1, 1), value=torch.inf).reshape(-1)
+    centre = (pixel // width + 1) * (width + 2) + pixel % width + 1
+    steps = [row * (width + 2) + column for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column]
     nearer = sum((around[centre + step] * _NEARER_AROUND < depth).to(torch.int64) for step in steps)
     return (nearest[pixel] * _NEARER < depth) | (nearer >= _AROUND)

@@ -15,9 +15,9 @@ from jaxtyping import Bool, Float64
 from torch import Tensor
 
 from tsar.filtering import densities
-from tsar.filtering.records import DEFAULT, ELEMENT_PX, TILE_SIDE
+from tsar.filtering.records import DEFAULT, ELEMENT_PX, TILE_SIDE, FilterOptions
 from tsar.policies.filter import Filter, State
-from tsar.policy import Moment, Price
+from tsar.policy import Moment, Price, Setting, require_square
 
 _AGED = 4.0
 """Weight of the variance by change so far, beside that of the next cycle; 1 to 8 give the same within 5 %."""
@@ -39,6 +39,10 @@ class DenseState(State):
 
 class ByDensities(Filter):
     """Tiles follow θ_s and are sampled when their θ_t is due."""
+
+    def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
+        super().__init__(setting, options)
+        require_square(self.config, "tsar-densities")
 
     @property
     def price(self) -> Price:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from math import ceil
 
 import torch
 from jaxtyping import Bool, Float, Float64, Int64
@@ -23,7 +24,7 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
 from tsar.filtering import samples, shadows, tiles
-from tsar.filtering.batches import Traced, taken_in
+from tsar.filtering.batches import Traced
 from tsar.filtering.records import (
     DEFAULT,
     ELEMENT_PX,
@@ -33,11 +34,13 @@ from tsar.filtering.records import (
     FilterOptions,
     Surfels,
 )
+from tsar.filtering.stages import REFERENCE, reference
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
 from tsar.prediction import predicted
 from tsar.roots import square_root
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
+from tsar.window import GRID
 
 PIXEL_FLOPS = {True: 340.0, False: 185.0}
 """Operations per output pixel and cycle, with and without reprojection, as a test counts them in the code: aging,
@@ -46,7 +49,6 @@ SAMPLE_FLOPS = 740.0
 """Operations per sample, an upper bound: replacing 6, encoding 6, roughness 24, sums 16, projection 40, taking in the
 pixel 135, a shadow's drift 85, and 3 x 3 pixels of roughness around it 9 x 35, with about 100 to spare."""
 _STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # golden ratio of two dimensions
-_GRID = 65536
 _WARMUP_FRAMES = 12  # as many as framed renderers that accumulate have
 _TILES_A_PROBE = 64
 _FIRST_CYCLE = 1 << 20  # cycles before the start have numbers down to its negative
@@ -97,17 +99,23 @@ class Filter(Policy[State]):
 
     def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
         super().__init__(setting)
-        self._options, self._side = options, self.config.resolution_px
-        self._stages = setting.stages_of(self.config).filtering
+        self._window, self._side = self.config.window, self.config.resolution_px
+        self._options = replace(options, reach=options.reach * self._window.reach)
+        tensors, self._stages = reference(self._window), setting.stages_of(self.config).filtering
+        if self._stages is REFERENCE:
+            self._stages = tensors
         if options.wavelets:  # compiled sets know residuals alone
-            self._stages = replace(self._stages, taken_in=taken_in)
+            self._stages = replace(self._stages, taken_in=tensors.taken_in)
         self._view = setting.view if options.reprojection else None
-        most = int(options.share_max * self._side**2) // TILE_SIDE**2
+        most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
         within = morton_to_raster(TILE_SIDE)
         self._cell = torch.stack((within % TILE_SIDE, within // TILE_SIDE), dim=1).to(torch.float64)
-        self._places = tiles.places(self._side)
+        self._places, self._kinds = tiles.places(self._side), tiles.spacings(min(self.config.shape))
+        self._size = torch.tensor(self.config.shape[::-1], dtype=torch.float64)
+        within = (self._places[:, :2] < self._size.flip(0)).all(1) & (self._places[:, 2] <= self._kinds[0])
+        self._sampled = None if self._window.whole else within
         level = max(0, (self._side // self.config.framelet_side).bit_length() - 1)
         self._level = torch.full((self._side, self._side), level)
 
@@ -122,7 +130,7 @@ class Filter(Policy[State]):
     @property
     def warmup_cycles(self) -> int:
         """Enough to sample every pixel twelve times, however short the cycles are."""
-        return max(self.config.warmup_cycles, _WARMUP_FRAMES * self._side**2 // (self._tiles * TILE_SIDE**2))
+        return max(self.config.warmup_cycles, _WARMUP_FRAMES * self.config.pixels // (self._tiles * TILE_SIDE**2))
 
     @property
     def price(self) -> Price:
@@ -135,18 +143,18 @@ class Filter(Policy[State]):
         nothing, observed = Estimates.empty(side), Change.empty(side)
         visits = torch.zeros_like(observed.rate, dtype=torch.int64)
         still = torch.zeros_like(observed.rate)
-        return State(nothing, Surfels.empty(side), observed, still, self._rate(observed, still), None, (),
-                     None, None, torch.ones(self._tiles), visits, nothing.color, nothing.variance)  # fmt: skip
+        return State(nothing, Surfels.empty(side), observed, still, self._rate(observed, still), None, (), None, None,
+                     torch.ones(self._tiles), visits, nothing.color, self._window.inside(nothing.variance))  # fmt: skip
 
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
         """Moves the estimates to the start of the cycle and asks for what they need."""
         state = self._advanced(state, moment)
         state, (x, y, spacing) = self._chosen(state, moment)
         if self._probes(moment):
-            spacing[0] = tiles.spacings(self._side)[0]
-            width = TILE_SIDE * float(spacing[0])
-            across = int(self._side / width)
-            number = moment.cycle // self._every % across**2
+            spacing[0] = self._kinds[0]
+            width = TILE_SIDE * self._kinds[0]
+            down, across = (ceil(side / width) for side in self.config.shape)
+            number = moment.cycle // self._every % (down * across)
             x[0], y[0] = number % across * width, number // across * width
         place = torch.stack((x, y), dim=1)
         offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
@@ -154,8 +162,10 @@ class Filter(Policy[State]):
             # the next point of the sequence for each tile, so that a pixel sees consecutive ones
             middle = ((place + 0.5 * TILE_SIDE * spacing[:, None]) / ELEMENT_PX).to(torch.int64)
             offset = ((state.visits[0][middle[:, 1], middle[:, 0]][:, None] + 1) * _STEP) % 1.0
+        # tiles that hang over the picture are sampled at its border
+        place = torch.minimum(place, self._size - TILE_SIDE * spacing[:, None])
         position = place[:, None] + (self._cell + offset[:, None]) * spacing[:, None, None]
-        position = (position / self._side * _GRID).floor() / _GRID
+        position = self._window.of_picture((position / self._side * GRID).floor() / GRID)
         at = torch.arange(self._tiles, dtype=torch.float64) / self._tiles * moment.cycle_s
         times = (moment.time_s + at)[:, None].expand(-1, TILE_SIDE**2).contiguous()
         none = torch.zeros(self._tiles, dtype=torch.int64)
@@ -189,7 +199,7 @@ class Filter(Policy[State]):
     def _advanced(self, state: State, moment: Moment) -> State:
         estimates, surfels, known, now_s = state.estimates, state.surfels, state.known, moment.time_s
         seconds = now_s - state.now_s if state.now_s is not None else 0.0
-        view = self._view(now_s) if self._view is not None else None
+        view = self._window.on_plane(self._view(now_s)) if self._view is not None else None
         if view is not None and view.kind == "panorama":
             view = None
         if view is not None:
@@ -209,6 +219,8 @@ class Filter(Policy[State]):
         """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
         state, chosen = self._picked(state, moment)
         found = torch.cat([level.reshape(-1) for level in chosen]).nonzero().squeeze(1)
+        if self._sampled is not None:
+            found = found[self._sampled[found]]
         tile = self._places[found]
         if len(tile) < self._tiles:
             tile = tile[torch.arange(self._tiles) % len(tile)]
@@ -239,30 +251,32 @@ class Filter(Policy[State]):
         """Tiles of one sample a pixel, in Morton order."""
         chosen = [torch.zeros(2 * (int(self._side / (TILE_SIDE * kind)),), dtype=torch.bool) for kind in kinds]
         fine = chosen[kinds.index(1.0)]
-        turn = (torch.arange(self._tiles) + (cycle + _FIRST_CYCLE) * self._tiles) % fine.numel()
-        fine.reshape(-1)[morton_to_raster(fine.shape[0])[turn]] = True
+        curve = morton_to_raster(fine.shape[0])
+        if self._sampled is not None:
+            curve = curve[self._sampled[self._places[:, 2] == 1.0][curve]]
+        turn = (torch.arange(self._tiles) + (cycle + _FIRST_CYCLE) * self._tiles) % curve.numel()
+        fine.reshape(-1)[curve[turn]] = True
         return chosen
 
     def _updated(self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment) -> State:
         color = replace_nonfinite(answered.color, TILE_SIDE)[0].clamp(0.0, samples.COLOR_MAX)
+        place = self._window.of_plane(batch.position)
         traced = Traced(
-            color, batch.position * self._side, batch.times, state.spacing, moment.time_s, moment.cycle_s,
+            color, place * self._side, batch.times, state.spacing, moment.time_s, moment.cycle_s,
             answered.hits, state.view, state.earlier,
         )  # fmt: skip
         after = self._stages.taken_in(state.estimates, state.surfels, state.change, traced, self._options)
         estimates, surfels, observed = after
-        drift_s = self._shadows(state, batch, answered, moment)
+        drift_s = self._shadows(state, place, answered, moment)
         rate = self._rate(observed, drift_s)
         return replace(state, estimates=estimates, surfels=surfels, change=observed, drift_s=drift_s, rate=rate)
 
     def _shadows(
-        self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment
+        self, state: State, place: Float[Tensor, "n samples 2"], answered: SampleBatch, moment: Moment
     ) -> Float[Tensor, "1 e e"]:
         if not self._options.shadows or answered.hits is None or state.view is None or state.earlier is None:
             return state.drift_s
-        return self._stages.drifted(
-            state.drift_s, batch.position, answered.hits, state.view, state.earlier, moment.cycle_s
-        )
+        return self._stages.drifted(state.drift_s, place, answered.hits, state.view, state.earlier, moment.cycle_s)
 
     def _rate(self, observed: Change, drift_s: Float[Tensor, "1 e e"]) -> Float[Tensor, "1 e e"]:
         return torch.maximum(observed.rate, shadows.expected_rate(drift_s, self._options.reach))
@@ -272,7 +286,7 @@ class Filter(Policy[State]):
         if not self._options.smoothing:
             later = state.estimates.later(state.rate, moment.cycle_s)
             later = later if surfels is None else later.beside(surfels)
-            return replace(state, shown=later.color, remaining=later.variance)
+            return replace(state, shown=later.color, remaining=self._window.inside(later.variance))
         shown, remaining = self._stages.displayed(state.estimates, surfels, state.rate, moment.cycle_s)
         return replace(state, shown=shown, remaining=remaining)
 

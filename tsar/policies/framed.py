@@ -9,7 +9,8 @@ Source: Stephens 2011, sec. 7.1.2 (nonadaptive renderer); its latency is two fra
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import frexp, log2
+from functools import lru_cache
+from math import ceil, frexp, gcd, log2
 
 import torch
 import torch.nn.functional as F
@@ -19,7 +20,7 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import require
 from tsar.error import replace_nonfinite
-from tsar.morton import raster_to_morton
+from tsar.morton import curve, raster_to_morton
 from tsar.policies.resampling import widened
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.selection import sample_positions
@@ -53,6 +54,7 @@ class Framed(Policy[Frame]):
         """
         super().__init__(setting)
         resolution = self.config.resolution_px
+        height, width = self.config.shape
         ok = samples_per_axis > 0 and frexp(samples_per_axis)[0] == 0.5
         require(ok, "samples_per_axis", "a power of two", samples_per_axis)
         require(resolution * samples_per_axis >= 1, "samples_per_axis", f"at least 1/{resolution}", samples_per_axis)
@@ -60,6 +62,7 @@ class Framed(Policy[Frame]):
         self._side = int(resolution * samples_per_axis)
         self._framelet_side = min(self.config.framelet_side, self._side)
         self._level = int(log2(self._side // self._framelet_side))
+        self._shape = ceil(height * samples_per_axis), ceil(width * samples_per_axis)
 
     @property
     def footprint(self) -> float:
@@ -74,13 +77,16 @@ class Framed(Policy[Frame]):
         """Enlarging by ``k`` weights two values of each channel: three operations, in a ``k``-th of the rows for the
         width and in all for the height. The box filter over several samples is not charged."""
         enlarge = 9.0 * (1.0 + self._axis) if self._axis < 1 else 0.0
-        return Price(self._side**2, pixel_flops=enlarge)
+        return Price(self._shape[0] * self._shape[1], pixel_flops=enlarge)
 
     def start(self) -> Frame:
         return Frame()
 
     def request(self, state: Frame, moment: Moment) -> tuple[Frame, FrameletBatch]:
-        """A whole frame as framelets of the uniform tiling."""
+        """A whole frame as framelets of the uniform tiling; of a picture that is no square of a power of two,
+        as samples along the same curve."""
+        if not self.config.window.whole:
+            return state, self._curve_batch(moment)
         tiling = uniform(self._level)
         position = sample_positions(tiling.level, tiling.index, self._framelet_side)
         batch = FrameletBatch(
@@ -92,8 +98,18 @@ class Framed(Policy[Frame]):
         self, state: Frame, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
     ) -> Frame:
         with timer("reconstruction"):
-            color = replace_nonfinite(samples.color, self._framelet_side)[0]
-            return Frame(frame_image(color, self._side, self.config.resolution_px), moment.time_s)
+            whole = self.config.window.whole
+            group = self._framelet_side if whole else 1
+            color = replace_nonfinite(samples.color.reshape(-1, group**2, 3), group)[0]
+            if whole:
+                return Frame(frame_image(color, self._side, self.config.resolution_px), moment.time_s)
+            return Frame(window_image(color, self._shape, self.config.shape, self._axis), moment.time_s)
+
+    def _curve_batch(self, moment: Moment) -> FrameletBatch:
+        count = self._shape[0] * self._shape[1]
+        nothing = torch.zeros(count // gcd(count, self.config.samples), dtype=torch.int64)
+        position = curve_positions(*self._shape, *self.config.shape, self._axis).reshape(len(nothing), -1, 2)
+        return FrameletBatch(nothing, nothing, position, moment.time_s, cycle=moment.cycle, seed=self.config.seed)
 
     def image(self, state: Frame, moment: Moment) -> Picture:
         assert state.image is not None
@@ -131,11 +147,44 @@ def frame_image(color: Float[Tensor, "n samples 3"], side: int, resolution_px: i
         resolution_px: pixels along it; these are box averages of several samples, or bilinear between few.
     """
     raster = color.reshape(-1, 3)[raster_to_morton(side)].reshape(side, side, 3)
-    if side == resolution_px:
-        return raster
+    return _resampled(raster, resolution_px / side)
+
+
+def window_image(
+    color: Float[Tensor, "n samples 3"], shape: tuple[int, int], picture: tuple[int, int], samples_per_axis: float
+) -> Float[Tensor, "h w 3"]:
+    """Image of samples along :func:`tsar.morton.curve`.
+
+    Args:
+        color: as many samples as ``shape`` says, height and width.
+        shape: of the samples.
+        picture: height and width of the image, pixels.
+        samples_per_axis: of a pixel's side.
+    """
+    raster = torch.empty(shape[0] * shape[1], 3)
+    raster[curve(*shape)] = color.reshape(-1, 3)
+    image = _resampled(raster.reshape(*shape, 3), 1.0 / samples_per_axis)
+    return image[: picture[0], : picture[1]].contiguous()
+
+
+@lru_cache(maxsize=4)
+def curve_positions(
+    rows: int, columns: int, height: int, width: int, samples_per_axis: float = 1.0
+) -> Float[Tensor, "samples 2"]:
+    """Where regular samples lie on an image of ``width x height`` pixels, along :func:`tsar.morton.curve`. Where a
+    square of pixels that has one sample hangs over the image, that lies in the centre of the last pixel."""
+    number = curve(rows, columns)
+    x, y = ((at + 0.5) / samples_per_axis for at in (number % columns, number // columns))
+    last = 0.5 * min(1.0, 1.0 / samples_per_axis)
+    return torch.stack((x.clamp(max=width - last) / width, y.clamp(max=height - last) / height), dim=1)
+
+
+def _resampled(raster: Float[Tensor, "h w 3"], factor: float) -> Float[Tensor, "h2 w2 3"]:
+    """Enlarged, or averaged where the factor is below 1."""
     planes = raster.permute(2, 0, 1)
-    if side > resolution_px:
-        return F.avg_pool2d(planes[None], side // resolution_px)[0].permute(1, 2, 0).contiguous()
-    factor = resolution_px // side
-    wide = widened(planes, factor)
-    return widened(wide.transpose(1, 2), factor).permute(2, 1, 0).contiguous()
+    if factor == 1.0:
+        return raster
+    if factor < 1.0:
+        return F.avg_pool2d(planes[None], round(1.0 / factor))[0].permute(1, 2, 0).contiguous()
+    wide = widened(planes, round(factor))
+    return widened(wide.transpose(1, 2), round(factor)).permute(2, 1, 0).contiguous()

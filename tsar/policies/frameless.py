@@ -49,7 +49,7 @@ class Frameless(Policy[Sweep]):
         """The next ``batch_size * s²`` pixels of the sweep."""
         config, count, queue = self.config, int(self.config.budget), state.queue
         while queue.numel() < count:
-            sweep = torch.randperm(config.resolution_px**2, generator=generator(config, moment.cycle + queue.numel()))
+            sweep = torch.randperm(config.pixels, generator=generator(config, moment.cycle + queue.numel()))
             queue = torch.cat((queue, sweep))
         asked = queue[:count]
         return Sweep(state.buffer, asked, queue[count:]), pixel_batch(asked, config, moment)
@@ -66,9 +66,9 @@ class Frameless(Policy[Sweep]):
 
 
 def _image(buffer: PixelBuffer, config: TsarConfig) -> Float[Tensor, "h w 3"]:
-    side = config.resolution_px
-    color = buffer.color.reshape(side, side, 3)
-    known = torch.isfinite(buffer.time_s).reshape(1, side, side)
+    height, width = config.shape
+    color = buffer.color.reshape(height, width, 3)
+    known = torch.isfinite(buffer.time_s).reshape(1, height, width)
     if bool(known.all()):
         return color.clone()
     return pull_push(color.permute(2, 0, 1), known.to(torch.float32)).permute(1, 2, 0).contiguous()

@@ -35,7 +35,7 @@ from tsar.config import TsarConfig
 from tsar.policies import displacement, refinement
 from tsar.policies.refinement import Level, mean
 from tsar.policies.scatter import generator, pixel_colors, pull_push
-from tsar.policy import Moment, Picture, Policy, Price, Setting
+from tsar.policy import Moment, Picture, Policy, Price, Setting, require_square
 from tsar.roots import encoded
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
@@ -137,6 +137,7 @@ class Interruptible(Policy[Buffers]):
 
     def __init__(self, setting: Setting) -> None:
         super().__init__(setting)
+        require_square(self.config, "interruptible")
         self._view = setting.view
 
     @property

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from tsar.policies.resampling import BILINEAR_FLOPS, bilinear, nearest
 from tsar.policies.scatter import pull_push
-from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen
+from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen, within
 from tsar.types import Viewpoint
 
 NEARER = 0.93
@@ -30,7 +30,7 @@ third more pixels than the image. In each: shares times channels and their sums,
 blend."""
 
 
-def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpoint) -> Float[Tensor, "side side 3"]:
+def warped(image: Float[Tensor, "h w 3"], surfaces: Surfaces, view: Viewpoint) -> Float[Tensor, "h w 3"]:
     """The image as another view sees its surfaces.
 
     Args:
@@ -38,8 +38,7 @@ def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpo
         surfaces: first hits of the same pixels.
         view: the poses to warp to.
     """
-    side = image.shape[0]
-    centre = centres(side)
+    centre = centres(*image.shape[:2])
     landing, deep = seen(surfaces, view)
     depth = deep.clamp(min=0.0).to(torch.float32)
     arrived = _winners(landing, depth)
@@ -54,7 +53,7 @@ def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpo
     if not bool(known.all()):
         read_at = torch.where(known[..., None], read_at, centre + _spread(back, known))
     shown = bilinear(image, read_at)
-    hidden = ~known & ((read_at >= -0.5) & (read_at < side - 0.5)).all(-1)
+    hidden = ~known & within(read_at)
     if not bool(hidden.any()):
         return shown
     moves = (surfaces.instance >= 0) & (view.track_of_instance[surfaces.instance.clamp(min=0).to(torch.int64)] > 0)
@@ -64,37 +63,35 @@ def warped(image: Float[Tensor, "side side 3"], surfaces: Surfaces, view: Viewpo
     return torch.where(hidden[..., None], filled, shown)
 
 
-def _winners(landing: Float64[Tensor, "side side 2"], depth: Float[Tensor, "side side"]) -> Int64[Tensor, "side side"]:
+def _winners(landing: Float64[Tensor, "h w 2"], depth: Float[Tensor, "h w"]) -> Int64[Tensor, "h w"]:
     """Number of the nearest pixel that arrives in each place, -1 where none does; of equals the first."""
-    side = landing.shape[0]
+    (height, width), count = landing.shape[:2], landing.shape[0] * landing.shape[1]
     target = (landing + 0.5).nan_to_num(nan=-1.0, posinf=-1.0, neginf=-1.0).floor()
-    inside = ((target >= 0) & (target < side)).all(-1) & (depth > 0)
-    cell = torch.where(inside, target[..., 1] * side + target[..., 0], side * side).to(torch.int64).reshape(-1)
+    inside = ((target >= 0) & (target < target.new_tensor((width, height)))).all(-1) & (depth > 0)
+    cell = torch.where(inside, target[..., 1] * width + target[..., 0], count).to(torch.int64).reshape(-1)
     # the bits of positive floats rise as the floats do
-    key = (depth.view(torch.int32).to(torch.int64).reshape(-1) << 32) | torch.arange(side * side)
+    key = (depth.view(torch.int32).to(torch.int64).reshape(-1) << 32) | torch.arange(count)
     none = torch.iinfo(torch.int64).max
-    best = torch.full((side * side + 1,), none).scatter_reduce(0, cell, key, "amin")[:-1]
-    return torch.where(best == none, -1, best & 0xFFFFFFFF).reshape(side, side)
+    best = torch.full((count + 1,), none).scatter_reduce(0, cell, key, "amin")[:-1]
+    return torch.where(best == none, -1, best & 0xFFFFFFFF).reshape(height, width)
 
 
-def _deepest_beside(
-    arrived: Int64[Tensor, "side side"], depth: Float[Tensor, "side side"]
-) -> Int64[Tensor, "side side"]:
+def _deepest_beside(arrived: Int64[Tensor, "h w"], depth: Float[Tensor, "h w"]) -> Int64[Tensor, "h w"]:
     """Of what arrived in the eight places around, the deepest pixel; -1 where nothing did; of equals the first."""
-    side = arrived.shape[0]
+    height, width = arrived.shape
     sources = F.pad(arrived, (1, 1, 1, 1), value=-1)
     depths = torch.where(sources >= 0, depth.reshape(-1)[sources.clamp(min=0)], -1.0)
     deepest, found = torch.full_like(depth, -1.0), torch.full_like(arrived, -1)
     for row in range(3):
         for column in range(3):
-            there = depths[row : row + side, column : column + side]
+            there = depths[row : row + height, column : column + width]
             deeper = there > deepest
             deepest = torch.where(deeper, there, deepest)
-            found = torch.where(deeper, sources[row : row + side, column : column + side], found)
+            found = torch.where(deeper, sources[row : row + height, column : column + width], found)
     return found
 
 
-def _spread(back: Float64[Tensor, "side side 2"], known: Bool[Tensor, "side side"]) -> Float64[Tensor, "side side 2"]:
+def _spread(back: Float64[Tensor, "h w 2"], known: Bool[Tensor, "h w"]) -> Float64[Tensor, "h w 2"]:
     """The motion of what is known around, where nothing is."""
     planes = F.pad(back.permute(2, 0, 1), (0, 0, 0, 0, 0, 1)).to(torch.float32)
     return pull_push(planes, known[None].to(torch.float32))[:2].permute(1, 2, 0).to(torch.float64)

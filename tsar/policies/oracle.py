@@ -26,7 +26,7 @@ from tsar.estimators import state_size
 from tsar.morton import morton_to_raster, raster_to_morton
 from tsar.policies.resampling import double_width
 from tsar.policies.thesis import Thesis
-from tsar.policy import Moment, Picture, Policy, Setting
+from tsar.policy import Moment, Picture, Policy, Setting, require_square
 from tsar.reconstruction import reconstruct
 from tsar.selection import sample_positions
 from tsar.tiling import uniform
@@ -55,6 +55,7 @@ class Oracle(Policy[Foresight]):
             ValueError: the setting has no truth or no such renderer.
         """
         super().__init__(setting)
+        require_square(self.config, "oracle")
         if setting.truth is None or setting.trace is None:
             raise ValueError("oracle: expected a truth to look at and a renderer that is not charged, got none")
         self._truth, self._trace = setting.truth, setting.trace

@@ -8,17 +8,18 @@ without warp is one part.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import floor, log2
+from math import floor, gcd, log2
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.config import require
 from tsar.error import replace_nonfinite
-from tsar.morton import raster_to_morton
+from tsar.morton import curve, raster_to_morton
 from tsar.policies.accumulation import ACCUMULATE_FLOPS, Accumulation, History, accumulated
+from tsar.policies.framed import curve_positions
 from tsar.policies.late import WARP_FLOPS, warped
 from tsar.policies.surfaces import Surfaces
 from tsar.policy import Moment, Picture, Policy, Price, Setting
@@ -44,7 +45,7 @@ class Finished:
         history: what has been accumulated; None without accumulation.
     """
 
-    color: Float[Tensor, "side side 3"]
+    color: Float[Tensor, "h w 3"]
     surfaces: Surfaces
     view: Viewpoint
     history: History | None = None
@@ -99,7 +100,9 @@ class Reprojected(Policy[Progress]):
         self._view, self._accumulation, self._warm_frames = setting.view, accumulation, warm_frames
         self._footprint, self._warps = footprint, parts > 1
         self._level = int(log2(self.config.resolution_px // self.config.framelet_side))
-        self._parts = min(parts, 4**self._level)
+        whole, shape = self.config.window.whole, self.config.shape
+        self._parts = min(parts, 4**self._level) if whole else gcd(parts, self.config.pixels)
+        self._order = raster_to_morton(shape[0]) if whole else torch.argsort(curve(*shape))
 
     @property
     def footprint(self) -> float:
@@ -119,7 +122,7 @@ class Reprojected(Policy[Progress]):
         """A part of a frame's samples, of its accumulation, and a warp."""
         accumulate = ACCUMULATE_FLOPS / self._parts if self._accumulation else 0.0
         warp = WARP_FLOPS if self._warps else 0.0
-        return Price(self.config.resolution_px**2 // self._parts, pixel_flops=accumulate + warp)
+        return Price(self.config.pixels // self._parts, pixel_flops=accumulate + warp)
 
     def start(self) -> Progress:
         return Progress()
@@ -128,16 +131,28 @@ class Reprojected(Policy[Progress]):
         """The next part of a frame, in Morton order; all parts are of the time at which the first is traced."""
         if not state.parts:
             state = replace(state, time_s=moment.time_s)
-        tiling = uniform(self._level)
-        count = tiling.tile_count // self._parts
-        part = slice(len(state.parts) * count, (len(state.parts) + 1) * count)
-        level, index = tiling.level[part], tiling.index[part]
-        position = sample_positions(level, index, self.config.framelet_side)
-        beside = torch.tensor(self._jitter_px(state.number)) / self.config.resolution_px
+        level, index, position = self._part(len(state.parts))
+        height, width = self.config.shape
+        beside = torch.tensor(self._jitter_px(state.number)) / torch.tensor((width, height))
         batch = FrameletBatch(
             level, index, position + beside, state.time_s, cycle=moment.cycle, seed=self.config.seed, hits=True
         )
         return state, batch
+
+    def _part(self, number: int) -> tuple[Int64[Tensor, " n"], Int64[Tensor, " n"], Float[Tensor, "n samples 2"]]:
+        """Tiles of a part of a frame, and the centres of its pixels; of a picture that is no square of a power of two
+        they are no tiles, but follow the same curve."""
+        config = self.config
+        if config.window.whole:
+            tiling = uniform(self._level)
+            count = tiling.tile_count // self._parts
+            part = slice(number * count, (number + 1) * count)
+            level, index = tiling.level[part], tiling.index[part]
+            return level, index, sample_positions(level, index, config.framelet_side)
+        count = config.pixels // self._parts
+        position = curve_positions(*config.shape, *config.shape)[number * count : (number + 1) * count]
+        nothing = torch.zeros(count // gcd(count, config.samples), dtype=torch.int64)
+        return nothing, nothing, position.reshape(len(nothing), -1, 2)
 
     def observe(
         self, state: Progress, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
@@ -151,9 +166,9 @@ class Reprojected(Policy[Progress]):
     def image(self, state: Progress, moment: Moment) -> Picture:
         """The last finished frame, warped to the poses of the time at which it is first shown, as those of the cycle's
         start and before foretell them; black before the first."""
-        side, last = self.config.resolution_px, state.finished
+        last = state.finished
         if last is None:
-            return Picture(torch.zeros(side, side, 3))
+            return Picture(torch.zeros(*self.config.shape, 3))
         age = torch.full((1, 1), last.view.time_s, dtype=torch.float64)
         shown = SampleMap(age, torch.full((1, 1), self._level))
         if not self._warps:
@@ -162,14 +177,15 @@ class Reprojected(Policy[Progress]):
         return Picture(warped(last.color, last.surfaces, view), shown)
 
     def _finish(self, state: Progress, parts: tuple[SampleBatch, ...]) -> Finished:
-        side, order = self.config.resolution_px, raster_to_morton(self.config.resolution_px)
+        shape, order = self.config.shape, self._order
         hits = [part.hits for part in parts if part.hits is not None]
         require(len(hits) == len(parts), "policy", "a renderer that tells first hits, for reprojection", None)
         color = torch.cat([part.color for part in parts])
-        color = replace_nonfinite(color, self.config.framelet_side)[0].reshape(-1, 3)[order].reshape(side, side, 3)
+        group = self.config.framelet_side if self.config.window.whole else 1
+        color = replace_nonfinite(color.reshape(-1, group**2, 3), group)[0].reshape(-1, 3)[order].reshape(*shape, 3)
         surfaces = Surfaces(
-            torch.cat([hit.instance for hit in hits]).reshape(-1)[order].reshape(side, side),
-            torch.cat([hit.point for hit in hits]).reshape(-1, 3)[order].reshape(side, side, 3),
+            torch.cat([hit.instance for hit in hits]).reshape(-1)[order].reshape(shape),
+            torch.cat([hit.point for hit in hits]).reshape(-1, 3)[order].reshape(*shape, 3),
             self._jitter_px(state.number),
         )
         view = self._view(state.time_s)

@@ -75,6 +75,22 @@ def _within(at: Float64[Tensor, "*n"], count: int) -> Int64[Tensor, "*n"]:
     return at.clamp(0.0, count - 1.0).to(torch.int64)
 
 
+def averaged(image: Float[Tensor, "h w c"], height: int, width: int) -> Float[Tensor, "h2 w2 c"]:
+    """A smaller image, each of whose pixels is the mean of what it covers, parts of pixels by their share."""
+    for axis, count in ((0, height), (1, width)):
+        old = image.shape[axis]
+        edge = torch.arange(count + 1, dtype=torch.float64) * old / count
+        first, last = edge[:-1].floor().to(torch.int64), edge[1:]
+        total = torch.zeros(*image.shape[:axis], count, *image.shape[axis + 1 :], dtype=image.dtype)
+        for k in range(-(-old // count) + 1):
+            cell = first + k
+            share = (torch.minimum(cell + 1.0, last) - torch.maximum(cell.to(torch.float64), edge[:-1])).clamp(min=0.0)
+            weight = (share * count / old).to(image.dtype).reshape(-1, *[1] * (image.ndim - axis - 1))
+            total = total + weight * image.index_select(axis, cell.clamp(max=old - 1))
+        image = total
+    return image
+
+
 def double_width(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
     """Twice as many columns, as :func:`widened` has them."""
     return widened(plane, 2)

@@ -22,8 +22,8 @@ class PixelBuffer:
     """Newest sample per output pixel, raster order; changes in place.
 
     Attributes:
-        color: ``(res * res, 3)`` float32.
-        time_s: ``(res * res,)`` float64, ``-inf`` where nothing has been sampled yet.
+        color: ``(height * width, 3)`` float32.
+        time_s: ``(height * width,)`` float64, ``-inf`` where nothing has been sampled yet.
     """
 
     color: Float[Tensor, "pixels 3"]
@@ -31,15 +31,14 @@ class PixelBuffer:
 
     @staticmethod
     def empty(config: TsarConfig) -> PixelBuffer:
-        pixels = config.resolution_px**2
+        pixels = config.pixels
         return PixelBuffer(torch.zeros(pixels, 3), torch.full((pixels,), -torch.inf, dtype=torch.float64))
 
 
 def sample_map(buffer: PixelBuffer, config: TsarConfig) -> SampleMap:
     """One sample a pixel, each of its own age."""
-    side = config.resolution_px
-    level = torch.full((side, side), int(log2(side / config.framelet_side)))
-    return SampleMap(buffer.time_s.reshape(side, side).clone(), level)
+    level = torch.full(config.shape, int(log2(config.resolution_px / config.framelet_side)))
+    return SampleMap(buffer.time_s.reshape(config.shape).clone(), level)
 
 
 def generator(config: TsarConfig, cycle: int) -> torch.Generator:
@@ -50,8 +49,9 @@ def generator(config: TsarConfig, cycle: int) -> torch.Generator:
 def pixel_batch(pixel: Int64[Tensor, " samples"], config: TsarConfig, moment: Moment) -> FrameletBatch:
     """The centres of output pixels (raster indices), grouped into as many framelets as fit; their count must be a
     multiple of ``config.samples``."""
-    resolution = config.resolution_px
-    position = torch.stack((pixel % resolution, pixel // resolution), dim=1).to(torch.float32).add_(0.5) / resolution
+    height, width = config.shape
+    position = torch.stack((pixel % width, pixel // width), dim=1).to(torch.float32).add_(0.5)
+    position = position / (width if height == width else position.new_tensor((width, height)))
     position = position.reshape(-1, config.samples, 2)
     nothing = torch.zeros(position.shape[0], dtype=torch.int64)
     return FrameletBatch(nothing, nothing, position, moment.time_s, cycle=moment.cycle, seed=config.seed)
@@ -74,8 +74,13 @@ def write(
 
 def pull_push(color: Float[Tensor, "c h w"], weight: Float[Tensor, "1 h w"]) -> Float[Tensor, "c h w"]:
     """Fill by pyramid: a pixel of weight 1 keeps its colour, one of less is blended with the coarser level, whose
-    weights are the sums of its children's, at most 1."""
-    if color.shape[1] == 1:
+    weights are the sums of its children's, at most 1. Beyond the picture there is no weight."""
+    height, width = color.shape[1:]
+    side = 1 << (max(height, width) - 1).bit_length()
+    if (height, width) != (side, side):
+        beyond = (0, side - width, 0, side - height)
+        return pull_push(F.pad(color, beyond), F.pad(weight, beyond))[:, :height, :width].contiguous()
+    if side == 1:
         return color
     total = 4.0 * F.avg_pool2d(weight[None], 2)[0]
     mean = 4.0 * F.avg_pool2d((color * weight)[None], 2)[0] / total.clamp(min=1e-12)

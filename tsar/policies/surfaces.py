@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Float64, Int
+from jaxtyping import Bool, Float, Float64, Int
 from torch import Tensor
 
 from tsar.projection import project
@@ -25,12 +25,12 @@ class Surfaces:
         jitter_px: where the samples lie beside the centres of their pixels, ``(x, y)``, pixels.
     """
 
-    instance: Int[Tensor, "side side"]
-    point: Float[Tensor, "side side 3"]
+    instance: Int[Tensor, "h w"]
+    point: Float[Tensor, "h w 3"]
     jitter_px: tuple[float, float] = (0.0, 0.0)
 
 
-def seen(surfaces: Surfaces, view: Viewpoint) -> tuple[Float64[Tensor, "side side 2"], Float64[Tensor, "side side"]]:
+def seen(surfaces: Surfaces, view: Viewpoint) -> tuple[Float64[Tensor, "h w 2"], Float64[Tensor, "h w"]]:
     """Where the centre of each pixel is seen by another view, and how deep.
 
     A pixel's centre moves as its sample does.
@@ -39,13 +39,19 @@ def seen(surfaces: Surfaces, view: Viewpoint) -> tuple[Float64[Tensor, "side sid
         Positions in pixels, as in :mod:`tsar.policies.resampling`, and depths, scene units; NaN and 0 or below where
         the view does not see it.
     """
-    side = surfaces.instance.shape[0]
+    height, width = surfaces.instance.shape
     position, depth = project(view, surfaces.instance, surfaces.point)
     beside = torch.tensor(surfaces.jitter_px, dtype=torch.float64)
-    return position * side - 0.5 - beside, depth
+    return position * position.new_tensor((width, height)) - 0.5 - beside, depth
 
 
-def centres(side: int) -> Float64[Tensor, "side side 2"]:
+def centres(height: int, width: int) -> Float64[Tensor, "h w 2"]:
     """Positions of the pixels' centres."""
-    along = torch.arange(side, dtype=torch.float64)
-    return torch.stack([along[None].expand(side, side), along[:, None].expand(side, side)], dim=-1)
+    row, column = (torch.arange(count, dtype=torch.float64) for count in (height, width))
+    return torch.stack([column[None].expand(height, width), row[:, None].expand(height, width)], dim=-1)
+
+
+def within(place: Float64[Tensor, "h w 2"]) -> Bool[Tensor, "h w"]:
+    """Which positions lie on a picture of as many pixels."""
+    height, width = place.shape[:2]
+    return ((place >= -0.5) & (place < place.new_tensor((width, height)) - 0.5)).all(-1)

@@ -3,20 +3,26 @@
 Contains no mathematics; every stage is a function of its own module.
 
 Source: Stephens 2011, sec. 3.4.4 and fig. 3.13.
+
+Deviation: a picture that is no square of a power of two is spread over the square of the least power of two that holds
+it, so that tiles have the picture's shape.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import torch
 
 from tsar.accounting import movement
 from tsar.cache import FrameletCache
 from tsar.clock import StageTimer
+from tsar.policies.resampling import averaged
 from tsar.policy import Cycle, Moment, Picture, Policy, Setting
 from tsar.response import initial_densities
 from tsar.selection import Request, initial_history, request
 from tsar.tiling import build
-from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, StepRecord, Tiling
+from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, SampleMap, StepRecord, Tiling
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,18 @@ class Thesis(Policy[State]):
 
     def image(self, state: State, moment: Moment) -> Picture:
         made = self._stages.reconstruct(state.cache, self.config, moment.cycle_s)
-        return Picture(made.image, made.sample_map, made.counters)
+        share = self.config.pixels / self.config.resolution_px**2
+        return Picture(made.image, made.sample_map, {name: round(share * one) for name, one in made.counters.items()})
+
+    def fitted(self, shown: Picture) -> Picture:
+        """The square that is reconstructed, averaged over the pixels of a picture of another shape."""
+        if self.config.window.whole:
+            return shown
+        samples, (height, width) = shown.sample_map, self.config.shape
+        assert samples is not None
+        row, column = (torch.arange(side) * len(samples.level) // side for side in (height, width))
+        newest_s, level = (one[row[:, None], column] for one in (samples.newest_s, samples.level))
+        return replace(shown, image=averaged(shown.image, height, width), sample_map=SampleMap(newest_s, level))
 
     def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord:
         before, after, config = cycle.before, cycle.after, self.config

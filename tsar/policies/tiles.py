@@ -19,7 +19,8 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from tsar.morton import floor_log2, morton_to_raster
+from tsar.morton import deinterleave, floor_log2, morton_to_raster
+from tsar.window import Window
 
 CHANGES_PER_CYCLE = 64
 
@@ -30,24 +31,57 @@ class Tree:
 
     Attributes:
         leaf: which nodes are in the cut.
+        shown_px: pixels of the picture in each node; None where all of its pixels are the picture's.
         sums: per node, over its samples, weights that fade with age, and these times luminance, squared luminance, and
             whatever else is gathered; only leaves' are in use.
     """
 
     leaf: Bool[Tensor, " nodes"]
     sums: Float[Tensor, "rows nodes"]
+    shown_px: Int64[Tensor, " nodes"] | None = None
 
     @property
     def leaves(self) -> Int64[Tensor, " leaves"]:
         return self.leaf.nonzero().squeeze(1)
 
+    @property
+    def sampled(self) -> Int64[Tensor, " leaves"]:
+        """Leaves that show any of the picture."""
+        leaves = self.leaves
+        return leaves if self.shown_px is None else leaves[self.shown_px[leaves] > 0]
 
-def initial(depth: int, leaves: int, rows: int) -> Tree:
-    """The uniform cut of a power of two of leaves through a tree whose pixels are nodes of ``depth``."""
+    def size_px(self, node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
+        """Pixels of the picture in nodes."""
+        return area_px(node, depth) if self.shown_px is None else self.shown_px[node]
+
+
+def initial(depth: int, leaves: int, rows: int, window: Window) -> Tree:
+    """The uniform cut of a power of two of leaves through a tree whose pixels are nodes of ``depth``, over the plane of
+    a window."""
     nodes = 2 ** (depth + 1)
     leaf = torch.zeros(nodes, dtype=torch.bool)
     leaf[leaves : 2 * leaves] = True
-    return Tree(leaf, torch.zeros(rows, nodes))
+    return Tree(leaf, torch.zeros(rows, nodes), None if window.whole else _shown(depth, window))
+
+
+def _shown(depth: int, window: Window) -> Int64[Tensor, " nodes"]:
+    x, y = deinterleave(torch.arange(2**depth))
+    counts = [((x < window.width_px) & (y < window.height_px)).to(torch.int64)]
+    for _ in range(depth):
+        counts.append(counts[-1].reshape(-1, 2).sum(1))
+    return torch.cat([torch.zeros(1, dtype=torch.int64), *reversed(counts)])
+
+
+def place(node: Int64[Tensor, " n"], share: Float64[Tensor, " n"], depth: int, window: Window) -> Int64[Tensor, " n"]:
+    """Raster index on the picture of the pixel at a share in [0, 1) of the picture's in each node, by rows."""
+    x, y = deinterleave(first_cell(node, depth))
+    levels = depth - floor_log2(node)
+    width = (torch.ones_like(x) << ((levels + 1) // 2)).clamp(max=window.side_px)
+    height = torch.ones_like(y) << (levels // 2)
+    width = torch.minimum(width, window.width_px - x)
+    height = torch.minimum(height, window.height_px - y)
+    cell = (share * (width * height)).to(torch.int64)
+    return (y + cell // width) * window.width_px + x + cell % width
 
 
 def area_px(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
@@ -60,14 +94,14 @@ def first_cell(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
     return (node << (depth - floor_log2(node))) - 2**depth
 
 
-def per_pixel(values: Float64[Tensor, " leaves"], tree: Tree, depth: int) -> Float64[Tensor, " pixels"]:
-    """Values of the leaves as a raster."""
+def per_pixel(values: Float64[Tensor, " leaves"], tree: Tree, depth: int, window: Window) -> Float64[Tensor, " pixels"]:
+    """Values of the leaves as a raster of the picture."""
     leaves = tree.leaves
     order = torch.argsort(first_cell(leaves, depth))
     along = values[order].repeat_interleave(area_px(leaves, depth)[order])
     raster = torch.empty_like(along)
     raster[morton_to_raster(2 ** (depth // 2))] = along
-    return raster
+    return window.cropped(raster.reshape(window.side_px, window.side_px)).reshape(-1)
 
 
 def gather(
@@ -80,10 +114,12 @@ def gather(
     return replace(tree, sums=sums)
 
 
-def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"]) -> Float[Tensor, " n"]:
-    """Variance times area; area in units of the image."""
+def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"], tree: Tree) -> Float[Tensor, " n"]:
+    """Variance times area of the picture; area in units of the plane."""
     weight = sums[0].clamp(min=1e-12)
     variance = (sums[2] / weight - (sums[1] / weight).square()).clamp(min=0.0)
+    if tree.shown_px is not None:
+        return variance * (tree.shown_px[node] / (len(tree.shown_px) // 2)).to(torch.float32)
     return variance * torch.exp2(-floor_log2(node).to(torch.float32))
 
 
@@ -94,11 +130,11 @@ def adapt(tree: Tree, depth: int) -> Tree:
     Children take half their parent's sums each; a merged leaf takes those of both. The number of leaves stays the same.
     """
     leaves = tree.leaves
-    leaf_error = error(tree.sums[:, leaves], leaves)
+    leaf_error = error(tree.sums[:, leaves], leaves, tree)
     left = leaves[(leaves & 1) == 0]
     left = left[tree.leaf[left + 1] & (left > 3)]
     merged_sums = tree.sums[:, left] + tree.sums[:, left + 1]
-    merged_error, merge_order = torch.sort(error(merged_sums, left >> 1), stable=True)
+    merged_error, merge_order = torch.sort(error(merged_sums, left >> 1, tree), stable=True)
     splittable = torch.where(leaves < 2**depth, leaf_error, -1.0)
     split_error, split_order = torch.sort(splittable, descending=True, stable=True)
     changes = min(CHANGES_PER_CYCLE, left.numel(), leaves.numel())
@@ -114,4 +150,4 @@ def adapt(tree: Tree, depth: int) -> Tree:
         leaf[child] = True
     leaf[split] = leaf[pair] = leaf[pair + 1] = False
     leaf[pair >> 1] = True
-    return Tree(leaf, sums)
+    return Tree(leaf, sums, tree.shown_px)

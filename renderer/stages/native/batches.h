@@ -107,7 +107,7 @@ template <class Plan> inline void locate(const Plan& plan, const Batch& b, int f
             x = d8{p[0], p[2], p[4], p[6], p[8], p[10], p[12], p[14]};
             y = d8{p[1], p[3], p[5], p[7], p[9], p[11], p[13], p[15]};
         }
-        seen &= (x >= 0.0) & (y >= 0.0) & (x < (double)plan.side) & (y < (double)plan.side);
+        seen &= (x >= 0.0) & (y >= 0.0) & (x < (double)plan.width) & (y < (double)plan.height);
         const i8 column = __builtin_convertvector(seen ? x : (d8)0.0, i8),
                  row = __builtin_convertvector(seen ? y : (d8)0.0, i8);
         store(s.at + start, __builtin_convertvector(seen, i8) ? row * plan.side + column : (i8)-1);

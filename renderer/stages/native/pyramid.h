@@ -27,23 +27,25 @@ struct Estimated {
     const float *aged, *inverse, *roughness, *rate, *position;
 };
 
-// What a picture is made from and of; `levels` begin with the second finest.
+// What a picture is made from and of; `levels` begin with the second finest. The picture is the upper left part of planes
+// of `side` pixels, whose other pixels are left alone.
 struct Picture {
     Fine fine;
     Estimated estimated;
     float* levels;
     Shown shown;
+    long long width, height;
 };
 
 inline float larger(float a, float b) { return a > b ? a : b; }
 inline float smaller(float a, float b) { return a < b ? a : b; }
 
 // Variance of the pixels of a row, some seconds later, with what lies beside its pixel.
-inline void vary(const Estimated& of, float seconds, int side, int row, float* variance) {
+inline void vary(const Estimated& of, float seconds, int side, int width, int row, float* variance) {
     const int start = row * side, count = side * side;
     const float *aged = of.aged + start, *inverse = of.inverse + start, *roughness = of.roughness + start;
     const float* rate = of.rate + row / given::ELEMENT_PX * (side / given::ELEMENT_PX);
-    for (int i = 0; i < side; ++i) {
+    for (int i = 0; i < width; ++i) {
         float later = smaller(aged[i] + rate[i / given::ELEMENT_PX] * seconds, given::VARIANCE_MAX);
         if (of.position) {
             const float x = of.position[start + i] - (i + 0.5f), y = of.position[count + start + i] - (row + 0.5f);
@@ -59,25 +61,33 @@ inline float mean4(const float* a, const float* b, int column) {
     return (((a[2 * column] + a[2 * column + 1]) + b[2 * column]) + b[2 * column + 1]) / 4.0f;
 }
 
-// A row of the coarser level. `between` is half the distance of the finer level's pixels, by which roughness becomes
-// variance; `spare` has room for four rows of it.
-inline void up(const Fine& fine, int side, float between, int row, float* spare, float* coarse) {
+// A row of the coarser level, over `rows` of two finer ones of the picture. `between` is half the distance of the finer
+// level's pixels, by which roughness becomes variance; `spare` has room for four rows of it. Beyond the picture there is
+// no weight, and the roughness of its border.
+inline void up(const Fine& fine, int side, int width, int rows, float between, int row, float* spare, float* coarse) {
     const int half = side / 2, quarter = half * half, count = side * side, start = 2 * row * side;
+    const int columns = (width + 1) / 2;
     const float *variance = fine.variance + start, *roughness = fine.roughness + start;
     float* __restrict weight = spare, * __restrict weighted = spare + 2 * side;
     float* __restrict to = coarse + row * half;
-    for (int i = 0; i < 2 * side; ++i) weight[i] = 1.0f / (variance[i] + between * roughness[i]);
-    for (int i = 0; i < half; ++i) {
-        to[3 * quarter + i] = 4.0f * mean4(weight, weight + side, i);
-        to[4 * quarter + i] = mean4(roughness, roughness + side, i);
+    for (int i = 0; i < 4 * side && (rows < 2 || width % 2); ++i) spare[i] = 0.0f;
+    for (int k = 0; k < rows * side; k += side)
+        for (int i = k; i < k + width; ++i) weight[i] = 1.0f / (variance[i] + between * roughness[i]);
+    const float* below = rows < 2 ? roughness : roughness + side;
+    for (int i = 0; i < columns; ++i) to[3 * quarter + i] = 4.0f * mean4(weight, weight + side, i);
+    for (int i = 0; i < width / 2; ++i) to[4 * quarter + i] = mean4(roughness, below, i);
+    if (width % 2) {
+        const float a = roughness[width - 1], b = below[width - 1];
+        to[4 * quarter + width / 2] = (((a + a) + b) + b) / 4.0f;
     }
     for (int plane = 0; plane < 3; ++plane) {
         const float* color = fine.color + plane * count + start;
-        for (int i = 0; i < 2 * side; ++i) weighted[i] = color[i] * weight[i];
-        for (int i = 0; i < half; ++i)
+        for (int k = 0; k < rows * side; k += side)
+            for (int i = k; i < k + width; ++i) weighted[i] = color[i] * weight[i];
+        for (int i = 0; i < columns; ++i)
             to[plane * quarter + i] = 4.0f * mean4(weighted, weighted + side, i) / to[3 * quarter + i];
     }
-    for (int i = 0; i < half; ++i) to[3 * quarter + i] = 1.0f / to[3 * quarter + i];
+    for (int i = 0; i < columns; ++i) to[3 * quarter + i] = 1.0f / to[3 * quarter + i];
 }
 
 // A row of twice the length, linear, the ends repeated.
@@ -90,33 +100,33 @@ inline void enlarge(const float* __restrict from, int half, float* __restrict to
     to[2 * half - 1] = 0.75f * from[half - 1] + 0.25f * from[half - 1];
 }
 
-// Two rows of the finer level, from one of the coarser and its neighbours. `spare` has room for sixteen of them. Without
-// `shown` what is found replaces the finer level.
-inline void down(const float* coarse, int side, float between, int row, float* spare, const Fine& fine,
-                 const Shown* shown) {
-    const int half = side / 2, count = side * side, quarter = half * half;
-    const int near[3] = {row > 0 ? row - 1 : 0, row, row + 1 < half ? row + 1 : row};
+// Two rows of the finer level, of a picture `width` and `height` there, from one of the coarser and its neighbours.
+// `spare` has room for sixteen of them. Without `shown` what is found replaces the finer level.
+inline void down(const float* coarse, int side, int width, int height, float between, int row, float* spare,
+                 const Fine& fine, const Shown* shown) {
+    const int half = side / 2, count = side * side, quarter = half * half, rows = (height + 1) / 2;
+    const int near[3] = {row > 0 ? row - 1 : 0, row, row + 1 < rows ? row + 1 : row};
     for (int plane = 0; plane < 4; ++plane)
         for (int k = 0; k < 3; ++k)
-            enlarge(coarse + plane * quarter + near[k] * half, half, spare + (3 * plane + k) * side);
-    for (int second = 0; second < 2; ++second) {
+            enlarge(coarse + plane * quarter + near[k] * half, (width + 1) / 2, spare + (3 * plane + k) * side);
+    for (int second = 0; second < 2 && 2 * row + second < height; ++second) {
         const int start = (2 * row + second) * side;
         const float *variance = fine.variance + start, *roughness = fine.roughness + start;
         float* __restrict share = spare + 12 * side, * __restrict found = share + side;
-        for (int i = 0; i < side; ++i) share[i] = variance[i] / (variance[i] + between * roughness[i]);
+        for (int i = 0; i < width; ++i) share[i] = variance[i] / (variance[i] + between * roughness[i]);
         for (int plane = 0; plane < 3; ++plane) {
             const float *mid = spare + (3 * plane + 1) * side, *beside = second ? mid + side : mid - side;
             const float* own = fine.color + plane * count + start;
             float* const to = shown ? found + plane * side : (float*)own;
-            for (int i = 0; i < side; ++i) to[i] = own[i] + share[i] * ((0.75f * mid[i] + 0.25f * beside[i]) - own[i]);
+            for (int i = 0; i < width; ++i) to[i] = own[i] + share[i] * ((0.75f * mid[i] + 0.25f * beside[i]) - own[i]);
         }
         const float *mid = spare + 10 * side, *beside = second ? mid + side : mid - side;
         float* const remaining = shown ? shown->remaining + start : fine.variance + start;
-        for (int i = 0; i < side; ++i) {
+        for (int i = 0; i < width; ++i) {
             const float wide = 0.75f * mid[i] + 0.25f * beside[i];
             remaining[i] = variance[i] + share[i] * share[i] * ((wide - variance[i]) - between * roughness[i]);
         }
-        for (int i = 0; shown && i < side; i += 16)
+        for (int i = 0; shown && i < width; i += 16)
             packets::store_joined(shown->color + 3 * (start + i), {packets::load<packets::f16>(found + i),
                                                                    packets::load<packets::f16>(found + side + i),
                                                                    packets::load<packets::f16>(found + 2 * side + i)});
@@ -124,35 +134,44 @@ inline void down(const float* coarse, int side, float between, int row, float* s
 }
 
 inline void shrink(const Picture& picture, int side, float seconds, int first, int last, float* spare) {
+    const int width = (int)picture.width, height = (int)picture.height;
     for (int row = first; row < last; ++row) {
-        for (int k = 2 * row; k < 2 * row + 2; ++k)
-            vary(picture.estimated, seconds, side, k, picture.fine.variance + k * side);
-        up(picture.fine, side, 0.5f, row, spare, picture.levels);
+        const int end = 2 * row + 2 < height ? 2 * row + 2 : height;
+        for (int k = 2 * row; k < end; ++k)
+            vary(picture.estimated, seconds, side, width, k, picture.fine.variance + k * side);
+        up(picture.fine, side, width, end - 2 * row, 0.5f, row, spare, picture.levels);
     }
 }
 
 inline void show(const Picture& picture, int side, int first, int last, float* spare) {
-    for (int row = first; row < last; ++row) down(picture.levels, side, 0.5f, row, spare, picture.fine, &picture.shown);
+    const int width = (int)picture.width, height = (int)picture.height;
+    for (int row = first; row < last; ++row)
+        down(picture.levels, side, width, height, 0.5f, row, spare, picture.fine, &picture.shown);
 }
 
-// The coarser levels, from the second finest on, whose planes are given.
-inline void smooth(float* levels, int side, float* spare) {
+// The coarser levels, from the second finest on, whose planes are given; the picture is `width` and `height` there.
+inline void smooth(float* levels, int side, int width, int height, float* spare) {
     const auto planes = [](float* level, int wide) {
         return Fine{level, level + 4 * wide * wide, level + 3 * wide * wide};
     };
     float* level = levels;
     int number = 1;
-    for (int wide = side; wide > 1; wide /= 2, ++number) {
+    // of a level whose pixels are so many of the second finest
+    const auto part = [](int length, int pixels) { return (length + pixels - 1) / pixels; };
+    for (int wide = side, pixels = 1; wide > 1; wide /= 2, pixels *= 2, ++number) {
         float* const next = level + PLANES_OF_LEVEL * wide * wide;
-        for (int row = 0; row < wide / 2; ++row)
-            up(planes(level, wide), wide, 0.5f * (float)(1 << number), row, spare, next);
+        const int columns = part(width, pixels), rows = part(height, pixels);
+        for (int row = 0; row < (rows + 1) / 2; ++row)
+            up(planes(level, wide), wide, columns, rows - 2 * row < 2 ? 1 : 2, 0.5f * (float)(1 << number), row, spare,
+               next);
         level = next;
     }
     for (int wide = 2; wide <= side; wide *= 2) {
         --number;
         float* const finer = level - PLANES_OF_LEVEL * wide * wide;
-        for (int row = 0; row < wide / 2; ++row)
-            down(level, wide, 0.5f * (float)(1 << number), row, spare, planes(finer, wide), nullptr);
+        const int columns = part(width, side / wide), rows = part(height, side / wide);
+        for (int row = 0; row < (rows + 1) / 2; ++row)
+            down(level, wide, columns, rows, 0.5f * (float)(1 << number), row, spare, planes(finer, wide), nullptr);
         level = finer;
     }
 }

@@ -202,8 +202,9 @@ inline void choose(const Plan& plan, const Poses& poses, const long long* instan
         const Key* least = band.least + (row - band.first + 2) * stride + 2;
         int* source = (int*)plan.source + row * side;
         double* front = (double*)plan.front + (row + 1) * wide + FRAME;
+        const int kept = row < plan.height ? plan.width : 0;
         for (int column = 0; column < side; ++column) {
-            source[column] = least[column] == NONE ? -1 : (int)least[column];
+            source[column] = column >= kept || least[column] == NONE ? -1 : (int)least[column];
             front[column] = source[column] < 0 ? INF : depth[source[column]];
         }
     }
