@@ -98,7 +98,7 @@ def _image(time_s: float) -> torch.Tensor:
 def _obtained(folder: Path, render: Callable[[float], torch.Tensor] = _image) -> Any:
     from analysis.storage.reference import ReferenceSpec, obtain
 
-    spec = ReferenceSpec("s", "h", "r", start_s=0.5, rate_hz=10.0, count=8, resolution_px=8, samples_per_axis=1)
+    spec = ReferenceSpec("s", "h", "r", start_s=0.5, rate_hz=10.0, count=8, width_px=8, height_px=8, samples_per_axis=1)
     return obtain(folder / "cache", spec, render)
 
 

@@ -141,8 +141,7 @@ class Filter(Policy[State]):
     def start(self) -> State:
         side = self._side
         nothing, observed = Estimates.empty(side), Change.empty(side)
-        visits = torch.zeros_like(observed.rate, dtype=torch.int64)
-        still = torch.zeros_like(observed.rate)
+        visits, still = torch.zeros_like(observed.rate, dtype=torch.int64), torch.zeros_like(observed.rate)
         return State(nothing, Surfels.empty(side), observed, still, self._rate(observed, still), None, (), None, None,
                      torch.ones(self._tiles), visits, nothing.color, self._window.inside(nothing.variance))  # fmt: skip
 

@@ -18,7 +18,9 @@ from analysis.command.progress import Task
 from analysis.storage.journal import Journal
 from analysis.storage.reference import Reference, ReferenceSpec, obtain
 
-SPEC = ReferenceSpec("scene", "s" * 8, "r" * 8, start_s=0.5, rate_hz=10.0, count=5, resolution_px=4, samples_per_axis=2)
+SPEC = ReferenceSpec(
+    "scene", "s" * 8, "r" * 8, start_s=0.5, rate_hz=10.0, count=5, width_px=4, height_px=4, samples_per_axis=2
+)
 
 
 class Renderer:
@@ -50,7 +52,7 @@ def test_renders_every_time_once_and_reuses(tmp_path: Path) -> None:
     again = obtain(tmp_path / "new", SPEC, second, Task(show=shown.append))
     assert second.times == [] and again.rendered == 0 and shown == [5]
     assert np.array_equal(again.images, found.images)
-    assert Journal(tmp_path / "new" / f"{SPEC.key}.journal").rows()[0]["resolution_px"] == 4
+    assert Journal(tmp_path / "new" / f"{SPEC.key}.journal").rows()[0]["width_px"] == 4
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
@@ -252,7 +254,7 @@ def test_the_key_depends_on_every_field() -> None:
     assert (SPEC.shape, SPEC.bytes) == ((5, 4, 4, 3), 480)
 
 
-@pytest.mark.parametrize("name", ["rate_hz", "count", "resolution_px", "samples_per_axis"])
+@pytest.mark.parametrize("name", ["rate_hz", "count", "width_px", "height_px", "samples_per_axis"])
 def test_bad_specifications_name_the_field(name: str) -> None:
     with pytest.raises(ValueError, match=rf"reference {name}: expected a positive number, got 0"):
         dataclasses.replace(SPEC, **{name: 0})
@@ -269,7 +271,7 @@ def test_a_full_disk_is_noticed_before_rendering(tmp_path: Path, monkeypatch: py
 
 def test_room_is_taken_before_rendering(tmp_path: Path) -> None:
     """A file with holes would end the process where the disk is full by then."""
-    large = dataclasses.replace(SPEC, resolution_px=64)
+    large = dataclasses.replace(SPEC, width_px=64, height_px=64)
     with pytest.raises(RuntimeError):
         get(tmp_path, Renderer(break_at=0), large)
     assert 512 * (tmp_path / f"{large.key}.npy").stat().st_blocks >= large.bytes

@@ -36,7 +36,7 @@ def error(screen: Screen, poses: bool) -> float:
 
 
 def test_crosshairs_are_a_place_in_their_tile_and_four_beside_it() -> None:
-    node, place = afr.draw(tiles.initial(DEPTH, 64, 6), DEPTH, CONFIG, 5)
+    node, place = afr.draw(tiles.initial(DEPTH, 64, 6, CONFIG.window), DEPTH, CONFIG, 5)
     assert node.numel() == 204 and place.shape == (1024, 2) and 0.0 <= float(place.min()) <= float(place.max()) < 1.0
     centre, *beside = (place[: 5 * 204] * 64).reshape(5, 204, 2)
     assert all(bool(((arm - centre).abs().sum(1) - 1.0).abs().max() < 0.01) for arm in beside)
@@ -45,7 +45,7 @@ def test_crosshairs_are_a_place_in_their_tile_and_four_beside_it() -> None:
 
 
 def test_tiles_keep_their_number_and_cover_the_picture() -> None:
-    tree = tiles.initial(DEPTH, 64, 6)
+    tree = tiles.initial(DEPTH, 64, 6, CONFIG.window)
     for cycle in range(20):
         node, place = afr.draw(tree, DEPTH, CONFIG, cycle)
         x, y = place[:204].unbind(1)
@@ -64,7 +64,7 @@ def test_extents_follow_the_gradients() -> None:
     base = torch.tensor([1.0, 0.5, 0.3, 1e-3, 1e-2, 1.0])
     found = []
     for factor in ((1.0, 1.0), (8.0, 1.0), (1.0, 0.125)):
-        tree = tiles.initial(DEPTH, 64, 6)
+        tree = tiles.initial(DEPTH, 64, 6, CONFIG.window)
         tree.sums[:, 64:128] = (base * torch.tensor([1.0, 1.0, 1.0, factor[0], factor[1], 1.0]))[:, None]
         found.append(float(afr.extents(tree, DEPTH, CONFIG, CYCLE_S)[0]))
     assert found[1] == pytest.approx(2.0 * found[0], rel=0.01) and found[2] == pytest.approx(2.0 * found[0], rel=0.01)
@@ -92,12 +92,12 @@ def test_the_buffer_drops_what_is_hidden_and_outside_and_the_oldest() -> None:
     assert answer.hits is not None
     buffer = DeepBuffer.empty(4)
     buffer.add(answer.color[0], 0.0, place, answer.hits)
-    assert buffer.seen(screen.view(0.0), 8).sample.tolist() == [0, 1, 2, 3]
+    assert buffer.seen(screen.view(0.0), (8, 8)).sample.tolist() == [0, 1, 2, 3]
     # the card at (0.5, 0.5) moves over the floor at (0.7, 0.5)
-    assert buffer.seen(screen.view(0.2), 8).sample.tolist() == [0, 3]
+    assert buffer.seen(screen.view(0.2), (8, 8)).sample.tolist() == [0, 3]
     # the floor has left the picture at its top
-    assert buffer.seen(screen.view(0.51), 8).sample.tolist() == []
-    assert buffer.seen(None, 8).sample.tolist() == [0, 1, 2, 3]
+    assert buffer.seen(screen.view(0.51), (8, 8)).sample.tolist() == []
+    assert buffer.seen(None, (8, 8)).sample.tolist() == [0, 1, 2, 3]
     hits = Hits(*(values[:, :1] for values in vars(answer.hits).values()))
     buffer.add(torch.full((1, 3), 0.5), 0.1, place[:1], hits)
-    assert buffer.seen(None, 8).sample.tolist() == [1, 2, 3, 0] and buffer.time_s.tolist() == [0.1, 0.0, 0.0, 0.0]
+    assert buffer.seen(None, (8, 8)).sample.tolist() == [1, 2, 3, 0] and buffer.time_s.tolist() == [0.1, 0.0, 0.0, 0.0]
