@@ -72,6 +72,7 @@ class SpectrumOptions:
     """Folder for the results."""
 
     def __post_init__(self) -> None:
+        require(not self.tsar.width_px, "width_px", "none here, where pictures are squares", self.tsar.width_px)
         unknown = [name for name in (*self.inputs, self.input) if name not in INPUTS]
         require(not unknown and len(self.inputs) > 0, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
         limits.within(self, frames_per_input=(1, 100), samples_per_axis=(1, 16), threads=limits.THREADS)

@@ -71,6 +71,7 @@ class Scale:
 
     def sized(self, batch: int, side: int, base: TsarConfig) -> TsarConfig:
         """As :meth:`config`, with a batch and an output side of the thesis' size."""
+        require(not base.width_px, "width_px", "none in a study, whose pictures are squares", base.width_px)
         area, divisor = self.divisor**2, self.divisor
         level_min = max(1, base.tiling.level_min - (divisor.bit_length() - 1))
         support = base.reconstruction.age_support_px // divisor

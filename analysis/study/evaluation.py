@@ -1,9 +1,8 @@
 """Runs one case of a study and puts its result on disk.
 
-A result is a table
-over the reference times (Parquet), stills, and what was measured of the whole run (JSON), which is written last. The
-case is done where all of them are as they were written. Nothing in them depends on the number of threads, processes or
-machines, except the entry ``machine`` of the JSON file, which holds measured seconds and memory.
+A result is a table over the reference times (Parquet), stills, and what was measured of the whole run (JSON), which is
+written last. The case is done where all of them are as they were written. Nothing in them depends on the number of
+threads, processes or machines, except the entry ``machine`` of the JSON file: measured seconds and memory.
 """
 
 from __future__ import annotations

@@ -70,7 +70,8 @@ def render_reference(animation: Animation, start_s: float, scale: Scale, folder:
             start_s=start_s,
             rate_hz=scale.reference_rate_hz,
             count=len(reference_times(start_s, start_s + scale.seconds, scale.reference_rate_hz)),
-            resolution_px=scale.reference_px,
+            width_px=scale.reference_px,
+            height_px=scale.reference_px,
             samples_per_axis=scale.reference_samples_per_axis,
         )
         side, axis = scale.reference_px, scale.reference_samples_per_axis

@@ -102,16 +102,15 @@ class Filter(Policy[State]):
         self._window, self._side = self.config.window, self.config.resolution_px
         self._options = replace(options, reach=options.reach * self._window.reach)
         tensors, self._stages = reference(self._window), setting.stages_of(self.config).filtering
-        if self._stages is REFERENCE:
-            self._stages = tensors
+        self._stages = tensors if self._stages is REFERENCE else self._stages
         if options.wavelets:  # compiled sets know residuals alone
             self._stages = replace(self._stages, taken_in=tensors.taken_in)
         self._view = setting.view if options.reprojection else None
         most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
-        within = morton_to_raster(TILE_SIDE)
-        self._cell = torch.stack((within % TILE_SIDE, within // TILE_SIDE), dim=1).to(torch.float64)
+        cell = morton_to_raster(TILE_SIDE)
+        self._cell = torch.stack((cell % TILE_SIDE, cell // TILE_SIDE), dim=1).to(torch.float64)
         self._places, self._kinds = tiles.places(self._side), tiles.spacings(min(self.config.shape))
         self._size = torch.tensor(self.config.shape[::-1], dtype=torch.float64)
         within = (self._places[:, :2] < self._size.flip(0)).all(1) & (self._places[:, 2] <= self._kinds[0])
