@@ -238,7 +238,8 @@ class TsarConfig:
     @property
     def window(self) -> Window:
         """Where the output image lies on the square plane that policies work on."""
-        return Window(*self.shape[::-1], self.resolution_px)
+        height, width = self.shape
+        return Window(width, height, self.resolution_px)
 
     @property
     def field_level(self) -> int:

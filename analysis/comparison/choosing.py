@@ -51,7 +51,7 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
     if asked is None:
         return options, None
     place = _place(options, asked, front or stored_front())
-    pixels = options.tsar.resolution_px**2
+    pixels = options.tsar.pixels
     capacity = place.flops[options.counted] * pixels
     batch = max(1, round(place.batch * pixels / _SIDE_PX**2))
     value = getattr(options, asked)
@@ -69,7 +69,7 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
 
 
 def _place(options: RunOptions, asked: str, front: Front) -> Place:
-    span = options.tsar.resolution_px**2 * options.seconds
+    span = options.tsar.pixels * options.seconds
     if asked == "preset":
         assert options.preset
         return front.preset(options.preset)

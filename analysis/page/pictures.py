@@ -125,7 +125,7 @@ def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
     if size[0] % height == 0 and size[1] % width == 0:
         return image.repeat(size[0] // height, 0).repeat(size[1] // width, 1)
     how = Image.Resampling.BOX if size[1] < width else Image.Resampling.BICUBIC
-    return np.asarray(Image.fromarray(image).resize(size[::-1], how))
+    return np.asarray(Image.fromarray(image).resize((size[1], size[0]), how))
 
 
 def with_scale(image: Pixels, bounds: tuple[float, float], unit: str, name: str) -> Pixels:
