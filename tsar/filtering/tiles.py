@@ -19,6 +19,7 @@ from tsar.filtering.records import (
     Surfels,
     by_pixels,
 )
+from tsar.morton import morton_to_raster
 
 BISECTIONS = 30
 PRICE_LEAST = 2.0**-46  # of the greatest gain
@@ -145,6 +146,26 @@ def covered(
         tile[0, (y[of] / width).to(torch.int64), (x[of] / width).to(torch.int64)] = 1
         total = _enlarged(total, side // width) + tile
     return _enlarged(total, side // ELEMENT_PX)
+
+
+def in_turn(side: int, sampled: Bool[Tensor, " tiles"] | None, first: int, count: int) -> list[Bool[Tensor, "_ _"]]:
+    """The next ``count`` tiles of one sample a pixel, in Morton order, for every spacing whether each is one of them.
+
+    Args:
+        side: pixels along the plane's side.
+        sampled: which of :func:`places` may be sampled; None for all.
+        first: tiles before them.
+        count: how many.
+    """
+    kinds = spacings(side)
+    chosen = [torch.zeros(2 * (int(side / (TILE_SIDE * kind)),), dtype=torch.bool) for kind in kinds]
+    fine = chosen[kinds.index(1.0)]
+    curve = morton_to_raster(fine.shape[0])
+    if sampled is not None:
+        curve = curve[sampled[places(side)[:, 2] == 1.0][curve]]
+    turn = (torch.arange(count) + first) % curve.numel()
+    fine.reshape(-1)[curve[turn]] = True
+    return chosen
 
 
 def places(side: int) -> Float64[Tensor, "n 3"]:

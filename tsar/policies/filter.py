@@ -230,7 +230,8 @@ class Filter(Policy[State]):
     def _picked(self, state: State, moment: Moment) -> tuple[State, list[Bool[Tensor, "_ _"]]]:
         """Which tiles of every spacing are sampled."""
         if not self._options.by_gain:
-            return state, self._in_turn(tiles.spacings(self._side), moment.cycle)
+            first = (moment.cycle + _FIRST_CYCLE) * self._tiles
+            return state, tiles.in_turn(self._side, self._sampled, first, self._tiles)
         return state, self._stages.chosen(
             state.remaining, state.estimates.roughness, state.rate, state.reprojected, moment.cycle_s, self._tiles,
             self._options,
@@ -244,17 +245,6 @@ class Filter(Policy[State]):
     def _every(self) -> int:
         """Cycles from one probe to the next."""
         return max(1, _TILES_A_PROBE // self._tiles)
-
-    def _in_turn(self, kinds: tuple[float, ...], cycle: int) -> list[Tensor]:
-        """Tiles of one sample a pixel, in Morton order."""
-        chosen = [torch.zeros(2 * (int(self._side / (TILE_SIDE * kind)),), dtype=torch.bool) for kind in kinds]
-        fine = chosen[kinds.index(1.0)]
-        curve = morton_to_raster(fine.shape[0])
-        if self._sampled is not None:
-            curve = curve[self._sampled[self._places[:, 2] == 1.0][curve]]
-        turn = (torch.arange(self._tiles) + (cycle + _FIRST_CYCLE) * self._tiles) % curve.numel()
-        fine.reshape(-1)[curve[turn]] = True
-        return chosen
 
     def _updated(self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment) -> State:
         color = replace_nonfinite(answered.color, TILE_SIDE)[0].clamp(0.0, samples.COLOR_MAX)

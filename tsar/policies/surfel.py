@@ -24,7 +24,7 @@ from tsar.filtering import splats
 from tsar.filtering.records import DEFAULT, ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX, FilterOptions
 from tsar.morton import deinterleave, morton_to_raster
 from tsar.policies.filter import SAMPLE_FLOPS, Filter, State
-from tsar.policy import Moment, Price, Setting
+from tsar.policy import Moment, Price, Setting, require_square
 from tsar.response import initial_densities
 from tsar.selection import initial_history
 from tsar.types import Densities, Errors
@@ -57,6 +57,7 @@ class Surfel(Filter):
 
     def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
         super().__init__(setting, options)
+        require_square(self.config, "surfel")
         within = self.config.samples // TILE_SIDE**2
         self.config = _smaller(self.config, max(1, self._tiles // within))
         self._tiles = within * self.config.batch_size

@@ -172,7 +172,7 @@ def test_the_poses_of_a_plane_place_things_where_those_of_the_picture_do() -> No
         assert torch.allclose(there, wanted, atol=1e-6) and torch.allclose(at, depth.to(torch.float64), atol=1e-6)
 
 
-@pytest.mark.parametrize("policy", ["tsar-densities", "tsar-densities-wavelets", "interruptible"])
+@pytest.mark.parametrize("policy", ["tsar-densities", "tsar-densities-wavelets", "surfel", "interruptible"])
 def test_policies_of_squares_alone_say_so(policy: str) -> None:
     with pytest.raises(ConfigError, match="width_px, height_px: expected a square of resolution_px for the policy"):
         POLICIES[policy](Setting(config_of(101, 58), view=STILL.view))
