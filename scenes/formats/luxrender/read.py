@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.arithmetic import norm, product
+from scenes.arithmetic import norm, product, sin
 from scenes.canonical import (
     ConstantTexture,
     EnvironmentLight,
@@ -68,6 +68,14 @@ _TRANSFORMS = (
     "CoordSysTransform",
 )
 _LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+
+
+def cone_sr(angle_deg: float) -> float:
+    """Irradiance that a cone of radiance 1 and this full angle gives a surface facing it: ``π sin²(angle / 2)``.
+
+    LuxCore's distant lights with ``theta`` (half the angle, degrees) have a radiance, others an irradiance (measured).
+    """
+    return math.pi * sin(math.radians(0.5 * angle_deg)) ** 2
 
 
 @dataclass
@@ -216,8 +224,11 @@ class LuxReader(SceneReader):
             if parameters.number("power", 0.0) > 0.0:
                 self.report.add(where, f"the power of a {kind} light", "none: its colour and gain count")
         if kind == "distant":
-            angle_deg = math.degrees(2.0 * parameters.number("theta", 0.0))
-            self.lights.append(lights.distant(start, target, strength, where, angle_deg))
+            angle_deg = 2.0 * parameters.number("theta", 0.0)
+            if not 0.0 <= angle_deg <= 180.0:
+                raise SceneError(f"{where}: theta: expected an angle in [0, 90], got {0.5 * angle_deg:g}")
+            facing = rgb(np.array(strength) * cone_sr(angle_deg)) if angle_deg else strength
+            self.lights.append(lights.distant(start, target, facing, where, angle_deg))
         elif kind == "spot":
             self.lights.append(lights.spot(parameters, start, target, strength, "secant"))
         else:

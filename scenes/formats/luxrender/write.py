@@ -7,7 +7,6 @@ ch. 4.
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import numpy as np
 
@@ -41,7 +40,7 @@ from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, 
 from scenes.formats.geometry.revolution import lamp_sphere
 from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport, first_of
-from scenes.formats.luxrender.read import SKY_UNIT, SPHERE_SR, SUN_UNIT
+from scenes.formats.luxrender.read import SKY_UNIT, SPHERE_SR, SUN_UNIT, cone_sr
 from scenes.formats.luxrender.write_materials import LuxSurfaceWriter
 from scenes.formats.text.numbers import listed, number, written_matrix
 from scenes.formats.text.output import Output
@@ -117,8 +116,9 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
             line = f'"spot" {ends} "color L" {listed(light.intensity)} {cone}'
         elif isinstance(light, DirectionalLight):
             ends = f'"point from" {listed((0.0, 0.0, 0.0))} "point to" {listed(light.direction)}'
-            theta = f' "float theta" [ {number(math.radians(light.angle_deg) / 2.0)} ]' if light.angle_deg else ""
-            line = f'"distant" {ends} "color L" {listed(light.irradiance)}{theta}'
+            theta = f' "float theta" [ {number(0.5 * light.angle_deg)} ]' if light.angle_deg else ""
+            shine = np.array(light.irradiance) / (cone_sr(light.angle_deg) if light.angle_deg else 1.0)
+            line = f'"distant" {ends} "color L" {listed(shine)}{theta}'
         elif isinstance(light, SunSky):
             self._daylight(light)
             return

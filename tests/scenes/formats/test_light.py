@@ -11,6 +11,7 @@ import pytest
 
 from scenes.canonical import (
     ConstantTexture,
+    DirectionalLight,
     EnvironmentLight,
     Film,
     Instance,
@@ -71,6 +72,20 @@ def test_lamps_of_luxrender_shine_alike_in_both_renderers(case: str, tmp_path: P
 def _copied(file: Path, folder: Path) -> Path:
     (folder / file.name).write_bytes(file.read_bytes())
     return folder / file.name
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 0.53, 5.0])
+def test_suns_of_luxrender_are_as_bright_whatever_their_angle(angle_deg: float, tmp_path: Path) -> None:
+    light = DirectionalLight((0.0, 0.0, -1.0), (10.0, 5.0, 2.0), angle_deg)
+    view = np.eye(4)
+    view[2, 3] = 4.0
+    floor = Instance(Rectangle(), Matte(even(0.5)), np.diag([9.0, 9.0, 1.0, 1.0]))
+    scene = Scene(PerspectiveCamera(view, 40.0), (floor,), (light,), Film(32, 32), integrator=Integrator("path", 1))
+    picture = drawn(scene, "luxcore", tmp_path)
+    assert picture.mean(axis=(0, 1)) == pytest.approx(0.5 / math.pi * np.array(light.irradiance), rel=0.01)
+    (found,) = load_scene_file(tmp_path / "a.lxs").lights
+    assert isinstance(found, DirectionalLight) and found.angle_deg == pytest.approx(angle_deg)
+    assert found.irradiance == pytest.approx(light.irradiance, rel=1e-6)
 
 
 def test_a_spot_of_luxcore_grows_with_the_angle_and_its_power_is_kept() -> None:
