@@ -32,7 +32,7 @@ def is_closed(shape: Shape) -> bool:
     points, corner = np.unique(shape.vertices, axis=0, return_inverse=True)
     faces = corner.reshape(-1)[shape.faces].astype(np.int64)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there, back = (np.sort(edges @ [len(points), 1][::step]) for step in (1, -1))
+    there, back = (np.sort(edges[:, step] * len(points) + edges[:, 1 - step]) for step in (0, 1))
     corners = points[faces].astype(np.float64)
     volume = (corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum()
     return bool(volume > 0.0) and np.array_equal(there, back)

@@ -31,8 +31,8 @@ def broken_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Has the renderer answer with NaN now and then, and one in each picture of the reference."""
     trace, render_frame = Renderer.trace, Renderer.render_frame
 
-    def some_bad(renderer: Renderer, batch: Any) -> SampleBatch:
-        found = trace(renderer, batch)
+    def some_bad(renderer: Renderer, *arguments: Any) -> SampleBatch:
+        found = trace(renderer, *arguments)
         color = found.color.clone()
         color[:, ::17] = float("nan")
         return SampleBatch(color, found.counters)
