@@ -148,7 +148,7 @@ class RunOptions:
             batch, default = self.tsar.batch_size, TsarConfig.batch_size
             require(batch == default, "batch_size", f"none beside a {name}, which sets it", batch)
             require(self.counted != "wall", "ledger", f"a modelled one beside a {name}", self.counted)
-        limits.within(self, budget_flops=(1.0, 1e30), budget_seconds=(1e-6, 1e9), error_target=(1e-12, 1.0))
+        limits.within(self, budget_flops=(1.0, 1e18), budget_seconds=(1e-6, 1e9), error_target=(1e-12, 1.0))
         require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
 
     @property

@@ -34,6 +34,7 @@ from analysis.tracer.options import (
     TileOptions,
 )
 from analysis.tracer.render_options import RenderOptions
+from analysis.trade.options import TradeOptions
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -60,6 +61,7 @@ OPTIONS: dict[str, Any] = {
     "spectrum.py": SpectrumOptions(),
     "suitability.py": SuitabilityOptions(),
     "tiles.py": TileOptions("glass"),
+    "trade.py": TradeOptions(),
 }
 """The options of each command at their defaults."""
 

@@ -63,7 +63,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "pointsets --levels 8 27": ("levels", "at least three"),
     "pointsets --cases 0": ("cases", "0"),
     "render nonsense": ("scene", "'nonsense'"),
-    "render fly-by --width-px 0": ("width_px", "0"),
+    "render fly-by --width-px -1": ("width_px", "-1"),
     "render fly-by --frames -3": ("frames", "-3"),
     "render fly-by --fps 0": ("fps", "between 1e-06 and"),
     "render fly-by --time-s inf": ("time_s", "inf"),
