@@ -206,7 +206,7 @@ class TsarConfig:
 
     def _follow_shape(self) -> None:
         """Sets the resolution to the least power of two that holds the picture's sides."""
-        for name in sorted(("width_px", "height_px"), key=lambda name: getattr(self, name) == 0):  # what was given first
+        for name in sorted(("width_px", "height_px"), key=lambda name: getattr(self, name) == 0):  # given ones first
             value = getattr(self, name)
             require(16 <= value <= SIDE_MOST, name, f"between 16 and {SIDE_MOST}, as both sides are given", value)
         side = max(64, 1 << (max(self.width_px, self.height_px) - 1).bit_length())
