@@ -171,7 +171,18 @@ def test_tsar_runs_on_a_file_with_a_turntable(tmp_path: Path, monkeypatch, capsy
     from tests.scripts.commands import call_script
 
     file = str(DATA / "mitsuba/cornell-box/scene.xml")
-    size = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", "16", "--no-film")
+    size = (
+        "--seconds",
+        "0.1",
+        "--resolution-px",
+        "64",
+        "--batch-size",
+        "16",
+        "--no-film",
+        "--rivals",
+        "framed",
+        "thesis",
+    )
     folders = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     status = call_script("run.py", monkeypatch, file, "--camera-path", "turntable", *size, *folders)
     assert status == 0, capsys.readouterr().err

@@ -26,7 +26,7 @@ SIDE = 64
 CONFIG = TsarConfig(
     batch_size=4, resolution_px=SIDE, sdf_side=32, cache_size=64, warmup_cycles=8, tiling=TilingConfig(level_min=1)
 )
-VARIANTS = ("tsar-densities", "tsar-wavelets", "surfel")
+VARIANTS = (*(pytest.param(name, marks=pytest.mark.slow) for name in ("tsar-densities", "tsar-wavelets")), "surfel")
 ALL = ("tsar", "filter", *VARIANTS, "frameless", "afr", "afr-simple", "interruptible", "thesis")
 ADAPTIVE = ("tsar", "filter", *VARIANTS, "afr", "interruptible")
 
@@ -135,7 +135,11 @@ def test_a_change_is_on_the_display_before_a_frame_would_be(policy: str, name: s
 
 @pytest.mark.parametrize(
     ("policy", "share"),
-    [("tsar", 0.125), ("filter", 0.125), *((one, 0.125) for one in VARIANTS), ("interruptible", 0.125), ("afr", 1.0)],
+    [
+        *((name, 0.125) for name in ("tsar", "filter", "surfel", "interruptible")),
+        *(pytest.param(name, 0.125, marks=pytest.mark.slow) for name in ("tsar-densities", "tsar-wavelets")),
+        ("afr", 1.0),
+    ],
 )
 def test_a_still_picture_converges(policy: str, share: float) -> None:
     """After one second its error is below an eighth of a frame's of one sample a pixel, and stays. That of the AFR,
