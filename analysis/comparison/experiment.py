@@ -56,18 +56,18 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
         require_memory(options.pixels_held * _BYTES_PER_PIXEL, options.size)
         slots = options.tsar.cache_slots
         require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
-        own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
-        writable_folder(options.cache, "cache")
     with first_imports():
         from scenes import catalog
 
     with bad_input():
         scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
-        for loss in losses:
-            print(loss)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
         renderer_of(1)  # what it refuses is bad input
-        return Setup(scene, renderer_of, losses)
+        own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
+        writable_folder(options.cache, "cache")
+    for loss in losses:
+        print(loss)
+    return Setup(scene, renderer_of, losses)
 
 
 def _renderer(options: RunOptions, scene: Scene, axis: float) -> Renderer:
