@@ -16,7 +16,7 @@ from torch import Tensor
 
 from tsar.clock import CycleSeconds, StageTimer, checked, end_of_cycle
 from tsar.config import TsarConfig, require
-from tsar.stages import REFERENCE, Stages
+from tsar.stages import Stages, reference
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, ShownImage, Spent, StepRecord, Trace, Viewpoint
 from tsar.window import Window
 
@@ -56,7 +56,7 @@ class Setting:
     """
 
     config: TsarConfig
-    stages_of: Callable[[TsarConfig], Stages] = lambda config: REFERENCE
+    stages_of: Callable[[TsarConfig], Stages] = reference
     truth: Truth | None = None
     trace: Trace | None = None
     view: Callable[[float], Viewpoint] | None = None

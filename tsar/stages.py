@@ -19,6 +19,7 @@ from tsar.config import TsarConfig
 from tsar.decision import Decision, decide
 from tsar.filtering.stages import REFERENCE as FILTERING
 from tsar.filtering.stages import FilterStages
+from tsar.filtering.stages import reference as filtering_of
 from tsar.observation import Observation, observe
 from tsar.reconstruction import Reconstruction, reconstruct
 from tsar.types import Densities, Errors, FrameletBatch
@@ -46,4 +47,9 @@ class Stages:
 
 
 REFERENCE = Stages()
-"""Tensor operations throughout."""
+"""Tensor operations throughout, for a picture that is a square of a power of two."""
+
+
+def reference(config: TsarConfig) -> Stages:
+    """Tensor operations throughout, for the picture of a configuration."""
+    return Stages(filtering=filtering_of(config.window))

@@ -31,7 +31,7 @@ from tsar.error import replace_nonfinite
 from tsar.observation import Observation
 from tsar.response import respond
 from tsar.selection import Request, require_full
-from tsar.stages import REFERENCE, Stages
+from tsar.stages import REFERENCE, Stages, reference
 from tsar.tiling import split_bounds
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
 
@@ -46,7 +46,7 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
         name: ``compiled``, or ``reference`` for the tensor operations of ``tsar``.
         threads: host threads that share a batch's observation and a reconstruction. No result depends on it.
     """
-    return compiled_stages(config, threads) if name == "compiled" else REFERENCE
+    return compiled_stages(config, threads) if name == "compiled" else reference(config)
 
 
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:

@@ -123,7 +123,7 @@ def test_runs_give_the_same_bits_on_any_number_of_threads() -> None:
 
 
 def test_the_stages_are_chosen_by_name() -> None:
-    assert stages(small(), "reference") is REFERENCE
+    assert stages(small(), "reference") == REFERENCE
     assert stages(small()).decide != REFERENCE.decide
 
 
