@@ -32,7 +32,6 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
-from tsar.morton import morton_to_raster
 from tsar.policies import deep_buffer, tiles
 from tsar.policies.deep_buffer import DeepBuffer, Placed
 from tsar.policies.scatter import generator, pixel_colors, pull_push
@@ -158,23 +157,19 @@ def draw(
     Tiles come in turn by the golden ratio along the curve, so that those of a cycle are spread. Arms that leave the
     picture are turned round.
     """
-    side, count = config.resolution_px, int(config.budget)
+    count = int(config.budget)
     crosshairs, random = count // len(_CROSSHAIR), generator(config, cycle)
     leaves = tree.sampled
     turn = cycle * crosshairs + torch.arange(crosshairs, dtype=torch.float64)
     node = leaves[((turn * _GOLDEN) % 1.0 * leaves.numel()).to(torch.int64)]
     height, width = config.shape
     share = torch.rand(crosshairs, generator=random, dtype=torch.float64)
-    if config.window.whole:
-        within = (share * tiles.area_px(node, depth)).to(torch.int64)
-        pixel = morton_to_raster(side)[tiles.first_cell(node, depth) + within]
-    else:
-        pixel = tiles.place(node, share, depth, config.window)
+    pixel = tiles.place(node, share, depth, config.window)
     centre = torch.stack((pixel % width, pixel // width), dim=1) + torch.rand(crosshairs, 2, generator=random)
     arms, size = (centre + _CROSSHAIR[:, None]).reshape(-1, 2), centre.new_tensor((width, height))
     arms = torch.where(arms < 0.0, arms + 2.0, torch.where(arms >= size, arms - 2.0, arms))
     single = torch.rand(count - len(arms), 2, generator=random) * size
-    places = (torch.cat((arms, single)) * (GRID // side)).floor() / GRID
+    places = (torch.cat((arms, single)) * (GRID // config.resolution_px)).floor() / GRID
     return node, config.window.of_picture(places)
 
 
@@ -184,7 +179,7 @@ def extents(tree: Tree, depth: int, config: TsarConfig, cycle_s: float) -> Float
     sums = tree.sums[:, leaves].to(torch.float64)
     spatial = sums[3] / sums[0].clamp(min=1e-9) + _LEAST_GRADIENT[0]
     temporal = torch.where(sums[5] > 0.0, sums[4].clamp(min=0.0) / sums[5].clamp(min=1e-12), 1.0) + _LEAST_GRADIENT[1]
-    interval_s = tree.size_px(leaves, depth).to(torch.float64) * tree.sampled.numel() / config.budget * cycle_s
+    interval_s = tree.shown_px[leaves].to(torch.float64) * tree.sampled.numel() / config.budget * cycle_s
     least = _LEAST_INTERVALS * interval_s.clamp(min=cycle_s)
     return (spatial / temporal * interval_s).pow(1.0 / 3.0).clamp(max=_EXTENT_S).maximum(least)
 

@@ -20,7 +20,6 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
-from tsar.morton import morton_to_raster
 from tsar.policies import tiles
 from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
 from tsar.policies.tiles import Tree
@@ -94,10 +93,7 @@ def draw(
     leaves = tree.sampled
     node = leaves[torch.arange(count) % leaves.numel()]
     uniform = torch.rand(count, generator=generator(config, cycle), dtype=torch.float64)
-    if not config.window.whole:
-        return node, tiles.place(node, uniform, depth, config.window)
-    cell = tiles.first_cell(node, depth) + (uniform * tiles.area_px(node, depth)).to(torch.int64)
-    return node, morton_to_raster(config.resolution_px)[cell]
+    return node, tiles.place(node, uniform, depth, config.window)
 
 
 def _image(
@@ -105,7 +101,7 @@ def _image(
 ) -> Float[Tensor, "h w 3"]:
     """Newest samples weighted by ``exp(-age / refresh interval of the leaf)``, filled by pull and push."""
     leaves = tree.leaves
-    interval_s = tree.size_px(leaves, depth).to(torch.float64) * tree.sampled.numel() / config.budget * cycle_s
+    interval_s = tree.shown_px[leaves].to(torch.float64) * tree.sampled.numel() / config.budget * cycle_s
     span_s = tiles.per_pixel(interval_s, tree, depth, config.window)
     weight = torch.exp((buffer.time_s - now_s) / span_s).to(torch.float32)
     color = buffer.color.reshape(*config.shape, 3).permute(2, 0, 1)

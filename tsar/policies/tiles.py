@@ -31,14 +31,14 @@ class Tree:
 
     Attributes:
         leaf: which nodes are in the cut.
-        shown_px: pixels of the picture in each node; None where all of its pixels are the picture's.
+        shown_px: pixels of the picture in each node.
         sums: per node, over its samples, weights that fade with age, and these times luminance, squared luminance, and
             whatever else is gathered; only leaves' are in use.
     """
 
     leaf: Bool[Tensor, " nodes"]
+    shown_px: Int64[Tensor, " nodes"]
     sums: Float[Tensor, "rows nodes"]
-    shown_px: Int64[Tensor, " nodes"] | None = None
 
     @property
     def leaves(self) -> Int64[Tensor, " leaves"]:
@@ -48,11 +48,7 @@ class Tree:
     def sampled(self) -> Int64[Tensor, " leaves"]:
         """Leaves that show any of the picture."""
         leaves = self.leaves
-        return leaves if self.shown_px is None else leaves[self.shown_px[leaves] > 0]
-
-    def size_px(self, node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
-        """Pixels of the picture in nodes."""
-        return area_px(node, depth) if self.shown_px is None else self.shown_px[node]
+        return leaves[self.shown_px[leaves] > 0]
 
 
 def initial(depth: int, leaves: int, rows: int, window: Window) -> Tree:
@@ -61,7 +57,7 @@ def initial(depth: int, leaves: int, rows: int, window: Window) -> Tree:
     nodes = 2 ** (depth + 1)
     leaf = torch.zeros(nodes, dtype=torch.bool)
     leaf[leaves : 2 * leaves] = True
-    return Tree(leaf, torch.zeros(rows, nodes), None if window.whole else _shown(depth, window))
+    return Tree(leaf, _shown(depth, window), torch.zeros(rows, nodes))
 
 
 def _shown(depth: int, window: Window) -> Int64[Tensor, " nodes"]:
@@ -73,8 +69,12 @@ def _shown(depth: int, window: Window) -> Int64[Tensor, " nodes"]:
 
 
 def place(node: Int64[Tensor, " n"], share: Float64[Tensor, " n"], depth: int, window: Window) -> Int64[Tensor, " n"]:
-    """Raster index on the picture of the pixel at a share in [0, 1) of the picture's in each node, by rows."""
-    x, y = deinterleave(first_cell(node, depth))
+    """Raster index on the picture of the pixel at a share in [0, 1) of the picture's in each node: by rows; along the
+    curve where the picture is the whole plane."""
+    first = first_cell(node, depth)
+    if window.whole:
+        return morton_to_raster(window.side_px)[first + (share * area_px(node, depth)).to(torch.int64)]
+    x, y = deinterleave(first)
     levels = depth - floor_log2(node)
     width = (torch.ones_like(x) << ((levels + 1) // 2)).clamp(max=window.side_px)
     height = torch.ones_like(y) << (levels // 2)
@@ -118,9 +118,7 @@ def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"], tree: Tree) 
     """Variance times area of the picture; area in units of the plane."""
     weight = sums[0].clamp(min=1e-12)
     variance = (sums[2] / weight - (sums[1] / weight).square()).clamp(min=0.0)
-    if tree.shown_px is not None:
-        return variance * (tree.shown_px[node] / (len(tree.shown_px) // 2)).to(torch.float32)
-    return variance * torch.exp2(-floor_log2(node).to(torch.float32))
+    return variance * (tree.shown_px[node] / (len(tree.shown_px) // 2)).to(torch.float32)
 
 
 def adapt(tree: Tree, depth: int) -> Tree:
@@ -150,4 +148,4 @@ def adapt(tree: Tree, depth: int) -> Tree:
         leaf[child] = True
     leaf[split] = leaf[pair] = leaf[pair + 1] = False
     leaf[pair >> 1] = True
-    return Tree(leaf, sums, tree.shown_px)
+    return Tree(leaf, tree.shown_px, sums)
