@@ -65,7 +65,7 @@ def read_image(path: Path) -> Picture:
     :data:`RADIANCE_MOST`, with a warning.
 
     Args:
-        path: PNG, JPEG or another format Pillow reads, ``.exr``, ``.hdr`` or ``.pfm``.
+        path: PNG, JPEG or another format Pillow reads, ``.exr``, ``.hdr``, ``.pfm`` or ``.tif``.
 
     Returns:
         ``(height, width, 3)`` float32, row 0 at the top; shared between callers, so read-only.

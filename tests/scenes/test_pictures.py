@@ -83,10 +83,10 @@ def radiance(rows: bytes, width: int, height: int, size: str = "-Y {} +X {}") ->
     return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + size.format(height, width).encode() + b"\n" + rows
 
 
-def test_radiance_pictures_without_runs_and_with_old_ones(tmp_path: Path) -> None:
+def test_radiance_pictures_without_runs(tmp_path: Path) -> None:
     """A pixel (m, e) is m 2^(e - 136), as Ward gives it; narrow rows have no runs of channels."""
     path = tmp_path / "a.hdr"
-    path.write_bytes(radiance(bytes((128, 64, 32, 129, 1, 1, 1, 2)), 3, 1))
+    path.write_bytes(radiance(bytes((128, 64, 32, 129)) * 3, 3, 1))
     np.testing.assert_array_equal(read_image(path), np.tile(np.float32([1.0, 0.5, 0.25]), (1, 3, 1)))
     path.write_bytes(radiance(bytes((128, 0, 0, 129, 0, 128, 0, 129)), 1, 2, "+Y {} +X {}"))
     assert read_image(path).tolist() == [[[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]]]
@@ -99,6 +99,7 @@ def test_radiance_pictures_without_runs_and_with_old_ones(tmp_path: Path) -> Non
     [
         ("a.hdr", b""),
         ("a.hdr", radiance(b"", 4, 4)),
+        ("a.hdr", radiance(bytes((128, 64, 32, 129, 1, 1, 1, 2)), 3, 1)),  # runs of whole pixels
         ("a.hdr", radiance(bytes((2, 2, 0, 8, 255, 0)), 8, 1)),
         ("a.hdr", radiance(bytes((1, 1, 1, 255)), 8, 1)),
         ("a.hdr", radiance(b"", 1 << 30, 1 << 30)),
@@ -150,13 +151,18 @@ def test_grey_palettes_and_alpha_are_the_colours_they_mean(mode: str, tmp_path: 
     assert found[:, 2:] == pytest.approx(np.ones((2, 2, 3)), abs=1e-6)
 
 
+def test_portable_float_maps_are_scaled(tmp_path: Path) -> None:
+    (tmp_path / "a.pfm").write_bytes(b"PF\n1 1\n-2.0\n" + np.float32([1.0, 0.5, 0.25]).tobytes())
+    assert read_image(tmp_path / "a.pfm").tolist() == [[[2.0, 1.0, 0.5]]]
+
+
 @pytest.mark.parametrize("channels", [2, 4, 6])
 def test_16_bits_with_colour_or_alpha(channels: int, tmp_path: Path) -> None:
     """PNG of colour type 4 (grey and alpha), 2 (colours) and 6 (both)."""
     kinds = {2: (4, 2), 4: (6, 4), 6: (2, 3)}
     kind, count = kinds[channels]
     values = np.full((2, 3, count), 65535, ">u2")
-    values[..., : count - (kind in (4, 6))] = 32768
+    values[..., : count - (kind in (4, 6))] = 32700
     rows = b"".join(b"\0" + row.tobytes() for row in values)
 
     def chunk(name: bytes, body: bytes) -> bytes:
@@ -166,4 +172,5 @@ def test_16_bits_with_colour_or_alpha(channels: int, tmp_path: Path) -> None:
     path = tmp_path / "a.png"
     parts = (chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(rows)), chunk(b"IEND", b""))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
-    assert read_image(path) == pytest.approx(np.full((2, 3, 3), decoded(0.5)), abs=0.003)
+    # 8 bits would give that of 127 / 255
+    assert read_image(path) == pytest.approx(np.full((2, 3, 3), decoded(32700 / 65535)), rel=1e-5)
