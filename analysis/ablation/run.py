@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -19,9 +17,9 @@ from analysis.command.console import markdown
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json, write_table
 from analysis.storage.summary import with_source
-from analysis.study.cases import Case
-from analysis.study.evaluation import broken, finished, times_of
-from analysis.study.farm import describe_failures, run_study
+from analysis.study.evaluation import broken
+from analysis.study.farm import run_study
+from analysis.study.outcomes import Outcomes
 
 Tables = dict[str, pd.DataFrame]
 WRITTEN = ("tables/*.csv", "tables.md", "moments.parquet", "parts_row_*.png")
@@ -39,12 +37,11 @@ def study(options: AblationOptions) -> tuple[dict[str, Any], Tables]:
     with bad_input():
         parts = chosen_parts(options.parts)
         planned = runs(options, parts)
-    place, keys, failures = run_study(options, [run.case for run in planned], WRITTEN)
-    for line in describe_failures({keys[case]: reason for case, reason in failures.items()}):
-        print(line, file=sys.stderr)
-    summaries = {case: finished(key, place) for case, key in keys.items()}
-    done = [Result(run, times_of(keys[run.case], place)) for run in planned if summaries[run.case] is not None]
-    moments = moment_table(done, rivals_of(options))
+    outcomes = run_study(options, [run.case for run in planned], WRITTEN)
+    outcomes.tell()
+    done = outcomes.summaries()
+    results = [Result(run, outcomes.times(run.case)) for run in planned if run.case in done]
+    moments = moment_table(results, rivals_of(options))
     tables = {"parts": part_table(moments), "budget": budget_table(moments), "floor": floor_table(moments)}
     out = options.out.resolve()
     with full_disk(out):
@@ -56,8 +53,7 @@ def study(options: AblationOptions) -> tuple[dict[str, Any], Tables]:
             file.write_text(markdown(shown_tables(tables)), encoding="utf-8")
         for row in sorted(set(tables["parts"]["row"])) if len(tables["budget"]) else ():
             save(figure(tables["parts"], tables["budget"], tables["floor"], row), out / f"parts_row_{row}.png")
-        summary = _summary(options, parts, planned, summaries, tables)
-        summary["failures"] = {keys[case]: reason for case, reason in failures.items()}
+        summary = _summary(options, parts, planned, outcomes, list(done.values()), tables)
         write_json(out / "summary.json", summary)
     return summary, tables
 
@@ -66,17 +62,18 @@ def _summary(
     options: AblationOptions,
     parts: tuple[Part, ...],
     planned: list[Run],
-    summaries: Mapping[Case, Mapping[str, Any] | None],
+    outcomes: Outcomes,
+    made: list[dict[str, Any]],
     tables: Tables,
 ) -> dict[str, Any]:
-    made = [one for one in summaries.values() if one is not None]
     found = {
-        "runs": len(summaries),
+        "runs": len(outcomes.keys),
         "runs_done": len(made),
         "ledger": options.ledger,
         "parts": {WHOLE: {}} | {part.words: dict(part.options) for part in parts},
         "broken_invariants": broken(made),
         "tables": {name: table.to_dict("records") for name, table in tables.items()},
         "seconds": {name: sum(one["machine"][name] for one in made) for name in ("run_s", "reference_s")},
+        "failures": outcomes.reasons,
     }
     return with_source(found, options, device="cpu", seeds=sorted({run.repetition for run in planned}))

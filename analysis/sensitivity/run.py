@@ -14,7 +14,7 @@ from analysis.sensitivity.runs import runs, sweeps
 from analysis.sensitivity.tables import optimum_table, setting_table
 from analysis.storage.files import write_table
 from analysis.storage.summary import write_summary
-from analysis.study.evaluation import broken, finished, times_of
+from analysis.study.evaluation import broken
 from analysis.study.farm import describe_failures, run_study
 
 
@@ -29,22 +29,25 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
     """
     with bad_input():
         planned = runs(options)
-    place, keys, failures = run_study(options, [run.case for run in planned], ("tables/*.csv", "figures/*.png"))
-    out = options.out.resolve()
-    summaries = {run: finished(keys[run.case], place) for run in planned}
-    done = {run: keys[run.case] for run, found in summaries.items() if found}
-    missing = [run for run in planned if run not in done]
-    failed = {f"{run.case.name} {run.setting or ''}".strip(): failures.get(run.case, "no result") for run in missing}
+    outcomes = run_study(options, [run.case for run in planned], ("tables/*.csv", "figures/*.png"))
+    out, summaries = options.out.resolve(), outcomes.summaries()
+    done = [run for run in planned if run.case in summaries]
+    failed = {
+        f"{run.case.name} {run.setting or ''}".strip(): outcomes.failures.get(run.case, "no result")
+        for run in planned
+        if run.case not in summaries
+    }
     for line in describe_failures(failed):  # at once: what follows may fail for the same reasons, such as a full disk
         print(line, file=sys.stderr)
-    results = {run.place: times_of(key, place) for run, key in done.items()}
+    results = {run.place: outcomes.times(run.case) for run in done}
     tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}
-    stills = {run.setting: key for run, key in done.items() if run.place == (options.figure_input, run.setting, 0)}
+    shown = [run for run in done if run.place == (options.figure_input, run.setting, 0)]
+    stills = {run.setting: outcomes.keys[run.case] for run in shown}
     head = {"runs": len(planned), "runs_done": len(done), "failures": failed, "ledger": options.ledger}
     with full_disk(out):
         for name, lines in tables.items():
             write_table(out / "tables" / f"{name}.csv", pd.DataFrame(lines))
-        write_all(out / "figures", options, tables["settings"], sweeps(options)["slopes"], stills, place)
+        write_all(out / "figures", options, tables["settings"], sweeps(options)["slopes"], stills, outcomes.place)
         seeds = list(range(options.repetitions))
         summary = write_summary(out, {**head, **tables}, options, device="cpu", seeds=seeds)
     return summary, broken(summaries.values())

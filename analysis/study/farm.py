@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
     from analysis.study.evaluation import Place
+    from analysis.study.outcomes import Outcomes
 
 
 class StudyOptions(Protocol):
@@ -37,9 +38,7 @@ class StudyOptions(Protocol):
     def farm(self) -> ClusterOptions: ...
 
 
-def run_study(
-    options: StudyOptions, cases: Sequence[Case], written: Sequence[str]
-) -> tuple[Place, dict[Case, str], dict[Case, str]]:
+def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[str]) -> Outcomes:
     """Takes over the folder of a study and runs its cases, with a bar.
 
     Args:
@@ -47,13 +46,11 @@ def run_study(
         cases: what to run.
         written: names and patterns of what the study will write, within its folder.
 
-    Returns:
-        Where the results are, the key of every case's result, and the reason of every failure.
-
     Raises:
         InputError: a folder cannot be had, or nothing answers at the scheduler's address.
     """
     from analysis.study.evaluation import Place
+    from analysis.study.outcomes import Outcomes
 
     with bad_input():
         own_results(options.out, tuple(written))
@@ -63,7 +60,7 @@ def run_study(
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
     with full_disk(out), bars() as shown:
         place.results.mkdir(exist_ok=True)
-        return place, *run_cases(cases, place, options.farm, shown.task("runs", len(set(cases))))
+        return Outcomes(place, *run_cases(cases, place, options.farm, shown.task("runs", len(set(cases)))))
 
 
 def run_cases(

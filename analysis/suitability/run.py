@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -13,8 +11,9 @@ from analysis.command.cli import bad_input, full_disk
 from analysis.storage.files import write_json, write_table
 from analysis.storage.summary import with_source
 from analysis.study.cases import ROWS, SCALES, Case
-from analysis.study.evaluation import Place, broken, finished, times_of
-from analysis.study.farm import describe_failures, run_study
+from analysis.study.evaluation import broken
+from analysis.study.farm import run_study
+from analysis.study.outcomes import Outcomes
 from analysis.suitability import plots
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.page import write_page
@@ -49,34 +48,21 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     with bad_input():
         planned = runs(options)
     written = ("report.html", "timing.csv", "tables/*.csv", "figures/*.png")
-    place, keys, failures = run_study(options, [run.case for run in planned], written)
-    out = options.out.resolve()
-    # said at once: what follows may fail for the same reasons, such as a full disk
-    for line in describe_failures({keys[case]: reason for case, reason in failures.items()}):
-        print(line, file=sys.stderr)
-    results = Results(collect(planned, keys, place))
-    tables = tables_of(options, results)
+    outcomes = run_study(options, [run.case for run in planned], written)
+    outcomes.tell()
+    out, done = options.out.resolve(), outcomes.summaries()
+    results = Results([Result(run, done[run.case], outcomes.times(run.case)) for run in planned if run.case in done])
+    tables, measured = tables_of(options, results), timing(done)
     with full_disk(out):
         for name, table in tables.items():
             write_table(out / "tables" / f"{name}.csv", table)
-        write_table(out / "timing.csv", timing(planned, keys, place))
-        pictures = plots.write_all(out / "figures", options, results, keys, place)
-        summary = _summary(options, planned, keys, place, failures, tables)
+        write_table(out / "timing.csv", measured)
+        pictures = plots.write_all(out / "figures", options, results, outcomes.keys, outcomes.place)
+        summary = _summary(options, planned, outcomes, measured, tables)
         summary["broken_invariants"] = broken(one.summary for one in results.all)
         write_page(out / "report.html", summary, tables, pictures)
         write_json(out / "summary.json", summary)
     return summary, tables
-
-
-def collect(planned: list[Run], keys: Mapping[Case, str], place: Place) -> list[Result]:
-    """Results of the runs that are on disk."""
-    found = []
-    for run in planned:
-        key = keys[run.case]
-        summary = finished(key, place)
-        if summary is not None:
-            found.append(Result(run, summary, times_of(key, place)))
-    return found
 
 
 def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
@@ -103,27 +89,15 @@ def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
     }
 
 
-def timing(planned: list[Run], keys: Mapping[Case, str], place: Place) -> pd.DataFrame:
+def timing(done: dict[Case, dict[str, Any]]) -> pd.DataFrame:
     """Measured seconds and memory of every run, which no table of results holds."""
-    lines = []
-    for case in dict.fromkeys(run.case for run in planned):
-        found = finished(keys[case], place)
-        if found is not None:
-            pixels, batch = case.tsar.resolution_px**2, case.tsar.batch_size
-            lines.append({"run": case.name, "batch": batch, "pixels": pixels, **found["machine"]})
-    return pd.DataFrame(lines)
+    sizes = [{"run": case.name, "batch": case.tsar.batch_size, "pixels": case.tsar.resolution_px**2} for case in done]
+    return pd.DataFrame([{**size, **found["machine"]} for size, found in zip(sizes, done.values(), strict=True)])
 
 
 def _summary(
-    options: SuitabilityOptions,
-    planned: list[Run],
-    keys: Mapping[Case, str],
-    place: Place,
-    failures: Mapping[Case, str],
-    tables: Tables,
+    options: SuitabilityOptions, planned: list[Run], outcomes: Outcomes, measured: pd.DataFrame, tables: Tables
 ) -> dict[str, Any]:
-    measured = timing(planned, keys, place)
-    cases = {run.case for run in planned}
     seconds = (
         {name: math.fsum(measured[name].tolist()) for name in ("run_s", "jod_s", "reference_s")}
         if len(measured)
@@ -131,9 +105,9 @@ def _summary(
     )
     runs_table = tables["runs"]
     found = {
-        "runs": len(cases),
+        "runs": len(outcomes.keys),
         "runs_done": len(measured),
-        "failures": {keys[case]: reason for case, reason in sorted(failures.items(), key=lambda one: keys[one[0]])},
+        "failures": dict(sorted(outcomes.reasons.items())),
         "invariants_ok": not len(runs_table) or bool(runs_table["invariants_ok"].all()),
         "ledger": options.ledger,
         "display": options.display,

@@ -10,9 +10,8 @@ import numpy as np
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.progress import bars
 from analysis.metrics.front import means
-from analysis.study.cases import Case
-from analysis.study.evaluation import Place, finished, times_of
-from analysis.study.farm import run_cases, run_study
+from analysis.study import farm
+from analysis.study.outcomes import Outcomes
 from analysis.trade.knobs import Knob, Setting, chosen_knobs
 from analysis.trade.options import TradeOptions
 from analysis.trade.runs import Point, Run, points_of, runs
@@ -30,34 +29,23 @@ class Measured:
     """Runs that were made. Changes in place.
 
     Attributes:
-        place: where their results are.
+        outcomes: of their cases.
         runs: all that were asked for, in order.
-        keys: of the results.
-        failures: reasons, by case.
         dropped: settings that do not fit the scale, and why.
     """
 
-    place: Place
-    runs: list[Run] = field(default_factory=list)
-    keys: dict[Case, str] = field(default_factory=dict)
-    failures: dict[Case, str] = field(default_factory=dict)
+    outcomes: Outcomes
+    runs: list[Run]
     dropped: dict[str, str] = field(default_factory=dict)
 
     def result(self, run: Run) -> Result | None:
         """What is on disk of a run."""
-        key = self.keys[run.case]
-        summary = finished(key, self.place)
-        return None if summary is None else Result(run, summary, times_of(key, self.place))
+        summary = self.outcomes.summary(run.case)
+        return None if summary is None else Result(run, summary, self.outcomes.times(run.case))
 
     def results(self) -> list[Result]:
         """Of all runs that ended well."""
         return [found for run in self.runs if (found := self.result(run)) is not None]
-
-    def keep(self, planned: list[Run], keys: dict[Case, str], failures: dict[Case, str]) -> None:
-        """Takes in runs that were made."""
-        self.runs += planned
-        self.keys |= keys
-        self.failures |= failures
 
 
 def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
@@ -68,18 +56,18 @@ def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
     """
     with bad_input():
         planned, dropped = runs(options, points_of(knobs))
-    place, keys, failures = run_study(options, [run.case for run in planned], WRITTEN)
-    measured = Measured(place, dropped=dropped)
-    measured.keep(planned, keys, failures)
+    outcomes = farm.run_study(options, [run.case for run in planned], WRITTEN)
+    measured = Measured(outcomes, planned, dropped)
     turned = searched(chosen_knobs(options.search_knobs) if options.search_knobs else knobs)
     if options.trials and turned:
-        with full_disk(place.results), bars() as shown:
+        with full_disk(outcomes.place.results), bars() as shown:
             task = shown.task("search", options.trials)
 
             def costs_and_errors(points: Sequence[Point]) -> list[tuple[float, float] | None]:
                 asked, dropped = runs(options, points)
                 measured.dropped.update(dropped)
-                measured.keep(asked, *run_cases([run.case for run in asked], place, options.farm))
+                measured.runs += asked
+                outcomes.keep(*farm.run_cases([run.case for run in asked], outcomes.place, options.farm))
                 task.advance(len(points))
                 standing = _by_place(
                     measured, [run for run in measured.runs if run.point.setting == Setting()], options

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import pandas as pd
@@ -13,8 +12,7 @@ from analysis.comparison.front import STORED
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json, write_table
 from analysis.storage.summary import with_source
-from analysis.study.evaluation import broken, finished
-from analysis.study.farm import describe_failures
+from analysis.study.evaluation import broken
 from analysis.trade import plots
 from analysis.trade.knobs import KNOBS, chosen_knobs
 from analysis.trade.measuring import Measured, measure
@@ -40,8 +38,7 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
         knobs = chosen_knobs(options.knobs)
         chosen_knobs(options.search_knobs)
     measured = measure(options, knobs)
-    for line in describe_failures({measured.keys[case]: reason for case, reason in measured.failures.items()}):
-        print(line, file=sys.stderr)
+    measured.outcomes.tell()
     points = point_table(measured.results(), options.ledger)
     front = relative(points, options.draws)
     tables = {"knobs": knob_table(points, options.draws), "front": front.front, "knees": knees(points)}
@@ -57,7 +54,7 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
         for path in (out / "front.json", *([STORED] if options.store else [])) if stored else ():
             write_json(path, stored)
         summary = _summary(options, measured, tables)
-        write_page(out / "report.html", summary, tables, points, pictures, measured.place)
+        write_page(out / "report.html", summary, tables, points, pictures, measured.outcomes.place)
         write_json(out / "summary.json", summary)
     return summary, tables
 
@@ -79,17 +76,17 @@ def _figures(options: TradeOptions, points: pd.DataFrame, front: Relative, knobs
 
 
 def _summary(options: TradeOptions, measured: Measured, tables: Tables) -> dict[str, Any]:
-    summaries = {case: finished(key, measured.place) for case, key in measured.keys.items()}
-    made = [one for one in summaries.values() if one is not None]
+    outcomes = measured.outcomes
+    made = list(outcomes.summaries().values())
     found = {
-        "runs": len(summaries),
+        "runs": len(outcomes.keys),
         "runs_done": len(made),
         "ledger": options.ledger,
         "dropped": measured.dropped,
         "sentences": sentences(tables["knobs"]),
         "broken_invariants": broken(made),
         "tables": {name: table.to_dict("records") for name, table in tables.items()},
-        "failures": {measured.keys[case]: reason for case, reason in measured.failures.items()},
+        "failures": outcomes.reasons,
         "machine": {name: sum(one["machine"][name] for one in made) for name in ("run_s", "reference_s", "jod_s")},
     }
     return with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))

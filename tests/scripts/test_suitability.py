@@ -84,7 +84,7 @@ def let_fail(policies: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None
     times = times.assign(flicker=0.0, causes_known=0.0, aliasing=0.0)
     monkeypatch.setattr("analysis.study.farm.run_cases", run_cases)
     for name, made in (("finished", finished), ("times_of", lambda *_: times)):
-        monkeypatch.setattr(f"analysis.suitability.run.{name}", made)
+        monkeypatch.setattr(f"analysis.study.outcomes.{name}", made)
 
 
 @pytest.mark.parametrize("policies", [("thesis",), ("framed",), ("thesis", "framed"), POLICIES])

@@ -4,42 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pytest
 from PIL import Image
 
 from analysis.metrics.front import on_front
-from analysis.study import evaluation
-from analysis.study.cases import SCALES, Case, Scale
-from analysis.study.evaluation import Place
 from analysis.trade.tables import COLUMNS
 from tests.scripts.commands import assert_refused, call_script
 
-TINY = Scale(4, seconds=0.2, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=4)
 SMALL = ("--inputs", "fly-by", "--repetitions", "1", "--seconds", "0.1", "--jod-s", "0", "--draws", "50")
 KNOBS = ("--knobs", "resolution", "depth", "tiles")
 SEARCH = ("--trials", "2", "--at-once", "2", "--search-knobs", "batch", "smoothing")
-
-
-@pytest.fixture
-def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the runs that were made, each in this process and small."""
-    made = list[str]()
-
-    def run_cases(asked: list[Case], place: Place, *rest: Any) -> tuple[dict[Case, str], dict[Case, str]]:
-        keys = {case: case.key(evaluation.source_of_results()) for case in asked}
-        for case, key in keys.items():
-            if evaluation.finished(key, place) is None:
-                made.append(case.name)
-                evaluation.evaluate(case, key, place)
-        return keys, {}
-
-    monkeypatch.setitem(SCALES, "quick", TINY)
-    monkeypatch.setattr("analysis.study.farm.run_cases", run_cases)
-    monkeypatch.setattr("analysis.trade.measuring.run_cases", run_cases)
-    return made
 
 
 def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
