@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenes.arithmetic import log
 from scenes.canonical import Rgb
 from scenes.formats.appearance.spectra import grey, rgb
 
@@ -20,14 +21,21 @@ def mean_reflectance(ior: float) -> float:
     Args:
         ior: index of refraction of the inside over the outside, above 1.
 
-    Source: Fresnel's equations for light without polarization.
+    Source: Walsh's integral of Fresnel's equations for light without polarization (Prahl 1988, "Light transport in
+    tissue", eq. B41). Near an index of 1, where its terms cancel, the first one of its series.
     """
-    x, weights = np.polynomial.legendre.leggauss(64)
-    cosine = 0.5 + 0.5 * x
-    inside = np.sqrt(1.0 - (1.0 - cosine**2) / ior**2)
-    across = ((cosine - ior * inside) / (cosine + ior * inside)) ** 2
-    along = ((ior * cosine - inside) / (ior * cosine + inside)) ** 2
-    return float((weights * 0.5 * (across + along) * cosine).sum())
+    if ior < 1.0001:
+        return (ior - 1.0) / 3.0
+    ior = min(ior, 1e15)
+    square = ior * ior
+    plus, minus = square + 1.0, square * square - 1.0
+    return (
+        0.5
+        + (ior - 1.0) * (3.0 * ior + 1.0) / (6.0 * (ior + 1.0) * (ior + 1.0))
+        + square * (square - 1.0) * (square - 1.0) / (plus * plus * plus) * log((ior - 1.0) / (ior + 1.0))
+        - 2.0 * square * ior * (square + 2.0 * ior - 1.0) / (plus * minus)
+        + 8.0 * square * square * (square * square + 1.0) / (plus * minus * minus) * log(ior)
+    )
 
 
 def reflectance_of_index(eta: Rgb, k: Rgb) -> Rgb:

@@ -10,10 +10,9 @@ from __future__ import annotations
 import dataclasses
 import math
 
-import numpy as np
 from scipy.optimize import brentq
 
-from scenes.arithmetic import cos, log, sin
+from scenes.arithmetic import cos, log, log1p, sin
 from scenes.canonical import SpotLight
 from scenes.canonical.values import Rgb
 from scenes.formats.losses import LossReport
@@ -36,13 +35,20 @@ def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
         return 1.0 - (sin(outer) - sin(inner)) / (outer - inner)
     if profile == "secant":
         # the integral of x⁴ / c over the cosine c, with x = (c - low) / (high - low)
-        x, weights = np.polynomial.legendre.leggauss(16)
-        x = 0.5 + 0.5 * x
-        square = x * x
-        rim = 0.5 * (high - low) * float((weights * square * square / (low + (high - low) * x)).sum())
-        return rim - log(high)
+        return _quartic_over(low / (high - low)) - log(high)
     share = 0.5 if profile == "hermite" else 0.2
     return 1.0 - high + share * (high - low)
+
+
+def _quartic_over(ratio: float) -> float:
+    """The integral of ``x⁴ / (x + ratio)`` from 0 to 1, by division of polynomials; for large ratios, where that
+    cancels, by the series of powers of ``-1 / ratio``."""
+    if ratio < 4.0:
+        return 0.25 - ratio * (1.0 / 3.0 - ratio * (0.5 - ratio * (1.0 - ratio * log1p(1.0 / ratio))))
+    total = 0.0
+    for power in range(33, 4, -1):
+        total = 1.0 / power - total / ratio
+    return total / ratio
 
 
 def _narrower(light: SpotLight) -> SpotLight:

@@ -93,12 +93,14 @@ def numeric_flux(light: SpotLight) -> float:
     x = np.clip((np.cos(theta) - math.cos(outer)) / (math.cos(inner) - math.cos(outer)), 0.0, 1.0)
     if light.profile == "linear":
         x = np.clip((outer - theta) / (outer - inner), 0.0, 1.0)
-    shape = {"hermite": x * x * (3.0 - 2.0 * x), "quartic": x**4, "linear": x}[light.profile]
+    shape = {"hermite": x * x * (3.0 - 2.0 * x), "quartic": x**4, "linear": x, "secant": x**4 / np.cos(theta)}[
+        light.profile
+    ]
     return light.intensity[0] * float((shape * np.sin(theta)).sum() * outer / 200_000)
 
 
-@pytest.mark.parametrize("wanted", ["hermite", "quartic", "linear"])
-@pytest.mark.parametrize("given", ["hermite", "quartic", "linear"])
+@pytest.mark.parametrize("wanted", ["hermite", "quartic", "linear", "secant"])
+@pytest.mark.parametrize("given", ["hermite", "quartic", "linear", "secant"])
 @pytest.mark.parametrize("angles", [(15.0, 20.0), (0.0, 40.0), (25.0, 85.0), (0.0, 5.0)])
 def test_spots_keep_their_power(given: str, wanted: str, angles) -> None:
     light = SpotLight((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (2.0, 2.0, 2.0), *angles, given)  # type: ignore[arg-type]
