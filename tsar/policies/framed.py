@@ -20,11 +20,9 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import require
 from tsar.error import replace_nonfinite
-from tsar.morton import curve, raster_to_morton
+from tsar.morton import curve
 from tsar.policies.resampling import widened
 from tsar.policy import Moment, Picture, Policy, Price, Setting
-from tsar.selection import sample_positions
-from tsar.tiling import uniform
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 
@@ -59,9 +57,8 @@ class Framed(Policy[Frame]):
         require(ok, "samples_per_axis", "a power of two", samples_per_axis)
         require(resolution * samples_per_axis >= 1, "samples_per_axis", f"at least 1/{resolution}", samples_per_axis)
         self._axis = float(samples_per_axis)
-        self._side = int(resolution * samples_per_axis)
-        self._framelet_side = min(self.config.framelet_side, self._side)
-        self._level = int(log2(self._side // self._framelet_side))
+        side = int(resolution * samples_per_axis)
+        self._level = int(log2(side // min(self.config.framelet_side, side)))
         self._shape = ceil(height * samples_per_axis), ceil(width * samples_per_axis)
 
     @property
@@ -83,33 +80,19 @@ class Framed(Policy[Frame]):
         return Frame()
 
     def request(self, state: Frame, moment: Moment) -> tuple[Frame, FrameletBatch]:
-        """A whole frame as framelets of the uniform tiling; of a picture that is no square of a power of two,
-        as samples along the same curve."""
-        if not self.config.window.whole:
-            return state, self._curve_batch(moment)
-        tiling = uniform(self._level)
-        position = sample_positions(tiling.level, tiling.index, self._framelet_side)
-        batch = FrameletBatch(
-            tiling.level, tiling.index, position, moment.time_s, cycle=moment.cycle, seed=self.config.seed
-        )
+        """A whole frame, along the curve."""
+        position = curve_positions(*self._shape, *self.config.shape, self._axis)
+        position = position.reshape(-1, gcd(len(position), self.config.samples), 2)
+        nothing = torch.zeros(len(position), dtype=torch.int64)
+        batch = FrameletBatch(nothing, nothing, position, moment.time_s, cycle=moment.cycle, seed=self.config.seed)
         return state, batch
 
     def observe(
         self, state: Frame, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
     ) -> Frame:
         with timer("reconstruction"):
-            whole = self.config.window.whole
-            group = self._framelet_side if whole else 1
-            color = replace_nonfinite(samples.color.reshape(-1, group**2, 3), group)[0]
-            if whole:
-                return Frame(frame_image(color, self._side, self.config.resolution_px), moment.time_s)
-            return Frame(window_image(color, self._shape, self.config.shape, self._axis), moment.time_s)
-
-    def _curve_batch(self, moment: Moment) -> FrameletBatch:
-        count = self._shape[0] * self._shape[1]
-        nothing = torch.zeros(count // gcd(count, self.config.samples), dtype=torch.int64)
-        position = curve_positions(*self._shape, *self.config.shape, self._axis).reshape(len(nothing), -1, 2)
-        return FrameletBatch(nothing, nothing, position, moment.time_s, cycle=moment.cycle, seed=self.config.seed)
+            color = finite(samples.color, self._shape, self.config.framelet_side)
+            return Frame(frame_image(color, self._shape, self.config.shape, self._axis), moment.time_s)
 
     def image(self, state: Frame, moment: Moment) -> Picture:
         assert state.image is not None
@@ -138,19 +121,21 @@ def quartered(setting: Setting) -> Framed:
     return PromptlyFramed(setting, 0.25)
 
 
-def frame_image(color: Float[Tensor, "n samples 3"], side: int, resolution_px: int) -> Float[Tensor, "h w 3"]:
-    """Image of the samples of a uniform tiling.
+def finite(
+    color: Float[Tensor, "n samples 3"], shape: tuple[int, int], side_most: int
+) -> Float[Tensor, "blocks block 3"]:
+    """Samples along :func:`tsar.morton.curve`, repaired by :func:`tsar.error.replace_nonfinite` in square blocks.
 
     Args:
-        color: ``side²`` samples: tiles in Morton order of samples in Morton order, which are one curve.
-        side: samples along the image's side.
-        resolution_px: pixels along it; these are box averages of several samples, or bilinear between few.
+        color: as many samples as ``shape`` says, height and width.
+        shape: of the samples. Blocks are the largest that it consists of.
+        side_most: samples along the side of a block at most, a power of two.
     """
-    raster = color.reshape(-1, 3)[raster_to_morton(side)].reshape(side, side, 3)
-    return _resampled(raster, resolution_px / side)
+    side = gcd(*shape, side_most)
+    return replace_nonfinite(color.reshape(-1, side**2, 3), side)[0]
 
 
-def window_image(
+def frame_image(
     color: Float[Tensor, "n samples 3"], shape: tuple[int, int], picture: tuple[int, int], samples_per_axis: float
 ) -> Float[Tensor, "h w 3"]:
     """Image of samples along :func:`tsar.morton.curve`.
@@ -158,7 +143,8 @@ def window_image(
     Args:
         color: as many samples as ``shape`` says, height and width.
         shape: of the samples.
-        picture: height and width of the image, pixels.
+        picture: height and width of the image, pixels; these are box averages of several samples, or bilinear between
+            few.
         samples_per_axis: of a pixel's side.
     """
     raster = torch.empty(shape[0] * shape[1], 3)

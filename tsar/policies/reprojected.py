@@ -11,21 +11,18 @@ from dataclasses import dataclass, replace
 from math import floor, gcd, log2
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float
 from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.config import require
-from tsar.error import replace_nonfinite
-from tsar.morton import curve, raster_to_morton
+from tsar.morton import curve
 from tsar.policies.accumulation import ACCUMULATE_FLOPS, Accumulation, History, accumulated
-from tsar.policies.framed import curve_positions
+from tsar.policies.framed import curve_positions, finite
 from tsar.policies.late import WARP_FLOPS, warped
 from tsar.policies.surfaces import Surfaces
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.prediction import foretold
-from tsar.selection import sample_positions
-from tsar.tiling import uniform
 from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
 
 _GOLDEN = 0.7548776662466927, 0.5698402909980532
@@ -100,9 +97,8 @@ class Reprojected(Policy[Progress]):
         self._view, self._accumulation, self._warm_frames = setting.view, accumulation, warm_frames
         self._footprint, self._warps = footprint, parts > 1
         self._level = int(log2(self.config.resolution_px // self.config.framelet_side))
-        whole, shape = self.config.window.whole, self.config.shape
-        self._parts = min(parts, 4**self._level) if whole else gcd(parts, self.config.pixels)
-        self._order = raster_to_morton(shape[0]) if whole else torch.argsort(curve(*shape))
+        self._parts = gcd(parts, 4**self._level if self.config.window.whole else self.config.pixels)
+        self._order = torch.argsort(curve(*self.config.shape))
 
     @property
     def footprint(self) -> float:
@@ -131,28 +127,16 @@ class Reprojected(Policy[Progress]):
         """The next part of a frame, in Morton order; all parts are of the time at which the first is traced."""
         if not state.parts:
             state = replace(state, time_s=moment.time_s)
-        level, index, position = self._part(len(state.parts))
         height, width = self.config.shape
+        count, number = self.config.pixels // self._parts, len(state.parts)
+        position = curve_positions(height, width, height, width)[number * count : (number + 1) * count]
+        position = position.reshape(-1, gcd(count, self.config.samples), 2)
+        nothing = torch.zeros(len(position), dtype=torch.int64)
         beside = torch.tensor(self._jitter_px(state.number)) / torch.tensor((width, height))
         batch = FrameletBatch(
-            level, index, position + beside, state.time_s, cycle=moment.cycle, seed=self.config.seed, hits=True
+            nothing, nothing, position + beside, state.time_s, cycle=moment.cycle, seed=self.config.seed, hits=True
         )
         return state, batch
-
-    def _part(self, number: int) -> tuple[Int64[Tensor, " n"], Int64[Tensor, " n"], Float[Tensor, "n samples 2"]]:
-        """Tiles of a part of a frame, and the centres of its pixels; of a picture that is no square of a power of two
-        they are no tiles, but follow the same curve."""
-        config = self.config
-        if config.window.whole:
-            tiling = uniform(self._level)
-            count = tiling.tile_count // self._parts
-            part = slice(number * count, (number + 1) * count)
-            level, index = tiling.level[part], tiling.index[part]
-            return level, index, sample_positions(level, index, config.framelet_side)
-        count = config.pixels // self._parts
-        position = curve_positions(*config.shape, *config.shape)[number * count : (number + 1) * count]
-        nothing = torch.zeros(count // gcd(count, config.samples), dtype=torch.int64)
-        return nothing, nothing, position.reshape(len(nothing), -1, 2)
 
     def observe(
         self, state: Progress, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
@@ -180,9 +164,8 @@ class Reprojected(Policy[Progress]):
         shape, order = self.config.shape, self._order
         hits = [part.hits for part in parts if part.hits is not None]
         require(len(hits) == len(parts), "policy", "a renderer that tells first hits, for reprojection", None)
-        color = torch.cat([part.color for part in parts])
-        group = self.config.framelet_side if self.config.window.whole else 1
-        color = replace_nonfinite(color.reshape(-1, group**2, 3), group)[0].reshape(-1, 3)[order].reshape(*shape, 3)
+        color = finite(torch.cat([part.color for part in parts]), shape, self.config.framelet_side)
+        color = color.reshape(-1, 3)[order].reshape(*shape, 3)
         surfaces = Surfaces(
             torch.cat([hit.instance for hit in hits]).reshape(-1)[order].reshape(shape),
             torch.cat([hit.point for hit in hits]).reshape(-1, 3)[order].reshape(*shape, 3),

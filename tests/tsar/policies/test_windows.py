@@ -13,7 +13,9 @@ from renderer.stages.control import stages
 from tests.oracles.screens import Layer, Screen
 from tsar.clock import StageTimer
 from tsar.config import ConfigError, TilingConfig, TsarConfig
+from tsar.morton import curve
 from tsar.policies import POLICIES
+from tsar.policies.framed import finite
 from tsar.policy import Moment, Picture, Setting
 from tsar.projection import project
 from tsar.roots import encoded
@@ -152,6 +154,16 @@ def test_threads_of_torch_do_not_change_a_bit(policy: str) -> None:
         found.append([one.image for _, one, _ in shown(policy, (101, 58), MOVING, 6, threads=0)])
     torch.set_num_threads(before)
     assert all(torch.equal(a, b) for a, b in zip(*found, strict=True))
+
+
+def test_what_is_no_number_is_replaced_from_beside_it() -> None:
+    height, width = 48, 80
+    ramp = (torch.arange(height)[:, None] + torch.arange(width)).to(torch.float32)
+    color = ramp.reshape(-1)[curve(height, width)][:, None].repeat(1, 3)
+    spoiled = color.clone()
+    spoiled[::37] = torch.nan
+    found = finite(spoiled[None], (height, width), 16).reshape(-1, 3)
+    assert float((found - color).abs().max()) <= 2.0
 
 
 def test_the_poses_of_a_plane_place_things_where_those_of_the_picture_do() -> None:
