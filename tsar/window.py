@@ -36,7 +36,7 @@ class Window:
     @property
     def reach(self) -> float:
         """Side of the square as large as the picture, as a share of the plane's."""
-        return 1.0 if self.whole else (self.width_px * self.height_px) ** 0.5 / self.side_px
+        return (self.width_px * self.height_px) ** 0.5 / self.side_px
 
     def on_plane(self, view: Viewpoint) -> Viewpoint:
         """Poses for the whole plane, as wide a camera as that takes, whose axis need not meet the plane's centre.
@@ -65,7 +65,7 @@ class Window:
 
     def cropped(self, image: Float[Tensor, "h w *c"]) -> Float[Tensor, "h2 w2 *c"]:
         """The picture of an image of the plane; one of the picture as it is."""
-        if self.whole or tuple(image.shape[:2]) != (self.side_px, self.side_px):
+        if tuple(image.shape[:2]) != (self.side_px, self.side_px):
             return image
         return image[: self.height_px, : self.width_px].contiguous()
 
@@ -73,7 +73,7 @@ class Window:
         """What a field of equal squares of the plane says of the picture: of its squares, or of its pixels where the
         picture's border cuts squares. A field of the picture, or of one value, is returned as it is."""
         rows = field.shape[0]
-        if self.whole or rows == 1 or tuple(field.shape) == (self.height_px, self.width_px):
+        if rows == 1 or tuple(field.shape) == (self.height_px, self.width_px):
             return field
         width = self.side_px // rows
         if self.width_px % width or self.height_px % width:
@@ -82,29 +82,21 @@ class Window:
 
     def of_picture(self, position: Float[Tensor, "*n 2"]) -> Float[Tensor, "*n 2"]:
         """Places on the plane, in its sides, as places on the picture, in the picture's."""
-        if self.whole:
-            return position
         return position * position.new_tensor((self.side_px / self.width_px, self.side_px / self.height_px))
 
     def of_plane(self, position: Float[Tensor, "*n 2"]) -> Float[Tensor, "*n 2"]:
         """The inverse, float32, of places on the plane that are multiples of 1/65536."""
-        if self.whole:
-            return position
         share = position.new_tensor((self.width_px / self.side_px, self.height_px / self.side_px)) * GRID
         return (position * share).round() / GRID
 
     def inside(self, plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w"]:
         """What a plane holds within the picture, and 0 beyond it."""
-        if self.whole:
-            return plane
         inside = plane.new_zeros(plane.shape)
         inside[:, : self.height_px, : self.width_px] = plane[:, : self.height_px, : self.width_px]
         return inside
 
     def enlarged(self, image: Float[Tensor, "h w c"]) -> Float[Tensor, "side side c"]:
         """An image of the picture as one of the plane, black beyond it."""
-        if self.whole:
-            return image
         plane = image.new_zeros(self.side_px, self.side_px, image.shape[2])
         plane[: self.height_px, : self.width_px] = image
         return plane

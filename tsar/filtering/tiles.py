@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import sqrt
 
 import torch
@@ -148,12 +149,12 @@ def covered(
     return _enlarged(total, side // ELEMENT_PX)
 
 
-def in_turn(side: int, sampled: Bool[Tensor, " tiles"] | None, first: int, count: int) -> list[Bool[Tensor, "_ _"]]:
+def in_turn(side: int, sampled: Bool[Tensor, " tiles"], first: int, count: int) -> list[Bool[Tensor, "_ _"]]:
     """The next ``count`` tiles of one sample a pixel, in Morton order, for every spacing whether each is one of them.
 
     Args:
         side: pixels along the plane's side.
-        sampled: which of :func:`places` may be sampled; None for all.
+        sampled: which of :func:`places` may be sampled.
         first: tiles before them.
         count: how many.
     """
@@ -161,13 +162,13 @@ def in_turn(side: int, sampled: Bool[Tensor, " tiles"] | None, first: int, count
     chosen = [torch.zeros(2 * (int(side / (TILE_SIDE * kind)),), dtype=torch.bool) for kind in kinds]
     fine = chosen[kinds.index(1.0)]
     curve = morton_to_raster(fine.shape[0])
-    if sampled is not None:
-        curve = curve[sampled[places(side)[:, 2] == 1.0][curve]]
+    curve = curve[sampled[places(side)[:, 2] == 1.0][curve]]
     turn = (torch.arange(count) + first) % curve.numel()
     fine.reshape(-1)[curve[turn]] = True
     return chosen
 
 
+@lru_cache(maxsize=8)
 def places(side: int) -> Float64[Tensor, "n 3"]:
     """Upper and left edge and spacing of all tiles, pixels, spacing after spacing, by rows."""
     found = []

@@ -112,8 +112,7 @@ class Filter(Policy[State]):
         self._cell = torch.stack((cell % TILE_SIDE, cell // TILE_SIDE), dim=1).to(torch.float64)
         self._places, self._kinds = tiles.places(self._side), tiles.spacings(min(self.config.shape))
         self._size = torch.tensor(self.config.shape[::-1], dtype=torch.float64)
-        within = (self._places[:, :2] < self._size.flip(0)).all(1) & (self._places[:, 2] <= self._kinds[0])
-        self._sampled = None if self._window.whole else within
+        self._sampled = (self._places[:, :2] < self._size.flip(0)).all(1) & (self._places[:, 2] <= self._kinds[0])
         level = max(0, (self._side // self.config.framelet_side).bit_length() - 1)
         self._level = torch.full((self._side, self._side), level)
 
@@ -216,9 +215,7 @@ class Filter(Policy[State]):
         """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
         state, chosen = self._picked(state, moment)
         found = torch.cat([level.reshape(-1) for level in chosen]).nonzero().squeeze(1)
-        if self._sampled is not None:
-            found = found[self._sampled[found]]
-        tile = self._places[found]
+        tile = self._places[found[self._sampled[found]]]
         if len(tile) < self._tiles:
             tile = tile[torch.arange(self._tiles) % len(tile)]
         middle = ((tile[:, :2] + 0.5 * TILE_SIDE * tile[:, 2:]) / ELEMENT_PX).to(torch.int64)
