@@ -1,5 +1,8 @@
 """The container of a glTF 2.0 file: its JSON, its buffers, and the numbers of its accessors.
 
+trimesh, which reads STL here, drops sparse accessors, samplers, texture transforms and all but the first texture
+coordinates; pygltflib reads the JSON alone, and leaves accessors to its callers.
+
 Source: Khronos Group, "glTF 2.0 specification", sections 3.6 (buffers, views, accessors) and 4 (GLB).
 """
 

@@ -1,5 +1,8 @@
 """OBJ files: a part for each material.
 
+trimesh, which reads STL here, drops smoothing groups, pictures with options, and the texture coordinates of a material
+of which one face has none, and says nothing of it.
+
 Source: Wavefront, "OBJ file format" (Advanced Visualizer manual, appendix B1).
 """
 
@@ -37,9 +40,9 @@ class _Group:
 class _File:
     """What the lines of a file hold."""
 
-    points: list[list[str]] = field(default_factory=list)
-    uvs: list[list[str]] = field(default_factory=list)
-    normals: list[list[str]] = field(default_factory=list)
+    points: list[str] = field(default_factory=list)
+    uvs: list[str] = field(default_factory=list)
+    normals: list[str] = field(default_factory=list)
     groups: dict[str, _Group] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
     unread: set[str] = field(default_factory=set)
@@ -77,10 +80,7 @@ def _parsed(text: str) -> _File:
     file, group, smoothing = _File(), None, 0
     name = ""
     for number, line in enumerate(text.replace("\\\n", " ").replace("\\\r\n", " ").splitlines(), start=1):
-        words = line.split()
-        if not words or words[0][0] == "#":
-            continue
-        keyword, rest = words[0], words[1:]
+        keyword, rest = (*line.split(maxsplit=1), "", "")[:2]
         if keyword == "v":
             file.points.append(rest)
         elif keyword == "vt":
@@ -88,22 +88,24 @@ def _parsed(text: str) -> _File:
         elif keyword == "vn":
             file.normals.append(rest)
         elif keyword in ("f", "fo"):
-            if len(rest) < 3:
+            corners = rest.split()
+            if len(corners) < 3:
                 raise SceneError(f"cannot be read: line {number}: expected a face of three corners, got {line!r:.40}")
             if group is None:
                 group = file.groups.setdefault(name, _Group())
-            if "-" in line:
+            if "-" in rest:
                 counts = len(file.points), len(file.uvs), len(file.normals)
-                rest = [_absolute(word, counts, number) for word in rest]
-            group.corners += rest
-            group.counts.append(len(rest))
+                corners = [_absolute(word, counts, number) for word in corners]
+            group.corners += corners
+            group.counts.append(len(corners))
             group.smoothing.append(smoothing)
         elif keyword == "usemtl":
-            name, group = " ".join(rest), None
+            name, group = " ".join(rest.split()), None
         elif keyword == "s" and rest:
-            smoothing = int(rest[0]) if rest[0].isdecimal() else int(rest[0] == "on")
+            word = rest.split()[0]
+            smoothing = int(word) if word.isdecimal() else int(word == "on")
         elif keyword == "mtllib":
-            file.libraries.append(line.split(maxsplit=1)[1].strip() if rest else "")
+            file.libraries.append(rest.strip())
         elif keyword in _UNREAD:
             file.unread.add(keyword)
     return file
@@ -119,16 +121,20 @@ def _absolute(corner: str, counts: Sequence[int], number: int) -> str:
     return "/".join(made)
 
 
-def _table(rows: list[list[str]], widths: Sequence[int], keyword: str) -> NDArray[np.float64]:
+def _table(rows: list[str], widths: Sequence[int], keyword: str) -> NDArray[np.float64]:
     """Numbers of lines; those that a line lacks are 0."""
     if not rows:
         return np.zeros((0, widths[-1]))
-    if any(len(row) not in widths for row in rows):
-        wrong = next(row for row in rows if len(row) not in widths)
-        raise SceneError(f"cannot be read: expected {widths[0]} to {widths[-1]} numbers behind {keyword}, got {wrong}")
-    width = max(len(row) for row in rows)
+    counts = [len(row.split()) for row in rows]
+    if not set(counts) <= set(widths):
+        wrong = next(row for row, count in zip(rows, counts, strict=True) if count not in widths)
+        raise SceneError(
+            f"cannot be read: expected {widths[0]} to {widths[-1]} numbers behind {keyword}, got {wrong!r:.40}"
+        )
+    width = max(counts)
+    filled = (row + " 0" * (width - count) for row, count in zip(rows, counts, strict=True))
     try:
-        return np.array([row + ["0"] * (width - len(row)) for row in rows], np.float64)
+        return np.loadtxt(filled, np.float64, ndmin=2, comments=None)
     except ValueError as error:
         raise SceneError(f"cannot be read: {error}") from None
 
@@ -199,17 +205,19 @@ def _indices(group: _Group, counts: Sequence[int]) -> NDArray[np.int64]:
     Raises:
         SceneError: one is no number, or beyond what there is.
     """
-    rows: dict[str, tuple[int, int, int]] = {}
-    for corner in dict.fromkeys(group.corners):
-        parts = corner.split("/")
-        try:
-            found = [int(part) - 1 if part else -1 for part in (*parts, "", "")[:3]]
-        except ValueError:
-            raise SceneError(f"cannot be read: expected indices of a corner, got {corner!r:.40}") from None
-        if found[0] < 0 or any(one >= count for one, count in zip(found, counts, strict=True)) or min(found) < -1:
-            raise SceneError(f"cannot be read: a face refers to {corner!r:.40}, of {counts[0]} vertices")
-        rows[corner] = (found[0], found[1], found[2])
-    return np.array([rows[corner] for corner in group.corners], np.int64).reshape(-1, 3)
+    place = {corner: number for number, corner in enumerate(dict.fromkeys(group.corners))}
+    fields = ((*corner.split("/"), "", "")[:3] for corner in place)
+    try:
+        rows = np.array([[int(part) - 1 if part else -1 for part in parts] for parts in fields], np.int64)
+    except (ValueError, OverflowError) as error:
+        raise SceneError(
+            f"cannot be read: expected indices of a corner, got {str(error).rpartition(': ')[2]}"
+        ) from None
+    wrong = (rows[:, 0] < 0) | (rows < -1).any(axis=1) | (rows >= counts).any(axis=1)
+    if wrong.any():
+        corner = list(place)[int(np.argmax(wrong))]
+        raise SceneError(f"cannot be read: a face refers to {corner!r:.40}, of {counts[0]} vertices")
+    return rows[[place[corner] for corner in group.corners]]
 
 
 def _shading(
