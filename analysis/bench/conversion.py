@@ -18,7 +18,7 @@ from analysis.bench.growth import exponent_row
 from analysis.bench.options import BenchOptions
 from analysis.bench.rows import Row, limit_row
 from scenes.formats.conversion import load_scene_file, save_scene_file
-from scenes.formats.geometry.ply_files import ply_bytes
+from scenes.formats.geometry.ply_writing import ply_bytes
 from scenes.loading import ASSETS
 
 if TYPE_CHECKING:

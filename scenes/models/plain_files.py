@@ -8,7 +8,7 @@ import numpy as np
 
 from scenes.canonical import ConstantTexture, Instance, Mesh, Phong, SceneError
 from scenes.canonical.values import vertices_of
-from scenes.formats.geometry.ply_files import ply_colours, read_ply
+from scenes.formats.geometry.ply_files import read_coloured_ply
 from scenes.formats.losses import LossReport
 from scenes.loading import decode_srgb
 from scenes.models.smoothing import with_corners
@@ -25,9 +25,7 @@ def read_plain(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
     if path.suffix.lower() == ".stl":
         mesh = _stl(path.read_bytes(), str(path))
         return () if mesh is None else (Instance(mesh, GREY, name=name),)
-    content = path.read_bytes()
-    mesh = read_ply(content, str(path))
-    colors = ply_colours(content, str(path))
+    mesh, colors = read_coloured_ply(path.read_bytes(), str(path))
     if colors is None:
         return (Instance(mesh, GREY, name=name),)
     texture, uvs = coloured(decode_srgb(colors)[mesh.faces], str(path))

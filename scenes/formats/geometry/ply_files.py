@@ -1,4 +1,4 @@
-"""PLY meshes, read from files that are not trusted, and written.
+"""PLY meshes, read from files that are not trusted.
 
 The mesh library also reads PLY, but it allocates what a header claims and makes normals where a file has none. Here
 counts are first compared with the length of the file, and a mesh without normals stays without them.
@@ -8,8 +8,9 @@ Source: G. Turk, "The PLY Polygon File Format" (1994).
 
 from __future__ import annotations
 
+import struct
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,6 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _CORNERS_MAX = 64
-_PIECE = 1 << 16  # rows that are written at a time
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,20 @@ def read_ply(content: bytes, name: str) -> Mesh:
     Raises:
         SceneError: it is no PLY file, or not what its header says.
     """
-    return _mesh(_tables(content, name), name)
+    return read_coloured_ply(content, name)[0]
 
 
-def ply_colours(content: bytes, name: str) -> NDArray[np.uint8] | None:
-    """Colours ``(v, 3)`` of the vertices of a file's content, eight bits a channel; None where it has none."""
-    vertex = _tables(content, name).get("vertex", {})
-    kinds = {part[0]: part[1] for element in _header(content, name)[1] for part in element.properties}
+def read_coloured_ply(content: bytes, name: str) -> tuple[Mesh, NDArray[np.uint8] | None]:
+    """As :func:`read_ply`, with the colours ``(v, 3)`` of the vertices, eight bits a channel, where it has any."""
+    tables = _tables(content, name)
+    vertex, colors = tables.get("vertex", {}), None
     for names in _COLOURS:
-        if set(names) <= set(vertex):
+        if colors is None and set(names) <= set(vertex):
+            kinds = {part[0]: part[1] for element in _header(content, name)[1] for part in element.properties}
             columns = np.stack([vertex[part] for part in names], axis=1)
             scale = 255.0 if kinds[names[0]][0] == "f" else 1.0 / 257.0 if kinds[names[0]] == "u2" else 1.0
-            return np.clip(np.rint(columns * scale), 0, 255).astype(np.uint8)
-    return None
+            colors = np.clip(np.rint(columns * scale), 0, 255).astype(np.uint8)
+    return _mesh(tables, name), colors
 
 
 def _tables(content: bytes, name: str) -> dict[str, dict[str, NDArray]]:
@@ -176,22 +177,15 @@ def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name
         rows = np.frombuffer(body, row(corners), element.count, at)
         if (rows["count"] == corners).all():
             return _fans(rows["corners"]), at + element.count * row(corners).itemsize
-    triangles = []
-    for _ in range(element.count):
-        for part in element.properties:
-            kind, corners = np.dtype(order + part[1]), 1
-            if part[2]:
-                counter = np.dtype(order + part[2])
-                _enough(len(body), at + counter.itemsize, element, name)
-                corners = int(np.frombuffer(body, counter, 1, at)[0])
-                at += counter.itemsize
-                if not (3 if part is wanted else 0) <= corners <= _CORNERS_MAX:
-                    raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners}")
-            _enough(len(body), at + corners * kind.itemsize, element, name)
-            if part is wanted:
-                triangles.append(_fans(np.frombuffer(body, kind, corners, at)[None]))
-            at += corners * kind.itemsize
-    return np.concatenate(triangles), at
+    heads = [struct.Struct(order + np.dtype(part[2] or part[1]).char) for part in element.properties]
+    sizes = [(head.size, np.dtype(part[1]).itemsize) for head, part in zip(heads, element.properties, strict=True)]
+    places = _places(element, wanted, at, len(body), sizes, lambda n, at: heads[n].unpack_from(body, at)[0], name)
+    content, kind = np.frombuffer(body, np.uint8), np.dtype(order + wanted[1])
+
+    def polygons(starts: NDArray[np.int64], corners: int) -> NDArray:
+        return content[starts[:, None] + np.arange(corners * kind.itemsize)].view(kind)
+
+    return _triangles(*places[:2], polygons), places[2]
 
 
 def _ascii_faces(
@@ -205,21 +199,50 @@ def _ascii_faces(
             rows = numbers[at:end].reshape(element.count, -1)
             if (rows[:, 0] == corners).all():
                 return _fans(rows[:, 1:]), end
-    triangles = [np.zeros((0, 3))]
+    wanted = next((part for part in element.properties if part[2] and part[0].startswith("vertex_ind")), None)
+    sizes = [(1, 1)] * len(element.properties)
+    starts, counts, end = _places(element, wanted, at, len(numbers), sizes, lambda _, at: numbers[at], name)
+    return _triangles(starts, counts, lambda starts, corners: numbers[starts[:, None] + np.arange(corners)]), end
+
+
+def _places(
+    element: _Element,
+    wanted: tuple[str, str, str] | None,
+    at: int,
+    there: int,
+    sizes: list[tuple[int, int]],
+    count_at: Callable[[int, int], float],
+    name: str,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+    """Where the wanted list of each face begins, how many corners it has, and where the next element begins."""
+    starts, counts = [], []
     for _ in range(element.count):
-        for part in element.properties:
-            _enough(len(numbers), at + 1, element, name)
-            if not part[2]:
-                at += 1
-                continue
-            corners = numbers[at]
-            if not (3 <= corners <= _CORNERS_MAX and corners == int(corners)):
-                raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners:g}")
-            _enough(len(numbers), at + 1 + int(corners), element, name)
-            if part[0].startswith("vertex_ind"):
-                triangles.append(_fans(numbers[None, at + 1 : at + 1 + int(corners)]))
-            at += 1 + int(corners)
-    return np.concatenate(triangles), at
+        for number, part in enumerate(element.properties):
+            corners, (head, size) = 1, sizes[number]
+            if part[2]:
+                _enough(there, at + head, element, name)
+                corners = count_at(number, at)
+                if not ((3 if part is wanted else 0) <= corners <= _CORNERS_MAX and corners == int(corners)):
+                    raise SceneError(f"{name}: expected faces of 3 to {_CORNERS_MAX} corners, got {corners:g}")
+                at += head
+                if part is wanted:
+                    starts.append(at)
+                    counts.append(corners)
+            at += int(corners) * size
+    _enough(there, at, element, name)
+    return np.array(starts, np.int64), np.array(counts, np.int64), at
+
+
+def _triangles(
+    starts: NDArray[np.int64], counts: NDArray[np.int64], polygons: Callable[[NDArray[np.int64], int], NDArray]
+) -> NDArray:
+    """Triangles of polygons in their order, made of all that have as many corners at a time."""
+    order, parts = [], []
+    for corners in np.unique(counts).tolist():
+        here = np.flatnonzero(counts == corners)
+        order.append(np.repeat(here, corners - 2))
+        parts.append(_fans(polygons(starts[here], corners)))
+    return np.concatenate(parts)[np.argsort(np.concatenate(order), kind="stable")] if order else np.zeros((0, 3))
 
 
 def _fans(polygons: NDArray) -> NDArray:
@@ -268,32 +291,3 @@ def checked_mesh(
         None if uvs is None else uvs.astype(np.float32),
         name,
     )
-
-
-def ply_parts(mesh: Mesh) -> Iterator[bytes | memoryview]:
-    """A mesh as a binary PLY file, in pieces."""
-    columns = [mesh.vertices]
-    names = ["x", "y", "z"]
-    if mesh.normals is not None:
-        columns.append(mesh.normals)
-        names += ["nx", "ny", "nz"]
-    if mesh.uvs is not None:
-        columns.append(mesh.uvs)
-        names += ["s", "t"]  # what LuxCore and PBRT both know
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
-    lines += [f"property float {name}" for name in names]
-    lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]
-    yield "\n".join(lines).encode()
-    for start in range(0, len(mesh.vertices), _PIECE):
-        piece = [column[start : start + _PIECE] for column in columns]
-        yield np.concatenate(piece, axis=1).astype("<f4", copy=False).data.cast("B")
-    for start in range(0, len(mesh.faces), _PIECE):
-        piece = mesh.faces[start : start + _PIECE]
-        rows = np.empty(len(piece), np.dtype([("count", "u1"), ("corners", "<i4", (3,))]))
-        rows["count"], rows["corners"] = 3, piece
-        yield rows.tobytes()
-
-
-def ply_bytes(mesh: Mesh) -> bytes:
-    """A mesh as a binary PLY file."""
-    return b"".join(ply_parts(mesh))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from scenes import loading
 from scenes.canonical import Mesh, SceneError
-from scenes.formats.geometry.ply_files import ply_parts
+from scenes.formats.geometry.ply_writing import ply_parts
 
 _OF_CONTENT = re.compile(r"-[0-9a-f]{8}$")
 

@@ -14,7 +14,7 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.formats.conversion import load_scene_file, save_scene_file
-from scenes.formats.geometry.ply_files import ply_bytes
+from scenes.formats.geometry.ply_writing import ply_bytes
 from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import SceneFiles
 from tests.scenes.formats.files import HEAD, mitsuba, pbrt

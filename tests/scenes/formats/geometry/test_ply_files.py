@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from scenes.canonical import Mesh, SceneError
-from scenes.formats.geometry.ply_files import ply_bytes, read_ply
+from scenes.formats.geometry.ply_files import read_ply
+from scenes.formats.geometry.ply_writing import ply_bytes
 
 ASCII = b"""ply
 format ascii 1.0
