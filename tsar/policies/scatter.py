@@ -51,8 +51,7 @@ def pixel_batch(pixel: Int64[Tensor, " samples"], config: TsarConfig, moment: Mo
     multiple of ``config.samples``."""
     height, width = config.shape
     position = torch.stack((pixel % width, pixel // width), dim=1).to(torch.float32).add_(0.5)
-    position = position / (width if height == width else position.new_tensor((width, height)))
-    position = position.reshape(-1, config.samples, 2)
+    position = (position / position.new_tensor((width, height))).reshape(-1, config.samples, 2)
     nothing = torch.zeros(position.shape[0], dtype=torch.int64)
     return FrameletBatch(nothing, nothing, position, moment.time_s, cycle=moment.cycle, seed=config.seed)
 
