@@ -21,6 +21,7 @@ from renderer.stages.control import stages
 from renderer.trace import Renderer
 from scenes.canonical import Scene
 from tests.renderer.builders import driving_scene
+from tests.tsar.policies.every import STAGED
 from tsar.clock import fixed_clock
 from tsar.config import StagesName, TilingConfig, TsarConfig
 from tsar.policies import POLICIES
@@ -69,7 +70,6 @@ def play(policy: str, renderer: Renderer, start_s: float, kind: StagesName = "re
     return list(run(made, renderer.trace, fixed_clock(cycle_s), start_s, start_s + min(CYCLES * cycle_s, MOST_S)))
 
 
-STAGED = ("tsar", "filter", "tsar-densities", "tsar-wavelets", "tsar-densities-wavelets", "surfel", "thesis")
 CASES = [
     pytest.param(
         name, kind, marks=[pytest.mark.slow] if name not in ("thesis", "filter") and kind != "compiled" else []

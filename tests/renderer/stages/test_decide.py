@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import cycle, product
 
 import jaxtyping
@@ -127,22 +128,29 @@ def test_decisions_agree_at_the_ends(response: ResponseConfig) -> None:
         assert_same_densities(found, respond(before, errors, config), config)
 
 
-def test_five_thousand_decisions_do_not_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("cycles", [5_000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_decisions_do_not_drift(cycles: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The errors lean to one side and back again every few thousand cycles."""
     monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
     config = TsarConfig(sdf_side=16, resolution_px=128, batch_size=16)
     control, g = Control(config), torch.Generator().manual_seed(11)
     densities, history = initial_densities(config), initial_history(config)
     (low_s, high_s), (low_t, high_t) = config.spatial_bounds, config.temporal_bounds
-    for turn in range(5000):
+    worst = 0.0
+    for turn in range(cycles):
         noise = torch.rand(3, 256, generator=g)
-        drift = 0.3 * torch.sin(torch.tensor(turn / 500.0))
-        field = torch.where(noise[2] < 0.4, (2 * noise[:2] - 1 + drift).clamp(-1, 1), 0.0)
+        field = torch.where(noise[2] < 0.4, (2 * noise[:2] - 1 + 0.3 * math.sin(turn / 500.0)).clamp(-1, 1), 0.0)
         decision = control.decide(densities, Errors(field[0], field[1]), history, config, StageTimer())
         densities, history = decision.densities, decision.due.history
         assert 0.0 <= densities.surplus <= config.response.surplus_max * config.budget * (1 + 1e-9)
-    assert abs(float(densities.combined().sum()) + densities.surplus - config.budget) <= 1e-9 * config.budget
-    assert low_s * (1 - 1e-12) <= densities.spatial.min() and densities.spatial.max() <= high_s * (1 + 1e-12)
-    assert low_t * (1 - 1e-12) <= densities.temporal.min() and densities.temporal.max() <= high_t * (1 + 1e-12)
+        if turn % 1000 == 999:
+            worst = max(worst, abs((float(densities.combined().sum()) + densities.surplus) / config.budget - 1.0))
+            assert low_s * (1 - 1e-12) <= densities.spatial.min() and densities.spatial.max() <= high_s * (1 + 1e-12)
+            assert low_t * (1 - 1e-12) <= densities.temporal.min() and densities.temporal.max() <= high_t * (1 + 1e-12)
+            assert float(history.abs().max()) < 1e3
+    print(f"conservation is off by {worst:.2g} at most")
+    # a step of 2^-52 of the budget a cycle, all to one side
+    assert worst <= cycles * 2.0**-52
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
