@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 from PIL import Image
+
+if TYPE_CHECKING:
+    from OpenImageIO import ImageBuf
 
 Pixels = NDArray[np.float32]
 _WIDE = (".exr", ".hdr", ".pfm", ".pic", ".png", ".rgbe", ".tif", ".tiff")
@@ -21,9 +23,6 @@ _WIDE = (".exr", ".hdr", ".pfm", ".pic", ".png", ".rgbe", ".tif", ".tiff")
 PIXELS_MOST = 1 << 27
 """Most pixels of a picture, such as 16384 x 8192. A file of some kilobytes can hold more pixels than memory does; one
 pixel takes about 36 bytes while its scene is loaded."""
-
-oiio.attribute("threads", 1)  # processes that fork keep no threads
-oiio.attribute("exr_threads", -1)
 
 
 def decoded(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
@@ -69,6 +68,10 @@ def _three(pixels: np.ndarray) -> np.ndarray:
 
 def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
     """Numbers of more than 8 bits; None for files of 8 bits."""
+    import OpenImageIO as oiio  # here, for its types complain where a process ends before it used any
+
+    oiio.attribute("threads", 1)  # processes that fork keep no threads
+    oiio.attribute("exr_threads", -1)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)  # what alpha hides keeps its colour
     image = oiio.ImageBuf(str(path), 0, 0, hints)
@@ -87,6 +90,6 @@ def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
     return _three(pixels)
 
 
-def _require_read(image: oiio.ImageBuf) -> None:
+def _require_read(image: ImageBuf) -> None:
     if image.has_error:
         raise ValueError(image.geterror().partition("\n")[0])

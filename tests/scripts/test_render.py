@@ -165,7 +165,7 @@ def test_a_model_is_rendered_whole_and_in_part(
     render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...]
 ) -> None:
     """A bare model in the middle of its picture, or lit by a Radiance picture; the part of a crop is that of it."""
-    (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\n\n-Y 2 +X 2\n" + SKY)
+    (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" + SKY)
     monkeypatch.chdir(tmp_path)
     arguments = (str(CUBE), "--size", "80x60", *arguments)
     assert render(*arguments) == 1
