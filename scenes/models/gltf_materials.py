@@ -10,7 +10,6 @@ KHR_materials_ior, KHR_materials_transmission, KHR_materials_unlit, KHR_material
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +18,12 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 
 from scenes.canonical import ConstantTexture, Emissive, Glass, Material, Phong, Texture
+from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
 from scenes.models.gltf_textures import GltfTextures, Lookup, Uvs, lookup_of, multiplied
-from scenes.models.phong_of_parts import diffuse_share, glowing, mean_of, metallic_rough, rgb, seen_through
+from scenes.models.phong_of_parts import diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.vertex_colours import coloured
 
 _USED = {"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_transmission", "KHR_materials_unlit",
@@ -143,7 +144,7 @@ class GltfMaterials:
                 else:
                     self.report.add(where, "a picture of what is metal", "its mean")
         if diffuse is None:
-            diffuse = _scaled(base, diffuse_share(metallic, roughness))
+            diffuse = scaled(base, diffuse_share(metallic, roughness))
         return metallic_rough(base, diffuse, metallic, roughness)
 
     def _glass(self, base: Texture, extensions: dict[str, Any], where: str) -> Material:
@@ -179,11 +180,3 @@ def _rough(given: dict[str, Any]) -> dict[str, Any]:
 
 def _factor(given: dict[str, Any], name: str) -> Float[NDArray[np.float64], " 3"]:
     return np.asarray(_rough(given).get(name, (1.0, 1.0, 1.0, 1.0))[:3], np.float64)
-
-
-def _scaled(texture: Texture, factor: float) -> Texture:
-    if factor == 1.0:
-        return texture
-    if isinstance(texture, ConstantTexture):
-        return ConstantTexture(rgb(np.asarray(texture.value) * factor))
-    return dataclasses.replace(texture, image=texture.image * np.float32(factor))  # type: ignore[union-attr]

@@ -12,23 +12,16 @@ Source: Wavefront, "MTL material format" (Advanced Visualizer appendix); D. Dods
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from scenes.canonical import ConstantTexture, Emissive, Glass, ImageTexture, Material, Phong, Rgb, SceneError, Texture
+from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
-from scenes.models.phong_of_parts import (
-    EXPONENT_MAX,
-    diffuse_share,
-    glowing,
-    mean_of,
-    metallic_rough,
-    rgb,
-    seen_through,
-)
+from scenes.models.phong_of_parts import EXPONENT_MAX, diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.sources import Sources
 
 _FIXED = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-mm": 2, "-texres": 1, "-bm": 1, "-imfchan": 1,
@@ -173,7 +166,7 @@ def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport)
     kind = int(entry.number("illum", -1))
     if "pm" in entry.lines or "pr" in entry.lines:
         metallic, roughness = (float(np.clip(entry.number(*part), 0.0, 1.0)) for part in (("pm", 0.0), ("pr", 0.5)))
-        return metallic_rough(texture, _times(texture, diffuse_share(metallic, roughness)), metallic, roughness)
+        return metallic_rough(texture, scaled(texture, diffuse_share(metallic, roughness)), metallic, roughness)
     if kind == 0:
         if isinstance(texture, ConstantTexture):
             return Emissive(texture.value)
@@ -195,10 +188,3 @@ def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport)
     if exponent < 1.0 or kind == 1:  # a highlight wider than that is not visible as one
         return Phong(texture)
     return Phong(texture, rgb(specular), min(exponent, EXPONENT_MAX))
-
-
-def _times(texture: Texture, factor: float) -> Texture:
-    if isinstance(texture, ImageTexture):
-        return dataclasses.replace(texture, image=texture.image * np.float32(factor))
-    assert isinstance(texture, ConstantTexture)
-    return ConstantTexture(rgb(np.asarray(texture.value) * factor))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
 
 import numpy as np
-from jaxtyping import Float
-from numpy.typing import NDArray
 
 from scenes.arithmetic import power
 from scenes.canonical import ConstantTexture, Emissive, Glass, ImageTexture, Material, Phong, Rgb, Texture
+from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 
 EXPONENT_MAX = 1.0e4
@@ -17,18 +17,12 @@ _SMOOTH = 0.2  # roughness below which metal mirrors
 _CLEAR = 0.5  # opacity below which a surface is a pane
 
 
-def rgb(values: Any) -> Rgb:
-    """Three numbers."""
-    red, green, blue = (float(value) for value in np.asarray(values).reshape(-1)[:3])
-    return red, green, blue
-
-
-def mean_of(texture: Texture) -> Float[NDArray[np.float64], " 3"]:
-    """Mean colour of a constant or a picture."""
+def scaled(texture: Texture, factor: float) -> Texture:
+    """A constant or a picture times a number."""
     if isinstance(texture, ImageTexture):
-        return texture.image.mean(axis=(0, 1), dtype=np.float64)
+        return texture if factor == 1.0 else dataclasses.replace(texture, image=texture.image * np.float32(factor))
     assert isinstance(texture, ConstantTexture)
-    return np.asarray(texture.value, np.float64)
+    return ConstantTexture(rgb(np.multiply(texture.value, factor)))
 
 
 def _scattered(roughness: float) -> float:
@@ -84,7 +78,7 @@ def glowing(material: Material, radiance: Rgb, where: str, report: LossReport) -
     if max(radiance) <= 0.0:
         return material
     became = "a surface that is seen and gives no light"
-    if isinstance(material, Phong) and mean_of(material.diffuse).max() > 0.0:
+    if isinstance(material, Phong) and max(mean_of(material.diffuse)) > 0.0:
         became += ", without its other colours"
     report.add(where, "emission", became)
     return Emissive(radiance)
