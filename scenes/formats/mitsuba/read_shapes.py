@@ -62,11 +62,12 @@ class MitsubaShapes:
         """Instances of a shape: one, those of a group, or none where it is left out, which is reported."""
         kind, properties = node.get("type"), Properties(node, self.report)
         if kind == "shapegroup":
-            parts = [child for child in properties.rest if child.tag == "shape"]
-            nested = [part for part in parts if part.get("type") in ("instance", "shapegroup")]
-            for part in nested:  # as in Mitsuba; groups in groups would multiply
-                self.report.add(str(part.place), f"{part.get('type')} inside a shapegroup")
-            parts = [part for part in parts if part not in nested]
+            parts = []
+            for part in (child for child in properties.rest if child.tag == "shape"):
+                if part.get("type") in ("instance", "shapegroup"):  # as in Mitsuba; groups in groups would multiply
+                    self.report.add(str(part.place), f"{part.get('type')} inside a shapegroup")
+                else:
+                    parts.append(part)
             self.groups[id(node)] = [found for part in parts for found in self.read(part)]
             return []
         if kind == "instance":
