@@ -1,8 +1,8 @@
 """How spot lights fall off towards their edges in each renderer, and how one profile becomes another.
 
 Source: PBRT v3 (Pharr, Jakob and Humphreys 2016, sec. 12.3.1); Mitsuba 0.5 documentation, section on spot lights;
-:mod:`renderer.kernels.lights` for this project's. LuxCore 2.10 falls off as PBRT does, and divides by the cosine: its
-pictures have 1.018, 1.067, 1.139 and 1.208 of the light of the axis at 11.1, 20.4, 28.7 and 34.2 degrees.
+:mod:`renderer.kernels.lights` for this project's. LuxCore 2.10 falls off as PBRT does, and divides by the cosine
+(measured in ``tests/scenes/formats/test_light.py``).
 """
 
 from __future__ import annotations

@@ -18,12 +18,13 @@ from scenes.canonical import (
     Metal,
     MixMaterial,
     Rectangle,
+    SceneError,
     Translucent,
 )
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
-from tests.scenes.formats.files import DELIVERED, HEAD, REAL, needs_data, pbrt, real
+from tests.scenes.formats.files import DELIVERED, HEAD, MITSUBA, REAL, needs_data, pbrt, real
 
 
 @needs_data
@@ -112,3 +113,21 @@ def test_scenes_in_one_folder_keep_their_meshes(tmp_path: Path) -> None:
     save_scene_file(scene, tmp_path / "b.lxs")
     assert difference(before, load_scene_file(tmp_path / "b.xml")) is None
     assert len(list((tmp_path / "models").iterdir())) == 2  # the cone is the same file
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("to", "ending", "count"),
+    [("pbrt", ".pbrt", 10), ("mitsuba", ".xml", 7), ("mitsuba3", ".xml", 6), ("luxrender", ".lxs", 3)],
+)
+def test_how_many_real_scenes_keep_their_picture(to: str, ending: str, count: int, tmp_path: Path) -> None:
+    kept = 0
+    for name in (*REAL, *MITSUBA):
+        report = LossReport()
+        scene = real(name, report)
+        try:
+            save_scene_file(scene, tmp_path / f"a{ending}", to, report, strict=True)
+            kept += 1
+        except SceneError as error:
+            assert "expected a conversion without losses" in str(error)
+    assert (len(REAL) + len(MITSUBA), kept) == (18, count)

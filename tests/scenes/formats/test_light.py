@@ -88,6 +88,26 @@ def test_suns_of_luxrender_are_as_bright_whatever_their_angle(angle_deg: float, 
     assert found.irradiance == pytest.approx(light.irradiance, rel=1e-6)
 
 
+def test_spots_of_luxcore_are_divided_by_the_cosine(tmp_path: Path) -> None:
+    """Inside the inner cone, on a floor that faces lamp and camera."""
+    view = np.eye(4)
+    view[2, 3] = 4.0
+    floor = Instance(Rectangle(), Matte(even(0.5)), np.diag([9.0, 9.0, 1.0, 1.0]))
+    spot = SpotLight((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (10.0,) * 3, 44.0, 45.0, "secant")
+    film, once = Film(64, 64), Integrator("path", 1)
+    picture = drawn(
+        Scene(PerspectiveCamera(view, 40.0), (floor,), (spot,), film, integrator=once), "luxcore", tmp_path, 64, 64
+    )
+    across = (np.arange(64) - 31.5) / 32.0 * 4.0 * math.tan(math.radians(20.0))
+    theta = np.arctan(np.hypot(across[:, None], across) / 2.0)
+    even_cone = 0.5 / math.pi * 10.0 * np.cos(theta) ** 3 / 4.0
+    for low in range(0, 40, 4):
+        ring = (theta >= math.radians(low)) & (theta < math.radians(low + 4))
+        found = (picture.mean(axis=-1) / even_cone)[ring].mean()
+        print(f"{low} to {low + 4} degrees: {found:.3f} of the light of the axis")
+        assert found == pytest.approx((1.0 / np.cos(theta[ring])).mean(), rel=0.005)
+
+
 def test_a_spot_of_luxcore_grows_with_the_angle_and_its_power_is_kept() -> None:
     """A wide one has more light than any cone of the intensity of its axis: the cone is brighter then."""
     from scenes.formats.appearance.spot_profiles import flux, reshaped
@@ -199,6 +219,14 @@ def test_materials_keep_their_brightness(program: str, via: str, tmp_path: Path)
     print(program, via or "direct", " ".join(f"{value:.3f}" for value in found))
     np.testing.assert_allclose(found, [albedo for _, albedo in ALBEDOS], atol=0.026)
     assert found[1] == pytest.approx(0.4, abs=0.004 if program == "mitsuba" else 0.015)
+
+
+def test_what_a_blunt_coat_takes_from_its_base(tmp_path: Path) -> None:
+    """Mitsuba 3 draws both; PBRT dims the base by the mean of a smooth coat."""
+    scene = furnace([Plastic(even(0.4), even(0.0), 1.5, 0.46)])
+    save_scene_file(scene, tmp_path / "via.pbrt")
+    kept = [drawn(one, "mitsuba", tmp_path).mean() / 0.4 for one in (scene, load_scene_file(tmp_path / "via.pbrt"))]
+    assert kept == pytest.approx([0.73, 0.91], abs=0.005)
 
 
 def test_the_plastic_of_a_file_is_as_bright_as_it_says(tmp_path: Path) -> None:
