@@ -180,17 +180,17 @@ def run_cli(main: Callable[[], None]) -> None:
 def run_process(main: Callable[[], None]) -> None:
     """Runs :func:`run_cli` as the last that this process does.
 
-    After Ctrl-C the process ends as soon as its exit functions have run: in a study, the interpreter's last collection
-    of garbage took up to a minute.
+    After an error or Ctrl-C the process ends as soon as its exit functions have run: the interpreter's last collection
+    of garbage took up to a minute in a study, and libraries list there what an error kept alive.
     """
     try:
         run_cli(main)
     except SystemExit as stop:
-        if stop.code == EXIT_INTERRUPTED:
+        if isinstance(stop.code, int) and stop.code:
             atexit._run_exitfuncs()
             sys.stdout.flush()
             sys.stderr.flush()
-            os._exit(EXIT_INTERRUPTED)
+            os._exit(stop.code)
         raise
 
 
