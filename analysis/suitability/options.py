@@ -51,6 +51,9 @@ class SuitabilityOptions:
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
+    stride: int = 6
+    """Reference images from one to the next at which FLIP, SSIM and the causes of the error are taken: at thesis scale
+    they cost four times as much as the runs at 6."""
     jod_repetitions: int = 1
     """Repetitions that ColorVideoVDP scores."""
     jod_span_s: tuple[float, float] = (0.4, 0.9)
@@ -80,6 +83,7 @@ class SuitabilityOptions:
             self,
             repetitions=limits.REPETITIONS,
             jod_repetitions=(0, limits.REPETITIONS[1]),
+            stride=(1, 1000),
             framed_rate_hz=(0.01, 1000.0),
             trace_segments=limits.SEGMENTS,
             start_s=limits.TIMES_S,

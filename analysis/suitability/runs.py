@@ -46,7 +46,7 @@ def runs(options: SuitabilityOptions) -> list[Run]:
 
 
 def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterator[Run]:
-    scale = SCALES[options.scale]
+    scale = dataclasses.replace(SCALES[options.scale], stride=options.stride)
     rows = [(row, scale.config(row, dataclasses.replace(options.tsar, seed=repetition))) for row in options.rows]
     at_row = scale.config(options.policy_row, dataclasses.replace(options.tsar, seed=repetition))
     everywhere = dict.fromkeys(("framed", *options.policies, *options.rivals))
