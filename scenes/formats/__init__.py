@@ -21,6 +21,7 @@ FORMATS: Named[Format] = Named(
         "luxrender": "scenes.formats.luxrender.declared:LUXRENDER",
         "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
+        "mitsuba-dictionary": "scenes.formats.mitsuba.declared:MITSUBA_DICTIONARY",
         "model": "scenes.models.scenes_of_models:MODEL",
     },
 )

@@ -97,6 +97,8 @@ class MitsubaLights:
             self.lights.append(SunSky(unit, turbidity, factor, part, up, albedo))  # type: ignore[arg-type]
             return
         for part, share in shares.items():
+            if share == 0.0:
+                continue
             self.lights.append(SunSky(unit, turbidity, scale * share, part, up, albedo))  # type: ignore[arg-type]
 
     def _by_time(self, properties: Properties) -> np.ndarray:

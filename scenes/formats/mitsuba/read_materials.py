@@ -29,13 +29,14 @@ from scenes.canonical import (
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.mixtures import NOTHING, plastic_of
 from scenes.formats.appearance.spectra import grey, metal
+from scenes.formats.mitsuba.principled import principled
 from scenes.formats.mitsuba.properties import Properties, ior
 from scenes.formats.mitsuba.read_textures import MitsubaTextures
 from scenes.formats.text.xml_tree import Node
 
 _NESTED_MAX = 32
 _ONE_SIDED = ("diffuse", "roughdiffuse", "conductor", "roughconductor", "plastic", "roughplastic", "phong", "ward")
-_AROUND = ("mask", "blendbsdf", "mixturebsdf", "bump", "bumpmap", "coating", "roughcoating")
+_AROUND = ("mask", "blendbsdf", "mixturebsdf", "bump", "bumpmap", "coating", "roughcoating", "normalmap")
 
 
 @dataclass
@@ -56,6 +57,7 @@ class MitsubaSurfaces(MitsubaTextures):
             "phong": self._phong, "ward": self._ward, "difftrans": self._difftrans, "twosided": self._twosided,
             "mask": self._mask, "blendbsdf": self._blend, "mixturebsdf": self._mixture, "bump": self._bump,
             "bumpmap": self._bump, "coating": self._coating, "roughcoating": self._coating,
+            "normalmap": self._coating, "principled": lambda found: principled(found, self),
         }  # fmt: skip
         kind, properties = node.get("type"), Properties(node, self.report)
         self._deep += 1
@@ -66,7 +68,7 @@ class MitsubaSurfaces(MitsubaTextures):
             properties.left_over()
         elif kind == "null":
             made = NOTHING
-        elif kind in ("hk", "irawan", "sssbrdf", "normalmap", "rmbrdf", "dipole"):
+        elif kind in ("hk", "irawan", "sssbrdf", "rmbrdf", "dipole", "measured", "hair", "pplastic"):
             self.report.add(properties.where, f"material {kind!r}", "grey, matte")
             made = Matte(ConstantTexture(grey(0.5)))
         else:
@@ -240,9 +242,10 @@ class MitsubaSurfaces(MitsubaTextures):
         heights = [node for node in nodes if node.tag == "texture"]
         if not heights:
             raise SceneError(f"{properties.where}: bump: expected a texture inside")
-        return Bumped(self.one_inner(properties), self.made_texture(heights[0]))
+        return Bumped(self.one_inner(properties), self.made_texture(heights[0]), properties.number("scale", 1.0))
 
     def _coating(self, properties: Properties) -> Material:
         properties.asked.update(properties.given)
+        properties.asked.update(child.get("name") for child in properties.rest)
         self.report.add(properties.where, f"{properties.node.get('type')} over a material", "the material alone")
         return self.one_inner(properties)

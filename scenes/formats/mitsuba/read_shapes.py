@@ -45,6 +45,8 @@ from scenes.formats.text.scene_files import SceneFiles
 from scenes.formats.text.xml_tree import Node
 
 _SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized")
+_HAIR = ("hair", "bsplinecurve", "linearcurve")
+_LEFT_OUT = (*_HAIR, "heightfield", "deformable", "sdfgrid", "ellipsoids", "ellipsoidsmesh")
 _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
 
@@ -70,10 +72,13 @@ class MitsubaShapes:
                     parts.append(part)
             self.groups[id(node)] = [found for part in parts for found in self.read(part)]
             return []
+        if kind == "merge":
+            inside = [child for child in properties.rest if child.tag == "shape" and child.get("type") != "merge"]
+            return [found for part in inside for found in self.read(part)]
         if kind == "instance":
             return self._instances(properties)
-        if kind in ("hair", "heightfield", "deformable"):
-            self.report.add(properties.where, "hair" if kind == "hair" else f"shape {kind!r}")
+        if kind in _LEFT_OUT:
+            self.report.add(properties.where, "hair" if kind in _HAIR else f"shape {kind!r}")
             return []
         if kind not in _SHAPES:
             self.report.unknown(properties.where, "shape", kind)

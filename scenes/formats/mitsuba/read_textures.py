@@ -26,7 +26,7 @@ _WRAPS = {"repeat": "repeat", "clamp": "clamp", "zero": "black", "mirror": "repe
 MISSING = "missing"
 """Kind of a texture that stands in the place of one that is not there; it has been reported."""
 
-_FILTERS = {"nearest": "nearest", "trilinear": "mipmap", "ewa": "mipmap"}
+_FILTERS = {"nearest": "nearest", "bilinear": "bilinear", "trilinear": "mipmap", "ewa": "mipmap"}
 
 
 @dataclass

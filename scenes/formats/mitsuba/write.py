@@ -30,13 +30,14 @@ from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.orientation import FLIPPED, upright
 from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.losses import LossReport, first_of
-from scenes.formats.mitsuba.read import FILTERS, FORWARD
+from scenes.formats.mitsuba.read_settings import FILTERS, FORWARD
 from scenes.formats.mitsuba.write_elements import Element
 from scenes.formats.mitsuba.write_lights import MitsubaLightWriter
 from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
 
 _FILTERS = first_of(FILTERS)
+_DEVIATIONS = 4.0  # that the radius of a Gaussian filter of Mitsuba 3 is wide
 _SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "halton": "halton",
              "hammersley": "hammersley"}  # fmt: skip
 _INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidirectional": "bdpt",
@@ -101,7 +102,11 @@ class MitsubaWriter(MitsubaLightWriter):
         if self.modern:
             if film.filter == "tent":
                 self.put(rfilter, "float", "radius", number(film.filter_radius_px))
-            elif film.filter != "box":
+            elif film.filter == "gaussian":
+                self.put(rfilter, "float", "stddev", number(film.filter_radius_px / _DEVIATIONS))
+            elif film.filter == "sinc" and film.filter_radius_px == int(film.filter_radius_px):
+                self.put(rfilter, "integer", "lobes", str(int(film.filter_radius_px)))
+            elif film.filter != "box" and (film.filter, film.filter_radius_px) != ("mitchell", 2.0):
                 self.report.add("film", f"a filter of radius {film.filter_radius_px:g}", "the width it has by default")
         else:
             self.put(rfilter, "float", "radius", number(film.filter_radius_px))

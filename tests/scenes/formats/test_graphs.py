@@ -106,12 +106,6 @@ def test_overflowing_transforms_are_one_clear_line(tmp_path: Path) -> None:
     assert "\n" not in str(error.value)
 
 
-def test_files_of_mitsuba_3_are_refused_not_misread(tmp_path: Path) -> None:
-    (tmp_path / "a.xml").write_text('<scene version="3.0.0"><sensor type="perspective"/></scene>')
-    with pytest.raises(SceneError, match=r"a\.xml:1:1: expected a scene of Mitsuba 0\.5 or before, got .* '3\.0\.0'"):
-        load_scene_file(tmp_path / "a.xml")
-
-
 def test_hints_are_no_reason_to_refuse(tmp_path: Path) -> None:
     """A sampler and the samples of a light do not change the picture; a shape that is left out does."""
     head = (

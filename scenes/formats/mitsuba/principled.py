@@ -1,0 +1,70 @@
+"""The principled material of Mitsuba 3, as mixtures of those of the canonical scene.
+
+Source: Mitsuba 3 documentation, plugin reference, "principled"; Burley 2012, "Physically based shading at Disney", for
+what its parameters mean.
+"""
+
+from __future__ import annotations
+
+from scenes.canonical import ConstantTexture, Glass, Material, Metal, MixMaterial, Plastic, SceneError, Texture
+from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.indices import index_of_reflectance
+from scenes.formats.appearance.spectra import grey
+from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.mitsuba.read_textures import MitsubaTextures
+
+_PLAIN = ("anisotropic", "specTint", "sheen", "sheenTint", "flatness", "clearcoat", "clearcoatGloss", "diffTrans")
+
+
+def principled(properties: Properties, textures: MitsubaTextures) -> Material:
+    """A base with a coat that adds to it, metal where it is metallic, and glass where light passes.
+
+    Deviation: the coat follows Fresnel's equations and its facets have one roughness; sheen, tint, clear coat and
+    flatness are left out, which is reported where they are given.
+    """
+    base = textures.texture(properties, "baseColor", grey(0.5))
+    roughness = _mean(properties, textures, "roughness", 0.5)
+    alpha = max(roughness * roughness, 1e-3)
+    specular = _mean(properties, textures, "specular", 0.5)
+    root = (0.08 * specular) ** 0.5
+    ior = properties.number("eta", (1.0 + root) / (1.0 - root))
+    if not 1.0 <= ior < 1e3:
+        raise SceneError(f"{properties.where}: eta: expected at least 1, got {ior:g}")
+    for name in _PLAIN:
+        if _mean(properties, textures, name, 0.0) != 0.0 and name not in ("sheenTint", "clearcoatGloss"):
+            textures.report.add(properties.where, f"{name} of the material 'principled'")
+    made: Material = Plastic(base, ior=ior, roughness=alpha, layered=False)
+    through = _amount(properties, textures, "specTrans")
+    if through is not None:
+        made = _mixed(made, Glass(transmittance=base, ior=ior, roughness=(alpha, alpha)), through)
+    metallic = _amount(properties, textures, "metallic")
+    if metallic is not None:
+        made = _mixed(made, _metal(base, alpha), metallic)
+    textures.report.add(properties.where, "material 'principled'", "plastic, metal and glass of its parameters")
+    return made
+
+
+def _metal(base: Texture, alpha: float) -> Material:
+    """A metal that reflects the base colour straight back; of a texture, the same at all angles."""
+    if isinstance(base, ConstantTexture):
+        return Metal(*index_of_reflectance(base.value), (alpha, alpha))
+    return Metal(grey(0.0), grey(1.0), (alpha, alpha), base)
+
+
+def _mixed(first: Material, second: Material, amount: Texture) -> Material:
+    return second if amount == ConstantTexture(grey(1.0)) else MixMaterial(first, second, amount)
+
+
+def _amount(properties: Properties, textures: MitsubaTextures, name: str) -> Texture | None:
+    """How much of a part there is, None where there is none."""
+    found = textures.texture(properties, name, grey(0.0))
+    return None if found == ConstantTexture(grey(0.0)) else found
+
+
+def _mean(properties: Properties, textures: MitsubaTextures, name: str, default: float) -> float:
+    """A number; a texture becomes its mean, which is reported."""
+    found = textures.texture(properties, name, grey(default))
+    value = sum(mean_of(found)) / 3.0
+    if not isinstance(found, ConstantTexture):
+        textures.report.add(properties.where, f"{name}: a texture", f"its mean, {value:g}")
+    return value
