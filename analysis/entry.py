@@ -21,6 +21,7 @@ COMMANDS = {
     "study": "analysis.suitability.command",
     "ablation": "analysis.ablation.command",
     "trade": "analysis.trade.command",
+    "precision": "analysis.precision.command",
     "sensitivity": "analysis.sensitivity.command",
     "spectrum": "analysis.spectrum.command",
     "cost_report": "analysis.cost_report.command",

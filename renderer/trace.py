@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
@@ -145,6 +146,11 @@ class Renderer:
         if not 0.0 < aspect < math.inf:
             raise ValueError(f"aspect: expected a positive number, got {aspect}")
         return self._shade(batch, aspect, footprint_px or self.footprint_resolution_px)
+
+    def change_texels(self, change: Callable[[Tensor], Tensor]) -> None:
+        """Replaces the colours of all textures, at every level, ``(texels, 3)`` float32."""
+        texels = wp.to_torch(self._buffers.data.texels)
+        texels.copy_(change(texels))
 
     def viewpoint(self, time_s: float, aspect: float = 1.0) -> Viewpoint:
         """Where the camera and all instances are, to the bit as samples of that time find them.

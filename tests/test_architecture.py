@@ -20,8 +20,9 @@ MEASURED = tuple(f"analysis.{room}" for room in ("command", "storage", "metrics"
 DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks")
 OTHERS = ("renderer", "scenes", "tsar")
 QUESTIONS = (
-    "comparison suitability ablation trade sensitivity spectrum cost_report conversion bench tracer perception".split()
-)
+    "comparison suitability ablation trade precision sensitivity spectrum cost_report conversion bench tracer "
+    "perception"
+).split()
 
 # What the modules of a room may import of the project, beside the room itself. A room that is not named has the rule of
 # the nearest folder above it that is.

@@ -46,7 +46,8 @@ def estimate(
     """
     color, nonfinite = replace_nonfinite(color, config.framelet_side)
     state, has_state = cache.previous(batch.level, batch.index)
-    signal, fields = compressed_luminance(color), torch.zeros(2, config.sdf_side**2)
+    signal = compressed_luminance(color)
+    fields = signal.new_zeros(2, config.sdf_side**2)
     first, _ = tile_interval(batch.level, batch.index, config.field_level)
     after = torch.empty_like(state)
     for level in range(config.level_min, config.level_max + 1):

@@ -125,9 +125,10 @@ class Animation:
 
 Tracing = tuple[tuple[str, bool | int | str], ...]
 """How a run is traced where that differs from its scene and from the renderer's own, by name in alphabetical order."""
-TRACING = ("depth", "light_cells", "packets", "structure")
+TRACING = ("depth", "light_cells", "packets", "structure", "texels")
 """Names in :data:`Tracing`. ``depth``: of reflections; ``light_cells``: along each axis of a light that has an extent,
-0 for one random point of it; ``packets`` and ``structure`` as of :class:`renderer.trace.Renderer`."""
+0 for one random point of it; ``packets`` and ``structure`` as of :class:`renderer.trace.Renderer`; ``texels``: one of
+:data:`tsar.formats.FORMATS` that holds textures."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,8 @@ class Case:
             compared over so many seconds; None for no such division.
         camera_path: motion of the camera of a file that has none.
         tracing: how it is traced; the reference is always traced as the scene says.
+        formats: of numbers that the policy keeps, where they are not its own, by name in alphabetical order
+            (:class:`tsar.policies.stored.Stored`). With any, what each cycle asks for is noted.
         display_px: side of the display, on which pictures of another size are shown enlarged; 0 for that of the
             pictures. With a display no causes are told apart.
         samples_per_s: samples a second of every policy, whatever they cost; None where the machine sets the pace.
@@ -176,6 +179,7 @@ class Case:
     budget_s: float | None = None
     camera_path: str = ""
     tracing: Tracing = ()
+    formats: tuple[tuple[str, str], ...] = ()
     display_px: int = 0
     samples_per_s: float | None = None
 
@@ -231,7 +235,7 @@ class Case:
         """For people: policy and changes, input, batch, resolution, seed and phase."""
         c = self.tsar
         batch = "" if is_framed(self.policy) else f"-b{c.batch_size}"
-        changes = (f"-{name}-{_short(value)}" for name, value in (*self.parts, *self.tracing))
+        changes = (f"-{name}-{_short(value)}" for name, value in (*self.parts, *self.tracing, *self.formats))
         scene = Path(self.input).stem
         text = f"{self.policy}{''.join(changes)}-{scene}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
         return text.replace(" ", "-")

@@ -193,6 +193,7 @@ def _run(case: Case, key: str, place: Place) -> None:
         "regions": seen.regions(),
         "stills": stills,
         **(_cycles(totals, case) if totals.recorded and totals.cycles else {}),
+        **({"asked": made.meter.asked} if made.meter.asked is not None else {}),
         "spent": spent(made, case),
         "machine": {
             "reference_s": began_run - began,
@@ -256,8 +257,10 @@ def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
 
     machine = Machine(case.ledger, case.capacity, case.cost, case.samples_per_s)
     span_s = case.start_s, case.start_s + case.scale.seconds
-    parts = dict(case.parts)
-    return begin(case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads, parts=parts)
+    return begin(
+        case.policy, case.tsar, renderer_of, machine, span_s, truths.at, threads=place.threads, parts=dict(case.parts),
+        formats=dict(case.formats),
+    )  # fmt: skip
 
 
 def _budgeting(case: Case, place: Place) -> Budgeting:

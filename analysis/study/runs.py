@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds, measured_parameters
@@ -16,6 +18,7 @@ from analysis.storage.records import RecordLimits
 from tsar.config import StagesName, TsarConfig, closed_choices
 from tsar.error import count_nonfinite
 from tsar.policies import POLICIES
+from tsar.policies.stored import Stored
 from tsar.policy import Policy, Price, Setting, run
 from tsar.types import FrameletBatch, SampleBatch, Spent, StepRecord, Trace
 
@@ -26,9 +29,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class Meter:
-    """A renderer that counts: work by kind, calls, seconds, and samples that are not finite. Changes in place."""
+    """A renderer that counts: work by kind, calls, seconds, and samples that are not finite. Changes in place.
+
+    Attributes:
+        asked: of each batch, a hash of where its samples lie; None where that is not noted.
+    """
 
     trace: Trace
+    asked: list[str] | None = None
     counters: Counter[str] = field(default_factory=Counter)
     calls: int = 0
     wall_s: float = 0.0
@@ -41,6 +49,8 @@ class Meter:
         self.calls += 1
         self.counters.update(samples.counters)
         self.nonfinite += count_nonfinite(samples.color)
+        if self.asked is not None:
+            self.asked.append(hashlib.sha256(batch.position.contiguous().numpy().tobytes()).hexdigest()[:8])
         return samples
 
 
@@ -169,6 +179,7 @@ def begin(
     threads: int = 1,
     on_record: Callable[[StepRecord], None] = lambda record: None,
     parts: Mapping[str, bool | int | float] | None = None,
+    formats: Mapping[str, str] | None = None,
 ) -> PolicyRun:
     """A run of a policy, not started yet.
 
@@ -183,9 +194,10 @@ def begin(
         threads: that share them.
         on_record: told of every recorded cycle.
         parts: options of the policy ``tsar`` that differ from its own; None for its own.
+        formats: of numbers that the policy keeps, where they are not its own; with any, what it asks for is noted.
 
     Raises:
-        ConfigError: no policy has that name.
+        ConfigError: no policy has that name, or it keeps no such numbers.
     """
     from renderer.stages.control import stages as stages_of
 
@@ -198,9 +210,10 @@ def begin(
         lambda batch: renderer_of(1).trace(batch, aspect),
         lambda time_s: renderer_of(1).viewpoint(time_s, aspect),
     )
-    policy = _changed(setting, parts) if parts else POLICIES[name](setting)
+    make: Callable[[Setting], Policy[Any]] = partial(_changed, parts=parts) if parts else POLICIES[name]
+    policy = Stored(setting, make, formats) if formats else make(setting)
     renderer = renderer_of(policy.footprint)
-    meter, totals = Meter(lambda batch: renderer.trace(batch, aspect)), Totals(config)
+    meter, totals = Meter(lambda batch: renderer.trace(batch, aspect), [] if formats else None), Totals(config)
     clock = machine.clock(policy.price)
     images = _noted(policy, meter, clock, span_s, totals, on_record)
     return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)

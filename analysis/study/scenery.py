@@ -10,6 +10,7 @@ from analysis.metrics.perceptual import one_thread
 from analysis.metrics.quality import reference_times
 from analysis.storage.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
 from analysis.study.cases import Animation, Scale, Tracing
+from tsar.formats import rounded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -47,7 +48,11 @@ def renderer(animation: Animation, footprint_px: float, threads: int, tracing: T
 
     scene = _scene(animation, tuple(one for one in tracing if one[0] in _OF_THE_SCENE))
     how: dict[str, Any] = {name: value for name, value in tracing if name not in _OF_THE_SCENE}
-    return Renderer(scene, "cpu", threads, footprint_resolution_px=footprint_px, **how)
+    texels = how.pop("texels", "float32")
+    made = Renderer(scene, "cpu", threads, footprint_resolution_px=footprint_px, **how)
+    if texels != "float32":
+        made.change_texels(lambda values: rounded(values, texels))
+    return made
 
 
 def render_reference(animation: Animation, start_s: float, scale: Scale, folder: Path, threads: int) -> Reference:

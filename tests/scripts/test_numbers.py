@@ -23,6 +23,7 @@ from analysis.perception.options import (
     SimulateOptions,
     StimuliOptions,
 )
+from analysis.precision.options import PrecisionOptions
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.spectrum.options import SpectrumOptions
 from analysis.suitability.options import SuitabilityOptions
@@ -55,6 +56,7 @@ OPTIONS: dict[str, Any] = {
     "perception.py simulate": SimulateOptions(),
     "perception.py stimuli": StimuliOptions(),
     "pointsets.py": PointSetOptions(),
+    "precision.py": PrecisionOptions(),
     "render.py": RenderOptions("glass"),
     "run.py": RunOptions("fly-by"),
     "sensitivity.py": SensitivityOptions(),

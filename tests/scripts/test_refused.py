@@ -10,7 +10,7 @@ import pytest
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 SMALL = "--resolution-px 64 --batch-size 16"
-CACHED = ("run", "sensitivity", "suitability", "ablation")
+CACHED = ("run", "sensitivity", "suitability", "ablation", "precision")
 """Commands that have a cache of references."""
 
 REFUSED: dict[str, tuple[str, ...]] = {
@@ -62,6 +62,12 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "pointsets --levels 8 27 60": ("levels", "cubes", "60"),
     "pointsets --levels 8 27": ("levels", "at least three"),
     "pointsets --cases 0": ("cases", "0"),
+    "precision --inputs nowhere": ("inputs", "nowhere"),
+    "precision --row 16": ("row", "0 to 15"),
+    "precision --policies tsar tsar": ("policies", "none twice"),
+    "precision --kept magic": ("kept", "colors", "densities", "magic"),
+    "precision --policies tsar --kept wavelets": ("kept", "colors", "wavelets"),
+    "precision --tolerance -1": ("tolerance", "between 0"),
     "render nonsense": ("scene", "'nonsense'"),
     "render fly-by --width-px -1": ("width_px", "-1"),
     "render fly-by --frames -3": ("frames", "-3"),

@@ -24,6 +24,7 @@ PACKAGES = ("tsar", "renderer", "analysis", "scenes")
 LACKING = [
     ("suitability.py", (), "distributed", "study"),
     ("ablation.py", (), "distributed", "study"),
+    ("precision.py", (), "distributed", "study"),
     ("trade.py", (), "optuna", "search"),
     ("trade.py", ("--trials", "0"), "distributed", "study"),
     ("suitability.py", (), "pycvvdp", "perception"),

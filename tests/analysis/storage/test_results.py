@@ -66,6 +66,7 @@ COMMANDS = {
     "cost_report.py": (),
     "spectrum.py": (),
     "ablation.py": (),
+    "precision.py": (),
     "suitability.py": ("--inputs", "fly-by", "--rows", "0"),
     "sensitivity.py": (),
     "accelerators.py": (),

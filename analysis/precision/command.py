@@ -1,0 +1,87 @@
+"""Measure what fewer bits cost: everything that a policy keeps, and textures, in formats down to 8 bits.
+
+Each run holds one thing in another format between the stages, or all of it, on the five inputs. Reported are the error
+over that of the policy as it is, and the first batch that it asks for otherwise. Arithmetic stays float32, but for runs
+in float64.
+
+Examples: python scripts/precision.py --out out/precision
+          python scripts/precision.py --inputs fly-by --policies tsar --kept colors variances --out out/two
+          python scripts/precision.py --scale half --repetitions 3 --markdown --out out/precision-half
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from analysis.command.cli import bad_input, full_disk, parse, require_unbroken
+from analysis.command.extras import require_extra
+from analysis.precision.options import PrecisionOptions
+
+WRITTEN = ("tables/*.csv", "tables.md")
+
+
+def main() -> None:
+    """Runs what is missing; prints the tables."""
+    options = parse(PrecisionOptions, __doc__ or "")
+    require_extra("study", "perception")
+    from analysis.command.console import show
+
+    summary = study(options)
+    written = f"written to {options.out}: summary.json, tables/, tables.md"
+    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
+    require_unbroken(summary["broken_invariants"])
+    if summary["failures"]:
+        sys.exit(1)
+
+
+def study(options: PrecisionOptions) -> dict[str, Any]:
+    """Runs what is missing, writes everything to ``options.out`` and prints the tables. Returns what ``summary.json``
+    holds.
+
+    Raises:
+        InputError: something asked for cannot be had.
+    """
+    from analysis.command.console import markdown, show
+    from analysis.precision.runs import OWN, runs
+    from analysis.precision.tables import Result, format_table, least_safe, run_table, shown_tables
+    from analysis.storage.files import atomic, write_json, write_table
+    from analysis.storage.summary import with_source
+    from analysis.study.evaluation import broken
+    from analysis.study.farm import run_study
+
+    with bad_input():
+        planned = runs(options)
+    outcomes = run_study(options, [run.case for run in planned], WRITTEN)
+    outcomes.tell()
+    done = outcomes.summaries()
+    made = [run for run in planned if run.case in done]
+    lines = run_table(
+        Result(
+            run,
+            float(outcomes.times(run.case)["mse"].mean()),
+            done[run.case]["asked"],
+            bool(broken([done[run.case]])),
+        )
+        for run in made
+    )
+    formats = format_table(lines, options.tolerance)
+    tables = {"runs": lines, "formats": formats, "safe": least_safe(formats)}
+    shown = shown_tables(formats, options.tolerance)
+    out = options.out.resolve()
+    with full_disk(out):
+        for name, table in tables.items():
+            write_table(out / "tables" / f"{name}.csv", table)
+        with atomic(out / "tables.md") as file:
+            file.write_text(markdown(shown), encoding="utf-8")
+        found = {
+            "runs": len(outcomes.keys),
+            "runs_done": len(made),
+            "failures": dict(sorted(outcomes.reasons.items())),
+            "broken_invariants": broken(done[run.case] for run in made if run.form == OWN),
+            "tables": {name: table.to_dict("records") for name, table in tables.items()},
+        }
+        summary = with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
+        write_json(out / "summary.json", summary)
+    show(*([markdown(shown)] if options.markdown else shown))
+    return summary

@@ -1,0 +1,56 @@
+"""Options of the study of precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from analysis.command import limits
+from analysis.command.cluster import ClusterOptions
+from analysis.command.options import REFERENCES, References, Unprefixed
+from analysis.study.cases import INPUTS, ROWS
+from tsar.config import TsarConfig, closed_choices, require
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class PrecisionOptions:
+    """What a policy keeps from one stage to the next, and textures, in numbers of fewer bits. Runs that are on disk are
+    not repeated."""
+
+    inputs: tuple[str, ...] = INPUTS
+    """Built-in inputs."""
+    policies: tuple[Literal["tsar", "thesis"], ...] = ("tsar", "thesis")
+    """Whose numbers."""
+    kept: tuple[str, ...] = ()
+    """Names of what is held in other formats, each alone; none for everything. A wrong name lists them."""
+    row: int = 7
+    """Row of table 7.2, 0 to 15."""
+    scale: Literal["thesis", "half", "quick"] = "quick"
+    """Sizes, as of the suitability study."""
+    repetitions: int = 1
+    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
+    """Of all runs; batch and resolution come from the row, the seed from the repetition."""
+    start_s: float = 0.0
+    """Where in the animation the measurement starts, seconds."""
+    tolerance: float = 0.01
+    """A format is safe where no run breaks an invariant and the error, in the mean of all runs, is greater by no more
+    than this share."""
+    markdown: bool = False
+    """Print the table as Markdown."""
+    farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
+    """Where the runs are made."""
+    out: Path = Path("out/precision")
+    """Folder for the results."""
+    cache: References = REFERENCES
+
+    def __post_init__(self) -> None:
+        unknown = [one for one in self.inputs if one not in INPUTS]
+        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        for name in ("inputs", "policies"):
+            chosen = getattr(self, name)
+            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
+        require(0 <= self.row < len(ROWS), "row", f"a number from 0 to {len(ROWS) - 1}", self.row)
+        limits.within(self, repetitions=limits.REPETITIONS, start_s=limits.TIMES_S, tolerance=(0.0, 10.0))

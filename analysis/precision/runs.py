@@ -1,0 +1,96 @@
+"""Which runs the study of precision has: everything that a policy keeps, in every format, alone and together."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from dataclasses import dataclass
+
+from analysis.precision.options import PrecisionOptions
+from analysis.study.cases import SCALES, Case
+from tsar.config import require
+from tsar.policies.stored import ALL
+
+TEXTURES = "textures"
+OWN = "as it is"
+"""The format that is the policy's own."""
+COLORS = ("bfloat16", "float16", "unorm8")
+NUMBERS = ("bfloat16", "float16", "float8")
+DOUBLES = ("float32", "bfloat16", "float16")
+KEPT: dict[str, dict[str, tuple[str, ...]]] = {
+    "tsar": {
+        ALL: ("float64", "bfloat16", "float16"),
+        "samples": COLORS,
+        "colors": COLORS,
+        "variances": NUMBERS,
+        "change": NUMBERS,
+        "points": NUMBERS,
+        "places": NUMBERS,
+        "times": DOUBLES,
+        "picture": COLORS,
+        TEXTURES: COLORS,
+    },
+    "thesis": {
+        ALL: ("float64", "bfloat16", "float16"),
+        "samples": COLORS,
+        "colors": COLORS,
+        "wavelets": NUMBERS,
+        "errors": NUMBERS,
+        "densities": DOUBLES,
+        "times": DOUBLES,
+        "picture": COLORS,
+        TEXTURES: COLORS,
+    },
+}
+"""What each policy keeps (:data:`tsar.policies.stored.FIELDS`), and the formats in which it is tried. Times and
+densities are float64 of their own, everything else float32."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case and its place in the study.
+
+    Attributes:
+        policy, kept, form: whose numbers, which, and their format; :data:`OWN` for the run that others are compared to.
+        repetition: 0, 1, …
+    """
+
+    policy: str
+    kept: str
+    form: str
+    repetition: int
+    case: Case
+
+
+def runs(options: PrecisionOptions) -> list[Run]:
+    """Every run.
+
+    Raises:
+        ConfigError: none of the policies keeps something that is asked for.
+    """
+    known = dict.fromkeys(name for policy in options.policies for name in KEPT[policy])
+    for name in options.kept:
+        require(name in known, "kept", f"names out of {', '.join(known)}", name)
+    scale = SCALES[options.scale]
+    found = []
+    for repetition, policy, name in itertools.product(range(options.repetitions), options.policies, options.inputs):
+        whole = Case(
+            input=name,
+            policy=policy,
+            tsar=scale.config(options.row, dataclasses.replace(options.tsar, seed=repetition)),
+            scale=scale,
+            phase=repetition / options.repetitions,
+            start_s=options.start_s,
+            formats=(("samples", "float32"),),  # changes nothing; what is asked for is noted
+        )
+        found.append(Run(policy, OWN, OWN, repetition, whole))
+        for kept, forms in KEPT[policy].items():
+            if options.kept and kept not in options.kept:
+                continue
+            for form in forms:
+                if kept == TEXTURES:
+                    case = dataclasses.replace(whole, tracing=(("texels", form),))
+                else:
+                    case = dataclasses.replace(whole, formats=((kept, form),))
+                found.append(Run(policy, kept, form, repetition, case))
+    return found
