@@ -59,7 +59,7 @@ def study(options: PrecisionOptions) -> dict[str, Any]:
     lines = run_table(
         Result(
             run,
-            float(outcomes.times(run.case)["mse"].mean()),
+            float(outcomes.times(run.case)["mse"].to_numpy().mean()),
             done[run.case]["asked"],
             bool(broken([done[run.case]])),
         )

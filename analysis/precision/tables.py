@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -74,13 +75,14 @@ def format_table(lines: pd.DataFrame, tolerance: float) -> pd.DataFrame:
     ``most`` are those of single ones; ``safe`` says that it is at most ``1 + tolerance``, and that no invariant
     broke."""
     found = []
-    for (policy, kept, form), group in lines.groupby(["policy", "kept", "format"], sort=False) if len(lines) else ():
+    groups: Any = lines.groupby(["policy", "kept", "format"], sort=False) if len(lines) else ()
+    for (policy, kept, form), group in groups:
         change = float(np.exp(np.log(group["change"]).mean()))
         found.append({
             "policy": policy,
             "kept": kept,
             "format": form,
-            "bits": BITS[str(form)],
+            "bits": BITS[form],
             "change": change,
             "least": float(group["change"].min()),
             "most": float(group["change"].max()),
@@ -97,7 +99,8 @@ def least_safe(formats: pd.DataFrame) -> pd.DataFrame:
     """A line a policy and what it keeps alone: the safe format of fewest bits, and of several the one of least error;
     empty where none of those tried is."""
     found = []
-    for (policy, kept), group in formats.groupby(["policy", "kept"], sort=False) if len(formats) else ():
+    groups: Any = formats.groupby(["policy", "kept"], sort=False) if len(formats) else ()
+    for (policy, kept), group in groups:
         safe = group[group["safe"]].sort_values(["bits", "change"], kind="stable")
         form, change = (safe["format"].iloc[0], safe["change"].iloc[0]) if len(safe) else ("", np.nan)
         found.append({"policy": policy, "kept": kept, "format": form, "change": change})
