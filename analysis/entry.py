@@ -22,6 +22,7 @@ COMMANDS = {
     "ablation": "analysis.ablation.command",
     "trade": "analysis.trade.command",
     "precision": "analysis.precision.command",
+    "workloads": "analysis.workloads.command",
     "sensitivity": "analysis.sensitivity.command",
     "spectrum": "analysis.spectrum.command",
     "cost_report": "analysis.cost_report.command",

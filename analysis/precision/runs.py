@@ -71,7 +71,7 @@ def runs(options: PrecisionOptions) -> list[Run]:
     known = dict.fromkeys(name for policy in options.policies for name in KEPT[policy])
     for name in options.kept:
         require(name in known, "kept", f"names out of {', '.join(known)}", name)
-    scale = SCALES[options.scale]
+    scale = SCALES[options.scale].errors_alone
     found = []
     for repetition, policy, name in itertools.product(range(options.repetitions), options.policies, options.inputs):
         whole = Case(

@@ -62,6 +62,11 @@ class Scale:
         """Side of the reference: of the finest row. Coarser rows see it averaged (Stephens 2011, sec. 7.2.3)."""
         return max(side for _, side in ROWS) // self.divisor
 
+    @property
+    def errors_alone(self) -> Scale:
+        """The same, with FLIP, SSIM and the causes taken at the first reference image only."""
+        return dataclasses.replace(self, stride=1 << 30)
+
     def config(self, row: int, base: TsarConfig) -> TsarConfig:
         """Configuration of a row of table 7.2: batch and resolution from the row, the rest from ``base``.
 

@@ -36,12 +36,14 @@ from analysis.tracer.options import (
 )
 from analysis.tracer.render_options import RenderOptions
 from analysis.trade.options import TradeOptions
+from analysis.workloads.options import WorkloadOptions
 from tests.scripts.commands import assert_refused, call_script, nothing_in, one_line, run_script
 
 ROOT = Path(__file__).resolve().parents[2]
 
 OPTIONS: dict[str, Any] = {
     "ablation.py": AblationOptions(),
+    "workloads.py": WorkloadOptions(),
     "accelerators.py": AcceleratorOptions(),
     "bench.py": BenchOptions(),
     "conversion_check.py": CheckOptions(markers=True),

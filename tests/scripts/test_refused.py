@@ -10,7 +10,7 @@ import pytest
 from tests.scripts.commands import assert_refused, call_script, nothing_in
 
 SMALL = "--resolution-px 64 --batch-size 16"
-CACHED = ("run", "sensitivity", "suitability", "ablation", "precision")
+CACHED = ("run", "sensitivity", "suitability", "ablation", "precision", "workloads")
 """Commands that have a cache of references."""
 
 REFUSED: dict[str, tuple[str, ...]] = {
@@ -62,6 +62,11 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "pointsets --levels 8 27 60": ("levels", "cubes", "60"),
     "pointsets --levels 8 27": ("levels", "at least three"),
     "pointsets --cases 0": ("cases", "0"),
+    "workloads --inputs nowhere": ("inputs", "nowhere"),
+    "workloads --policies nobody": ("policies", "nobody"),
+    "workloads --sample-flops 0": ("sample_flops", "between 1", "0.0"),
+    "workloads --sides-px 300": ("sides_px", "512", "300"),
+    "workloads --image-hz 8 8": ("image_hz", "none twice"),
     "precision --inputs nowhere": ("inputs", "nowhere"),
     "precision --row 16": ("row", "0 to 15"),
     "precision --policies tsar tsar": ("policies", "none twice"),

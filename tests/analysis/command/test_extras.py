@@ -25,6 +25,7 @@ LACKING = [
     ("suitability.py", (), "distributed", "study"),
     ("ablation.py", (), "distributed", "study"),
     ("precision.py", (), "distributed", "study"),
+    ("workloads.py", (), "distributed", "study"),
     ("trade.py", (), "optuna", "search"),
     ("trade.py", ("--trials", "0"), "distributed", "study"),
     ("suitability.py", (), "pycvvdp", "perception"),

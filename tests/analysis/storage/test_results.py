@@ -67,6 +67,7 @@ COMMANDS = {
     "spectrum.py": (),
     "ablation.py": (),
     "precision.py": (),
+    "workloads.py": (),
     "suitability.py": ("--inputs", "fly-by", "--rows", "0"),
     "sensitivity.py": (),
     "accelerators.py": (),

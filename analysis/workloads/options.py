@@ -1,0 +1,61 @@
+"""Options of the map of workloads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from analysis.command import limits
+from analysis.command.cluster import ClusterOptions
+from analysis.command.options import REFERENCES, References, Unprefixed
+from analysis.study.cases import INPUTS
+from tsar.config import TsarConfig, closed_choices, require
+from tsar.policies import POLICIES, RIVALS
+
+
+@dataclass(frozen=True)
+@closed_choices()
+class WorkloadOptions:
+    """Which policy has the least error, by what a sample costs, how fast the picture moves and how large it is. Runs
+    that are on disk are not repeated."""
+
+    inputs: tuple[str, ...] = INPUTS
+    """Built-in inputs."""
+    policies: tuple[str, ...] = ("tsar", "thesis", "framed", *RIVALS)
+    """Policies that are compared; framed is one of them in any case."""
+    sample_flops: tuple[float, ...] = (1e2, 1e3, 1e4, 1e5)
+    """What a sample costs, FLOPs, on a machine that keeps the framed renderer's rate at that price."""
+    image_hz: tuple[float, ...] = (32.0, 8.0, 2.0)
+    """Images a second of the framed renderer: the fewer, the more moves from one to the next."""
+    sides_px: tuple[int, ...] = (512,)
+    """Output sides at the thesis' own size, powers of two up to 1024; batches have an eighth as many samples as there
+    are pixels."""
+    scale: Literal["thesis", "half", "quick"] = "quick"
+    """Sizes, as of the suitability study."""
+    repetitions: int = 1
+    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
+    """Of all runs; batch and resolution come from the side, the seed from the repetition."""
+    markdown: bool = False
+    """Print the tables as Markdown."""
+    farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
+    """Where the runs are made."""
+    out: Path = Path("out/workloads")
+    """Folder for the results."""
+    cache: References = REFERENCES
+
+    def __post_init__(self) -> None:
+        unknown = [one for one in self.inputs if one not in INPUTS]
+        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        for one in self.policies:
+            POLICIES.require(one, "policies")
+        for name in ("inputs", "policies", "sample_flops", "image_hz", "sides_px"):
+            chosen = getattr(self, name)
+            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
+        for name, (least, most) in {"sample_flops": (1.0, 1e9), "image_hz": (0.5, 1000.0)}.items():
+            ok = all(least <= one <= most for one in getattr(self, name))
+            require(ok, name, f"numbers between {least:g} and {most:g}", getattr(self, name))
+        ok = all(256 <= side <= 1024 and side & (side - 1) == 0 for side in self.sides_px)
+        require(ok, "sides_px", "256, 512 or 1024", self.sides_px)
+        limits.within(self, repetitions=limits.REPETITIONS)

@@ -1,0 +1,82 @@
+"""Which runs the map of workloads has."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from analysis.metrics.cost_model import CostParameters, per_segment
+from analysis.study.cases import ROWS, SCALES, Case, framed_config, is_framed
+from analysis.workloads.options import WorkloadOptions
+from tsar.config import ConfigError
+
+UNPRICED = ("framed", "framed-1", "framed-super")
+"""Policies that are charged for samples alone: on a machine that keeps the framed renderer's rate, what a sample costs
+changes nothing for them."""
+_BATCH, _SIDE = ROWS[7]
+_SEGMENTS = 4.0
+
+
+@dataclass(frozen=True)
+class Workload:
+    """A place on the map.
+
+    Attributes:
+        sample_flops: what a sample costs, FLOPs.
+        image_hz: images a second of the framed renderer.
+        side_px: of the output, at the thesis' own size.
+    """
+
+    sample_flops: float
+    image_hz: float
+    side_px: int
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case and its place on the map. ``case`` is None where the policy has no time for a cycle within the run."""
+
+    policy: str
+    workload: Workload
+    repetition: int
+    input: str
+    case: Case | None
+
+
+def runs(options: WorkloadOptions) -> list[Run]:
+    """Every run, of which several may share a case."""
+    policies = dict.fromkeys(("framed", *options.policies))
+    places = itertools.product(options.sides_px, options.image_hz, options.sample_flops)
+    workloads = [Workload(flops, rate, side) for side, rate, flops in places]
+    return [
+        run
+        for repetition in range(options.repetitions)
+        for workload in workloads
+        for name in options.inputs
+        for run in _runs_at(options, tuple(policies), workload, name, repetition)
+    ]
+
+
+def _runs_at(
+    options: WorkloadOptions, policies: tuple[str, ...], workload: Workload, name: str, repetition: int
+) -> Iterator[Run]:
+    scale = SCALES[options.scale].errors_alone
+    batch = _BATCH * (workload.side_px // (_SIDE // 2)) ** 2 // 4
+    config = scale.sized(batch, workload.side_px, dataclasses.replace(options.tsar, seed=repetition))
+    segments = workload.sample_flops / float(per_segment(CostParameters()))
+    for policy in policies:
+        try:
+            case = Case(
+                input=name,
+                policy=policy,
+                tsar=framed_config(config.resolution_px) if is_framed(policy) else config,
+                scale=scale,
+                phase=repetition / options.repetitions,
+                framed_rate_hz=workload.image_hz,
+                trace_segments=_SEGMENTS if policy in UNPRICED else segments,
+            )
+        except ConfigError:
+            case = None
+        yield Run(policy, workload, repetition, name, case)
