@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ def figure(maps: pd.DataFrame) -> Figure:
     colors = inks([name for name in names if name not in ("tsar", "framed")], "tsar")
     colors |= {"tsar": ADAPTIVE, "framed": FRAMED}
     for axis, side in zip(axes, sides, strict=True):
-        here = maps[maps["side_px"] == side]
+        here: Any = maps[maps["side_px"] == side]
         prices = sorted(set(here["sample_flops"]))
         rates = sorted(set(here["image_hz"]), reverse=True)
         cells = {(line["sample_flops"], line["image_hz"]): line for line in here.to_dict("records")}

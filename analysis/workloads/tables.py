@@ -98,7 +98,7 @@ def shown_tables(maps: pd.DataFrame, paying: pd.DataFrame) -> list[Table]:
     """The tables as people read them: a map for each side, and from where on every policy pays."""
     found = []
     for side in sorted(set(maps["side_px"])) if len(maps) else ():
-        here = maps[maps["side_px"] == side]
+        here: Any = maps[maps["side_px"] == side]
         prices = sorted(set(here["sample_flops"]))
         rows = []
         for rate in sorted(set(here["image_hz"]), reverse=True):
