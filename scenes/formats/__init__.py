@@ -18,6 +18,7 @@ FORMATS: Named[Format] = Named(
     "tsar.scene_formats",
     {
         "pbrt": "scenes.formats.pbrt.declared:PBRT",
+        "pbrt4": "scenes.formats.pbrt.declared:PBRT_4",
         "luxrender": "scenes.formats.luxrender.declared:LUXRENDER",
         "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",

@@ -65,10 +65,10 @@ def _of_two(first: Texture, second: Texture, join: Join) -> Texture | None:
 def _joined(first: Texture, second: Texture, join: Join, again: Pairs) -> Texture | None:
     if isinstance(first, ConstantTexture):
         value = np.array(first.value)
-        return _changed(second, lambda other: join(value, other))
+        return changed(second, lambda other: join(value, other))
     if isinstance(second, ConstantTexture):
         value = np.array(second.value)
-        return _changed(first, lambda other: join(other, value))
+        return changed(first, lambda other: join(other, value))
     if isinstance(first, CheckerboardTexture) and isinstance(second, CheckerboardTexture):
         if first.uv_scale != second.uv_scale:
             return None
@@ -83,7 +83,7 @@ def _joined(first: Texture, second: Texture, join: Join, again: Pairs) -> Textur
     return None
 
 
-def _changed(texture: Texture, change: Change) -> Texture | None:
+def changed(texture: Texture, change: Change) -> Texture | None:
     """A texture with every colour changed, or None where it is not plain."""
     return once_a_node(lambda node, again: _change(node, change, again), texture)
 

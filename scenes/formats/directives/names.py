@@ -17,12 +17,17 @@ Of = Literal["color", "float"]
 
 @dataclass
 class Names:
-    """Tables of what has a name; what a block names is forgotten at its end, which costs no more than it named."""
+    """Tables of what has a name; what a block names is forgotten at its end, which costs no more than it named.
+
+    Attributes:
+        lasting: whether nothing is forgotten: names of PBRT v4 belong to the whole scene.
+    """
 
     colors: dict[str, Texture] = field(default_factory=dict)
     floats: dict[str, Texture] = field(default_factory=dict)
     materials: dict[str, Material] = field(default_factory=dict)
     indices: dict[str, tuple[Rgb, Rgb]] = field(default_factory=dict)
+    lasting: bool = False
     _before: list[tuple[dict[str, Any], str, Any]] = field(default_factory=list)
 
     def textures(self, of: Of) -> dict[str, Texture]:
@@ -40,7 +45,7 @@ class Names:
 
     def forget(self, mark: int) -> None:
         """Ends the block that began at a mark."""
-        while len(self._before) > mark:
+        while len(self._before) > mark and not self.lasting:
             table, name, value = self._before.pop()
             if value is None:
                 del table[name]

@@ -6,7 +6,7 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3).
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import numpy as np
 from scenes.canonical import Material, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.directives.names import Names
-from scenes.formats.directives.syntax import Directive, Parameters, parameters_of, parse_directives
+from scenes.formats.directives.syntax import Directive, Parameters, Values, parameters_of, parse_directives
 from scenes.formats.geometry.transform_stack import (
     TransformStack,
     inverse,
@@ -41,6 +41,8 @@ class Attributes:
     emission: tuple[float, float, float] | None = None
     power: float = 0.0  # lumens that the emission is scaled to, 0 for none
     reversed: bool = False
+    # parameters of what follows, by target and name
+    assumed: Mapping[tuple[str, str], tuple[Values, Values]] = field(default_factory=dict)
 
 
 @dataclass

@@ -45,6 +45,8 @@ class ShapeReader:
                 parameters.asked.update(parameters.given)
                 self.report.add(where, "a subdivision surface", "its control mesh")
             return facing_normals(turned(mesh) if turn_over else mesh), np.eye(4)
+        if kind == "bilinearmesh":
+            return turned(self._patches(parameters)) if turn_over else self._patches(parameters), np.eye(4)
         if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
             return self._quadric(kind, parameters, turn_over)
         parameters.asked.update(parameters.given)
@@ -118,6 +120,28 @@ class ShapeReader:
                 raise SceneError(f"{parameters.place}: quadindices: expected fours")
             kept.append(quads.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].ravel())
         return np.concatenate(kept) if kept else None
+
+    def _patches(self, parameters: Parameters) -> Mesh:
+        """Bilinear patches, each as two triangles; that loses the form of those that are not flat."""
+        points, indices = parameters.numbers("P"), parameters.numbers("indices")
+        where = str(parameters.place)
+        if indices is None and points is not None and len(points) == 12:
+            indices = np.arange(4.0)
+        if points is None or indices is None or len(points) % 3 or len(indices) % 4 or not len(indices):
+            raise SceneError(f"{where}: expected points P in threes and indices in fours")
+        patches, vertices = indices.reshape(-1, 4), points.reshape(-1, 3)
+        arrays = []
+        for name, width in (("N", 3), ("uv", 2)):
+            found = parameters.numbers(name)
+            if found is not None and len(found) != width * len(vertices):
+                raise SceneError(f"{where}: {name}: expected {width * len(vertices)} numbers, got {len(found)}")
+            arrays.append(None if found is None else found.reshape(-1, width))
+        made = checked_mesh(vertices, patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3), arrays[0], arrays[1], where)
+        corners = vertices[patches.astype(np.int64)]
+        bent = np.abs(corners[:, 0] + corners[:, 3] - corners[:, 1] - corners[:, 2]).max(axis=1)
+        if (bent > 1e-4 * np.ptp(corners, axis=1).max(axis=1)).any():
+            self.report.add(where, "bilinear patches", f"a mesh of {len(made.faces)} triangles")
+        return made
 
     def _triangles(self, parameters: Parameters) -> Mesh:
         points, indices = parameters.numbers("P"), self._indices(parameters)

@@ -65,7 +65,7 @@ class SurfaceWriter:
             return self.constant(name, texture.value, kind)
         key = id(texture), kind
         if key not in self._textures:
-            made = self._texture_line(texture, kind)
+            made = self.texture_line(texture, kind)
             label = self.label("t", "")
             self._textures[key] = texture, label
             self.lines.append(f'\tTexture "{label}" "{self.color_texture if kind == "color" else kind}" {made}')
@@ -77,7 +77,7 @@ class SurfaceWriter:
             return f'"float {name}" [ {number(sum(value) / 3.0)} ]'
         return f'"{self.color} {name}" {listed(value)}'
 
-    def _texture_line(self, texture: Texture, kind: Kind) -> str:
+    def texture_line(self, texture: Texture, kind: Kind) -> str:
         if isinstance(texture, ImageTexture):
             return self.image_line(texture)
         if isinstance(texture, CheckerboardTexture):

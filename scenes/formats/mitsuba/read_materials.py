@@ -26,6 +26,7 @@ from scenes.canonical import (
     SceneError,
     Translucent,
 )
+from scenes.formats.appearance.coats import without_bounces
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.mixtures import NOTHING, plastic_of
 from scenes.formats.appearance.spectra import grey, metal
@@ -174,7 +175,7 @@ class MitsubaSurfaces(MitsubaTextures):
             self.texture(properties, "specularReflectance", grey(1.0)),
         )
         if properties.truth("nonlinear", False):
-            self.report.add(properties.where, "colour shifts by bounces inside (nonlinear)", "none")
+            parts = without_bounces(parts[0], index, properties.where, self.report), parts[1]
         alpha = 0.0
         if properties.node.get("type") == "roughplastic":
             alphas = self._alphas(properties)

@@ -7,20 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from scenes import loading
-from scenes.canonical import EnvironmentLight, Integrator, Rgb, Sampler, Scene
+from scenes.canonical import EnvironmentLight, Integrator, Rgb, Sampler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives import lights
 from scenes.formats.directives.reader import typed
-from scenes.formats.directives.scene_reader import SceneReader, scene_of
+from scenes.formats.directives.scene_reader import SceneReader
 from scenes.formats.directives.syntax import Directive, Parameters
-from scenes.formats.losses import SAME_PICTURE, LossReport
+from scenes.formats.losses import SAME_PICTURE
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
-from scenes.formats.text.scene_files import SceneFiles
 
 SAMPLERS = {"halton": "halton", "sobol": "sobol", "02sequence": "sobol", "lowdiscrepancy": "sobol",
             "maxmindist": "sobol", "random": "independent", "stratified": "stratified"}  # fmt: skip
@@ -108,12 +106,3 @@ class PbrtReader(SceneReader):
             self.report.add(str(directive.place), "an area light of two sides", "its front")
         lights.lose_hints(parameters, self.report)
         self.left_over(parameters, "area light")
-
-
-def load_pbrt(path: Path, root: Path | None, report: LossReport) -> Scene:
-    """Reads a scene; see :data:`scenes.formats.text.format.Read`.
-
-    Raises:
-        SceneError: something cannot be read; the message has file, line and column.
-    """
-    return scene_of(PbrtReader(SceneFiles(path, root), report), path)

@@ -53,7 +53,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
 
     times_s: tuple[float, float] = (0.0, 1.0)
 
-    def _times(self, scene: Scene) -> None:
+    def write_times(self, scene: Scene) -> None:
         """Writes the two times that all motions of a PBRT file share."""
         tracks = tracks_of(scene)
         if tracks:
@@ -64,15 +64,11 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     # --- options -------------------------------------------------------------------------------------------------
 
     def write_settings(self, scene: Scene) -> None:
-        self._times(scene)
+        self.write_times(scene)
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
         self.lines.append(f'Integrator "{_INTEGRATORS[integrator.kind]}" "integer maxdepth" [ {depth} ]')
         if sampler.kind == "stratified":
-            across = _most_even(sampler.samples_per_pixel)
-            sizes = across, sampler.samples_per_pixel // across
-            self.lines.append(
-                f'Sampler "stratified" "integer xsamples" [ {sizes[0]} ] "integer ysamples" [ {sizes[1]} ]'
-            )
+            self.lines.append(self.stratified_line(sampler.samples_per_pixel))
         else:
             count = sampler.samples_per_pixel
             self.lines.append(f'Sampler "{_SAMPLERS[sampler.kind]}" "integer pixelsamples" [ {count} ]')
@@ -85,6 +81,11 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         name = quoted(film.filename or "picture.png")
         size = f'"integer xresolution" [ {film.width_px} ] "integer yresolution" [ {film.height_px} ]'
         self.lines.append(f'Film "image" {size} "string filename" [ {name} ]')
+
+    def stratified_line(self, count: int) -> str:
+        """A stratified sampler of a number of samples, as nearly square as can be."""
+        across = _most_even(count)
+        return f'Sampler "stratified" "integer xsamples" [ {across} ] "integer ysamples" [ {count // across} ]'
 
     def write_camera(self, camera: Camera) -> None:
         track = getattr(camera, "track", None)
@@ -129,18 +130,18 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         elif isinstance(light, SunSky):
             self._daylight(light)
         else:
-            self._infinite(light)
+            self.infinite(light)
 
     def _daylight(self, light: SunSky) -> None:
         """The sky as a picture, the sun as a light from one direction."""
         if light.part != "sun":
             sky = sky_map(light)
             self.report.add("light", "the analytic sky", f"a map of {sky.image.shape[0]} rows")
-            self._infinite(sky)
+            self.infinite(sky)
         if light.part != "sky":
             self.write_light(sun_light(light))
 
-    def _infinite(self, light: EnvironmentLight) -> None:
+    def infinite(self, light: EnvironmentLight) -> None:
         if light.image.shape[:2] == (1, 1):
             radiance = light.scale * light.image[0, 0].astype(np.float64)
             self.lines.append(f'\tLightSource "infinite" "rgb L" {listed(radiance)}')

@@ -70,10 +70,10 @@ class PbrtSurfaceWriter(SurfaceWriter):
             if material.distribution != "ggx":
                 self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
             index = [self.constant("eta", material.eta), self.constant("k", material.k)]
-            return "metal", [*index, _roughness(material.roughness)]
+            return "metal", [*index, unmapped_roughness(material.roughness)]
         if isinstance(material, Glossy):
             parts = [self.texture(material.diffuse, "Kd"), self.texture(material.specular, "Ks")]
-            return "substrate", [*parts, _roughness(material.roughness)]
+            return "substrate", [*parts, unmapped_roughness(material.roughness)]
         if isinstance(material, Plastic):
             return self._plastic(material, where)
         if isinstance(material, Translucent):
@@ -84,7 +84,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
             names = ("diffuse", "Kd"), ("specular", "Ks"), ("reflectance", "Kr"), ("transmittance", "Kt")
             parts = [self.texture(getattr(material, ours), theirs) for ours, theirs in names]
             parts += [self.texture(material.opacity, "opacity"), f'"float eta" [ {number(material.ior)} ]']
-            return "uber", [*parts, _roughness(material.roughness)]
+            return "uber", [*parts, unmapped_roughness(material.roughness)]
         if isinstance(material, Phong):
             return self._phong(material, where)
         return super().plain_material(material, where)
@@ -111,7 +111,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
             self.report.add(where, "rays spread about the perfect ones", "clear glass")
         parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
         parts.append(f'"float eta" [ {number(material.ior)} ]')
-        return "glass", parts + ([_roughness(material.roughness)] if material.roughness != (0.0, 0.0) else [])
+        return "glass", parts + ([unmapped_roughness(material.roughness)] if material.roughness != (0.0, 0.0) else [])
 
     def _phong(self, material: Phong, where: str) -> tuple[str, list[str]]:
         """Highlights as wide: ``alpha² = 2 / (exponent + 2)`` (Walter et al. 2007, sec. 5.2)."""
@@ -121,8 +121,9 @@ class PbrtSurfaceWriter(SurfaceWriter):
         mirrored = rgb(material.fresnel_min * np.array(material.mirror_tint))
         parts = [self.texture(material.diffuse, "Kd"), self.constant("Ks", material.specular)]
         parts += [self.constant("Kr", mirrored), self.constant("Kt", grey(0.0))]
-        return "uber", [*parts, _roughness((alpha, alpha))]
+        return "uber", [*parts, unmapped_roughness((alpha, alpha))]
 
 
-def _roughness(alphas: Pair) -> str:
+def unmapped_roughness(alphas: Pair) -> str:
+    """Alphas along both directions of a surface, as they are."""
     return f'{roughness_pair(alphas)} "bool remaproughness" [ "false" ]'

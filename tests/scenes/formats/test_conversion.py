@@ -60,6 +60,18 @@ def test_the_same_box_in_all_formats_is_the_same_scene() -> None:
 
 
 @needs_data
+@pytest.mark.parametrize(("to", "ending"), [("pbrt4", ".pbrt"), ("mitsuba3", ".xml")])
+@pytest.mark.parametrize("name", [*REAL, *MITSUBA])
+def test_real_scenes_come_back_from_the_newer_formats(name: str, to: str, ending: str, tmp_path: Path) -> None:
+    report = LossReport()
+    save_scene_file(real(name), tmp_path / f"first{ending}", to)
+    once = load_scene_file(tmp_path / f"first{ending}", None, report)
+    save_scene_file(once, tmp_path / f"second{ending}", to)
+    assert difference(once, load_scene_file(tmp_path / f"second{ending}")) is None
+    assert all("a mesh of" in loss.what for loss in report.losses)
+
+
+@needs_data
 def test_what_real_files_say() -> None:
     report = LossReport()
     scene = real("pbrt/pbrt-v3-rs/objects/instances.pbrt", report)
@@ -118,7 +130,13 @@ def test_scenes_in_one_folder_keep_their_meshes(tmp_path: Path) -> None:
 @needs_data
 @pytest.mark.parametrize(
     ("to", "ending", "count"),
-    [("pbrt", ".pbrt", 10), ("mitsuba", ".xml", 7), ("mitsuba3", ".xml", 6), ("luxrender", ".lxs", 3)],
+    [
+        ("pbrt", ".pbrt", 10),
+        ("pbrt4", ".pbrt", 5),
+        ("mitsuba", ".xml", 7),
+        ("mitsuba3", ".xml", 6),
+        ("luxrender", ".lxs", 3),
+    ],
 )
 def test_how_many_real_scenes_keep_their_picture(to: str, ending: str, count: int, tmp_path: Path) -> None:
     kept = 0

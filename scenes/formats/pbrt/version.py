@@ -1,0 +1,30 @@
+"""Whether a PBRT file is one of version 4: its words are told apart from those of version 3.
+
+Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4).
+"""
+
+from __future__ import annotations
+
+import re
+
+_LOOKED_AT = 1 << 22  # characters of a file: what follows is geometry
+_MATERIALS = (
+    "coateddiffuse|coatedconductor|diffuse|conductor|dielectric|thindielectric|diffusetransmission|interface|measured"
+)
+_SIGNS = re.compile(
+    rf"""^\s*(?:Attribute|Option|Import|ColorSpace)\s+"|
+    ^\s*Film\s+"(?:rgb|gbuffer|spectral)"|
+    ^\s*Sampler\s+"(?:zsobol|paddedsobol|independent|pmj02bn)"|
+    ^\s*Integrator\s+"(?:simplepath|simplevolpath|lightpath|randomwalk|function)"|
+    ^\s*Material\s+"(?:{_MATERIALS})"|"string\s+type"\s*\[?\s*"(?:{_MATERIALS})"|
+    "float\s+(?:power|illuminance)"|"string\s+materials"|"(?:float|string)\s+(?:interface|conductor)\.|
+    ^\s*Shape\s+"bilinearmesh\"""",
+    re.VERBOSE | re.MULTILINE,
+)
+_OLD_SIGNS = re.compile(r'^\s*WorldEnd\b|^\s*Film\s+"image"', re.MULTILINE)
+
+
+def is_v4(text: str) -> bool:
+    """Whether a text has words that version 4 alone has, and no end of the world, which version 3 alone has."""
+    head = text[:_LOOKED_AT]
+    return _SIGNS.search(head) is not None and _OLD_SIGNS.search(text) is None
