@@ -15,6 +15,7 @@ from torch import Tensor
 from renderer.batches import PacketBatches, checked, empty_hits
 from renderer.compute import device as devices
 from renderer.compute.launching import shared
+from renderer.grids import grid_frame
 from renderer.kernels import entry as kernels
 from renderer.kernels import packets as packet_kernels
 from renderer.kernels.bundles import stack_size
@@ -26,7 +27,7 @@ from renderer.tables.accelerators import STRUCTURES, Structure
 from renderer.tables.buffers import build_buffers
 from renderer.tables.checks import check_frame_size
 from renderer.tables.origin import near_origin
-from renderer.tables.requirements import required
+from renderer.tables.requirements import lit_by_all, required
 from renderer.tables.viewing import camera_view, check_camera
 from renderer.viewpoints import viewpoint_of
 from scenes.canonical import Scene
@@ -97,7 +98,7 @@ class Renderer:
         self.threads = threads or devices.core_count()
         self.footprint_resolution_px = float(footprint_resolution_px)
         check_camera(scene)
-        self._scene = scene = near_origin(scene)
+        self._scene = scene = near_origin(lit_by_all(scene))
         self._camera = check_camera(scene)
         needed = required(scene)
         if structure not in (*STRUCTURES, "warp"):
@@ -109,7 +110,9 @@ class Renderer:
         self.packets = together and packet_kernels.suffice_for(needed)
         if own is None:
             needed |= Feature.WARP_TREES
-        self.features = PACKETS if self.packets else kernels.nearest(needed) if specialise else ALL
+        self.features = (
+            PACKETS if self.packets else kernels.nearest(needed) if specialise else ALL | needed & Feature.PATHS
+        )
         self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
         # before the buffers are built, which takes those of packets too: they are compiled side by side
         devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)
@@ -189,6 +192,8 @@ class Renderer:
             if int(value) != value or value < 1:
                 raise ValueError(f"{name}: expected a whole number of at least 1, got {value}")
         check_frame_size(width_px, height_px, samples_per_axis)
+        if self._kernels.render_pixels is None:
+            return grid_frame(self, float(time_s), width_px, height_px, samples_per_axis)
         target = torch.device(self.device)
         image = torch.empty(height_px, width_px, 3, device=target)
         view = self._view(width_px / height_px, min(width_px, height_px) * samples_per_axis)

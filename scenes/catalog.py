@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from scenes.canonical import PerspectiveCamera, Scene, SceneError
 from scenes.driving import animations
@@ -20,6 +20,9 @@ from tsar.named import Named
 
 if TYPE_CHECKING:
     from scenes.viewing import Up
+
+IntegratorName = Literal["whitted", "path"]
+"""What draws a scene: direct light, mirrors and glass; or light between all surfaces."""
 
 MakeScene = Callable[[float], Scene]
 """Makes a scene; takes its phase, a fraction in [0, 1) by which a repetition of an animation is ahead."""
@@ -87,12 +90,15 @@ def load(scene: str | Scene, phase: float = 0.0) -> Scene:
     return SCENES[NAMES[int(scene)] if numbered else scene](phase)
 
 
-def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
+def load_file(
+    name: str, camera_path: str = "", integrator: IntegratorName = "whitted"
+) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a file, as this project's renderer can draw it, and what was lost on the way.
 
     Args:
         name: of the file; its ending tells the format.
         camera_path: ``turntable`` or ``fly-through`` moves the camera of a file without motion; empty for none.
+        integrator: what draws it; along paths more of its materials can be drawn.
 
     Raises:
         SceneError: the file cannot be read.
@@ -103,7 +109,7 @@ def load_file(name: str, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]
     from scenes.formats.losses import LossReport
 
     losses = LossReport()
-    scene = drawable(load_scene_file(Path(name), None, losses), losses)
+    scene = drawable(load_scene_file(Path(name), None, losses), losses, integrator)
     if camera_path:
         scene = on_a_path(scene, camera_path)  # type: ignore[arg-type]
     return scene, tuple(str(loss) for loss in losses.losses)
@@ -119,6 +125,8 @@ class Look:
         camera: eye and target of a camera at rest, six numbers.
         fov_deg: its full angle along the shorter image axis; None keeps that of the scene.
         environment: picture that lights the scene from all around, see :func:`scenes.viewing.with_environment`.
+        integrator: what draws it.
+        bounces: greatest number of them; None for that of the scene.
     """
 
     up: Up | None = None
@@ -126,6 +134,8 @@ class Look:
     camera: tuple[float, ...] | None = None
     fov_deg: float | None = None
     environment: Path | None = None
+    integrator: IntegratorName = "whitted"
+    bounces: int | None = None
 
 
 def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[str, ...]]:
@@ -139,7 +149,9 @@ def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[
     from scenes.models.smoothing import smoothed
     from scenes.viewing import framed, up_of, with_camera, with_environment
 
-    found, losses = load_any(scene, phase)
+    found, losses = load_any(scene, phase, integrator=look.integrator)
+    if look.bounces is not None:
+        found = dataclasses.replace(found, integrator=dataclasses.replace(found.integrator, depth=look.bounces))
     if look.smooth_deg > 0.0:
         found = dataclasses.replace(found, instances=smoothed(found.instances, look.smooth_deg))
     if look.up and str(scene) not in SCENES and Path(scene).suffix.lower() in MODEL_ENDINGS:
@@ -156,21 +168,27 @@ def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[
     return found, losses
 
 
-def load_any(scene: str | Path | Scene, phase: float = 0.0, camera_path: str = "") -> tuple[Scene, tuple[str, ...]]:
+def load_any(
+    scene: str | Path | Scene, phase: float = 0.0, camera_path: str = "", integrator: IntegratorName = "whitted"
+) -> tuple[Scene, tuple[str, ...]]:
     """A scene by its name, that of a file, or the scene itself; and what was lost.
 
     Args:
         scene: as in :func:`load`, or a file whose name has an ending.
         phase: as in :func:`load`; files have none.
         camera_path: as in :func:`load_file`, for files alone.
+        integrator: as in :func:`load_file`; a scene that is given keeps its own unless paths are asked for.
 
     Raises:
         ConfigError: no scene has this name.
         SceneError: the file cannot be read, or the scene does not have the phase or takes no camera path.
     """
     if not isinstance(scene, Scene) and str(scene) not in SCENES and Path(scene).suffix:
-        return load_file(str(scene), camera_path)
+        return load_file(str(scene), camera_path, integrator)
     if camera_path:
         what = "a scene that is given" if isinstance(scene, Scene) else "a built-in scene"
         raise SceneError(f"camera_path: expected none for {what}, got {camera_path}")
-    return load(scene if isinstance(scene, Scene) else str(scene), phase), ()
+    found = load(scene if isinstance(scene, Scene) else str(scene), phase)
+    if integrator == "path":
+        found = dataclasses.replace(found, integrator=dataclasses.replace(found.integrator, kind="path"))
+    return found, ()

@@ -24,22 +24,30 @@ from scenes.canonical import (
     ConstantTexture,
     DirectionalLight,
     EnvironmentLight,
+    Glass,
     ImageTexture,
     Instance,
     Light,
+    Masked,
     Material,
     Matrix,
     Matte,
     Mesh,
+    Metal,
+    Mirror,
+    NormalMapped,
     PerspectiveCamera,
     Phong,
+    Plastic,
     PointLight,
     Rectangle,
     RigidTrack,
     Scene,
     SceneError,
+    Sphere,
     Texture,
 )
+from scenes.canonical.textures import WHITE
 
 # their camera looks along +z with +x to the left
 _CAMERA_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -104,6 +112,8 @@ def _light(mitsuba: Any, light: Light) -> dict[str, Any]:
 
 
 def _shape(mitsuba: Any, instance: Instance, time_s: float) -> Any:
+    if isinstance(instance.shape, Sphere) or instance.emission is not None:
+        return _plain_shape(mitsuba, instance, time_s)
     mesh = _SQUARE if isinstance(instance.shape, Rectangle) else instance.shape
     if not isinstance(mesh, Mesh):
         raise SceneError(f"Instance {instance.name!r}: {type(mesh).__name__} has no translation")
@@ -133,6 +143,21 @@ def _shape(mitsuba: Any, instance: Instance, time_s: float) -> Any:
     return shape
 
 
+def _plain_shape(mitsuba: Any, instance: Instance, time_s: float) -> dict[str, Any]:
+    """A sphere or rectangle, which may be a lamp."""
+    if not isinstance(instance.shape, Sphere | Rectangle):
+        raise SceneError(f"Instance {instance.name!r}: a lamp {type(instance.shape).__name__} has no translation")
+    pose = _posed(instance.to_world, instance.track, time_s)
+    found: dict[str, Any] = {"type": "rectangle"}
+    if isinstance(instance.shape, Sphere):
+        found = {"type": "sphere"}
+        pose = pose @ np.diag([*[instance.shape.radius] * 3, 1.0])
+    found |= {"to_world": mitsuba.ScalarTransform4f(pose.tolist()), "bsdf": _bsdf(mitsuba, instance.material)}
+    if instance.emission is not None:
+        found["emitter"] = {"type": "area", "radiance": _rgb(instance.emission)}
+    return found
+
+
 def _flat(values: NDArray) -> NDArray[np.float32]:
     return np.ascontiguousarray(values, np.float32).ravel()
 
@@ -158,11 +183,50 @@ def _texture(mitsuba: Any, texture: Texture) -> dict[str, Any]:
 
 
 def _bsdf(mitsuba: Any, material: Material) -> dict[str, Any]:
-    """Two-sided, as our surfaces are."""
+    """Two-sided, as our surfaces are; light passes glass and holes."""
+    if isinstance(material, Glass):
+        return _glass(mitsuba, material)
+    if isinstance(material, Masked):
+        if material.cutoff is not None:
+            raise SceneError("holes by a cutoff have no translation")
+        inner = _bsdf(mitsuba, material.base)
+        return {"type": "mask", "opacity": _texture(mitsuba, material.opacity), "nested": inner}
+    if isinstance(material, NormalMapped):
+        normals = _texture(mitsuba, material.normals)
+        return {"type": "normalmap", "normalmap": normals, "nested": _bsdf(mitsuba, material.base)}
     return {"type": "twosided", "inner": _one_side(mitsuba, material)}
 
 
+def _glass(mitsuba: Any, material: Glass) -> dict[str, Any]:
+    kind = "thindielectric" if material.thin else "roughdielectric" if max(material.roughness) > 0.0 else "dielectric"
+    found: dict[str, Any] = {"type": kind, "int_ior": material.ior, "ext_ior": 1.0}
+    for name, texture in (("reflectance", material.reflectance), ("transmittance", material.transmittance)):
+        if texture is not WHITE:
+            found[f"specular_{name}"] = _texture(mitsuba, texture)
+    return found | ({"distribution": "ggx", "alpha": material.roughness[0]} if kind == "roughdielectric" else {})
+
+
+def _coated(mitsuba: Any, material: Plastic) -> dict[str, Any]:
+    found = {"type": "roughplastic" if material.roughness > 0.0 else "plastic", "int_ior": material.ior, "ext_ior": 1.0}
+    found["diffuse_reflectance"] = _texture(mitsuba, material.diffuse)
+    return found | ({"distribution": "ggx", "alpha": material.roughness} if material.roughness > 0.0 else {})
+
+
+def _metal(mitsuba: Any, material: Metal) -> dict[str, Any]:
+    found: dict[str, Any] = {"type": "conductor", "eta": _rgb(material.eta), "k": _rgb(material.k)}
+    found["specular_reflectance"] = _texture(mitsuba, material.reflectance_scale)
+    rough = {"type": "roughconductor", "distribution": material.distribution, "alpha": material.roughness[0]}
+    return found | (rough if max(material.roughness) > 0.0 else {})
+
+
 def _one_side(mitsuba: Any, material: Material) -> dict[str, Any]:
+    if isinstance(material, Metal):
+        return _metal(mitsuba, material)
+    if isinstance(material, Plastic):
+        return _coated(mitsuba, material)
+    if isinstance(material, Mirror):
+        mirror = {"type": "conductor", "material": "none"}
+        return mirror | {"specular_reflectance": _texture(mitsuba, material.reflectance)}
     if isinstance(material, Matte):
         return {"type": "diffuse", "reflectance": _texture(mitsuba, material.reflectance)}
     if not isinstance(material, Phong):

@@ -10,17 +10,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from analysis.bench.options import FRAMELET_SIDE, BenchOptions
 from scenes.canonical import (
     ConstantTexture,
+    Glass,
     Instance,
     Integrator,
+    Matrix,
     Matte,
     Mesh,
+    Metal,
     PerspectiveCamera,
     PointLight,
+    Rectangle,
     Scene,
+    Sphere,
     identity,
 )
 from tsar.morton import deinterleave
@@ -66,6 +72,40 @@ def bumpy_scene(subdivisions: int = SHADED_SUBDIVISIONS) -> Scene:
         integrator=Integrator("direct", depth=0),
         name="bumpy sphere",
     )
+
+
+def room_scene() -> Scene:
+    """A room with a lamp, a bumpy sphere of rough metal in it and a ball of glass: most of its light is indirect."""
+    half = np.pi / 2.0
+    walls = {"floor": (-half, 0.0, _ALBEDO), "ceiling": (half, 0.0, _ALBEDO), "back": (0.0, 0.0, _ALBEDO),
+             "left": (0.0, half, (0.6, 0.1, 0.1)), "right": (0.0, -half, (0.1, 0.5, 0.1))}  # fmt: skip
+    instances = [
+        Instance(Rectangle(), Matte(ConstantTexture(color)), _placed(about_x, about_y), name=name)
+        for name, (about_x, about_y, color) in walls.items()
+    ]
+    lamp = _placed(half, 0.0, (0.0, 0.98, 0.0), 0.25)
+    dark = Matte(ConstantTexture((0.0, 0.0, 0.0)))
+    metal = Metal((0.2, 0.9, 1.3), (3.9, 2.4, 2.2), (0.3, 0.3))
+    pose = [np.diag([size, size, size, 1.0]) for size in (0.35, 0.3)]
+    pose[0][:3, 3], pose[1][:3, 3] = (-0.4, -0.6, -0.2), (0.45, -0.7, 0.2)
+    instances += [
+        Instance(Rectangle(), dark, lamp, name="lamp", emission=(12.0, 11.0, 9.0)),
+        Instance(bumpy_sphere(SHADED_SUBDIVISIONS), metal, pose[0], name="metal"),
+        Instance(Sphere(), Glass(), pose[1], name="glass"),
+    ]
+    eye = identity()
+    eye[2, 3] = 3.4
+    camera = PerspectiveCamera(eye, FOV_DEG)
+    return Scene(camera, tuple(instances), integrator=Integrator("path", depth=8), name="room")
+
+
+def _placed(about_x: float, about_y: float, at: tuple[float, float, float] | None = None, size: float = 1.0) -> Matrix:
+    """Where the unit square lies: turned, and then one unit back along its normal unless it says where."""
+    turn = Rotation.from_euler("xy", (about_x, about_y)).as_matrix()
+    matrix = identity()
+    matrix[:3, :3] = turn * size
+    matrix[:3, 3] = -turn[:, 2] if at is None else at
+    return matrix
 
 
 def driving_scenes(options: BenchOptions) -> dict[str, Scene]:

@@ -1,6 +1,7 @@
 """Group shaded: whole pictures beside Mitsuba 3, both on all cores.
 
-The bumpy sphere is the same work on either side: one camera ray and one shadow ray a sample. Of the driving scenes,
+The bumpy sphere is the same work on either side: one camera ray and one shadow ray a sample; so is the room, along
+paths of as many bounces at most. Of the driving scenes,
 Mitsuba's paths also go on from diffuse surfaces, which ours do not; a second row beside its direct light alone, which
 follows no mirrors, which ours does, bounds the comparison from the other side.
 """
@@ -16,7 +17,7 @@ import numpy as np
 from analysis.bench import mitsuba as peer
 from analysis.bench.options import BenchOptions
 from analysis.bench.rows import Row, rate_row
-from analysis.bench.scenes import bumpy_scene, driving_scenes, renderer_of
+from analysis.bench.scenes import bumpy_scene, driving_scenes, renderer_of, room_scene
 from analysis.command.timing import take_turns
 from scenes.canonical import Scene
 from tsar.config import closed_choices
@@ -58,6 +59,7 @@ def stills(options: BenchOptions) -> Iterator[Still]:
     bumpy, targets = bumpy_scene(), peer.VARIANTS
     for axis in (2, 4):
         yield Still(f"bumpy sphere, {axis**2} per pixel", bumpy, 0.0, "direct", axis, targets)
+    yield Still("room along paths, 16 per pixel", room_scene(), 0.0, "path", 4, _NO_TARGETS)
     for name, scene in driving_scenes(options).items():
         yield Still(f"{name}, 4 per pixel", scene, DRIVING_S, "path", 2, targets)
         yield Still(f"{name}, 4 per pixel, peer without mirrors", scene, DRIVING_S, "direct", 2, _NO_TARGETS)

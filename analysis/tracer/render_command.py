@@ -5,6 +5,7 @@ Examples: python scripts/render.py fly-by --time-s 1 --out out/still
           python scripts/render.py moving-object --samples 125 --point-set stratified --out out/blur
           python scripts/render.py car.glb --size 800x600 --samples 64 --out out/car
           python scripts/render.py car.glb --camera 3 1 4 0 0.5 0 --environment sky.hdr --out out/car
+          python scripts/render.py car.glb --integrator path --samples 256 --out out/car
           python scripts/render.py glass --explain
 """
 

@@ -45,6 +45,11 @@ class RenderOptions:
     up: Literal["y", "z"] | None = None
     """Upward axis of the world, for the camera and the environment; by default y for OBJ and glTF, z for PLY and STL,
     and in a scene that of its camera."""
+    integrator: Literal["whitted", "path"] = "whitted"
+    """What light is followed: direct light, mirrors and glass; or along paths between all surfaces, which takes many
+    samples and draws more materials of files."""
+    bounces: int | None = None
+    """Greatest number of bounces, -1 for no limit; by default that of the scene."""
     smooth_deg: float = 0.0
     """Edges of meshes without normals that turn by at most this are smooth, degrees; 0 keeps faces flat."""
     samples_per_axis: int = 2
@@ -87,6 +92,7 @@ class RenderOptions:
             camera=(-1e12, 1e12),
             fov_deg=(1e-3, 179.0),
             smooth_deg=(0.0, 180.0),
+            bounces=(-1, 64),
             samples_per_axis=(1, 64),
             samples=(0, 1 << 16),
             frames=(1, 10**6),
@@ -113,7 +119,9 @@ class RenderOptions:
         """How the scene is looked at and lit."""
         from scenes.catalog import Look
 
-        return Look(self.up, self.smooth_deg, self.camera, self.fov_deg, self.environment)
+        return Look(
+            self.up, self.smooth_deg, self.camera, self.fov_deg, self.environment, self.integrator, self.bounces
+        )
 
     def size_px(self, film_px: tuple[int, int]) -> tuple[int, int]:
         """Width and height of the picture, given those of the scene's film.

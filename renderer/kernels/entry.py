@@ -13,11 +13,12 @@ import warp as wp
 
 from renderer.kernels.camera import camera_ray, track_rotation, track_translation
 from renderer.kernels.packets import MODULE_OPTIONS
+from renderer.kernels.paths import path_radiance
 from renderer.kernels.randomness import group_draw
 from renderer.kernels.shading import radiance
 from renderer.layout.features import ALL, Feature
 from renderer.layout.sizes import BLOCK_PX
-from renderer.layout.structs import Ray, SceneData, ViewData
+from renderer.layout.structs import Draw, Ray, SceneData, ViewData
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,13 @@ class ShadingKernels:
 
     Attributes:
         shade_samples: shades a list of samples in groups.
-        render_pixels: shades the samples of a regular grid in every pixel, and takes their means.
+        render_pixels: shades the samples of a regular grid in every pixel, and takes their means. None for paths, whose
+            kernels take long to compile.
         module: what holds both, for loading.
     """
 
     shade_samples: wp.Kernel
-    render_pixels: wp.Kernel
+    render_pixels: wp.Kernel | None
     module: wp.Module
 
 
@@ -57,7 +59,7 @@ def nearest(features: Feature) -> Feature:
     if features in _asked or len(_asked) < SETS_MAX:
         _asked.add(features)
         return features
-    return ALL
+    return ALL | features & Feature.PATHS
 
 
 _asked: set[Feature] = set()
@@ -67,6 +69,7 @@ _asked: set[Feature] = set()
 def specialised(features: Feature) -> ShadingKernels:
     """Kernels that can do what is in ``features`` and hold no code for the rest; the same object for the same set."""
     mask = int(features)
+    transport = along_path if Feature.PATHS in features else radiance
     name = f"{_MODULE}{mask:08x}"
     wp.get_module(name).options.update(MODULE_OPTIONS)
 
@@ -97,7 +100,7 @@ def specialised(features: Feature) -> ShadingKernels:
         factor = wp.float32(1.0)
         if footprint_scale.shape[0] > 0:
             factor = footprint_scale[i]
-        result, counts, hit = radiance(
+        result, counts, hit = transport(
             wp.static(mask), scene, view, time_s[i], draw, origin, direction, factor, stack, wp.tid()
         )  # fmt: skip
         color[i] = result
@@ -106,6 +109,9 @@ def specialised(features: Feature) -> ShadingKernels:
             point[i] = hit.point
             occluder[i] = hit.occluder
         rays[i] = counts
+
+    if Feature.PATHS in features:
+        return ShadingKernels(shade_samples, None, shade_samples.module)
 
     @wp.kernel(enable_backward=False, module=name)
     def render_pixels(
@@ -134,13 +140,31 @@ def specialised(features: Feature) -> ShadingKernels:
                 position = grid_position(column, row, sample, samples, width, height)
                 draw = group_draw(scene.seed, leader, time_s, sample, samples * samples)
                 origin, direction = camera_ray(wp.static(mask), scene, view, draw, position, time_s)
-                result, _counts, _hit = radiance(
+                result, _counts, _hit = transport(
                     wp.static(mask), scene, view, time_s, draw, origin, direction, 1.0, stack, wp.tid()
                 )  # fmt: skip
                 total = total + result
             image[row, column] = total * (1.0 / wp.float32(samples * samples))
 
     return ShadingKernels(shade_samples, render_pixels, shade_samples.module)
+
+
+@wp.func
+def along_path(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    time_s: wp.float64,
+    draw: Draw,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    footprint_scale: wp.float32,
+    stack: wp.array2d(dtype=Ray),
+    row: wp.int32,
+):
+    """Light along one path, with the arguments of the tree of rays, of which none waits."""
+    total, counts, first = path_radiance(features, scene, view, time_s, draw, origin, direction, footprint_scale)
+    return total, counts, first
 
 
 @wp.func

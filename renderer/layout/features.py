@@ -38,9 +38,14 @@ class Feature(IntFlag):
     ENVIRONMENT = auto()
     ALL_CELLS = auto()
     WARP_TREES = auto()
+    PATHS = auto()
+    FACETS = auto()
+    PASSING = auto()
+    BENT = auto()
 
 
-ALL = Feature((1 << len(Feature)) - 1)
+ALL = Feature((1 << len(Feature)) - 1) & ~Feature.PATHS
+"""Everything that one integrator can do; with :attr:`Feature.PATHS` the other one."""
 
 PACKETS = (
     Feature.MESH
@@ -85,4 +90,8 @@ MEANING = {
     Feature.ENVIRONMENT: "light from the environment map",
     Feature.ALL_CELLS: "a shadow ray to every cell of a light",
     Feature.WARP_TREES: "Warp's own trees over meshes, as on a GPU",
+    Feature.PATHS: "light between surfaces, along paths",
+    Feature.FACETS: "surfaces of facets: rough metal and glass, coats",
+    Feature.PASSING: "holes, and panes that shadow rays pass",
+    Feature.BENT: "normal and bump maps",
 }

@@ -41,6 +41,12 @@ class CameraKind(IntEnum):
     PERSPECTIVE, PARALLEL, PANORAMA = range(3)
 
 
+class ScatterKind(IntEnum):
+    """How surfaces scatter light along paths."""
+
+    BLACK, DIFFUSE, PHONG, MIRROR, METAL, GLASS, COATED, METALLIC = range(8)
+
+
 class StructureKind(IntEnum):
     """Acceleration structures over the triangles of a mesh."""
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import warp as wp
 
+from renderer.layout.scattering import ScatterRecord
+
 
 @wp.struct
 class TrackRecord:
@@ -172,6 +174,8 @@ class SceneData:
     uvs: wp.array(dtype=wp.vec2)
     face_materials: wp.array(dtype=wp.int32)
     materials: wp.array(dtype=MaterialRecord)
+    scattering: wp.array(dtype=ScatterRecord)  # one a material, for paths; else one alone
+    light_of_instance: wp.array(dtype=wp.int32)  # the light that an instance is; negative for none
     textures: wp.array(dtype=TextureRecord)
     levels: wp.array(dtype=LevelRecord)
     texels: wp.array(dtype=wp.vec3)

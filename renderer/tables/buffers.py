@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from renderer.layout.kinds import Shape
+from renderer.layout.scattering import ScatterRecord
 from renderer.layout.structs import (
     GroupRecord,
     InstanceRecord,
@@ -80,12 +81,13 @@ class _Builder:
 
     def __init__(self, scene: Scene, device: str, structure: Structure | None) -> None:
         self.scene, self.device = scene, device
-        self.materials = MaterialTable(device)
+        self.materials = MaterialTable(device, scene.integrator.kind == "path")
         self.lights = LightTable()
         self.tracks = TrackTable(device)
         self.meshes = MeshTable(device, structure)
         self.instance_rows: list[tuple[dict, np.ndarray, np.ndarray]] = []
         self.reliefs: list[dict] = []
+        self.light_of: dict[int, int] = {}
 
     def assembly(self, assembly: Assembly) -> None:
         """Adds meshes that became one."""
@@ -99,7 +101,10 @@ class _Builder:
         name, shape = instance.name, instance.shape
         row = {"track": self.tracks.add(instance.track), "material": self.materials.add(instance.material, name)}
         if instance.emission is not None:
+            before = len(self.lights.rows)
             self.lights.add_emitter(instance, row["track"])
+            if len(self.lights.rows) > before:
+                self.light_of[len(self.instance_rows)] = before
             row["emission"] = instance.emission
         if isinstance(instance.material, HeightField):
             self._relief(row, instance, instance.material)
@@ -208,6 +213,11 @@ class _Builder:
         for name, pool in self.meshes.pools.items():
             setattr(data, name, pool.upload(device))
         data.materials = _upload(self.materials.rows, MaterialRecord, device)
+        data.scattering = _upload(self.materials.scattering, ScatterRecord, device)
+        lamps = np.full(max(len(self.instance_rows), 1), -1, np.int32)
+        for number, light in self.light_of.items():
+            lamps[number] = light
+        data.light_of_instance = wp.array(lamps, dtype=wp.int32, device=device)
         data.textures = _upload(self.materials.textures, TextureRecord, device)
         data.levels = _upload(self.materials.levels, LevelRecord, device)
         data.texels = self.materials.upload_texels()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import torch
 import warp as wp
 
 from renderer.layout.kinds import Filter, TextureKind, Wrap
 from renderer.tables.checks import check_finite, check_light
+from renderer.tables.scattering import scatter_row, unwrapped
 from scenes.arithmetic import cos
 from scenes.canonical import (
     CheckerboardTexture,
@@ -50,9 +53,11 @@ def mip_levels(image: np.ndarray) -> list[np.ndarray]:
 class MaterialTable:
     """Rows of materials, textures and mip levels, and the pool of texels."""
 
-    def __init__(self, device: str) -> None:
-        self.device = device
+    def __init__(self, device: str, paths: bool = False) -> None:
+        """Starts empty; with ``paths`` each material has a row of how it scatters light along them as well."""
+        self.device, self.paths = device, paths
         self.rows: list[dict] = []
+        self.scattering: list[dict] = []
         self.textures: list[dict] = []
         self.levels: list[dict] = []
         self.texels: list[np.ndarray] = []
@@ -129,7 +134,10 @@ class MaterialTable:
     def add(self, material: Material, where: str) -> int:
         """Index of a material; the same object is stored once."""
         if id(material) not in self._material_index:
-            row = self._material_row(material, f"Instance {where!r}")
+            where = f"Instance {where!r}"
+            if self.paths:
+                self.scattering.append(scatter_row(material, self, where))
+            row = self._material_row(_along_tree(material) if self.paths else material, where)
             self._material_index[id(material)] = len(self.rows)
             self.rows.append(row)
             self._alive.append(material)
@@ -182,6 +190,14 @@ class MaterialTable:
         for name in row.keys() - {"diffuse", "mirror", "transmission"}:
             check_light(row[name], f"{where}: {type(material).__name__}.{name}")
         return row
+
+
+def _along_tree(material: Material) -> Material:
+    """What the tree of rays draws of a material that is drawn along paths: only numbers that both share."""
+    base = unwrapped(material)
+    if isinstance(base, Glass):
+        return dataclasses.replace(base, roughness=(0.0, 0.0))
+    return base if isinstance(base, Phong | Mirror) else Emissive(_BLACK)
 
 
 def _cos_half(angle_deg: float) -> float:

@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 from renderer.kernels.entry import kept_count
 from renderer.layout.features import MEANING, PACKETS, Feature
+from renderer.tables.scattering import unwrapped
 from scenes.canonical import (
+    Bumped,
     CheckerboardTexture,
     Cube,
     DirectionalLight,
     Disk,
+    Emissive,
     EnvironmentCamera,
     EnvironmentLight,
     Glass,
     HeightField,
     ImageTexture,
     Instance,
+    Masked,
     Material,
     Matte,
     Mesh,
+    Metal,
+    MetallicRough,
     Mirror,
+    NormalMapped,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
+    Plastic,
     PointLight,
     Rectangle,
     Scene,
@@ -40,6 +49,7 @@ _SHAPES = {Mesh: Feature.MESH, Sphere: Feature.SPHERE, Rectangle: Feature.FLAT, 
 def explain(scene: Scene) -> dict[Feature, str]:
     """What a scene requires, each with the first thing in it that does."""
     found: dict[Feature, str] = {}
+    scene = lit_by_all(scene)
     lit = any(_is_lit(instance.material) for instance in scene.instances)
     for feature, cause in _required(scene):
         if lit or not feature & _LIGHTING:
@@ -66,8 +76,21 @@ def explanation(scene: Scene) -> list[str]:
     return [*(line.rstrip() for line in lines), f"samples are traced {alone}; {kept}"]
 
 
+def lit_by_all(scene: Scene) -> Scene:
+    """A scene for paths: a background without an environment light lights surfaces, and there is no ambient light,
+    which stands for that between surfaces; other scenes stay as they are."""
+    if scene.integrator.kind != "path":
+        return scene
+    lights, background = scene.lights, scene.background
+    if background is not None and not any(isinstance(light, EnvironmentLight) for light in lights):
+        lights, background = (*lights, background), None
+    return dataclasses.replace(scene, lights=lights, background=background, ambient=(0.0, 0.0, 0.0))
+
+
 def _required(scene: Scene) -> Iterator[tuple[Feature, str]]:
     yield from _of_camera(scene)
+    if scene.integrator.kind == "path":
+        yield Feature.PATHS, "Integrator.kind"
     for instance in scene.instances:
         yield from _of_instance(instance, scene)
     for light in scene.lights:
@@ -109,9 +132,15 @@ def _of_instance(instance: Instance, scene: Scene) -> Iterator[tuple[Feature, st
 
 
 def _of_material(material: Material, scene: Scene) -> Iterator[Feature]:
-    several = scene.integrator.reflection_rays > 1
-    if isinstance(material, HeightField):
+    several = scene.integrator.reflection_rays > 1 and scene.integrator.kind != "path"
+    if isinstance(material, HeightField | Masked | Bumped | NormalMapped):
         yield from _of_material(material.base, scene)
+    if isinstance(material, Masked):
+        yield from _of_texture(material.opacity)
+        yield Feature.PASSING
+    if isinstance(material, Bumped | NormalMapped):
+        yield from _of_texture(material.height if isinstance(material, Bumped) else material.normals)
+        yield Feature.BENT
     if isinstance(material, Phong):
         yield from _of_texture(material.diffuse)
         if max(material.specular) > 0.0:
@@ -130,7 +159,15 @@ def _of_material(material: Material, scene: Scene) -> Iterator[Feature]:
     if isinstance(material, Glass):
         yield from _of_texture(material.transmittance)
         yield Feature.GLASS
-        several = several or scene.integrator.refraction_rays > 1
+        several = several or (scene.integrator.refraction_rays > 1 and scene.integrator.kind != "path")
+        if scene.integrator.kind == "path" and material.thin and material.spread_deg == 0.0:
+            yield Feature.PASSING
+        if max(material.roughness) > 0.0:
+            yield Feature.FACETS
+    if isinstance(material, Metal | Plastic | MetallicRough):
+        yield Feature.FACETS
+        for texture in _textures(material):
+            yield from _of_texture(texture)
     spread = getattr(material, "spread_deg", getattr(material, "mirror_spread_deg", 0.0))
     if several and spread > 0.0:
         yield Feature.MANY_RAYS
@@ -138,7 +175,16 @@ def _of_material(material: Material, scene: Scene) -> Iterator[Feature]:
 
 def _is_lit(material: Material) -> bool:
     """Whether a material takes light from the lights, not only from where it mirrors and refracts."""
-    return _is_lit(material.base) if isinstance(material, HeightField) else isinstance(material, Phong | Matte)
+    bare = unwrapped(material)
+    return not isinstance(bare, Mirror | Glass | Emissive) or (isinstance(bare, Glass) and max(bare.roughness) > 0.0)
+
+
+def _textures(material: Metal | Plastic | MetallicRough) -> list[Texture]:
+    if isinstance(material, Metal):
+        return [material.reflectance_scale]
+    if isinstance(material, Plastic):
+        return [material.diffuse, material.specular]
+    return [texture for texture in (material.base, material.parts, material.glow) if texture is not None]
 
 
 def _of_texture(texture: Texture) -> Iterator[Feature]:

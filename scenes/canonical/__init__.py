@@ -13,21 +13,20 @@ Conventions, fixed here once:
 """
 
 from scenes.canonical.cameras import Camera, EnvironmentCamera, OrthographicCamera, PerspectiveCamera, RealisticCamera
+from scenes.canonical.facets import Glossy, Metal, MetallicRough, Plastic
 from scenes.canonical.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, SunSky
 from scenes.canonical.materials import (
     Bumped,
     Emissive,
     Glass,
-    Glossy,
     HeightField,
     Masked,
     Material,
     Matte,
-    Metal,
     Mirror,
     MixMaterial,
+    NormalMapped,
     Phong,
-    Plastic,
     Translucent,
     Uber,
 )
@@ -46,8 +45,8 @@ from scenes.canonical.values import Matrix, Rgb, RigidTrack, SceneError, identit
 __all__ = [
     "Bumped", "Camera", "CheckerboardTexture", "ConstantTexture", "Cube", "DirectionalLight", "Disk", "Emissive",
     "EnvironmentCamera", "EnvironmentLight", "Film", "Glass", "Glossy", "HeightField", "ImageTexture", "Instance",
-    "Integrator", "Light", "Masked", "Material", "Matrix", "Matte", "Mesh", "Metal", "Mirror", "MixMaterial",
-    "MixTexture", "OrthographicCamera", "PerspectiveCamera", "Phong", "Plastic", "PointLight", "RealisticCamera",
-    "Rectangle", "Rgb", "RigidTrack", "Sampler", "ScaleTexture", "Scene", "SceneError", "Shape", "Sphere",
-    "SpotLight", "SunSky", "Texture", "Translucent", "Uber", "identity",
+    "Integrator", "Light", "Masked", "Material", "Matrix", "Matte", "Mesh", "Metal", "MetallicRough", "Mirror",
+    "MixMaterial", "MixTexture", "NormalMapped", "OrthographicCamera", "PerspectiveCamera", "Phong", "Plastic",
+    "PointLight", "RealisticCamera", "Rectangle", "Rgb", "RigidTrack", "Sampler", "ScaleTexture", "Scene", "SceneError",
+    "Shape", "Sphere", "SpotLight", "SunSky", "Texture", "Translucent", "Uber", "identity",
 ]  # fmt: skip

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.canonical.facets import Glossy, Metal, MetallicRough, Plastic
 from scenes.canonical.textures import WHITE, Texture
 from scenes.canonical.values import Rgb, SceneError
 
@@ -103,45 +103,6 @@ class Glass:
 
 
 @dataclass(frozen=True)
-class Metal:
-    """Conductor with complex index ``eta + i k`` in RGB; ``roughness`` is the microfacet alpha."""
-
-    eta: Rgb
-    k: Rgb
-    roughness: tuple[float, float] = (0.0, 0.0)
-    reflectance_scale: Texture = WHITE
-    distribution: Literal["beckmann", "ggx"] = "ggx"
-
-
-@dataclass(frozen=True)
-class Glossy:
-    """A glossy coat over a diffuse base (PBRT ``substrate``, LuxRender ``glossy``)."""
-
-    diffuse: Texture
-    specular: Texture
-    roughness: tuple[float, float] = (0.1, 0.1)
-
-
-@dataclass(frozen=True)
-class Plastic:
-    """A dielectric coat of index ``ior`` over a diffuse base.
-
-    Attributes:
-        diffuse: albedo of the base by itself.
-        specular: multiplies what Fresnel's equations reflect.
-        roughness: microfacet alpha of the coat.
-        layered: whether the base gets what the coat lets through, both ways (Mitsuba); otherwise the coat adds to the
-            base and takes nothing from it (PBRT).
-    """
-
-    diffuse: Texture
-    specular: Texture = WHITE
-    ior: float = 1.5
-    roughness: float = 0.0
-    layered: bool = True
-
-
-@dataclass(frozen=True)
 class Translucent:
     """Diffuse reflection and diffuse transmission."""
 
@@ -211,10 +172,33 @@ class Emissive:
 
 @dataclass(frozen=True)
 class Masked:
-    """A material with holes: ``opacity`` of it is there, the rest lets light pass unbent."""
+    """A material with holes: ``opacity`` of it is there, the rest lets light pass unbent.
+
+    Attributes:
+        base: what has holes.
+        opacity: its red channel counts.
+        cutoff: all of the material is there where the opacity is at least this, and nothing elsewhere; None for what
+            ``opacity`` says.
+    """
 
     base: Material
     opacity: Texture
+    cutoff: float | None = None
+
+
+@dataclass(frozen=True)
+class NormalMapped:
+    """A material whose shading normal a picture gives.
+
+    Attributes:
+        base: what is bent.
+        normals: vectors ``2 c - 1`` in the frame of growing u, growing v and the normal, not encoded.
+        scale: multiplies their first two parts.
+    """
+
+    base: Material
+    normals: Texture
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -247,4 +231,6 @@ Material = (
     | Emissive
     | Masked
     | Bumped
+    | NormalMapped
+    | MetallicRough
 )

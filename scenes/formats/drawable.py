@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Literal
 
 import numpy as np
 
@@ -29,8 +30,10 @@ from scenes.canonical import (
     Material,
     Matte,
     Metal,
+    MetallicRough,
     Mirror,
     MixMaterial,
+    NormalMapped,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
@@ -54,6 +57,9 @@ from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.placing import lose_back
 from scenes.formats.losses import LossReport
 
+PATH_MATERIALS = Matte | Glass | Metal | MetallicRough | Masked | Bumped | NormalMapped
+"""What is drawn along paths as it is, beside plastic that takes from its base what its coat reflects."""
+
 DEPTH_MAX = 8
 """Most bounces of mirrored and refracted rays."""
 
@@ -64,8 +70,8 @@ _EXPONENT_MAX = 1.0e4
 class Approximation:
     """Replaces parts of a scene, each once."""
 
-    def __init__(self, report: LossReport) -> None:
-        self.report = report
+    def __init__(self, report: LossReport, paths: bool = False) -> None:
+        self.report, self.paths = report, paths
         self._materials: dict[int, tuple[Material, Material]] = {}
         self._textures: dict[int, tuple[Texture, Texture]] = {}
 
@@ -79,18 +85,18 @@ class Approximation:
             self.report.add("camera", "a picture off the viewing direction", "one about it")
             camera = dataclasses.replace(camera, shift=(0.0, 0.0))
         assert isinstance(camera, PerspectiveCamera | OrthographicCamera | EnvironmentCamera)
-        if depth < 0 or depth > DEPTH_MAX:
+        if (depth < 0 or depth > DEPTH_MAX) and not self.paths:
             self.report.add("integrator", f"{'endless' if depth < 0 else depth} bounces", f"{DEPTH_MAX}")
             depth = DEPTH_MAX
-        if scene.integrator.kind not in ("whitted", "direct"):
-            self.report.add(
-                "integrator", f"{scene.integrator.kind}: light between surfaces", "direct light, mirrors, glass"
-            )
+        kind = "path" if self.paths else "direct" if scene.integrator.kind == "direct" else "whitted"
+        if scene.integrator.kind not in (kind, "whitted", "direct"):
+            became = "paths from the camera" if self.paths else "direct light, mirrors, glass"
+            self.report.add("integrator", f"{scene.integrator.kind}: light between surfaces", became)
         lights = tuple(made for light in scene.lights for made in self.light(light))
         instances = tuple(
             made for number, instance in enumerate(scene.instances) for made in self.instance(instance, number)
         )
-        integrator = dataclasses.replace(scene.integrator, depth=depth)
+        integrator = dataclasses.replace(scene.integrator, kind=kind, depth=depth)
         return dataclasses.replace(scene, camera=camera, lights=lights, instances=instances, integrator=integrator)
 
     def light(self, light: Light) -> list[Light]:
@@ -125,7 +131,8 @@ class Approximation:
             self.report.add(name, "a round lamp", "a square one of the same area")
             scaled = product(instance.to_world, np.diag([side, side, 1.0, 1.0]))
             return [dataclasses.replace(made, shape=Rectangle(), to_world=scaled)]
-        self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
+        if not self.paths:  # which find it by chance
+            self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
         return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
 
     def texture(self, texture: Texture, where: str) -> Texture:
@@ -151,6 +158,10 @@ class Approximation:
         return self._materials[id(material)][1]
 
     def _material(self, material: Material, where: str) -> Material:
+        if self.paths and (
+            isinstance(material, PATH_MATERIALS) or (isinstance(material, Plastic) and material.layered)
+        ):
+            return self._along_paths(material, where)
         if isinstance(material, Matte):
             if material.sigma_deg:
                 self.report.add(where, f"a roughness of {material.sigma_deg:g} degrees", "smooth")
@@ -172,11 +183,34 @@ class Approximation:
                 where, "a mixture of materials", f"the one of which there is more ({max(share, 1 - share):.2g})"
             )
             return self.material(kept, where)
-        if isinstance(material, Masked | Bumped):
+        if isinstance(material, Masked | Bumped | NormalMapped):
             what = "holes in a material" if isinstance(material, Masked) else "bumps"
             self.report.add(where, what, "none")
             return self.material(material.base, where)
         return material
+
+    def _along_paths(self, material: Material, where: str) -> Material:
+        """A material of facets, with holes or with bent normals, all of which paths draw."""
+        changed: dict[str, object] = {}
+        for field in dataclasses.fields(material):
+            value = getattr(material, field.name)
+            if isinstance(value, Texture):
+                changed[field.name] = self.texture(value, where)
+            elif isinstance(value, Material):
+                changed[field.name] = self.material(value, where)
+        if isinstance(material, Metal | Glass) and material.roughness[0] != material.roughness[1]:
+            alpha = math.sqrt(material.roughness[0] * material.roughness[1])
+            self.report.add(where, f"facets of two alphas {material.roughness}", f"of one, {alpha:.3g}")
+            changed["roughness"] = alpha, alpha
+        if isinstance(material, Metal) and material.distribution != "ggx" and max(material.roughness) > 0.0:
+            self.report.add(where, f"facets of the {material.distribution} distribution", "of GGX")
+            changed["distribution"] = "ggx"
+        if isinstance(material, Glass) and material.thin and max(material.roughness) > 0.0:
+            self.report.add(where, "a rough pane", "a clear one")
+            changed["roughness"] = 0.0, 0.0
+        if all(value is getattr(material, name) for name, value in changed.items()):
+            return material
+        return dataclasses.replace(material, **changed)  # type: ignore[arg-type]
 
     def _glass(self, material: Glass, where: str) -> Material:
         sides = self.texture(material.reflectance, where), self.texture(material.transmittance, where)
@@ -240,11 +274,12 @@ def spread_deg(alpha: float) -> float:
     return min(180.0, math.degrees(4.0 * arctan(alpha)))
 
 
-def drawable(scene: Scene, report: LossReport) -> Scene:
+def drawable(scene: Scene, report: LossReport, integrator: Literal["whitted", "path"] = "whitted") -> Scene:
     """A scene that this project's renderer draws.
 
     Args:
         scene: any canonical scene.
         report: receives what was replaced.
+        integrator: what will draw it.
     """
-    return Approximation(report).scene(scene)
+    return Approximation(report, integrator == "path").scene(scene)

@@ -75,9 +75,10 @@ def test_rows_of_one_picture_beside_all_variants() -> None:
 
 def test_pictures_of_the_group() -> None:
     found = list(stills(BenchOptions(scenes=("chase", "fly-by"))))
-    assert [picture.samples_per_axis for picture in found] == [2, 4, 2, 2, 2, 2]
-    assert [picture.integrator for picture in found] == ["direct"] * 2 + ["path", "direct"] * 2
-    assert [bool(picture.targets["scalar_rgb"]) for picture in found] == [True] * 3 + [False, True, False]
+    assert [picture.samples_per_axis for picture in found] == [2, 4, 4, 2, 2, 2, 2]
+    assert [picture.integrator for picture in found] == ["direct"] * 2 + ["path"] + ["path", "direct"] * 2
+    wanted = [True] * 2 + [False, True, False, True, False]
+    assert [bool(picture.targets["scalar_rgb"]) for picture in found] == wanted
 
 
 def test_without_mitsuba_rows_say_so(monkeypatch: pytest.MonkeyPatch) -> None:

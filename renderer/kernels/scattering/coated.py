@@ -1,0 +1,63 @@
+"""A dielectric coat over a diffuse base, smooth or of facets.
+
+The base gets what the coat lets through, both ways; what the coat throws back inside is summed up. Deviation: a rough
+coat lets through what a smooth one does.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from renderer.kernels.glass import dielectric_reflectance
+from renderer.kernels.scattering.facets import facet_density, seen_share, visible_density, visible_normal
+from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, brightness, cosine_direction, mirrored
+
+
+@wp.func
+def coat_chance(lobes: Lobes, reflectance: wp.float32) -> wp.float32:
+    """Chance of a direction of the coat."""
+    coat = reflectance * brightness(lobes.specular)
+    base = (1.0 - reflectance) * brightness(lobes.base)
+    return coat / wp.max(coat + base, 1.0e-12)
+
+
+@wp.func
+def coated_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
+    """``albedo (1 - F_o) (1 - F_i) ratio^2 / (pi (1 - inner)) cos``, and the facets of a rough coat."""
+    response = Response()
+    if arriving[2] <= 0.0 or outgoing[2] <= 0.0:
+        return response
+    reflectance = dielectric_reflectance(outgoing[2], lobes.ratio)
+    let_in = 1.0 - dielectric_reflectance(arriving[2], lobes.ratio)
+    chance = coat_chance(lobes, reflectance)
+    passed = (1.0 - reflectance) * let_in * lobes.ratio * lobes.ratio / (1.0 - lobes.inner)
+    response.value = lobes.base * (passed * arriving[2] / wp.pi)
+    response.density = (1.0 - chance) * arriving[2] / wp.pi
+    if lobes.alpha > 0.0:
+        half = wp.normalize(outgoing + arriving)
+        toward = wp.dot(outgoing, half)
+        shape = facet_density(lobes.alpha, half[2]) * seen_share(lobes.alpha, outgoing[2])
+        shape = shape * seen_share(lobes.alpha, arriving[2]) / (4.0 * outgoing[2])
+        response.value = response.value + lobes.specular * (dielectric_reflectance(toward, lobes.ratio) * shape)
+        choice = visible_density(lobes.alpha, outgoing, half) / wp.max(4.0 * toward, 1.0e-9)
+        response.density = response.density + chance * choice
+    return response
+
+
+@wp.func
+def coated_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.vec2) -> Chosen:
+    """A direction of the coat or of the base."""
+    chosen = Chosen()
+    chosen.squeeze = 1.0
+    reflectance = dielectric_reflectance(outgoing[2], lobes.ratio)
+    chance = coat_chance(lobes, reflectance)
+    if choice >= chance:
+        chosen.density = 1.0
+        chosen.direction = cosine_direction(point)
+    elif lobes.alpha > 0.0:
+        chosen.density = 1.0
+        chosen.direction = mirrored(outgoing, visible_normal(lobes.alpha, outgoing, point))
+    else:
+        chosen.direction = mirrored(outgoing, wp.vec3(0.0, 0.0, 1.0))
+        chosen.weight = lobes.specular * (reflectance / chance)
+    return chosen

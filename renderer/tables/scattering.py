@@ -1,0 +1,224 @@
+"""Materials as rows of how they scatter light along paths: a function a material.
+
+Wrappers (height fields, holes, bent normals) add to the row of what they wrap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from renderer.layout.kinds import ScatterKind
+from renderer.tables.checks import check_light
+from scenes.arithmetic import sin
+from scenes.canonical import (
+    Bumped,
+    Emissive,
+    Glass,
+    HeightField,
+    Masked,
+    Material,
+    Matte,
+    Metal,
+    MetallicRough,
+    Mirror,
+    NormalMapped,
+    Phong,
+    Plastic,
+    SceneError,
+    Texture,
+)
+
+Row = dict[str, Any]
+
+
+class Textures(Protocol):
+    """What gives textures their numbers."""
+
+    def add_texture(self, texture: Texture, where: str) -> int: ...
+
+
+EMPTY: Row = {
+    "kind": ScatterKind.BLACK,
+    "base": -1,
+    "specular": -1,
+    "parts": -1,
+    "alpha": 0.0,
+    "rough": (1.0, 0.0),
+    "roughness": 1.0,
+    "metallic": 0.0,
+    "clear": 0.0,
+    "clear_alpha": 1.0,
+    "ior": 1.0,
+    "thin": 0,
+    "eta": (1.0, 1.0, 1.0),
+    "k": (0.0, 0.0, 0.0),
+    "inner": 0.0,
+    "glow": -1,
+    "emission": (0.0, 0.0, 0.0),
+    "opacity": -1,
+    "cutoff": -1.0,
+    "bend": -1,
+    "bend_scale": 1.0,
+    "bumps": 0,
+}
+"""A surface that scatters nothing."""
+
+
+def _phong(material: Phong, textures: Textures, where: str) -> Row:
+    return {"kind": ScatterKind.PHONG, "base": textures.add_texture(material.diffuse, where)}
+
+
+def _matte(material: Matte, textures: Textures, where: str) -> Row:
+    square = np.radians(material.sigma_deg) ** 2
+    rough = float(1.0 - 0.5 * square / (square + 0.33)), float(0.45 * square / (square + 0.09))
+    return {"kind": ScatterKind.DIFFUSE, "base": textures.add_texture(material.reflectance, where), "rough": rough}
+
+
+def _mirror(material: Mirror, textures: Textures, where: str) -> Row:
+    return {"kind": ScatterKind.MIRROR, "specular": textures.add_texture(material.reflectance, where)}
+
+
+def _glass(material: Glass, textures: Textures, where: str) -> Row:
+    return {
+        "kind": ScatterKind.GLASS,
+        "base": textures.add_texture(material.transmittance, where),
+        "specular": textures.add_texture(material.reflectance, where),
+        "ior": material.ior,
+        "thin": int(material.thin),
+        "alpha": mean_alpha(material.roughness),
+    }
+
+
+def _metal(material: Metal, textures: Textures, where: str) -> Row:
+    alpha = mean_alpha(material.roughness)
+    if material.distribution != "ggx" and alpha > 0.0:
+        raise SceneError(f"{where}: Metal.distribution: expected ggx, which paths draw, got {material.distribution}")
+    return {
+        "kind": ScatterKind.METAL,
+        "specular": textures.add_texture(material.reflectance_scale, where),
+        "alpha": alpha,
+        "eta": material.eta,
+        "k": material.k,
+    }
+
+
+def _plastic(material: Plastic, textures: Textures, where: str) -> Row:
+    if not material.layered:
+        raise SceneError(f"{where}: Plastic.layered: expected True, which paths draw, got False")
+    return {
+        "kind": ScatterKind.COATED,
+        "base": textures.add_texture(material.diffuse, where),
+        "specular": textures.add_texture(material.specular, where),
+        "ior": material.ior,
+        "alpha": material.roughness,
+        "inner": thrown_back(material.ior),
+    }
+
+
+def _metallic_rough(material: MetallicRough, textures: Textures, where: str) -> Row:
+    return {
+        "kind": ScatterKind.METALLIC,
+        "base": textures.add_texture(material.base, where),
+        "parts": -1 if material.parts is None else textures.add_texture(material.parts, where),
+        "roughness": material.roughness,
+        "metallic": material.metallic,
+        "ior": material.ior,
+        "clear": material.coat,
+        "clear_alpha": max(material.coat_roughness**2, 1.0e-4),
+        "emission": material.emission,
+        "glow": -1 if material.glow is None else textures.add_texture(material.glow, where),
+    }
+
+
+def _emissive(material: Emissive, textures: Textures, where: str) -> Row:
+    return {"kind": ScatterKind.BLACK, "emission": material.radiance}
+
+
+def _height_field(material: HeightField, textures: Textures, where: str) -> Row:
+    return scatter_row(material.base, textures, where)
+
+
+def _masked(material: Masked, textures: Textures, where: str) -> Row:
+    inner = scatter_row(material.base, textures, where)
+    if inner["opacity"] >= 0:
+        raise SceneError(f"{where}: Masked: expected a base without holes of its own")
+    cutoff = -1.0 if material.cutoff is None else material.cutoff
+    return inner | {"opacity": textures.add_texture(material.opacity, where), "cutoff": cutoff}
+
+
+def _bumped(material: Bumped, textures: Textures, where: str) -> Row:
+    return _bent(material.base, material.height, material.scale, 1, textures, where)
+
+
+def _normal_mapped(material: NormalMapped, textures: Textures, where: str) -> Row:
+    return _bent(material.base, material.normals, material.scale, 0, textures, where)
+
+
+def _bent(base: Material, picture: Texture, scale: float, bumps: int, textures: Textures, where: str) -> Row:
+    inner = scatter_row(base, textures, where)
+    if inner["bend"] >= 0:
+        raise SceneError(f"{where}: expected one normal or bump map, got two")
+    return inner | {"bend": textures.add_texture(picture, where), "bend_scale": scale, "bumps": bumps}
+
+
+ROWS: dict[type, Callable[[Any, Textures, str], Row]] = {
+    Phong: _phong,
+    Matte: _matte,
+    Mirror: _mirror,
+    Glass: _glass,
+    Metal: _metal,
+    Plastic: _plastic,
+    MetallicRough: _metallic_rough,
+    Emissive: _emissive,
+    HeightField: _height_field,
+    Masked: _masked,
+    Bumped: _bumped,
+    NormalMapped: _normal_mapped,
+}
+"""What fills the row of each material."""
+
+
+def scatter_row(material: Material, textures: Textures, where: str) -> Row:
+    """The row of a material; a field for each of :class:`renderer.layout.structs.ScatterRecord`.
+
+    Raises:
+        SceneError: for a material that paths do not draw, or values that they cannot.
+    """
+    if type(material) not in ROWS:
+        raise SceneError(f"{where}: material {type(material).__name__} is not supported by paths")
+    row = EMPTY | ROWS[type(material)](material, textures, where)
+    for name in ("alpha", "roughness", "metallic", "clear", "ior", "eta", "k", "emission"):
+        check_light(row[name], f"{where}: {type(material).__name__}.{name}")
+    return row
+
+
+def unwrapped(material: Material) -> Material:
+    """A material without height field, holes and bent normals."""
+    while isinstance(material, HeightField | Masked | Bumped | NormalMapped):
+        material = material.base
+    return material
+
+
+def mean_alpha(roughness: tuple[float, float]) -> float:
+    """One alpha for both axes: their geometric mean."""
+    return float(np.sqrt(roughness[0] * roughness[1]))
+
+
+def thrown_back(ior: float) -> float:
+    """Share of even light that a smooth dielectric throws back inside: ``1 - (1 - r) / ior²`` with ``r`` outside.
+
+    By Simpson's rule over the sine of the angle outside, 0 to 90 degrees.
+    """
+    angle = np.linspace(0.0, np.pi / 2.0, 2049)
+    s, c = sin(angle), sin(np.pi / 2.0 - angle)
+    beyond = np.sqrt(1.0 - (s / ior) ** 2)
+    across = (c - ior * beyond) / (c + ior * beyond)
+    within = (ior * c - beyond) / (ior * c + beyond)
+    value = (across**2 + within**2) * s * c  # 2 F sin cos
+    weights = np.full(len(angle), 2.0)
+    weights[1::2], weights[[0, -1]] = 4.0, 1.0
+    outside = float((weights * value).sum() * (angle[1] / 3.0))
+    return 1.0 - (1.0 - outside) / ior**2

@@ -1,0 +1,80 @@
+"""Materials of facets, and coats, of the canonical scene; conventions as in :mod:`scenes.canonical`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from scenes.canonical.textures import WHITE, Texture
+from scenes.canonical.values import Rgb, SceneError
+
+
+@dataclass(frozen=True)
+class Metal:
+    """Conductor with complex index ``eta + i k`` in RGB; ``roughness`` is the microfacet alpha."""
+
+    eta: Rgb
+    k: Rgb
+    roughness: tuple[float, float] = (0.0, 0.0)
+    reflectance_scale: Texture = WHITE
+    distribution: Literal["beckmann", "ggx"] = "ggx"
+
+
+@dataclass(frozen=True)
+class Glossy:
+    """A glossy coat over a diffuse base (PBRT ``substrate``, LuxRender ``glossy``)."""
+
+    diffuse: Texture
+    specular: Texture
+    roughness: tuple[float, float] = (0.1, 0.1)
+
+
+@dataclass(frozen=True)
+class Plastic:
+    """A dielectric coat of index ``ior`` over a diffuse base.
+
+    Attributes:
+        diffuse: albedo of the base by itself.
+        specular: multiplies what Fresnel's equations reflect.
+        roughness: microfacet alpha of the coat.
+        layered: whether the base gets what the coat lets through, both ways (Mitsuba); otherwise the coat adds to the
+            base and takes nothing from it (PBRT).
+    """
+
+    diffuse: Texture
+    specular: Texture = WHITE
+    ior: float = 1.5
+    roughness: float = 0.0
+    layered: bool = True
+
+
+@dataclass(frozen=True)
+class MetallicRough:
+    """The surface of glTF: facets over a diffuse base, in part a metal, under a clear coat.
+
+    Attributes:
+        base: colour, of the diffuse part and of the metal.
+        metallic, roughness: in [0, 1]; the alpha of the facets is the roughness squared.
+        parts: picture whose green multiplies ``roughness`` and whose blue multiplies ``metallic``; None for none.
+        ior: index of refraction of what is not metal.
+        coat, coat_roughness: strength and roughness of the clear coat, in [0, 1].
+        emission: radiance.
+        glow: picture that multiplies it; None for none.
+    """
+
+    base: Texture
+    metallic: float = 1.0
+    roughness: float = 1.0
+    parts: Texture | None = None
+    ior: float = 1.5
+    coat: float = 0.0
+    coat_roughness: float = 0.0
+    emission: Rgb = (0.0, 0.0, 0.0)
+    glow: Texture | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("metallic", "roughness", "coat", "coat_roughness"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise SceneError(f"MetallicRough.{name}: expected 0 to 1, got {getattr(self, name)}")
+        if not 1.0 <= self.ior < float("inf"):
+            raise SceneError(f"MetallicRough.ior: expected at least 1, got {self.ior}")
