@@ -7,7 +7,7 @@ BASE := $(VENV)/.base
 STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 
-.PHONY: demo test test-slow lint bench study-quick solvers docs constraints clean
+.PHONY: demo test test-fast test-slow lint bench study-quick solvers docs constraints clean
 
 # the base alone, which is all that the demo needs
 $(BASE): pyproject.toml constraints.txt
@@ -32,8 +32,13 @@ lint: $(STAMP)
 	$(VENV)/bin/clang-format --dry-run --Werror renderer/*/native/*.h
 	$(VENV)/bin/pyright
 
+# on all cores, as far as there is memory; a worker goes on with the neighbours of its tests, which share fixtures
 test: $(STAMP)
-	$(PY) -m pytest
+	$(PY) -m pytest -n auto --dist worksteal
+
+# the tests of the modules that differ from the main branch, or of those named: make test-fast MODULES='tsar/morton.py'
+test-fast: $(STAMP)
+	$(PY) -m tests.changed $(MODULES)
 
 test-slow: $(STAMP)
 	$(PY) -m pytest -m slow

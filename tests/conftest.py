@@ -1,8 +1,15 @@
 """Settings shared by all tests."""
 
+import os
 import signal
 
+import psutil
+import pytest
 from hypothesis import settings
+
+# Tensors are small here: threads of torch cost more than they save, and on a busy machine wait for one another for most
+# of the time. No result depends on their number, which has tests of its own. Processes that tests start inherit this.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 settings.register_profile("tsar", deadline=None, max_examples=60, derandomize=True)
 settings.load_profile("tsar")
@@ -10,3 +17,12 @@ settings.load_profile("tsar")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # as in a shell's background: tests of interrupts need what a process in front has
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+WORKER_BYTES = 3 << 30
+"""Memory of one process of tests with all that it starts, at most."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """As many processes as there are cores, and memory for."""
+    return max(1, min(len(os.sched_getaffinity(0)), psutil.virtual_memory().available // WORKER_BYTES))

@@ -14,7 +14,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +117,7 @@ def _content(module: str) -> str | None:
     return digest.hexdigest()[:16] if paths else None
 
 
+@cache
 def version_of(library: str) -> str | None:
     """Version of an installed library by the name it is imported by; None where it is not installed."""
     try:
@@ -130,6 +131,7 @@ def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
     modules, libraries, waiting = set[Path](), set[str](), list(starts)
     # installed packages lie beside those of others
     own = {*_PACKAGES, *(path.relative_to(root).with_suffix("").parts[0] for path in starts)}
+    module = cache(lambda name: _module(root, name))  # most names stand in many files
     while waiting:
         path = waiting.pop()
         if path in modules:
@@ -137,10 +139,10 @@ def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
         modules.add(path)
         content = path.read_bytes()
         for place in _places(content):
-            waiting += _module(root, place) if place.partition(".")[0] in own else []
+            waiting += module(place) if place.partition(".")[0] in own else []
         for name in _imports(content, path.parent.relative_to(root).parts):
             top = name.partition(".")[0]
-            found = _module(root, name) if top in own else []
+            found = module(name) if top in own else []
             waiting += found
             if not found and top not in sys.stdlib_module_names:
                 libraries.add(top)
