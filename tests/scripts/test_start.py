@@ -17,13 +17,10 @@ HEAVY = (
     *("embreex", "pywt", "dask", "distributed"),
 )
 PROGRAM = """
-import json, runpy, sys
-sys.argv, status = sys.argv[1:], 0
-try:
-    runpy.run_path(sys.argv[0], run_name="__main__")
-except SystemExit as stop:
-    status = stop.code or 0
-print("\\n" + json.dumps([status, sorted({name.partition(".")[0] for name in sys.modules})]))
+import atexit, json, runpy, sys
+atexit.register(lambda: print("\\n" + json.dumps(sorted({name.partition(".")[0] for name in sys.modules}))))
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
 """
 
 
@@ -32,8 +29,7 @@ def start(folder: Path, *arguments: str) -> tuple[int, set[str], str]:
     command = [sys.executable, "-c", PROGRAM, *arguments]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
     shown, _, last = done.stdout.rstrip().rpartition("\n")
-    status, modules = json.loads(last)
-    return status, set(modules), shown + done.stderr
+    return done.returncode, set(json.loads(last)), shown + done.stderr
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
