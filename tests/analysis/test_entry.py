@@ -10,6 +10,7 @@ from importlib.metadata import version
 
 import pytest
 
+from analysis.command.cli import run_cli
 from analysis.command.extras import DISTRIBUTION
 from analysis.entry import COMMANDS, TABLES, main
 from tests.scripts.commands import ROOT, one_line
@@ -19,6 +20,7 @@ from tsar.response.transport import trivial
 
 def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     monkeypatch.setattr(sys, "argv", ["tsar", *arguments])
+    monkeypatch.setattr("analysis.entry.run_process", run_cli)  # the other would end this process
     try:
         main()
     except SystemExit as stop:
