@@ -107,9 +107,15 @@ def load_file(
     from scenes.formats.conversion import load_scene_file
     from scenes.formats.drawable import drawable
     from scenes.formats.losses import LossReport
+    from scenes.models import MODEL_ENDINGS
+    from scenes.models.scenes_of_models import model_scene
 
     losses = LossReport()
-    scene = drawable(load_scene_file(Path(name), None, losses), losses, integrator)
+    if integrator == "path" and Path(name).suffix.lower() in MODEL_ENDINGS:
+        found = model_scene(Path(name), losses, facets=True)
+    else:
+        found = load_scene_file(Path(name), None, losses)
+    scene = drawable(found, losses, integrator)
     if camera_path:
         scene = on_a_path(scene, camera_path)  # type: ignore[arg-type]
     return scene, tuple(str(loss) for loss in losses.losses)

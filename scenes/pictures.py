@@ -61,6 +61,18 @@ def by_pillow(path: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.
         return np.array(image.convert("RGB"))
 
 
+def alpha_of(path: Path | BinaryIO) -> Pixels:
+    """The opacity ``(h, w)`` of a picture that Pillow reads, 0 to 1, to 8 bits; 1 where it has none."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large ones are refused here
+        image = Image.open(path)
+    with image:
+        _require_size(*image.size)
+        if "A" not in image.getbands() and "transparency" not in image.info:
+            return np.ones((image.height, image.width), np.float32)
+        return np.array(image.convert("RGBA"))[..., 3].astype(np.float32) / np.float32(255.0)
+
+
 def _three(pixels: np.ndarray) -> np.ndarray:
     """Colours of pixels ``(h, w, channels)``; with fewer than three channels the first is grey."""
     return pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)

@@ -25,11 +25,11 @@ MODEL_ENDINGS = tuple(_READERS)
 
 _KEPT_MAX = 32
 _Kept = tuple[dict[Path, FileState | None], tuple[Instance, ...], tuple[Loss, ...]]
-_kept: dict[Path, _Kept] = {}
-"""Models that were read, and the files that each was made of."""
+_kept: dict[tuple[Path, bool], _Kept] = {}
+"""Models that were read, with facets or without, and the files that each was made of."""
 
 
-def read_model(path: Path, report: LossReport | None = None) -> tuple[Instance, ...]:
+def read_model(path: Path, report: LossReport | None = None, facets: bool = False) -> tuple[Instance, ...]:
     """Parts of a model, each with its own material, in the file's frame.
 
     A part without normals has flat faces, unless its file asks for smoothing (smoothing groups of OBJ);
@@ -41,6 +41,7 @@ def read_model(path: Path, report: LossReport | None = None) -> tuple[Instance, 
     Args:
         path: OBJ, PLY, STL, GLB or glTF.
         report: receives what the file holds and is not kept.
+        facets: materials of glTF are as paths draw them (:mod:`scenes.models.gltf_facets`).
 
     Returns:
         Instances whose transforms are those of the file's nodes.
@@ -50,12 +51,12 @@ def read_model(path: Path, report: LossReport | None = None) -> tuple[Instance, 
             a texture or material file that is not there.
     """
     path, report = Path(path), report or LossReport()
-    files, kept, losses = _kept.pop(path, ({}, (), ()))
+    files, kept, losses = _kept.pop((path, facets), ({}, (), ()))
     if not files or any(state_of(file) != state for file, state in files.items()):
         sources, found = Sources(path), LossReport()
-        kept = _read(path, sources, found)
+        kept = _read(path, sources, found, facets)
         files, losses = sources.files, found.losses
-    _kept[path] = files, kept, losses
+    _kept[path, facets] = files, kept, losses
     if len(_kept) > _KEPT_MAX:
         del _kept[next(iter(_kept))]
     for loss in losses:
@@ -63,13 +64,14 @@ def read_model(path: Path, report: LossReport | None = None) -> tuple[Instance, 
     return kept
 
 
-def _read(path: Path, sources: Sources, report: LossReport) -> tuple[Instance, ...]:
+def _read(path: Path, sources: Sources, report: LossReport, facets: bool) -> tuple[Instance, ...]:
     if path.suffix.lower() not in _READERS:
         raise SceneError(f"model {path}: expected a file that ends in {', '.join(MODEL_ENDINGS)}")
     if not path.is_file():
         raise SceneError(f"model {path}: expected a file, found none")
     try:
-        parts = _READERS[path.suffix.lower()](sources, report)
+        read = _READERS[path.suffix.lower()]
+        parts = read_gltf(sources, report, facets=True) if facets and read is read_gltf else read(sources, report)
     except SceneError as error:
         raise SceneError(f"model {path}: {str(error).removeprefix(f'{path}: ')}") from None
     except Exception as error:  # parsers raise what they like on broken files

@@ -25,8 +25,10 @@ _READ = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "
 _DEPTH_MAX = 256
 
 
-def read_gltf(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
+def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
     """Parts of the file's scene, or of all of its nodes where it names none; animations and skins stand still.
+
+    With ``facets`` materials are as paths draw them, else Phong.
 
     Parts without normals have flat faces, as the format says.
 
@@ -38,7 +40,7 @@ def read_gltf(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
     for name in ("animations", "skins", "cameras"):
         if data.items(name):
             report.add(sources.path.stem, name)
-    return _Reader(data, report).parts()
+    return _Reader(data, report, facets).parts()
 
 
 def _check_extensions(data: GltfData, report: LossReport) -> None:
@@ -54,9 +56,9 @@ def _check_extensions(data: GltfData, report: LossReport) -> None:
 class _Reader:
     """Reads nodes and meshes, each mesh once."""
 
-    def __init__(self, data: GltfData, report: LossReport) -> None:
+    def __init__(self, data: GltfData, report: LossReport, facets: bool) -> None:
         self.data, self.report = data, report
-        self.materials = GltfMaterials(data, report)
+        self.materials = GltfMaterials(data, report, facets)
         self._meshes: dict[int, list[tuple[Mesh, Material]]] = {}
 
     def parts(self) -> tuple[Instance, ...]:

@@ -22,6 +22,7 @@ from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
+from scenes.models.gltf_facets import ALONG_PATHS, FacetMaterials, lookups_beside
 from scenes.models.gltf_textures import GltfTextures, Lookup, Uvs, lookup_of, multiplied
 from scenes.models.phong_of_parts import diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.vertex_colours import coloured
@@ -49,9 +50,11 @@ class Painted:
 class GltfMaterials:
     """Materials of a file, each made once for meshes without colours of vertices."""
 
-    def __init__(self, data: GltfData, report: LossReport) -> None:
+    def __init__(self, data: GltfData, report: LossReport, facets: bool = False) -> None:
+        """Reads on demand; with ``facets`` as paths draw them (:mod:`scenes.models.gltf_facets`)."""
         self.data, self.report = data, report
         self.textures = GltfTextures(data, report)
+        self._facets = FacetMaterials(self.textures, report) if facets else None
         self._made: dict[int, Material] = {}
 
     def painted(
@@ -79,31 +82,38 @@ class GltfMaterials:
             if (colors != 1.0).any():
                 self.report.add(where, "colours of vertices beside a texture", "their mean times the texture")
             tint = ConstantTexture(rgb(mean))
-        if lookup is not None:
-            uvs = lookup.moved(sets[lookup.coordinates]).astype(np.float32)
+        shared = lookup
+        if self._facets is not None and lookup is None and uvs is None:
+            shared = next((one for _, one in lookups_beside(given) if one.coordinates in sets), None)
+        if shared is not None:
+            uvs = shared.moved(sets[shared.coordinates]).astype(np.float32)
         if tint is not None:
-            return Painted(self._material(given, where, lookup, tint), uvs, lookup is None and uvs is not None)
+            return Painted(self._material(given, where, lookup, tint, shared), uvs, shared is None and uvs is not None)
         key = -1 if number is None else number
         if key not in self._made or (lookup is None) != (lookup_of(_rough(given).get("baseColorTexture")) is None):
-            self._made[key] = self._material(given, where, lookup, None)
+            self._made[key] = self._material(given, where, lookup, None, shared)
         return Painted(self._made[key], uvs)
 
-    def _material(self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None) -> Material:
+    def _material(
+        self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None, shared: Lookup | None
+    ) -> Material:
         extensions = given.get("extensions", {})
-        for name in sorted(extensions.keys() - _USED):
+        for name in sorted(extensions.keys() - (_USED | (ALONG_PATHS if self._facets else set()))):
             self.report.add(where, name)
-        for name in ("normalTexture", "occlusionTexture"):
+        for name in () if self._facets else ("normalTexture", "occlusionTexture"):
             if name in given:
                 self.report.add(where, name)
         base = self._base(given, where, lookup, tint)
+        through = extensions.get("KHR_materials_transmission", {})
+        if self._facets is not None and through.get("transmissionFactor", 0.0) <= 0.5:
+            return self._facets.material(given, base, shared, where)
         if "KHR_materials_unlit" in extensions:
             if isinstance(base, ConstantTexture):
                 return Emissive(base.value)
             self.report.add(where, "a picture that no light changes", "a diffuse one")
             return Phong(base)
-        through = extensions.get("KHR_materials_transmission", {})
         if through.get("transmissionFactor", 0.0) > 0.5:
-            return self._glass(base, extensions, where)
+            return self._glass(given, base, extensions, where)
         material = self._rough(given, base, where, lookup)
         mode = given.get("alphaMode", "OPAQUE")
         solid: Material = material
@@ -147,8 +157,8 @@ class GltfMaterials:
             diffuse = scaled(base, diffuse_share(metallic, roughness))
         return metallic_rough(base, diffuse, metallic, roughness)
 
-    def _glass(self, base: Texture, extensions: dict[str, Any], where: str) -> Material:
-        """Glass of the mean base colour, thin unless it has a volume."""
+    def _glass(self, given: dict[str, Any], base: Texture, extensions: dict[str, Any], where: str) -> Material:
+        """Glass of the mean base colour, thin unless it has a volume; along paths as rough as it says."""
         thickness = extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0)
         if "KHR_materials_volume" in extensions:
             self.report.add(where, "colour by the length of the way in glass")
@@ -156,7 +166,9 @@ class GltfMaterials:
         if not isinstance(base, ConstantTexture):
             self.report.add(where, "a picture on glass", "its mean")
         color = rgb(np.clip(mean_of(base), 0.0, 1.0))
-        return Glass(transmittance=ConstantTexture(color), ior=max(ior, 1.0), thin=not thickness > 0.0)
+        alpha = float(np.clip(_rough(given).get("roughnessFactor", 1.0), 0.0, 1.0)) ** 2
+        rough = (alpha, alpha) if self._facets is not None and thickness > 0.0 else (0.0, 0.0)
+        return Glass(transmittance=ConstantTexture(color), ior=max(ior, 1.0), roughness=rough, thin=not thickness > 0.0)
 
     def _glowing(self, given: dict[str, Any], material: Material, where: str) -> Material:
         strength = given.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)

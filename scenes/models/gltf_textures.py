@@ -18,7 +18,7 @@ from scenes.canonical import ImageTexture
 from scenes.formats.losses import LossReport
 from scenes.loading import Picture, decode_srgb
 from scenes.models.gltf_data import GltfData
-from scenes.pictures import by_pillow, decoded
+from scenes.pictures import alpha_of, by_pillow, decoded
 
 Uvs = Float[NDArray[np.float64], "*n 2"]
 _NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
@@ -77,12 +77,11 @@ class GltfTextures:
     def __init__(self, data: GltfData, report: LossReport) -> None:
         self.data, self.report = data, report
         self._pictures: dict[tuple[int, bool], Picture] = {}
+        self._opacities: dict[int, Picture] = {}
 
     def picture(self, lookup: Lookup, numbers: bool = False) -> Picture:
         """Texels ``(h, w, 3)`` of a texture: linear colours, or numbers that are not encoded."""
-        texture = self.data.at("textures", lookup.texture)
-        extensions = texture.get("extensions", {})
-        source = texture.get("source", extensions.get("EXT_texture_webp", {}).get("source"))
+        source = self._source(lookup)
         key = (source, numbers)
         if key not in self._pictures:
             name, content = self.data.image_bytes(source)
@@ -95,6 +94,19 @@ class GltfTextures:
                 found = found.astype(np.float32) / np.float32(most) if numbers else decode_srgb(found)  # type: ignore[arg-type]
             self._pictures[key] = found.astype(np.float32)
         return self._pictures[key]
+
+    def opacity(self, lookup: Lookup) -> Picture:
+        """Texels ``(h, w, 3)`` of the alpha of a texture, 1 where its picture has none."""
+        source = self._source(lookup)
+        if source not in self._opacities:
+            name, content = self.data.image_bytes(source)
+            found = alpha_of(self.data.sources.require(name, "a texture at") if content is None else content)
+            self._opacities[source] = np.repeat(found[..., None], 3, axis=-1)
+        return self._opacities[source]
+
+    def _source(self, lookup: Lookup) -> Any:
+        texture = self.data.at("textures", lookup.texture)
+        return texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
 
     def texture(self, lookup: Lookup, image: Picture, where: str) -> ImageTexture:
         """A texture of these texels, with the sampler of the file."""

@@ -20,7 +20,9 @@ def model_up(path: Path) -> Up:
     return "y" if path.suffix.lower() in _Y_UP else "z"
 
 
-def model_scene(path: Path, report: LossReport, up: Up | None = None, smooth_deg: float = 0.0) -> Scene:
+def model_scene(
+    path: Path, report: LossReport, up: Up | None = None, smooth_deg: float = 0.0, facets: bool = False
+) -> Scene:
     """A model with a camera that sees all of it, and light (:func:`scenes.viewing.framed`).
 
     Args:
@@ -28,11 +30,12 @@ def model_scene(path: Path, report: LossReport, up: Up | None = None, smooth_deg
         report: receives what the file holds and is not kept.
         up: the upward axis; by default :func:`model_up`.
         smooth_deg: see :func:`scenes.models.place_model`.
+        facets: see :func:`scenes.models.read_model`.
 
     Raises:
         SceneError: it cannot be read.
     """
-    return framed(smoothed(read_model(path, report), smooth_deg), up or model_up(path), path.stem)
+    return framed(smoothed(read_model(path, report, facets), smooth_deg), up or model_up(path), path.stem)
 
 
 def _read(path: Path, root: Path | None, report: LossReport) -> Scene:

@@ -1,0 +1,110 @@
+"""Materials of a glTF file as paths draw them: metallic and rough texel by texel, with normals, holes and glow.
+
+All pictures of a material are looked up alike, as the first that it has; one that is not is left out, with a line.
+Occlusion is not needed where light between surfaces is followed.
+
+Source: Khronos Group, "glTF 2.0 specification", section 3.9 and appendix B; extensions KHR_materials_clearcoat,
+KHR_materials_emissive_strength, KHR_materials_ior, KHR_materials_unlit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from scenes.canonical import ConstantTexture, Masked, Material, MetallicRough, NormalMapped, Texture
+from scenes.formats.appearance.spectra import rgb
+from scenes.formats.losses import LossReport
+from scenes.models.gltf_textures import GltfTextures, Lookup, lookup_of
+
+ALONG_PATHS = {"KHR_materials_clearcoat"}
+"""Extensions that are read here alone."""
+
+_BLACK = ConstantTexture((0.0, 0.0, 0.0))
+
+
+def lookups_beside(given: dict[str, Any]) -> Iterator[tuple[str, Lookup]]:
+    """The pictures of a material but that of its colour, by their names."""
+    parts = given.get("pbrMetallicRoughness", {})
+    for name, info in (
+        ("metallicRoughnessTexture", parts.get("metallicRoughnessTexture")),
+        ("normalTexture", given.get("normalTexture")),
+        ("emissiveTexture", given.get("emissiveTexture")),
+    ):
+        lookup = lookup_of(info)
+        if lookup is not None:
+            yield name, lookup
+
+
+class FacetMaterials:
+    """Makes materials of the pictures of one file."""
+
+    def __init__(self, textures: GltfTextures, report: LossReport) -> None:
+        self.textures, self.report = textures, report
+
+    def material(self, given: dict[str, Any], base: Texture, shared: Lookup | None, where: str) -> Material:
+        """The material of these properties.
+
+        Args:
+            given: of the file.
+            base: its colour.
+            shared: how its pictures are looked up; None where there are no coordinates for any.
+            where: for messages.
+        """
+        extensions, parts = given.get("extensions", {}), given.get("pbrMetallicRoughness", {})
+        pictures = {name: self._alike(name, lookup, shared, where) for name, lookup in lookups_beside(given)}
+        found: Material
+        if "KHR_materials_unlit" in extensions:
+            found = MetallicRough(_BLACK, 0.0, 1.0, ior=1.0, emission=(1.0, 1.0, 1.0), glow=base)
+        else:
+            coat = extensions.get("KHR_materials_clearcoat", {})
+            for name in sorted(name for name in coat if name.endswith("Texture")):
+                self.report.add(where, f"a picture of its clear coat ({name})")
+            metallic, rough = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in _PARTS)
+            beside, glow = pictures.get("metallicRoughnessTexture"), pictures.get("emissiveTexture")
+            strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+            emission = np.asarray(given.get("emissiveFactor", (0.0, 0.0, 0.0)), np.float64) * strength
+            found = MetallicRough(
+                base,
+                metallic,
+                rough,
+                None if beside is None else self._picture(beside, where, numbers=True),
+                max(float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5)), 1.0),
+                float(np.clip(coat.get("clearcoatFactor", 0.0), 0.0, 1.0)),
+                float(np.clip(coat.get("clearcoatRoughnessFactor", 0.0), 0.0, 1.0)),
+                rgb(np.maximum(emission, 0.0)),
+                None if glow is None or not (emission > 0.0).any() else self._picture(glow, where),
+            )
+        normal = pictures.get("normalTexture")
+        if normal is not None:
+            scale = float(given["normalTexture"].get("scale", 1.0))
+            found = NormalMapped(found, self._picture(normal, where, numbers=True), scale)
+        return self._with_holes(given, found, shared, where)
+
+    def _alike(self, name: str, lookup: Lookup, shared: Lookup | None, where: str) -> Lookup | None:
+        if shared is not None and lookup.place == shared.place:
+            return lookup
+        self.report.add(where, f"{name}, which is looked up in another way than its other pictures")
+        return None
+
+    def _picture(self, lookup: Lookup, where: str, numbers: bool = False) -> Texture:
+        return self.textures.texture(lookup, self.textures.picture(lookup, numbers), where)
+
+    def _with_holes(self, given: dict[str, Any], material: Material, shared: Lookup | None, where: str) -> Material:
+        mode, parts = given.get("alphaMode", "OPAQUE"), given.get("pbrMetallicRoughness", {})
+        if mode not in ("MASK", "BLEND"):
+            return material
+        factor = np.float32(np.clip(parts.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3], 0.0, 1.0))
+        cutoff = float(given.get("alphaCutoff", 0.5)) if mode == "MASK" else None
+        lookup = lookup_of(parts.get("baseColorTexture"))
+        if lookup is None or shared is None:
+            return (
+                Masked(material, ConstantTexture(rgb(np.full(3, float(factor)))), cutoff) if factor < 1.0 else material
+            )
+        opacity = self.textures.texture(lookup, self.textures.opacity(lookup) * factor, where)
+        return Masked(material, opacity, cutoff)
+
+
+_PARTS = ("metallic", "roughness")
