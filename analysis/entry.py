@@ -17,6 +17,7 @@ from analysis.command.later import command
 COMMANDS = {
     "run": "analysis.comparison.run_command",
     "inputs": "analysis.comparison.inputs_command",
+    "report": "analysis.comparison.report_command",
     "render": "analysis.tracer.render_command",
     "study": "analysis.suitability.command",
     "ablation": "analysis.ablation.command",

@@ -203,7 +203,7 @@ def _compare(
 ) -> Measured:
     from analysis.comparison.rivalry import Panels
     from analysis.comparison.summary import Measured
-    from analysis.comparison.viewers import Filming, Steps
+    from analysis.comparison.viewers import EXACT, Filming, Steps
     from analysis.metrics import METRICS
     from analysis.page.video import Scales
     from analysis.study.displays import Measuring, watch
@@ -214,7 +214,8 @@ def _compare(
     span_s = options.start_s, options.start_s + options.seconds
     side_px = min(options.tsar.shape[1], 512)
     filming = [Filming(options.policy, scales, side_px, options.out, stride)] if options.film else []
-    steps, task = Steps(options.policy, scales, len(times_s)), bars.task("comparison", len(times_s))
+    steps = Steps(options.policy, scales, len(times_s), exact=options.page == EXACT)
+    task = bars.task("comparison", len(times_s))
 
     def on_view(view: View) -> None:
         task.advance()
@@ -234,9 +235,8 @@ def _compare(
         with Mp4Writer(options.out / "comparison.mp4", fps, made.width_px, made.height_px) as sink:
             one.write(panels, made, sink, drawn.advance)
     sequences = {name: _scored(options, name, seen) for name in options.metrics if METRICS[name].sequence}
-    return Measured(
-        options.policy, times_s, seen, runs, steps.chosen(panels), reference.nonfinite, options.cost, sequences
-    )
+    shown = steps.made, steps.panels(list(seen))
+    return Measured(options.policy, times_s, seen, runs, *shown, reference.nonfinite, options.cost, sequences)
 
 
 def _scored(options: RunOptions, metric: str, seen: dict[str, Seen]) -> dict[str, float]:

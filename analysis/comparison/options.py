@@ -98,6 +98,8 @@ class RunOptions:
     """Also write what the display of the policy shows at every reference time to frames/, as EXR."""
     film: bool = True
     """Write comparison.mp4."""
+    page: Literal["near", "lossless"] = "near"
+    """How report.html holds pictures: codes off by about 1 of 255, or exact and three times as large."""
     out: Path = Path("out/run")
     """Folder for the results."""
     cache: References = REFERENCES
@@ -174,3 +176,16 @@ class RunOptions:
     def cost(self) -> CostParameters:
         """Parameters of the cost model for this run."""
         return parameters_of(self.tsar, self.trace_segments)
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """Which finished runs a page compares."""
+
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Folders of finished runs."""
+    out: Path = Path("out/report")
+    """Folder for the page."""
+
+    def __post_init__(self) -> None:
+        require(len(self.folders) >= 1, "folders", "at least one", self.folders)

@@ -9,9 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 
-from analysis.page.figures import ADAPTIVE, FRAMED, Floats, inks, new_figure
+from analysis.page.figures import ADAPTIVE, FRAMED, Floats, label_ends, line_style, new_figure, styles
 
 _TITLE_CHARACTERS = 105  # of a line above the figure
 
@@ -40,20 +39,18 @@ def error_figure(
     upper = axes[0]
     for axis in axes:
         axis.vlines(refresh_s, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
-    for name, ink in inks(list(errors), own).items():
+    for name, style in styles(list(errors), own).items():
         values = errors[name]
-        style = {"linewidth": 2.0, "zorder": 3} if name == own else {"linewidth": 1.3}
-        upper.plot(times_s, np.where(values > 0, values, np.nan), color=ink, label=name, **style)
+        upper.plot(times_s, np.where(values > 0, values, np.nan), label=name, **line_style(style))
     upper.set_yscale("log")
     upper.set_ylabel("mean squared error")
     upper.set_title(textwrap.fill(title, _TITLE_CHARACTERS), fontsize=10, loc="left", parse_math=False)
-    upper.margins(y=0.15)
-    upper.legend(frameon=False, fontsize=8, ncols=min(len(errors), 5), loc="upper left")
     if rivals:
         _draw_ratio(axes[-1], times_s, ratio, f"{own} / {rivals[0]}")
     marked = f"   (dotted: the display of {rivals[0]} changes)" if rivals else ""
     axes[-1].set_xlabel(f"simulated time, s{marked}")
     axes[-1].set_xlim(times_s[0], times_s[-1])
+    label_ends(upper)
     return figure
 
 
@@ -79,28 +76,6 @@ def _widen(axis, values: Floats) -> None:
     axis.yaxis.set_major_formatter("{x:g}")
     axis.yaxis.set_minor_formatter("")
     axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-
-
-def density_figure(quantiles: Mapping[str, NDArray], bounds: Mapping[str, tuple[float, float]]) -> Figure:
-    """Bands of the densities over time: 5–95 %, 25–75 % and the median over the elements."""
-    figure, axes = new_figure(9.0, 4.6, 2, sharex=True)
-    labels = {
-        "density_spatial": "spatial density,\nsamples per element",
-        "density_temporal": "temporal density,\nper cycle",
-    }
-    time = quantiles["sim_time_s"]
-    for axis, (name, label), ink in zip(axes, labels.items(), (FRAMED, ADAPTIVE), strict=True):
-        q = quantiles[name]
-        axis.fill_between(time, q[:, 0], q[:, 4], color=ink, alpha=0.18, linewidth=0, label="5–95 %")
-        axis.fill_between(time, q[:, 1], q[:, 3], color=ink, alpha=0.38, linewidth=0, label="25–75 %")
-        axis.plot(time, q[:, 2], color=ink, linewidth=1.3, label="median")
-        axis.set_yscale("log", base=2)
-        axis.set_ylim(bounds[name][0] / 1.3, bounds[name][1] * 1.3)
-        axis.set_ylabel(label)
-        axis.margins(x=0.0)
-    axes[0].legend(frameon=False, fontsize=8, ncols=3, loc="upper left", bbox_to_anchor=(0.0, 1.18))
-    axes[1].set_xlabel("simulated time, s (negative: warm-up)")
-    return figure
 
 
 def stage_figure(modelled: Mapping[str, float], measured: Mapping[str, float]) -> Figure:

@@ -11,13 +11,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analysis.comparison import plots
-from analysis.comparison.rivalry import best_rival_table
+from analysis.comparison.rivalry import Panels, best_rival_table
 from analysis.comparison.summary import Measured, measured_stages, modelled_stages
 from analysis.comparison.tables import key_table, ledger_table, metric_table, stage_table
+from analysis.comparison.viewers import EXACT, MAP_PX
+from analysis.metrics.quality import ratio
 from analysis.page import figures
-from analysis.page.player import Curve, Player
+from analysis.page.comparer import Comparer
+from analysis.page.curves import Curve, Plot
 from analysis.page.report import Report, write_report
-from analysis.storage.records import density_quantiles, read_limits
+from analysis.page.video import REFERENCE
+from analysis.storage.records import density_quantiles, stage_seconds
 
 
 def _size(tsar: Mapping[str, Any]) -> str:
@@ -35,42 +39,78 @@ def _title(summary: Mapping[str, Any]) -> str:
     )
 
 
+def _short_title(summary: Mapping[str, Any]) -> str:
+    config, rivals = summary["config"], summary["rivals"]
+    beside = f" beside {rivals[0]}" + (f" and {len(rivals) - 1} more" if rivals[1:] else "") if rivals else ""
+    return f"{config['input']}: {summary['policy']}{beside} at {_size(config['tsar'])}"
+
+
 def _error_figure(summary: Mapping[str, Any], measured: Measured) -> Figure:
     refresh = measured.seen[measured.rival].refresh_s if measured.rival else []
     return plots.error_figure(measured.times_s, measured.mse, measured.own, measured.ratio(), refresh, _title(summary))
 
 
 def write_figures(out: Path, summary: Mapping[str, Any], measured: Measured) -> None:
-    """Writes ``error.png``."""
+    """Writes ``error.png`` and ``error.svg``."""
     figures.save(_error_figure(summary, measured), out / "error.png")
 
 
-def _player(measured: Measured) -> Player:
-    inks = figures.inks(list(measured.seen), measured.own)
-    rival = measured.rival
-    marks = f" Dotted: the display of {rival} changes." if rival else ""
-    return Player(
-        times_s=measured.times_s,
-        steps=measured.steps,
-        curves=[Curve(name, ink, measured.mse[name].tolist()) for name, ink in inks.items()],
-        quantity="mean squared error",
-        marks_s=measured.seen[rival].refresh_s if rival else [],
-        readings={f"{measured.own} / {rival}": [f"{value:.3f}" for value in measured.ratio()]} if rival else {},
-        note="Every view shows what stands on the display at that time, latency included. Move the slider, also by "
-        f"the arrow keys, or click into the curves.{marks} Of the framed rivals the one of the lowest median error has "
-        f"a view. Maps that name no run are of {measured.own}; ages are of the newest sample in each place.",
+def _comparer(summary: Mapping[str, Any], measured: Measured, steps: Path | None) -> Comparer:
+    panels, rival = Panels.of(measured.mse, measured.own), measured.rival
+    how = (
+        "without loss"
+        if summary["config"]["page"] == EXACT
+        else (
+            f"nearly without loss (codes off by 1 of 255 or so; maps of more than {MAP_PX} pixels a side are thinned)"
+        )
     )
+    return Comparer(
+        panels=measured.panels,
+        steps=measured.steps,
+        left=panels.best_framed or rival or REFERENCE,
+        right=measured.own,
+        plots=[*_error_plots(measured), *(_cycle_plots(measured.recorded or "", steps) if steps else [])],
+        note=f"Pictures show what stands on each display, latency included, pixel for pixel, {how}. Curves are of the "
+        "exact values.",
+    )
+
+
+def _error_plots(measured: Measured) -> list[Plot]:
+    styles, times = figures.styles(list(measured.seen), measured.own), measured.times_s.tolist()
+    rival = measured.rival
+    marks = measured.seen[rival].refresh_s if rival else []
+    errors = [Curve(name, times, values.tolist(), styles[name]) for name, values in measured.mse.items()]
+    found = [Plot("Mean squared error of what is shown", "", errors, marks_s=marks)]
+    if rival:
+        own = measured.mse[measured.own]
+        ratios = [Curve(name, times, ratio(own, measured.mse[name]).tolist(), styles[name])
+                  for name in measured.rivals]  # fmt: skip
+        found.append(Plot(f"Error of {measured.own} over that of each rival", "", ratios, level=1.0))
+    return found
+
+
+def _cycle_plots(name: str, path: Path) -> list[Plot]:
+    """Densities and stages of the run whose cycles are on disk."""
+    quantiles = density_quantiles(path)
+    times, words = quantiles["sim_time_s"].tolist(), ("5 %", "25 %", "median", "75 %", "95 %")
+    found = []
+    for column, title, unit in (
+        ("density_spatial", f"Spatial density of {name} over the picture", "samples per element"),
+        ("density_temporal", f"Temporal density of {name} over the picture", "refreshes per cycle"),
+    ):
+        curves = [Curve(word, times, quantiles[column][:, i].tolist(), abs(i - 2)) for i, word in enumerate(words)]
+        found.append(Plot(title, unit, curves[::-1]))
+    at_s, stages = stage_seconds(path)
+    curves = [
+        Curve(stage, at_s, (1e3 * values).tolist(), style) for style, (stage, values) in enumerate(stages.items())
+    ]
+    return [*found, Plot(f"Stages of a cycle of {name}, as measured", "ms", curves)] if curves else found
 
 
 def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> None:
     """Writes ``report.html``."""
-    drawn = {"Error over time": _error_figure(summary, measured)}
-    tables = [ledger_table(measured)]
-    if measured.recorded is not None:
-        limits = read_limits(out / "steps.parquet")
-        bounds = {"density_spatial": limits.density_spatial, "density_temporal": limits.density_temporal}
-        caption = f"Densities of {measured.recorded} over time"
-        drawn[caption] = plots.density_figure(density_quantiles(out / "steps.parquet"), bounds)
+    drawn: dict[str, Figure] = {}
+    tables, steps = [ledger_table(measured)], out / "steps.parquet" if measured.recorded is not None else None
     if measured.totals.cycles:
         drawn[f"Stages of {measured.own}"] = plots.stage_figure(modelled_stages(measured), measured_stages(measured))
         tables.insert(0, stage_table(measured))
@@ -78,11 +118,11 @@ def write_page(out: Path, summary: Mapping[str, Any], measured: Measured) -> Non
     write_report(
         out / "report.html",
         Report(
-            title=_title(summary),
+            title=_short_title(summary),
             lead=_lead(summary, measured),
             key_numbers=key_table(measured),
             figures=[(caption, _png(figure)) for caption, figure in drawn.items()],
-            player=_player(measured),
+            comparer=_comparer(summary, measured, steps),
             tables=[*(table for table in further if table), *tables],
             details={"Configuration": summary["config"], "Provenance": summary["provenance"]},
         ),
@@ -104,11 +144,10 @@ def _lead(summary: Mapping[str, Any], measured: Measured) -> list[str]:
     ]
     if measured.rival is not None:
         statistics = measured.statistics(measured.rival)
-        better = "less" if statistics.median < 1 else "more"
-        found.append(
-            f"{measured.own} has {better} error than {measured.rival} at the median of the reference times (ratio "
-            f"{statistics.median:.3f}); its error is at most as large {100 * statistics.share_suitable:.0f} % of the "
-            "time."
+        found.insert(
+            0,
+            f"The error of {measured.own} is {statistics.median:.3f} times that of {measured.rival} at the median of "
+            f"the reference times, and at most as large {100 * statistics.share_suitable:.0f} % of the time.",
         )
     error = "The error is the mean squared difference of display-encoded values in [0, 1] over pixels and channels."
     return [*found, error]

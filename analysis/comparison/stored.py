@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tsar.types import StepRecord
 
 SUMMARY = "summary.json"
-FILES = ("steps.parquet", "error.png", "report.html", "comparison.mp4")
+FILES = ("steps.parquet", "error.png", "error.svg", "report.html", "comparison.mp4")
 
 
 @dataclass

@@ -17,7 +17,7 @@ from analysis.metrics.cost_model import (
     stage_flops,
 )
 from analysis.metrics.quality import Floats, RatioStatistics, ratio, ratio_statistics
-from analysis.page.player import Step
+from analysis.page.comparer import Panel, Step
 from analysis.study.displays import Seen
 from analysis.study.runs import PolicyRun, Totals
 from analysis.study.spending import cycle_flops
@@ -36,6 +36,7 @@ class Measured:
         seen: what every display showed, by name; the first rival is the one compared to.
         runs: the runs that showed it.
         steps: pictures of evenly spaced times, for the page.
+        panels: what they are of.
         reference_nonfinite: non-finite values in the reference.
         cost: parameters of the cost model, scalars.
         sequences: values of metrics of sequences, by metric and run.
@@ -47,6 +48,7 @@ class Measured:
     seen: Mapping[str, Seen]
     runs: Mapping[str, PolicyRun]
     steps: list[Step]
+    panels: list[Panel]
     reference_nonfinite: int
     cost: CostParameters
     sequences: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

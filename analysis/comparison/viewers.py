@@ -8,28 +8,43 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from analysis.comparison.rivalry import Panels
 from analysis.metrics.quality import View
-from analysis.page.pictures import Pixels, webp_bytes
-from analysis.page.player import Step
-from analysis.page.video import ComparisonFilm, FrameSink, Scales, maps, photographs, side_of
+from analysis.page.comparer import Panel, Step
+from analysis.page.pictures import Map, Pixels, Scale, enlarge, picture_bytes
+from analysis.page.video import (
+    AGES,
+    REFERENCE,
+    ComparisonFilm,
+    FrameSink,
+    Scales,
+    images,
+    maps,
+    photographs,
+    side_of,
+    to_pixels,
+)
 
 STEPS_MAX = 60
 """Positions of the slider in the report at most."""
-STEP_PX = 256
-"""Width of the pictures in the report."""
+EXACT = "lossless"
+"""The report holds pictures and maps exactly."""
+MAP_PX = 256
+"""Otherwise larger maps, which are noisy, are held at every so many pixels that this many are left."""
 
 
 @dataclass
 class Steps:
-    """Keeps pictures of evenly spaced times for the page: every k-th, with the least k that keeps to ``most``.
+    """Keeps pictures of evenly spaced times for the page, each pixel of them: every k-th, with the least k that keeps
+    to ``most``. What stands on a display unchanged is kept once.
 
     Changes in place.
 
@@ -37,27 +52,45 @@ class Steps:
         own: the run whose decisions are shown first.
         scales: bounds of the colour scales.
         count: how many reference times there will be.
+        exact: whether pictures are kept without loss, and maps of any size.
         made: the pictures, of all runs.
+        map_scales: of maps, by label.
     """
 
     own: str
     scales: Scales
     count: int
     most: int = STEPS_MAX
+    exact: bool = False
     made: list[Step] = field(default_factory=list)
+    map_scales: dict[str, Scale] = field(default_factory=dict)
+    _ages: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))
+    _last: dict[str, tuple[Any, bytes]] = field(default_factory=dict)
 
     def __call__(self, view: View) -> None:
         if view.number % -(-self.count // self.most) == 0:
             # encoded at once: the pixels of all steps together would take as much memory as the run
-            photos = photographs(view, STEP_PX).items()
-            pictures: dict[str, bytes | None] = {label: webp_bytes(pixels, lossless=False) for label, pixels in photos}
-            for label, pixels in maps(view, self.own, self.scales, STEP_PX).items():
-                pictures[label] = webp_bytes(pixels, lossless=True)
-            self.made.append(Step(view.number, pictures))
+            pictures: dict[str, bytes | None] = {name: self._kept(name, image) for name, image in images(view).items()}
+            for label, one in maps(view, self.own, self.scales).items():
+                apart = 1 if self.exact else -(-max(one.places.shape) // MAP_PX)
+                pictures[label] = picture_bytes(one.places[::apart, ::apart], exact=True)
+                self.map_scales[label] = one.scale
+                if label == AGES:
+                    self._ages += np.bincount(one.places.ravel(), minlength=256)
+            self.made.append(Step(float(view.time_s), pictures))
 
-    def chosen(self, panels: Panels) -> list[Step]:
-        """Those of the runs that have a panel."""
-        return [replace(step, pictures=panels.arranged(step.pictures)) for step in self.made]
+    def _kept(self, name: str, image: Any) -> bytes:
+        before = self._last.get(name)
+        if before is None or before[0] is not image:
+            self._last[name] = before = (image, picture_bytes(to_pixels(image), self.exact))
+        return before[1]
+
+    def panels(self, runs: Sequence[str]) -> list[Panel]:
+        """The reference, runs and maps, the scale of ages fitted to the data."""
+        found = [Panel(REFERENCE), *(Panel(name, truth=REFERENCE) for name in runs)]
+        for label, scale in self.map_scales.items():
+            found.append(Panel(label, scale=scale.fitted(self._ages) if label == AGES else scale))
+        return found
 
 
 class Reel:
@@ -97,6 +130,8 @@ class Filming:
         self.own, self.scales, self.side_px, self.stride = own, scales, side_of(side_px), stride
         self._reel = Reel(folder)
         self._frames: list[tuple[float, dict[str, Any]]] = []
+        self._scales: dict[str, Scale] = {}
+        self._ages = np.zeros(256, np.int64)
         self._times_s: list[float] = []
         self._errors: dict[str, list[float]] = {}
 
@@ -105,7 +140,11 @@ class Filming:
         for name, mse in view.mse.items():
             self._errors.setdefault(name, []).append(mse)
         if view.number % self.stride == 0:
-            drawn = photographs(view, self.side_px) | maps(view, self.own, self.scales, self.side_px)
+            mapped = maps(view, self.own, self.scales)
+            drawn = photographs(view, self.side_px) | {label: one.places for label, one in mapped.items()}
+            self._scales |= {label: one.scale for label, one in mapped.items()}
+            if AGES in mapped:
+                self._ages += np.bincount(mapped[AGES].places.ravel(), minlength=256)
             kept = {label: self._reel.keep(pixels) for label, pixels in drawn.items()}
             self._frames.append((view.time_s, kept))
 
@@ -114,14 +153,23 @@ class Filming:
         first = panels.arranged(self._frames[0][1])
         height_px = next(iter(first.values()))[2][0]
         runs, row = list(self._errors), len(panels.runs) + 1
-        return ComparisonFilm(self.side_px, span_s, runs, self.own, list(first), row, height_px)
+        return ComparisonFilm(self.side_px, span_s, runs, self.own, list(first), row, height_px, self.map_scales)
+
+    @property
+    def map_scales(self) -> dict[str, Scale]:
+        """Scales of the maps so far, that of ages fitted to the data."""
+        return {label: one.fitted(self._ages) if label == AGES else one for label, one in self._scales.items()}
 
     def write(
         self, panels: Panels, film: ComparisonFilm, sink: FrameSink, advance: Callable[[], None] = lambda: None
     ) -> None:
         """Sends all frames to a sink."""
+        scales, height_px = self.map_scales, film.panel_height_px
         for number, (time_s, kept) in enumerate(self._frames):
             pictures = {label: self._reel.picture(one) for label, one in panels.arranged(kept).items()}
+            for label in scales.keys() & pictures.keys():
+                coloured = Map(pictures[label], scales[label]).pixels()
+                pictures[label] = enlarge(coloured, self.side_px, height_px)
             until = number * self.stride + 1
             sink.add(film.frame(time_s, pictures, self._times_s[:until], _until(self._errors, until)))
             advance()

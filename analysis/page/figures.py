@@ -1,12 +1,19 @@
-"""What all figures share: axes, colours and files."""
+"""What all figures share: axes, inks, dashes, labels at the ends of lines, and files.
+
+Inks are those of Okabe and Ito (2008), which people who confuse red and green tell apart; each goes with a dash pattern
+of its own, so that a figure in grey can be read.
+"""
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -15,22 +22,83 @@ from analysis.storage.files import atomic
 
 Floats = NDArray[np.float64]
 
-ADAPTIVE, FRAMED, OTHER = "#c9570c", "#1f6fb4", "#5a8f29"
-_RIVALS = (FRAMED, OTHER, "#8a56ac", "#b8860b", "#2a9d8f", "#b5485d", "#6b6b6b")
+INKS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9")
+"""Vermilion is the ink of the run's own; yellow is left out: it cannot be seen on white."""
+DASHES = ("", "7 3", "2 2", "8 3 2 3", "5 2 1 2 1 2", "12 3", "1 3")
+"""Dash patterns beside the inks, in points or pixels."""
+ADAPTIVE, FRAMED, OTHER = INKS[:3]
 _GRID = {"color": "0.85", "linewidth": 0.6}
+_LINE_PX = 12  # between labels, at the resolution of a figure
 
 
 def save(figure: Figure, path: Path, dpi: int = 130) -> None:
-    """Writes a figure as PNG, atomically."""
+    """Writes a figure as PNG, and beside it as SVG of the same name, each atomically and with the same bytes every
+    time."""
     FigureCanvasAgg(figure)
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=dpi, format="png")
+    with atomic(path.with_suffix(".svg")) as temporary, rc_context({"svg.hashsalt": path.stem}):
+        figure.savefig(temporary, format="svg", metadata={"Date": None})
+
+
+def styles(runs: Sequence[str], own: str) -> dict[str, int]:
+    """The number of ink and dashes of each run: 0 is the run's own, the rivals' repeat where there are many."""
+    rivals = itertools.cycle(range(1, len(INKS)))
+    return {name: 0 if name == own else next(rivals) for name in runs}
 
 
 def inks(runs: Sequence[str], own: str) -> dict[str, str]:
-    """A colour for each run; the rivals' repeat where there are many."""
-    rivals = itertools.cycle(_RIVALS)
-    return {name: ADAPTIVE if name == own else next(rivals) for name in runs}
+    """The ink of each run."""
+    return {name: INKS[style] for name, style in styles(runs, own).items()}
+
+
+def line_style(style: int) -> dict:
+    """Ink, dashes and width of a line of matplotlib."""
+    dashes = tuple(float(length) for length in DASHES[style % len(DASHES)].split())
+    width = 2.0 if style == 0 else 1.4
+    # matplotlib multiplies dashes by the width of the line
+    pattern = (0, tuple(length / width for length in dashes)) if dashes else "solid"
+    return {"color": INKS[style % len(INKS)], "linewidth": width, "linestyle": pattern, "zorder": 3 - 0.1 * style}
+
+
+def label_ends(axis: Axes) -> None:
+    """Writes the label of every line beside its last point, right of the axes, apart from each other. The scales of the
+    axes must be final."""
+    figure = axis.figure
+    known = [line for line in axis.lines if not str(line.get_label()).startswith("_")]
+    ends = []
+    for line in known:
+        x, y = (np.asarray(values, np.float64) for values in line.get_data())
+        shown = np.isfinite(x) & np.isfinite(y)
+        point = (x[shown][-1], y[shown][-1]) if shown.any() else (np.nan, np.nan)
+        ends.append(axis.transData.transform(point)[1] if shown.any() else np.nan)
+    low, high = axis.transAxes.transform([(0, 0), (1, 1)])[:, 1]
+    apart = _LINE_PX * getattr(figure, "dpi", 100) / 72
+    for line, y in zip(known, spread(ends, apart, low, high), strict=True):
+        place = axis.transAxes.inverted().transform((0, y))[1]
+        axis.annotate(
+            str(line.get_label()), (1.0, place), (18, 0), xycoords="axes fraction", textcoords="offset points",
+            va="center", fontsize=8, color="0.1", annotation_clip=False,
+        )  # fmt: skip
+        axis.plot(
+            [1.005, 1.022], [place, place], transform=axis.transAxes, clip_on=False, label="_lead",
+            color=line.get_color(), linewidth=line.get_linewidth(), linestyle=line.get_linestyle(),
+        )  # fmt: skip
+
+
+def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:
+    """Places near those that are wanted, in their order, at least so far apart and, where there is room, within the
+    bounds; those of NaN come last."""
+    order = sorted(range(len(wanted)), key=lambda i: (math.isnan(wanted[i]), wanted[i]))
+    found, least = [0.0] * len(wanted), low
+    for i in order:
+        found[i] = least if math.isnan(wanted[i]) else max(wanted[i], least)
+        least = found[i] + apart
+    most = high
+    for i in reversed(order):
+        found[i] = min(found[i], most)
+        most = found[i] - apart
+    return [round(y, 1) for y in found]
 
 
 def new_figure(width: float, height: float, rows: int = 1, **kwargs) -> tuple[Figure, NDArray]:

@@ -14,20 +14,22 @@ from torch import Tensor
 
 from analysis.metrics.quality import View, encode
 from analysis.page.pictures import (
-    AGE_MAP,
-    DENSITY_MAP,
     RATE_MAP,
+    Map,
     Pixels,
-    age_image,
-    colour,
-    density_image,
+    Scale,
+    age_map,
+    density_map,
     enlarge,
     font,
-    tiling_image,
-    with_scale,
+    scale_strip,
+    stored,
+    tiling_map,
 )
 
 REFERENCE = "reference"
+AGES = "age of samples"
+"""Label of the map whose scale is fitted to the data."""
 INK, PAPER = (235, 235, 235), (24, 24, 24)
 OWN = (255, 176, 64)
 RIVALS = ((96, 176, 255), (140, 205, 95), (225, 130, 215), (240, 225, 90), (110, 220, 210), (235, 115, 105))
@@ -49,11 +51,12 @@ class FrameSink(Protocol):
 
 @dataclass(frozen=True)
 class Scales:
-    """Bounds of the colour scales, the same in every frame: least and greatest density, and age in seconds."""
+    """Bounds of the colour scales, the same in every frame: least and greatest density, and age in seconds; of ages
+    the part is shown that the data have."""
 
     spatial: tuple[float, float]
     temporal: tuple[float, float]
-    age_s: tuple[float, float] = (0.01, 1.0)
+    age_s: tuple[float, float] = (1e-3, 100.0)
 
 
 def to_pixels(image: Tensor) -> Pixels:
@@ -62,11 +65,15 @@ def to_pixels(image: Tensor) -> Pixels:
     return (encode(finite) * 255.0 + 0.5).clamp(0, 255).byte().contiguous().numpy()
 
 
+def images(view: View) -> dict[str, Tensor]:
+    """The reference and what every display shows, by name, linear."""
+    return {REFERENCE: view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
+
+
 def photographs(view: View, side_px: int) -> dict[str, Pixels]:
-    """The reference and what every display shows, by name."""
-    images = {REFERENCE: view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
+    """The reference and what every display shows, by name, at one size."""
     size = side_px, height_of(view, side_px)
-    return {label: enlarge(to_pixels(image), *size) for label, image in images.items()}
+    return {label: enlarge(to_pixels(image), *size) for label, image in images(view).items()}
 
 
 def height_of(view: View, width_px: int) -> int:
@@ -76,41 +83,36 @@ def height_of(view: View, width_px: int) -> int:
     return width_px if height == width else 2 * round(0.5 * width_px * min(max(height / width, 0.25), 4.0))
 
 
-def maps(view: View, own: str, scales: Scales, side_px: int) -> dict[str, Pixels]:
+def maps(view: View, own: str, scales: Scales) -> dict[str, Map]:
     """What runs say of their decisions, by label: what the run ``own`` knows of every place, how old its samples are,
     and tiling and densities of every run that records its cycles. The labels of other runs begin with their names."""
-    found: dict[str, Pixels] = {}
-    size = side_px, height_of(view, side_px)
+    found: dict[str, Map] = {}
+    height, width = view.reference.shape[:2]
     for name in (own, *(name for name in view.shown if name != own)):
         record, display = view.shown[name]
         before = "" if name == own else f"{name}: "
         if record is not None:
-            rates, densities = record.densities.temporal, record.densities
-            tiling = tiling_image(record.tiling, rates, side_px, scales.temporal)
-            spatial = density_image(densities.spatial, scales.spatial, side_px)
-            temporal = density_image(rates, scales.temporal, side_px, RATE_MAP)
-            rate = scales.temporal, "refreshes per cycle", RATE_MAP
-            found[f"{before}tiling by refresh rate"] = with_scale(enlarge(tiling, *size), *rate)
-            fields = scales.spatial, "samples per element", DENSITY_MAP
-            found[f"{before}spatial density"] = with_scale(enlarge(spatial, *size), *fields)
-            found[f"{before}temporal density"] = with_scale(enlarge(temporal, *size), *rate)
+            rates, densities, rate = record.densities.temporal, record.densities, "refreshes per cycle"
+            tiling = tiling_map(record.tiling, rates, max(height, width), scales.temporal)
+            found[f"{before}tiling by refresh rate"] = tiling
+            found[f"{before}spatial density"] = density_map(densities.spatial, scales.spatial, "samples per element")
+            found[f"{before}temporal density"] = density_map(rates, scales.temporal, rate, RATE_MAP)
         if name == own:
             for label, one in display.maps.items():
-                drawn = enlarge(colour(one.values.numpy().astype(np.float64), one.bounds, RATE_MAP), *size)
-                found[label] = with_scale(drawn, one.bounds, one.unit, RATE_MAP)
+                places = stored(one.values.numpy().astype(np.float64), one.bounds)
+                found[label] = Map(places, Scale.of(one.bounds, one.unit, RATE_MAP))
             if display.sample_map is not None:
-                age = age_image(display.sample_map.newest_s, view.time_s, scales.age_s, *size)
-                bounds_ms = 1e3 * scales.age_s[0], 1e3 * scales.age_s[1]
-                found["age of samples"] = with_scale(age, bounds_ms, "ms", AGE_MAP)
+                found[AGES] = age_map(display.sample_map.newest_s, view.time_s, scales.age_s)
     return found
 
 
 class ComparisonFilm:
-    """Composes frames of rows of panels: photographs first, then maps, and last the errors so far, which take what is
-    left of the last row. Keeps no images.
+    """Composes frames of rows of panels: photographs first, then maps with their colour scales below them, and last the
+    errors so far, which take what is left of the last row. Keeps no images.
 
     Attributes:
         width_px, height_px: size of a frame, even.
+        panel_height_px: height of a panel without its label and scale.
     """
 
     def __init__(
@@ -122,10 +124,11 @@ class ComparisonFilm:
         labels: Sequence[str],
         row: int,
         height_px: int = 0,
+        scales: Mapping[str, Scale] | None = None,
     ) -> None:
         """Takes the width of a panel and, where that differs, its height, the span of time on the error panel's axis,
-        the runs whose errors are drawn, the labels of all panels but that of the errors, and how many panels are best
-        seen side by side."""
+        the runs whose errors are drawn, the labels of all panels but that of the errors, how many panels are best
+        seen side by side, and the colour scales of maps by label."""
         self._side = side_of(side_px)
         self._height = height_px or self._side
         self._strip = 2 * max(9, self._side // 24)
@@ -134,7 +137,12 @@ class ComparisonFilm:
         self._columns = min(max(row, _COLUMNS[0]), _COLUMNS[1])
         rows = len(self._labels) // self._columns + 1
         self._errors = (rows * self._columns - len(self._labels)) * self._side
-        self.width_px, self.height_px = self._columns * self._side, rows * (self._height + self._strip)
+        self._scales = dict(scales or {})
+        scaled = [any(label in self._scales for label in self._labels[r * self._columns :][: self._columns])
+                  for r in range(rows)]  # fmt: skip
+        self._tops = np.cumsum([0, *(self._height + self._strip * (2 if one else 1) for one in scaled)]).tolist()
+        self.width_px, self.height_px = self._columns * self._side, self._tops[-1]
+        self.panel_height_px = self._height
 
     def frame(
         self,
@@ -152,6 +160,7 @@ class ComparisonFilm:
             pixels = pictures.get(label)
             if pixels is not None:
                 canvas.paste(Image.fromarray(pixels), (left, top + self._strip))
+                self._draw_scale(canvas, left, top + self._strip + self._height, label)
             self._label(draw, left, top, label if pixels is not None else f"{label}: missing")
         left, top = self._corner(len(self._labels))
         self._label(draw, left, top, f"squared error, t = {time_s:.3f} s")
@@ -160,7 +169,12 @@ class ComparisonFilm:
         return np.asarray(canvas)
 
     def _corner(self, slot: int) -> tuple[int, int]:
-        return slot % self._columns * self._side, slot // self._columns * (self._height + self._strip)
+        return slot % self._columns * self._side, self._tops[slot // self._columns]
+
+    def _draw_scale(self, canvas: Image.Image, left: int, top: int, label: str) -> None:
+        if label in self._scales:
+            strip = scale_strip(self._side, self._strip, self._scales[label], INK, PAPER)
+            canvas.paste(Image.fromarray(strip), (left, top))
 
     def _label(self, draw: ImageDraw.ImageDraw, left: int, top: int, text: str) -> None:
         size = self._strip * 2 // 3

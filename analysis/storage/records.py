@@ -173,3 +173,19 @@ def density_quantiles(path: Path, percents: tuple[float, ...] = (5.0, 25.0, 50.0
             for row in part.column(name):
                 found[name].append(np.percentile(row.values.to_numpy(), percents))
     return {name: np.asarray(values) for name, values in found.items()}
+
+
+def stage_seconds(path: Path, most: int = 120) -> tuple[list[float], dict[str, np.ndarray]]:
+    """Wall seconds of the stages of a cycle over time: medians over runs of cycles, so many at most.
+
+    Returns:
+        Time of the first cycle of each run of cycles, and by stage its medians.
+    """
+    file = pq.ParquetFile(path)
+    names = [name for name in file.schema_arrow.names if name.startswith("stage_")]
+    table = file.read(["sim_time_s", *names])
+    starts = np.arange(0, table.num_rows, max(1, -(-table.num_rows // most)))
+    times = table["sim_time_s"].to_numpy()[starts].tolist()
+    stages = {name: np.split(table[name].to_numpy(), starts[1:]) for name in names}
+    medians = {name: np.array([np.median(part) for part in parts]) for name, parts in stages.items()}
+    return times, {name.removeprefix("stage_").removesuffix("_s"): values for name, values in medians.items()}

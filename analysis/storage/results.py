@@ -24,16 +24,17 @@ def own_results(folder: Path, names: Iterable[str]) -> None:
         names: of all files that the command may write, replace or delete there, relative to the folder and with
             forward slashes; each may be a pattern. Names that a command took belong to commands from then on, so that
             what a killed one left behind may be replaced. Files that a :class:`~analysis.storage.store.Store` makes
-            need not be named.
+            need not be named, nor the SVG that stands beside each PNG of a figure.
 
     Raises:
         ValueError: the folder cannot be created or written, another process writes there, or a file that no command
             made has one of the names.
     """
     own_folder(folder, "out")
+    names = tuple(names)
     journal = Journal(folder / JOURNAL)
     taken = {name for row in journal.rows() for name in row.get("taken", ())}
-    wanted = sorted({SUMMARY, *names} - taken)
+    wanted = sorted({SUMMARY, *names, *(f"{name[:-4]}.svg" for name in names if name.endswith(".png"))} - taken)
     if not wanted:
         return
     if not _is_summary(folder / SUMMARY):

@@ -23,7 +23,7 @@ from PIL import Image
 from analysis.metrics.causes import Truths
 from analysis.metrics.perceptual import jod, one_thread
 from analysis.metrics.quality import View, reference_times
-from analysis.page.pictures import Pixels, tiling_image
+from analysis.page.pictures import Pixels, tiling_map
 from analysis.page.video import to_pixels
 from analysis.storage.files import locked
 from analysis.storage.reference import Reference, as_stored
@@ -240,7 +240,7 @@ class _Stills:
             if record is not None:
                 config = self._case.tsar
                 side, bounds = max(256, config.resolution_px), config.temporal_bounds
-                pictures["tiling"] = tiling_image(record.tiling, record.densities.temporal, side, bounds)
+                pictures["tiling"] = tiling_map(record.tiling, record.densities.temporal, side, bounds).pixels()
             self._keep(self._numbers[view.number], pictures)
 
 

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, sync_playwright
 
 from analysis.page.report import write_report
-from tests.browser.reports import Opened, player, report, shown
+from tests.browser.reports import Opened, comparer, report, shown
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
@@ -29,7 +29,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def opened(browser: Browser, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Opened]:
     """The page of the report given as parameter, else of the plain one; at the end it has neither failed nor loaded."""
-    made = getattr(request, "param", None) or report(player())
+    made = getattr(request, "param", None) or report(comparer())
     write_report(tmp_path / "report.html", made)
     context = browser.new_context(viewport={"width": 1180, "height": 900})
     found = Opened(context.new_page())
@@ -39,7 +39,7 @@ def opened(browser: Browser, tmp_path: Path, request: pytest.FixtureRequest) -> 
     found.page.on("request", lambda request: found.requests.append(request.url))
     address = (tmp_path / "report.html").as_uri()
     found.page.goto(address)
-    if made.player:
+    if made.comparer:
         shown(found.page, 0)
     yield found
     assert found.messages == []

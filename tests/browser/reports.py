@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from PIL import Image
 from playwright.sync_api import Page, expect
 
-from analysis.page.player import Curve, Player, Step
+from analysis.page.comparer import Comparer, Panel, Step
+from analysis.page.curves import Curve, Plot
+from analysis.page.pictures import Scale, picture_bytes
 from analysis.page.report import Report, Table
-from analysis.page.video import maps, photographs
-from tests.analysis.builders import SCALES, png_bytes, view
+from tests.analysis.builders import png_bytes
 
-LABELS = [*photographs(view(), 96), *maps(view(), "own", SCALES, 96)]
-STEPS, TIMES = 7, 13
+LABELS = ["reference", "tsar", "framed", "age of samples"]
+STEPS, SIDE = 7, 64
 LOST, BROKEN = 2, 4
-"""Steps at which the second view has no picture, and one that does not decode."""
+"""Steps at which the run framed has no picture, and one that does not decode."""
+SCALE = Scale.of((1.0, 1000.0), "ms", "viridis", special=(200, 0, 0), meaning="not sampled yet")
 
 
 @dataclass
@@ -30,50 +30,52 @@ class Opened:
 
 
 def ink(step: int, number: int) -> tuple[int, int, int]:
-    """Colour that tells the step and the view."""
+    """Colour that tells the step and the panel."""
     return 30 * step + 10, 20 * number + 5, 99
 
 
 def picture(step: int, number: int) -> bytes:
-    pixels = np.full((64, 64, 3), ink(step, number), np.uint8)
-    if number % 2:
-        return png_bytes(pixels)
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, format="WEBP", lossless=True)
-    return buffer.getvalue()
+    if number == 3:
+        return picture_bytes(np.full((16, 16), 40 * step, np.uint8), exact=True)
+    pixels = np.full((SIDE, SIDE, 3), ink(step, number), np.uint8)
+    return png_bytes(pixels) if number % 2 else picture_bytes(pixels, exact=True)
 
 
-def player(labels: list[str] = LABELS) -> Player:
-    times = np.arange(TIMES)
-    steps = [Step(2 * step, {label: picture(step, i) for i, label in enumerate(labels)}) for step in range(STEPS)]
-    curves = [
-        Curve("thesis", "#c9570c", (1e-3 * 1.3**times).tolist()),
-        Curve("framed", "#1f6fb4", np.where(times == 6, 0.0, 2e-2 / 1.2**times).tolist()),
+def comparer(labels: list[str] = LABELS) -> Comparer:
+    panels = [Panel(labels[0]), *(Panel(name, truth=labels[0]) for name in labels[1:3]), Panel(labels[3], scale=SCALE)]
+    steps = [Step(step / 15, {name: picture(step, i) for i, name in enumerate(labels)}) for step in range(STEPS)]
+    times = (np.arange(13) / 30).tolist()
+    errors = [
+        Curve(labels[1], times, (1e-3 * 1.3 ** np.arange(13)).tolist(), 0),
+        Curve(labels[2], times, (2e-2 / 1.2 ** np.arange(13)).tolist(), 1),
     ]
-    ratio = {"thesis / framed": [f"{0.1 * time:.3f}" for time in times]}
-    return Player(times / 30, steps, curves, "mean squared error", [0.1, 0.2, 0.3], ratio, "A note on the views.")
+    plots = [
+        Plot("Mean squared error", "", errors, marks_s=[0.1, 0.2, 0.3]),
+        Plot("Stages", "ms", [Curve("tracing", [-0.1, 0.1, 0.2], [1.0, 2.0, 3.0], 0)], logarithmic=False),
+    ]
+    return Comparer(panels, steps, labels[2], labels[1], plots, "A note on the pictures.")
 
 
-def gappy() -> Player:
-    """No picture of the second view at one step, and broken ones at another: cut off in its header, and noise."""
-    made = player()
+def gappy() -> Comparer:
+    """No picture of the run framed at one step, and a broken one at another."""
+    made = comparer()
     steps = list(made.steps)
-    steps[LOST] = Step(steps[LOST].number, {**steps[LOST].pictures, LABELS[1]: None})
-    cut, noise = picture(BROKEN, 1)[:20], b"no picture" * 9
-    steps[BROKEN] = Step(steps[BROKEN].number, {**steps[BROKEN].pictures, LABELS[1]: cut, LABELS[2]: noise})
+    steps[LOST] = replace(steps[LOST], pictures={**steps[LOST].pictures, "framed": None})
+    steps[BROKEN] = replace(steps[BROKEN], pictures={**steps[BROKEN].pictures, "framed": b"no picture" * 9})
     return replace(made, steps=steps)
 
 
-def report(played: Player | None, text: str = "plain") -> Report:
+def report(compared: Comparer | None, text: str = "plain") -> Report:
     wide = Table(text, [text] * 6, [[f"{text} of some length"] * 6], text)
     figure = png_bytes(np.zeros((40, 990, 3), np.uint8))
-    details = {text: {"a_long_name": "x" * 300, text: {"in": text}}}
-    return Report(text, [text, text], wide, [(text, figure)], played, [wide], details)
+    details = {f"{text}, details": {"a_long_name": "x" * 300, text: {"in": text}}}
+    numbers = Table(f"{text} numbers", ["", text], [[text, "3"]])
+    return Report(text, [text, text], numbers, [(text, figure)], compared, [wide], details)
 
 
 def shown(page: Page, step: int) -> None:
     """Waits until the page shows the step."""
-    expect(page.locator("#player")).to_have_attribute("data-step", str(step), timeout=5000)
+    expect(page.locator("#comparer")).to_have_attribute("data-step", str(step), timeout=8000)
 
 
 def move(page: Page, step: int) -> None:
@@ -81,23 +83,13 @@ def move(page: Page, step: int) -> None:
     shown(page, step)
 
 
-PICTURES = """() => [...document.querySelectorAll('.frame')].map(frame => {
-  const image = frame.querySelector('img');
-  if (!image) return null;
-  const canvas = document.createElement('canvas');
-  canvas.width = canvas.height = 1;
-  const context = canvas.getContext('2d');
-  context.drawImage(image, 0, 0, 1, 1);
-  return {src: image.src, alt: image.alt, width: image.naturalWidth, seen: image.checkVisibility(),
-          ink: [...context.getImageData(0, 0, 1, 1).data].slice(0, 3)};
-})"""
-
-
-def readings(page: Page) -> list[str]:
-    return page.locator(".now td.n").all_text_contents()
-
-
-def cursor_x(page: Page) -> float:
-    """Where the cursor is on the screen."""
-    box = page.locator("#cursor line").evaluate("line => line.getBoundingClientRect().x")
-    return float(box)
+def seen(page: Page, across: float, down: float = 0.5) -> list[int]:
+    """Colour of the stage there, in shares of its size."""
+    found = page.locator("#stage").evaluate(
+        """(canvas, [x, y]) => { const one = document.createElement('canvas'); one.width = one.height = 1;
+        const context = one.getContext('2d', {willReadFrequently: true});
+        context.drawImage(canvas, -Math.floor(x * canvas.width), -Math.floor(y * canvas.height));
+        return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3); }""",
+        [across, down],
+    )
+    return list(found)

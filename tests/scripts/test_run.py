@@ -98,7 +98,7 @@ def again(folder: Path, printed: str) -> Iterator[tuple[dict[str, Any], int]]:
 
 def test_every_result_is_there(folder: Path, printed: str) -> None:
     found = sorted(path.name for path in (folder / "out").iterdir())
-    files = {"comparison.mp4", "error.png", "report.html", "steps.parquet", "summary.json"}
+    files = {"comparison.mp4", "error.png", "error.svg", "report.html", "steps.parquet", "summary.json"}
     assert set(found) == files | {"files.journal", "frames"}
     assert all(name in printed for name in files)
     with Image.open(folder / "out" / "error.png") as picture:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from analysis.metrics.quality import View
-from analysis.page.pictures import AGE_MAP, RATE_MAP, Pixels, palette
+from analysis.page.pictures import RATE_MAP, Map, Pixels, enlarge
 from analysis.page.video import OWN, PAPER, RIVALS, ComparisonFilm, draw_errors, inks, maps, photographs, to_pixels
 from renderer.film.files import Mp4Writer
 from tests.analysis.builders import SCALES, grey, view
@@ -34,11 +34,21 @@ class Film(ComparisonFilm):
 
 
 def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> Film:
-    return Film(side, span, ["own", "framed"], "own", LABELS, 3)
+    scales = {label: one.scale for label, one in maps(view(), "own", SCALES).items()}
+    return Film(side, span, ["own", "framed"], "own", LABELS, 3, scales=scales)
 
 
 def panels(view: View, side: int = SIDE) -> dict:
-    return photographs(view, side) | maps(view, "own", SCALES, side)
+    return photographs(view, side) | drawn(maps(view, "own", SCALES), side)
+
+
+def drawn(found: dict[str, Map], side: int = SIDE) -> dict[str, Pixels]:
+    return {label: enlarge(one.pixels(), side) for label, one in found.items()}
+
+
+def strip_of(made: ComparisonFilm, side: int = SIDE) -> int:
+    """Height of a label and of a scale: both rows hold maps."""
+    return (made.height_px - 2 * side) // 4
 
 
 def of_age(view: View, newest_s: torch.Tensor | None) -> View:
@@ -50,7 +60,7 @@ def of_age(view: View, newest_s: torch.Tensor | None) -> View:
 
 def panel(frame: np.ndarray, slot: int, strip: int) -> np.ndarray:
     """Pixels below the label of one of two times four slots."""
-    top, left = slot // 4 * (SIDE + strip) + strip, slot % 4 * SIDE
+    top, left = slot // 4 * (SIDE + 2 * strip) + strip, slot % 4 * SIDE
     return frame[top : top + SIDE, left : left + SIDE]
 
 
@@ -71,42 +81,52 @@ def test_a_frame_has_the_size_it_says_and_that_is_even(side: int) -> None:
 def test_every_picture_has_its_place_and_its_label() -> None:
     """Reference and displays first, then tiling, fields and ages; the last slot holds the errors."""
     made = film()
-    strip = made.height_px // 2 - SIDE
+    strip = strip_of(made)
     frame, shown = made.of(view(), [0.0], ERRORS), panels(view())
     assert list(shown) == LABELS
     for slot, pixels in enumerate(shown.values()):
         assert pixels is not None and np.array_equal(panel(frame, slot, strip), pixels), LABELS[slot]
     for slot, value in enumerate((0, 255, 188)):
         assert (panel(frame, slot, strip) == value).all(), "sRGB of linear 0, 0.5 and 1"
-    labels = [frame[s // 4 * (SIDE + strip) :, s % 4 * SIDE :][:strip, :SIDE] for s in range(8)]
+    labels = [frame[s // 4 * (SIDE + 2 * strip) :, s % 4 * SIDE :][:strip, :SIDE] for s in range(8)]
     assert all((~has(label, PAPER)).sum() > 20 for label in labels)
     assert len({label.tobytes() for label in labels}) == 8
 
 
 def test_ages_are_of_the_time_shown() -> None:
-    """The same samples are older later; the scale is logarithmic from 10 ms to 1 s."""
+    """The same samples are older later."""
     sampled = of_age(view(), torch.zeros(2, 2, dtype=torch.float64))
-    shown = [panels(replace(sampled, time_s=t))["age of samples"] for t in (0.01, 0.2, 0.5, 1.0)]
-    found = [palette(AGE_MAP).tolist().index(pixels[0, 0].tolist()) for pixels in shown if pixels is not None]
-    assert found == [0, round(255 * np.log10(20) / 2), round(255 * np.log10(50) / 2), 255]
+    shown = [maps(replace(sampled, time_s=t), "own", SCALES)["age of samples"] for t in (0.01, 0.2, 0.5, 1.0)]
+    low, high = shown[0].scale.bounds
+    found = [low * (high / low) ** ((int(one.places[0, 0]) - 1) / 254) for one in shown]
+    assert found == pytest.approx([10.0, 200.0, 500.0, 1000.0], rel=0.03)
+
+
+def test_scales_stand_below_the_maps() -> None:
+    """Maps have a strip below them, and pictures none."""
+    made = film()
+    frame, strip = made.of(view(), [0.0], ERRORS), strip_of(made)
+    below = frame[-strip:]
+    assert all((~has(below[:, s * SIDE : (s + 1) * SIDE], PAPER)).sum() > 40 for s in range(3))
+    assert has(below[:, 3 * SIDE :], PAPER).all()
 
 
 def test_unknown_ages_leave_their_place_empty() -> None:
     lacking, made = of_age(view(), None), film()
     assert "age of samples" not in panels(lacking)
     known, unknown = (made.of(shown, [0.0], ERRORS) for shown in (view(), lacking))
-    strip = made.height_px // 2 - SIDE
+    strip = strip_of(made)
     assert (panel(unknown, 6, strip) == PAPER).all() and not (panel(known, 6, strip) == PAPER).all()
-    label = slice(SIDE + strip, SIDE + 2 * strip), slice(2 * SIDE, 3 * SIDE)
+    label = slice(SIDE + 2 * strip, SIDE + 3 * strip), slice(2 * SIDE, 3 * SIDE)
     assert not np.array_equal(known[label], unknown[label]), "the label says so"
 
 
 @pytest.mark.parametrize("side", [96, 256, 512])
 def test_labels_do_not_run_into_the_next_panel(side: int) -> None:
     made = film(side)
-    frame, width, strip = made.of(view(), [0.0], ERRORS), made.width_px // 4, made.height_px // 2 - side
+    frame, width, strip = made.of(view(), [0.0], ERRORS), made.width_px // 4, strip_of(made, side)
     for slot in range(8):
-        top, left = slot // 4 * (side + strip), slot % 4 * width
+        top, left = slot // 4 * (side + 2 * strip), slot % 4 * width
         label = frame[top : top + strip, left : left + width]
         assert not has(label, PAPER).all() and has(label[:, -2:], PAPER).all(), slot
 
@@ -121,8 +141,8 @@ def test_curves_lie_where_their_values_are() -> None:
     """The greater error above the lesser one, both up to the present and no further."""
     side, text = 256, 170  # pixels: of a panel, and how far its legend reaches
     made = film(side)
-    top, times = made.height_px - side, np.linspace(0.0, 0.75, 30).tolist()
-    box = made.of(view(0.75), times, {"own": [1e-3] * 30, "framed": [1e-1] * 30})[top:, 3 * side :]
+    top, times = made.height_px - side - strip_of(made, side), np.linspace(0.0, 0.75, 30).tolist()
+    box = made.of(view(0.75), times, {"own": [1e-3] * 30, "framed": [1e-1] * 30})[top : top + side, 3 * side :]
     drawn = {ink: has(box, ink)[:, text:] for ink in (OWN, FRAMED)}
     rows = {ink: np.median(mask.nonzero()[0]) for ink, mask in drawn.items()}
     assert rows[FRAMED] < rows[OWN] - side / 4
@@ -150,7 +170,7 @@ def test_to_pixels_is_srgb_and_black_where_not_finite() -> None:
 def test_a_film_reads_back(tmp_path: Path) -> None:
     """Frames, size, rate and colours; the grey of the framed panel grows from frame to frame."""
     made, path = film(), tmp_path / "films" / "comparison.mp4"
-    strip, values = made.height_px // 2 - SIDE, [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9]
+    strip, values = strip_of(made), [0.02, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9]
     with Mp4Writer(path, 30.0, made.width_px, made.height_px) as writer:
         for number, value in enumerate(values):
             writer.add(made.of(view(number / 30, framed=value), [0.0], ERRORS))
@@ -183,7 +203,7 @@ def test_no_run_is_left_out(count: int, columns: int, rows: int) -> None:
     one, names = view(), [f"run {number}" for number in range(count)]
     many = replace(one, shown={name: one.shown["framed"] for name in names}, mse=dict.fromkeys(names, 0.1))
     many = replace(many, shown={**many.shown, "run 0": one.shown["own"]})
-    shown = photographs(many, SIDE) | maps(many, "run 0", SCALES, SIDE)
+    shown = photographs(many, SIDE) | drawn(maps(many, "run 0", SCALES))
     made = ComparisonFilm(SIDE, (0.0, 1.0), names, "run 0", list(shown), 1 + count)
     frame = made.frame(0.0, shown, [0.0], {name: [0.1] for name in names})
     strip = made.height_px // rows - SIDE
@@ -202,9 +222,9 @@ def test_maps_of_a_rival_bear_its_name_and_a_policy_shows_what_it_knows() -> Non
     known = MapShown(torch.tensor([[1.0, 2.0], [4.0, 8.0]]), (1.0, 8.0), "volts")
     own = replace(framed, maps={"tension": known}, sample_map=display.sample_map)
     both = replace(one, shown={"own": (None, own), "thesis": (record, replace(display, maps={"heat": known}))})
-    found = maps(both, "own", SCALES, SIDE)
+    found = maps(both, "own", SCALES)
     fields = ["thesis: tiling by refresh rate", "thesis: spatial density", "thesis: temporal density"]
     assert list(found) == ["tension", "age of samples", *fields]
-    assert found["tension"][0, 0].tolist() == palette(RATE_MAP)[0].tolist()
-    assert found["tension"][0, -1].tolist() == palette(RATE_MAP)[85].tolist(), "a third of the way from 1 to 8"
-    assert np.array_equal(found[fields[1]], maps(one, "own", SCALES, SIDE)["spatial density"])
+    assert found["tension"].places.tolist() == [[1, 86], [170, 255]], "thirds of the way from 1 to 8"
+    assert found["tension"].scale.palette == RATE_MAP and found["tension"].scale.unit == "volts"
+    assert np.array_equal(found[fields[1]].places, maps(one, "own", SCALES)["spatial density"].places)

@@ -1,0 +1,14 @@
+"""Compare finished runs, also of different days and versions, on one page."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.command.cli import run_process
+from analysis.command.later import command
+
+main = command("analysis.comparison.report_command")
+
+if __name__ == "__main__":
+    run_process(main)
