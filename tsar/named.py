@@ -9,9 +9,10 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.metadata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Generic, TypeVar, cast
 
 from tsar.checks import ConfigError
@@ -132,7 +133,7 @@ class Named(Generic[Entry]):
         module = module or getattr(entry, "__module__", None) or type(entry).__module__
         package = self._brought_by.get(name)
         if package is None and module != "__main__":
-            found = importlib.metadata.packages_distributions().get(module.partition(".")[0])
+            found = _distributions().get(module.partition(".")[0])
             package = importlib.metadata.distribution(found[0]) if found else None
         return Origin(module, package.name, package.version) if package else Origin(module, None, None)
 
@@ -156,3 +157,9 @@ class Named(Generic[Entry]):
         except (ImportError, AttributeError) as error:
             raise ConfigError(f"{self.kind} {name!r}: {place} cannot be imported ({error})") from error
         return found
+
+
+@cache
+def _distributions() -> Mapping[str, list[str]]:
+    """Names of the installed distributions by those of their packages; to list them takes most of a second."""
+    return importlib.metadata.packages_distributions()
