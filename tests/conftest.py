@@ -2,14 +2,19 @@
 
 import os
 import signal
+from collections.abc import Generator
 
 import psutil
 import pytest
 from hypothesis import settings
 
+from tests import shapes
+
 # Tensors are small here: threads of torch cost more than they save, and on a busy machine wait for one another for most
 # of the time. No result depends on their number, which has tests of its own. Processes that tests start inherit this.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# where a test asks for more, those that wait leave their core to others
+os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 settings.register_profile("tsar", deadline=None, max_examples=60, derandomize=True)
 settings.load_profile("tsar")
@@ -26,3 +31,9 @@ WORKER_BYTES = 3 << 30
 def pytest_xdist_auto_num_workers() -> int:
     """As many processes as there are cores, and memory for."""
     return max(1, min(len(os.sched_getaffinity(0)), psutil.virtual_memory().available // WORKER_BYTES))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol() -> Generator[None, object, object]:
+    shapes.begin()
+    return (yield)
