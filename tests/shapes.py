@@ -1,7 +1,7 @@
 """Checks of shapes and types at run time, in every test, but not again and again.
 
-A cycle passes some hundred checks, and they take longer than the cycle. What a test does for the thousandth time has the
-shapes that it had before.
+A cycle passes some hundred checks, and they take longer than the cycle. What a test does for the thousandth time has
+the shapes that it had before.
 """
 
 from __future__ import annotations

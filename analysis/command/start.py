@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import sys
@@ -35,7 +36,8 @@ def first_imports() -> Iterator[None]:
     """Marks a block that imports large packages.
 
     The objects that an import makes are kept until the process ends. The garbage collector is switched off meanwhile,
-    and leaves those objects out afterwards.
+    and leaves those objects out afterwards. At the end it takes them in again: of what is left then, libraries print
+    lists.
     """
     before, collecting = len(sys.modules), gc.isenabled()
     gc.disable()
@@ -46,6 +48,7 @@ def first_imports() -> Iterator[None]:
             gc.enable()
         if len(sys.modules) > before:
             gc.freeze()
+            atexit.register(gc.unfreeze)
 
 
 def first_made(items: Iterator[Item], began_s: float, say: Callable[[str], None]) -> tuple[Iterator[Item], float]:

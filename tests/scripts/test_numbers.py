@@ -222,9 +222,10 @@ def test_a_run_that_shows_no_cycle_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     size = ("--resolution-px", "64", "--batch-size", "16", "--reference-samples-per-axis", "1", "--threads", "1")
-    span = ("--seconds", "0.01", "--reference-rate-hz", "20", "--capacity", "3e10", "--policy", "thesis")
+    span = ("--seconds", "0.01", "--reference-rate-hz", "20", "--capacity", "3e10")
+    runs = ("--policy", "thesis", "--rivals", "framed")
     places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
-    assert call_script("run.py", monkeypatch, "fly-by", *size, *span, *places) == 2
+    assert call_script("run.py", monkeypatch, "fly-by", *size, *span, *runs, *places) == 2
     shown = capsys.readouterr()
     assert shown.out == "" and shown.err.splitlines()[-1].startswith("error: seconds: expected time for a cycle")
     assert nothing_in(tmp_path / "out")

@@ -58,6 +58,19 @@ def test_the_collector_rests_during_imports_only(before: bool, tmp_path: Path, m
         sys.modules.pop("large_package_of_a_test", None)
 
 
+def test_what_was_kept_is_collected_as_the_process_ends() -> None:
+    """Also by a library that lists what was not."""
+    program = (
+        "import atexit, gc, sys\n"
+        "atexit.register(lambda: print(gc.get_freeze_count()))\n"
+        "from analysis.command.start import first_imports\n"
+        "with first_imports():\n    import OpenImageIO\n"
+        "print(gc.get_freeze_count() > 1000)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "0"] and done.stderr == ""
+
+
 def test_the_collector_comes_back_after_an_error() -> None:
     assert gc.isenabled()
     with pytest.raises(ImportError), first_imports():

@@ -97,7 +97,7 @@ def test_threads_change_no_bit(name: str) -> None:
         for threads in (1, 2):
             torch.set_num_threads(threads)
             found.append(
-                [one.image for one in shown(POLICIES[name](Setting(CONFIG, stages, view=screen.view)), screen, 0.3)]
+                [one.image for one in shown(POLICIES[name](Setting(CONFIG, stages, view=screen.view)), screen, 0.15)]
             )
     finally:
         torch.set_num_threads(before)
