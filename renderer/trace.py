@@ -21,7 +21,7 @@ from renderer.kernels import packets as packet_kernels
 from renderer.kernels.bundles import stack_size
 from renderer.layout.features import ALL, PACKETS, Feature
 from renderer.layout.sizes import BLOCK_PX
-from renderer.layout.structs import Ray, ViewData
+from renderer.layout.structs import Ray, SceneData, ViewData
 from renderer.singles import SingleSamples
 from renderer.tables.accelerators import STRUCTURES, Structure
 from renderer.tables.buffers import build_buffers
@@ -47,6 +47,7 @@ class Renderer:
         footprint_resolution_px: pixels along the shorter image axis that :meth:`trace` filters textures for.
         features: what kernels are compiled for.
         packets: whether sixteen samples at a time are traced.
+        scene: as it is traced, moved near the origin.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class Renderer:
         self.threads = threads or devices.core_count()
         self.footprint_resolution_px = float(footprint_resolution_px)
         check_camera(scene)
-        self._scene = scene = near_origin(lit_by_all(scene))
+        self.scene = scene = near_origin(lit_by_all(scene))
         self._camera = check_camera(scene)
         needed = required(scene)
         if structure not in (*STRUCTURES, "warp"):
@@ -202,6 +203,12 @@ class Renderer:
         pixels = -(-width_px // BLOCK_PX) * -(-height_px // BLOCK_PX) * BLOCK_PX**2
         self._launch(self._kernels.render_pixels, view, shared, pixels)
         return image.cpu()
+
+    def posed(self, time_s: float, aspect: float, footprint_px: float) -> tuple[SceneData, ViewData]:
+        """The scene, and the camera at one time, for launches of other kernels."""
+        view = self._view(aspect, footprint_px)
+        self._pose(view, time_s)
+        return self._buffers.data, view
 
     @property
     def shutter_s(self) -> tuple[float, float]:

@@ -59,6 +59,14 @@ class RenderOptions:
     open as well."""
     point_set: str = "hammersley"
     """The point set; stratified takes cubes of samples only."""
+    rounds: int = 0
+    """Take the samples of a still in this many rounds of that point set: an interrupted still goes on where it was, and
+    its error is known. 0 for 16 where an error or layers are asked for, else none."""
+    error_target: float = 0.0
+    """Give a tile no more rounds once its root mean square error, in encoded colour from 0 to 1, is at most this; 0
+    gives every tile all samples."""
+    layers: bool = False
+    """Write depth, normal, albedo, instance, motion, sample count and variance as layers of the EXR files as well."""
     shift: Literal["white", "blue"] = "white"
     """How far each pixel shifts it: independently of its neighbours, or by spatiotemporal blue noise."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
@@ -95,6 +103,8 @@ class RenderOptions:
             bounces=(-1, 64),
             samples_per_axis=(1, 64),
             samples=(0, 1 << 16),
+            rounds=(0, 1 << 12),
+            error_target=(0.0, 1.0),
             frames=(1, 10**6),
             fps=(1e-6, 1e5),
             time_s=limits.TIMES_S,
@@ -107,6 +117,18 @@ class RenderOptions:
         limits.within(self, sides_px=limits.SIDES_PX)
         two = self.size and (self.width_px or self.height_px)
         require(not two, "size", "none beside width_px and height_px", self.size)
+
+        require(not self.layers or self.format == "exr", "layers", "the format exr", self.format)
+        if self.in_rounds:
+            require(self.rounds != 1, "rounds", "at least 2", self.rounds)
+            needed = self.in_rounds
+            whole = self.samples > 0 and self.samples % needed == 0
+            require(whole, "samples", f"a multiple of the {needed} rounds", self.samples)
+
+    @property
+    def in_rounds(self) -> int:
+        """Rounds of a still; 0 where its samples are taken at once."""
+        return self.rounds or (16 if self.error_target or self.layers else 0)
 
     @property
     def sides_px(self) -> tuple[int, ...]:

@@ -68,6 +68,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
     """
     from analysis.storage.reference import content_hash
     from analysis.storage.source import brought, code_hash
+    from analysis.tracer.rounds import StillRounds
     from analysis.tracer.stills import render_stills
     from renderer.film.files import FilmError
     from renderer.film.sequence import still_path, write_film
@@ -83,18 +84,21 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
         own_results(options.out, ["film.mp4"] if options.format == "mp4" else [])
         renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
         kinds = options.point_set, options.seed, options.space_filter
+        count = options.samples // (options.in_rounds or 1)
         plan = (
-            SamplePlan(options.samples, *kinds, time_filter=options.time_filter, shift=options.shift)
-            if options.samples
-            else None
+            SamplePlan(count, *kinds, time_filter=options.time_filter, shift=options.shift) if options.samples else None
         )
         picture = pictures(renderer, plan or options.samples_per_axis, *size, options.crop)
     added = brought((POINT_SETS, options.point_set)) if options.samples else []
-    key = content_hash((options.job, scene, code_hash(Renderer, pictures, render_stills), *added))
+    key = content_hash((options.job, scene, code_hash(Renderer, pictures, render_stills, StillRounds), *added))
     out, ending = options.out, options.still_ending
     with bad_input(), full_disk(out, FilmError), bars() as shown:
-        task = shown.task("frames", options.frames)
-        rendered, nonfinite = render_stills(picture, dict(enumerate(options.times_s)), out, ending, key, task)
+        times = dict(enumerate(options.times_s))
+        if plan is not None and options.in_rounds:
+            made = StillRounds(renderer, plan, options, size, shown)
+            rendered, nonfinite = render_stills(made.picture, times, out, ending, key, made.frames, made.write)
+        else:
+            rendered, nonfinite = render_stills(picture, times, out, ending, key, shown.task("frames", options.frames))
         if options.format == "mp4":
             stills = [still_path(out, number, ending) for number in range(options.frames)]
             write_film(stills, out / "film.mp4", options.fps)

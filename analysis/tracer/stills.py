@@ -24,6 +24,7 @@ def render_stills(
     ending: str,
     key: str,
     task: Task | None = None,
+    write: Callable[[Path, Tensor], int] = write_image,
 ) -> tuple[int, int]:
     """Renders the stills that are not on disk as they were made under this key.
 
@@ -33,6 +34,7 @@ def render_stills(
         folder, ending: where stills go, and their format.
         key: hash of everything that decides a still but its number and time.
         task: of which a step is a still.
+        write: writes a picture to a file, and says how many values were not finite.
 
     Returns:
         How many were rendered now, and how many values of all of them, whenever rendered, were not finite.
@@ -49,7 +51,7 @@ def render_stills(
         found = store.find(names[number])
         if found is None:
             with store.make(names[number]) as found:
-                found.facts["nonfinite"] = write_image(found.path, picture(number, time_s))
+                found.facts["nonfinite"] = write(found.path, picture(number, time_s))
             rendered += 1
         nonfinite += found.facts["nonfinite"]
         task.advance()

@@ -28,7 +28,7 @@ class FilmError(ValueError):
 
 
 @contextmanager
-def _placed(path: Path) -> Iterator[Path]:
+def placed(path: Path) -> Iterator[Path]:
     """A temporary name beside ``path``, moved there when the block ends well and removed when it does not."""
     temporary = path.with_name(f"{path.stem}.partial{path.suffix}")
     try:
@@ -86,7 +86,7 @@ def write_exr(path: Path, image: Float[Tensor, "h w 3"], half: bool = True) -> i
         # values beyond half's range would silently become infinite
         pixels = np.where(np.isfinite(pixels), np.clip(pixels, -limit, limit), pixels).astype(np.float16)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with _placed(path) as temporary:
+    with placed(path) as temporary:
         try:
             OpenEXR.File(header, {"RGB": pixels}).write(str(temporary))
         except (RuntimeError, ValueError) as error:
@@ -109,7 +109,7 @@ def write_png(path: Path, image: Float[Tensor, "h w 3"]) -> int:
     """Writes an 8-bit sRGB PNG; returns and raises as :func:`write_exr`."""
     from PIL import Image
 
-    with _placed(path) as temporary:
+    with placed(path) as temporary:
         Image.fromarray(encode_srgb(image)).save(temporary, format="PNG")
     return count_nonfinite(image)
 
@@ -117,7 +117,7 @@ def write_png(path: Path, image: Float[Tensor, "h w 3"]) -> int:
 def write_ppm(path: Path, image: Float[Tensor, "h w 3"]) -> int:
     """Writes an 8-bit sRGB binary PPM (P6); returns and raises as :func:`write_exr`."""
     pixels = encode_srgb(image)
-    with _placed(path) as temporary:
+    with placed(path) as temporary:
         temporary.write_bytes(f"P6\n{pixels.shape[1]} {pixels.shape[0]}\n255\n".encode() + pixels.tobytes())
     return count_nonfinite(image)
 
@@ -152,7 +152,7 @@ class _FilmWriter:
             raise FilmError(f"{path}: expected a positive frame rate, got {fps}")
         self.path, self.frames = path, 0
         self._size, self._fps = (width_px, height_px), fps
-        self._placing = _placed(path)
+        self._placing = placed(path)
 
     def _add_stream(self, container: Any) -> Any:
         """The stream of frames of a container, set up."""
