@@ -72,6 +72,7 @@ class DirectiveReader:
     names: Names = field(default_factory=Names)
     _saved: list[Block] = field(default_factory=list)
     _file: Path | None = None
+    _known: dict[str, Callable[[Directive], None]] = field(default_factory=dict)
 
     def read(self, path: Path) -> None:
         """Reads a file and what it includes.
@@ -107,7 +108,9 @@ class DirectiveReader:
         raise NotImplementedError
 
     def _do(self, directive: Directive) -> None:
-        own = self.dialect().get(directive.name) or self._common().get(directive.name)
+        if not self._known:
+            self._known.update({**self._common(), **self.dialect()})
+        own = self._known.get(directive.name)
         if own is None:
             raise SceneError(f"{directive.place}: expected a directive, got {directive.name!r}")
         own(directive)

@@ -30,10 +30,10 @@ directive: NAME value*
 value: STRING | NUMBER | NUMBERS | STRINGS | TRUTH
 TRUTH.2: /(true|false)\b/
 NAME: /[A-Za-z_]\w*/
-STRING: /"(?:[^"\\\n]|\\.)*"/
+STRING: /"[^"\\\n]*(?:\\.[^"\\\n]*)*"/
 NUMBER: /[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])/
 NUMBERS: /\[[-+.\deE\s,]*(?:#[^\n]*(?:\n|$)[-+.\deE\s,]*)*\]/
-STRINGS: /\[(?:\s|#[^\n]*\n|true\b|false\b|"(?:[^"\\\n]|\\.)*")+\]/
+STRINGS: /\[\s*(?:(?:#[^\n]*\n|true\b|false\b|"[^"\\\n]*(?:\\.[^"\\\n]*)*")\s*)*\]/
 COMMENT: /#[^\n]*/
 %ignore /[\s]+/
 %ignore COMMENT
@@ -212,6 +212,8 @@ def _values(token: Any, file: str) -> Values:
     if token.type == "STRINGS":
         return tuple(str(part) if part.type == "TRUTH" else _unquoted(part) for part in _strings(token))
     place = Place(file, token.line, token.column)
+    if token.type == "NUMBER" and abs(value := float(token)) <= NUMBER_MAX:
+        return np.array([value])
     body = str(token) if token.type == "NUMBER" or "#" in token else token
     if "#" in body:
         body = "[" + "\n".join(line.split("#")[0] for line in body[1:-1].splitlines()) + "]"

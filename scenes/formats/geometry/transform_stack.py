@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,11 @@ def scaling(x: float, y: float, z: float) -> Matrix:
 
 def rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
     """A turn about an axis, counter-clockwise seen from its tip; identity for an axis of no length."""
+    return _rotation(angle_deg, x, y, z).copy()
+
+
+@lru_cache(maxsize=4096)
+def _rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
     axis = np.array([x, y, z])
     length = norm(axis)
     matrix = np.eye(4)

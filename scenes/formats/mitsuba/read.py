@@ -28,6 +28,10 @@ TEXT_MAX = 1 << 16
 """Most characters of a value with its parameters."""
 
 
+_NAME_MAX = 256
+"""Most characters of a parameter's name."""
+
+
 class MitsubaReader(MitsubaSettings):
     """State of a Mitsuba file while it is read."""
 
@@ -36,6 +40,7 @@ class MitsubaReader(MitsubaSettings):
         self.files = files
         self.names: dict[str, Node] = {}
         self.defaults: dict[str, str] = {}
+        self._longest = 0
         self._missing: dict[str, Node] = {}
         self.surfaces = MitsubaSurfaces(files, report, self.find)
         self.shapes = MitsubaShapes(files, report, self.surfaces, self.find)
@@ -72,6 +77,7 @@ class MitsubaReader(MitsubaSettings):
         for node in root.children:
             if node.tag == "default":
                 self.defaults.setdefault(node.get("name"), node.get("value"))
+                self._longest = min(max(self._longest, len(node.get("name"))), _NAME_MAX)
                 continue
             self._filled(node)
             if modern:
@@ -99,13 +105,24 @@ class MitsubaReader(MitsubaSettings):
 
     def _with_parameters(self, text: str, node: Node) -> str:
         """A value with its parameters, wherever they stand in it; of two that fit the longer one is meant."""
-        for name in sorted(self.defaults, key=len, reverse=True):
-            text = text.replace(f"${name}", self.defaults[name])
+        for _ in range(DEPTH_MAX):  # what stands in a parameter's place may name others
+            found = [self._parameter(part) for part in text.split("$")[1:]]
+            if not any(name for name, _ in found):
+                break
+            pieces = [self.defaults[name] + rest if name else f"${rest}" for name, rest in found]
+            text = text.split("$", 1)[0] + "".join(pieces)
             if len(text) > TEXT_MAX:
                 raise SceneError(f"{node.place}: expected at most {TEXT_MAX:,} characters with parameters")
         if "$" in text:
             raise SceneError(f"{node.place}: expected a parameter with a default, got {text[:40]!r}")
         return text
+
+    def _parameter(self, text: str) -> tuple[str, str]:
+        """The longest parameter that a text begins with, empty where there is none, and what follows."""
+        for length in range(min(len(text), self._longest), 0, -1):
+            if text[:length] in self.defaults:
+                return text[:length], text[length:]
+        return "", text
 
     def _sample(self, node: Node) -> None:
         """Puts the samples of a spectrum's file in the place of its name; none where it is missing."""

@@ -45,6 +45,7 @@ class MitsubaSurfaces(MitsubaTextures):
     """Makes textures and materials of elements."""
 
     made: dict[int, Material] = field(default_factory=dict)
+    _sides: dict[int, bool] = field(default_factory=dict)
     _deep: int = 0
 
     def material(self, node: Node) -> Material:
@@ -81,6 +82,11 @@ class MitsubaSurfaces(MitsubaTextures):
 
     def one_sided(self, node: Node, deep: int = 0) -> bool:
         """Whether what an element makes is black behind: what is opaque has one side in Mitsuba, unless it is told."""
+        if id(node) not in self._sides:
+            self._sides[id(node)] = self._one_sided(node, deep)
+        return self._sides[id(node)]
+
+    def _one_sided(self, node: Node, deep: int) -> bool:
         if node.get("type") in _ONE_SIDED:
             return True
         if node.get("type") not in _AROUND or deep > _NESTED_MAX:

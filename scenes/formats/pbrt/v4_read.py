@@ -34,7 +34,7 @@ _SAME = SAME_PICTURE | {"simplepath", "simplevolpath", "lightpath", "randomwalk"
 _TARGETS = {"Shape": "shape", "LightSource": "light", "AreaLightSource": "light", "Material": "material",
             "MakeNamedMaterial": "material", "Texture": "texture", "MakeNamedMedium": "medium"}  # fmt: skip
 _PICTURE_OPTIONS = ("forcediffuse", "disablepixeljitter", "disabletexturefiltering", "rendercoordsys")
-_ASSUMED_MAX = 256
+_ASSUMED_MAX = 32
 _DEVIATION = 0.5  # of the Gaussian filter, pixels
 
 
@@ -77,7 +77,7 @@ class PbrtV4Reader(PbrtReader):
         assumed = {name for _, name in self.attributes.assumed}
         for name in parameters.unasked():
             if name in assumed:
-                self.report.hint(str(parameters.place), f"{what}: parameter {name!r} of Attribute")
+                self.report.hint("Attribute", f"parameter {name!r}, which not all have that it is for")
                 parameters.asked.add(name)
         super().left_over(parameters, what)
 

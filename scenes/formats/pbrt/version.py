@@ -12,16 +12,16 @@ _MATERIALS = (
     "coateddiffuse|coatedconductor|diffuse|conductor|dielectric|thindielectric|diffusetransmission|interface|measured"
 )
 _SIGNS = re.compile(
-    rf"""^\s*(?:Attribute|Option|Import|ColorSpace)\s+"|
-    ^\s*Film\s+"(?:rgb|gbuffer|spectral)"|
-    ^\s*Sampler\s+"(?:zsobol|paddedsobol|independent|pmj02bn)"|
-    ^\s*Integrator\s+"(?:simplepath|simplevolpath|lightpath|randomwalk|function)"|
-    ^\s*Material\s+"(?:{_MATERIALS})"|"string\s+type"\s*\[?\s*"(?:{_MATERIALS})"|
+    rf"""^[ \t]*(?:Attribute|Option|Import|ColorSpace)\s+"|
+    ^[ \t]*Film\s+"(?:rgb|gbuffer|spectral)"|
+    ^[ \t]*Sampler\s+"(?:zsobol|paddedsobol|independent|pmj02bn)"|
+    ^[ \t]*Integrator\s+"(?:simplepath|simplevolpath|lightpath|randomwalk|function)"|
+    ^[ \t]*Material\s+"(?:{_MATERIALS})"|"string[ \t]+type"[ \t]*\[?[ \t]*"(?:{_MATERIALS})"|
     "float\s+(?:power|illuminance)"|"string\s+materials"|"(?:float|string)\s+(?:interface|conductor)\.|
-    ^\s*Shape\s+"bilinearmesh\"""",
+    ^[ \t]*Shape\s+"bilinearmesh\"""",
     re.VERBOSE | re.MULTILINE,
 )
-_OLD_SIGNS = re.compile(r'^\s*WorldEnd\b|^\s*Film\s+"image"', re.MULTILINE)
+_OLD_SIGNS = re.compile(r'^[ \t]*WorldEnd\b|^[ \t]*Film\s+"image"', re.MULTILINE)
 
 
 def is_v4(text: str) -> bool:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import resource
 import shutil
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -38,25 +41,49 @@ def mutated(content: bytes, rng: np.random.Generator) -> bytes:
     return bytes(found)
 
 
+def newer(files: list[Path]) -> list[Path]:
+    """The same scenes in the newest formats, beside the files."""
+    made = []
+    for file in files:
+        scene = load_scene_file(file, file.parents[1])
+        for to, ending in (("pbrt4", "-4.pbrt"), ("mitsuba3", "-3.xml")):
+            made.append(file.with_name(f"newer-{file.stem}{ending}"))
+            save_scene_file(scene, made[-1], to)
+    tree = {"type": "scene", "sensor": {"type": "perspective"}, "ball": {"type": "sphere", "radius": 2.0}}
+    tree["floor"] = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}}}
+    made.append(files[0].with_name("newer.json"))
+    made[-1].write_text(json.dumps(tree))
+    return made
+
+
 def fuzz(count: int, folder: Path) -> dict[str, int]:
-    """How many changed files made a scene, and how many a clear error; anything else is raised."""
+    """How many changed files made a scene, and how many a clear error; anything else is raised.
+
+    It prints the longest that a file took, and the most memory that the process had.
+    """
     shutil.copytree(DATA if REAL else DELIVERED, folder, dirs_exist_ok=True, copy_function=shutil.copyfile)
     for path in [folder, *folder.rglob("*/")]:
         path.chmod(0o755)
     files = [folder / name for name in (*REAL, *MITSUBA)] or sorted(folder.glob("cornell-box.*[blts]"))
-    sources = [(file, file.read_bytes()) for file in files]
+    sources = [(file, file.read_bytes()) for file in (*files, *newer(files))]
+    longest_s, slowest = 0.0, ""
     outcome = {"scene": 0, "error": 0}
     for number in range(count):
         rng = np.random.default_rng([7, number])
         file, content = sources[rng.integers(0, len(sources))]
         changed = file.with_name(f"changed{file.suffix}")
         changed.write_bytes(mutated(content, rng))
+        begun_s = time.perf_counter()
         try:
             load_scene_file(changed, folder)
             outcome["scene"] += 1
         except SceneError as error:
             assert "\n" not in str(error) and len(str(error)) < 1000
             outcome["error"] += 1
+        if time.perf_counter() - begun_s > longest_s:
+            longest_s, slowest = time.perf_counter() - begun_s, f"{file.name}, change {number}"
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{count} files: {outcome}; longest {longest_s:.2f} s ({slowest}), at most {peak_mb:.0f} MB")
     return outcome
 
 
@@ -67,8 +94,8 @@ def test_changed_files_make_a_scene_or_a_clear_error(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_many_changed_files(tmp_path: Path) -> None:
-    outcome = fuzz(10_000, tmp_path / "files")
-    assert outcome["scene"] + outcome["error"] == 10_000
+    outcome = fuzz(20_000, tmp_path / "files")
+    assert outcome["scene"] + outcome["error"] == 20_000
 
 
 WORDS = (

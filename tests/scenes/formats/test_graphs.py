@@ -125,3 +125,31 @@ def test_hints_are_no_reason_to_refuse(tmp_path: Path) -> None:
     assert [row["picture"] for row in report.rows()] == [False, False, False, True, True]
     with pytest.raises(SceneError, match=r"got a: b: left out \(and 1 more\)"):
         report.refuse_any()
+
+
+def test_which_side_of_a_shared_mixture_is_black_is_asked_once_a_part(tmp_path: Path) -> None:
+    """30 levels of mixtures, each of which names the one before twice."""
+    levels = "".join(f'<bsdf type="blendbsdf" id="m{n + 1}"><ref id="m{n}"/><ref id="m{n}"/></bsdf>' for n in range(30))
+    shape = '<shape type="sphere"><ref id="m30"/></shape>'
+    text = f'<scene version="0.5.0"><bsdf type="diffuse" id="m0"/>{levels}{shape}</scene>'
+    (tmp_path / "a.xml").write_text(text)
+    assert load_scene_file(tmp_path / "a.xml").instances[0].one_sided
+
+
+def test_blank_lines_and_long_strings_before_the_world(tmp_path: Path) -> None:
+    """Looking for the version, and reading a string, are linear in the text."""
+    head = " \n" * 200_000 + f'Film "image" "string filename" "{"a" * 500_000}"\n'
+    (tmp_path / "a.pbrt").write_text(head + HEAD)
+    assert len(load_scene_file(tmp_path / "a.pbrt").film.filename) == 500_000
+
+
+def test_parameters_that_name_parameters(tmp_path: Path) -> None:
+    """The longest name counts; what stands in its place may name others; many of them cost no more each."""
+    names = "".join(f'<default name="a{n}" value="{n}"/>' for n in range(5000))
+    names += '<default name="far" value="$near"/><default name="near" value="$a4999"/>'
+    (tmp_path / "a.xml").write_text(
+        f'<scene version="0.5.0">{names}<shape type="sphere"><float name="radius" value="$far"/></shape>'
+        '<shape type="sphere"><float name="radius" value="$a12"/></shape></scene>'
+    )
+    radii = [one.shape.radius for one in load_scene_file(tmp_path / "a.xml").instances]  # type: ignore[union-attr]
+    assert radii == [4999.0, 12.0]
