@@ -90,6 +90,16 @@ def load(scene: str | Scene, phase: float = 0.0) -> Scene:
     return SCENES[NAMES[int(scene)] if numbered else scene](phase)
 
 
+def require_known(scene: str) -> None:
+    """Refuses what is neither the name or number of a scene nor looks like a file, without loading anything.
+
+    Raises:
+        ConfigError: the message has the known names and the nearest of them.
+    """
+    if not Path(scene).suffix and not (scene.isdecimal() and int(scene) < len(NAMES)):
+        SCENES.require(scene, "scene")
+
+
 def load_file(
     name: str, camera_path: str = "", integrator: IntegratorName = "whitted"
 ) -> tuple[Scene, tuple[str, ...]]:

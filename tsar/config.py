@@ -217,6 +217,9 @@ class TsarConfig:
     def _require_room_for_a_batch(self, coarse: int, fine: int) -> None:
         """Refuses tilings too small for a full batch, and densities whose least sum exceeds the budget."""
         count, size = self.tile_count_max, self.batch_size
+        if size == TsarConfig.batch_size:  # which nobody asked for
+            needs = f"room for a batch of {size} tiles (it has {fine}; --batch-size {fine} fits)"
+            require(size <= fine, "resolution_px", needs, self.resolution_px)
         require(size <= fine, "batch_size", f"at most {fine} (all tiles of the finest level)", size)
         least = tiles_at_least(size, self.level_min)
         needs = f"between {least} (a tiling has {coarse} + 3 k tiles, and every batch must be full) and {fine}"

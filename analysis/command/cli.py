@@ -5,10 +5,12 @@ from __future__ import annotations
 import atexit
 import contextlib
 import errno
+import importlib.util
 import io
 import os
 import re
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -159,7 +161,7 @@ def run_cli(main: Callable[[], None]) -> None:
     except ModuleNotFoundError as error:
         from analysis.command.extras import extra_of
 
-        missing = extra_of(error)
+        missing = extra_of(error) or _base_of(error)
         if missing is None:
             raise
         _end(missing, EXIT_BAD_INPUT)
@@ -180,18 +182,32 @@ def run_cli(main: Callable[[], None]) -> None:
 def run_process(main: Callable[[], None]) -> None:
     """Runs :func:`run_cli` as the last that this process does.
 
-    After an error or Ctrl-C the process ends as soon as its exit functions have run: the interpreter's last collection
-    of garbage took up to a minute in a study, and libraries list there what an error kept alive.
+    The process ends as soon as its exit functions have run: the interpreter's last collection of garbage took up to a
+    minute in a study, and libraries list there what is still alive.
     """
+    code: int | str | None = 0
     try:
         run_cli(main)
     except SystemExit as stop:
-        if isinstance(stop.code, int) and stop.code:
-            atexit._run_exitfuncs()
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(stop.code)
-        raise
+        code = stop.code
+        if isinstance(code, str):
+            raise
+    if not code:
+        threading._shutdown()  # waits for threads, as at any end
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code or 0)
+
+
+def _base_of(error: ModuleNotFoundError) -> InputError | None:
+    """The error to report where packages that every command needs are not installed for this Python; else None."""
+    if importlib.util.find_spec("tyro") and importlib.util.find_spec("torch"):
+        return None
+    return InputError(
+        f"expected the package {error.name}, found none for {sys.executable}; activate the environment in which tsar "
+        "is installed (in a checkout: make demo, then . .venv/bin/activate)"
+    )
 
 
 def _end(error: Exception, status: int) -> NoReturn:

@@ -21,7 +21,7 @@ from analysis.metrics.cost_model import (
     parameters_of,
 )
 from analysis.metrics.display_model import DisplayModel
-from tsar.config import StagesName, TsarConfig, closed_choices, require
+from tsar.config import RESOLUTION_DEFAULT, StagesName, TsarConfig, closed_choices, require
 from tsar.policies import POLICIES
 
 DEFAULT_POLICY = "tsar"
@@ -159,6 +159,20 @@ class RunOptions:
         c = self.tsar
         return (
             f"width_px x height_px: {c.width_px} x {c.height_px}" if c.width_px else f"resolution_px: {c.resolution_px}"
+        )
+
+    @property
+    def pace(self) -> str:
+        """What a size other than the default's changes in the experiment, in words; empty where it changes nothing."""
+        default = CAPACITY_DEFAULT * self.tsar.pixels / RESOLUTION_DEFAULT**2
+        if self.capacity != CAPACITY_DEFAULT or self.tsar.pixels == RESOLUTION_DEFAULT**2 or self.counted == "wall":
+            return ""
+        if any(getattr(self, name) not in ("", None) for name in CHOICES):
+            return ""
+        rate = self.capacity / float(nonadaptive_flops(self.cost, expected_ledger(self.counted)))
+        return (
+            f"{self.size}: this machine of {self.capacity:.3g} FLOP/s shows {rate:.3g} framed images a second; "
+            f"--capacity {default:.3g} shows as many as at {RESOLUTION_DEFAULT}²"
         )
 
     @property

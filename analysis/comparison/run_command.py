@@ -7,8 +7,8 @@ Examples: python scripts/run.py fly-by --seconds 2 --out out/fly-by
 
 from __future__ import annotations
 
-from analysis.command.cli import parse, require_unbroken
-from analysis.command.start import process_began_s
+from analysis.command.cli import bad_input, parse, require_unbroken
+from analysis.command.start import first_imports, process_began_s
 from analysis.comparison.experiment import run_experiment
 from analysis.comparison.options import RunOptions
 
@@ -16,6 +16,12 @@ from analysis.comparison.options import RunOptions
 def main() -> None:
     """Parses, runs, prints what came out and where it is."""
     options = parse(RunOptions, __doc__ or "")
+    with first_imports(), bad_input():
+        from scenes import catalog
+
+        catalog.require_known(options.input)  # before anything that takes long to load
+    if options.pace:
+        print(options.pace)
     summary = run_experiment(options, process_began_s())
 
     from analysis.command.console import Table, show
@@ -48,5 +54,6 @@ def main() -> None:
         from analysis.comparison.choosing import choice_table
 
         parts.append(choice_table(summary["choice"]))
-    show(*parts, f"written to {options.out}: {files}")
+    page = (options.out / "report.html").resolve().as_uri()
+    show(*parts, f"written to {options.out}: {files}", f"look at it: {page}")
     require_unbroken([] if checked is None or checked["ok"] else [options.input])

@@ -113,6 +113,8 @@ class RenderOptions:
             threads=limits.THREADS,
         )
 
+        cube = round(self.samples ** (1 / 3)) ** 3 == self.samples
+        require(self.point_set != "stratified" or cube, "samples", "a cube for the point set stratified", self.samples)
         require(not self.size or len(self.sides_px) == 2, "size", "such as 800x600", self.size)
         limits.within(self, sides_px=limits.SIDES_PX)
         two = self.size and (self.width_px or self.height_px)

@@ -227,6 +227,10 @@ def test_a_clock_that_stops_time_is_refused():
         ),
         (lambda: TsarConfig(batch_size=100, resolution_px=64), r"batch_size: expected at most 64 \(all tiles"),
         (
+            lambda: TsarConfig(resolution_px=64),
+            r"resolution_px: expected room for a batch of 128 .* fits\), got 64",
+        ),
+        (
             lambda: TsarConfig(batch_size=2, response=ResponseConfig(temporal_min=0.5)),
             r"response.temporal_min: expected at most 0.125 \(a batch of 2 for the 16 tiles of the coarsest level\)",
         ),

@@ -1,0 +1,74 @@
+"""What a new user meets first: wrong input is said before anything loads, and sizes are said to change the pace."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from analysis.command import cli
+from analysis.comparison.options import RunOptions
+from analysis.tracer.render_options import RenderOptions
+from scenes.catalog import require_known
+from tsar.config import ConfigError, TsarConfig
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def test_a_size_says_what_it_does_to_the_framed_renderer() -> None:
+    small = RunOptions("fly-by", tsar=TsarConfig(resolution_px=128))
+    assert small.pace == (
+        "resolution_px: 128: this machine of 8.7e+10 FLOP/s shows 128 framed images a second; "
+        "--capacity 5.44e+09 shows as many as at 512²"
+    )
+    followed = dataclasses.replace(small, capacity=5.44e9)
+    assert followed.pace == RunOptions("fly-by").pace == dataclasses.replace(small, clock="wall").pace == ""
+
+
+def test_unknown_scenes_are_refused_by_name_before_anything_loads() -> None:
+    with pytest.raises(ConfigError, match=r"^scene: expected one of corner-exit, .*got 'flyby' \(nearest: fly-by\)"):
+        require_known("flyby")
+    for known in ("fly-by", "2", "glass", "some/file.pbrt"):
+        require_known(known)
+    program = (
+        "import sys; sys.argv = ['run', 'flyby']\nfrom analysis.comparison.run_command import main\n"
+        "try: main()\nexcept ValueError: print('torch' in sys.modules, 'warp' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "False False\n"
+
+
+@pytest.mark.parametrize("samples", [10, 26, 28])
+def test_stratified_samples_are_a_cube(samples: int) -> None:
+    with pytest.raises(ConfigError, match=rf"^samples: expected a cube for the point set stratified, got {samples}"):
+        RenderOptions("glass", samples=samples, point_set="stratified")
+    RenderOptions("glass", samples=27, point_set="stratified")
+
+
+def test_a_python_without_the_packages_is_told_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    def main() -> None:
+        raise ModuleNotFoundError("No module named 'tyro'", name="tyro")
+
+    with pytest.raises(ModuleNotFoundError):
+        cli.run_cli(main)
+    monkeypatch.setattr(cli.importlib.util, "find_spec", lambda name: None if name == "tyro" else name)
+    with pytest.raises(SystemExit, match="2"):
+        cli.run_cli(main)
+    shown = capsys.readouterr().err
+    assert shown.count("\n") == 1 and "expected the package tyro" in shown and ". .venv/bin/activate" in shown
+
+
+def test_a_command_that_ends_well_ends_at_once() -> None:
+    """Its exit functions and threads have run, and what it printed is there."""
+    program = (
+        "import atexit, threading, time\nfrom analysis.command.cli import run_process\n"
+        "class Last:\n    def __del__(self): print('never')\n"
+        "def main():\n    global kept\n    kept = Last()\n    atexit.register(print, 'exit')\n"
+        "    threading.Thread(target=lambda: (time.sleep(0.1), print('thread'))).start()\n    print('main')\n"
+        "run_process(main)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "main\nthread\nexit\n", "")
