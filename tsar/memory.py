@@ -1,11 +1,23 @@
-"""Memory that this process can still allocate: the least of what the machine, containers and its own limits leave."""
+"""Memory that this process can still allocate, the least of what the machine, containers and its own limits leave; and
+the cores that it may use. Systems other than Linux tell less of it."""
 
 from __future__ import annotations
 
 import os
-import resource
 from collections.abc import Iterator
 from pathlib import Path
+
+try:
+    import resource
+except ModuleNotFoundError:  # Windows
+    resource = None
+
+
+def core_count() -> int:
+    """Number of CPU cores this process may use; all of the machine's where the system does not tell."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def free_memory_bytes(root: Path = Path("/")) -> int:
@@ -15,7 +27,15 @@ def free_memory_bytes(root: Path = Path("/")) -> int:
         root: where ``proc`` and ``sys`` lie.
     """
     found = [*_machine(root), *_groups(root), *_process(root)]
-    return max(0, min(found, default=os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))
+    return max(0, min(found) if found else _whole())
+
+
+def _whole() -> int:
+    """What the machine has where it does not tell what is free; without a bound where it tells neither."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 1 << 62
 
 
 def _machine(root: Path) -> Iterator[int]:
@@ -26,6 +46,8 @@ def _machine(root: Path) -> Iterator[int]:
 
 def _process(root: Path) -> Iterator[int]:
     """What ``ulimit -v`` and ``ulimit -d`` leave."""
+    if resource is None:
+        return
     used = dict(_table(root / "proc/self/status"))
     for limit, name in ((resource.RLIMIT_AS, "VmSize:"), (resource.RLIMIT_DATA, "VmData:")):
         most, _ = resource.getrlimit(limit)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
-import os
 import platform
 from typing import Any
 
 from analysis.storage.provenance import cpu_model
+from tsar.memory import core_count
 
 PACKAGES = {
     "torch": "torch",
@@ -26,7 +26,7 @@ def machine(device: str = "cpu") -> dict[str, Any]:
     minute."""
     import psutil
 
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    cores = core_count()
     found = {"cpu": cpu_model(), "cores": cores, "memory_gib": round(psutil.virtual_memory().total / 2**30, 1)}
     found["load_average"] = round(psutil.getloadavg()[0], 2)
     if device != "cpu":

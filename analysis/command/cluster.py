@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from analysis.command import limits
 from analysis.command.cli import InputError
 from analysis.command.interrupts import SIGNALS
+from tsar.memory import core_count
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -47,12 +48,12 @@ class ClusterOptions:
     @property
     def processes(self) -> int:
         """Processes of the local cluster."""
-        return self.workers or len(os.sched_getaffinity(0))
+        return self.workers or core_count()
 
     @property
     def threads(self) -> int:
         """Threads that each of them traces with."""
-        return max(1, len(os.sched_getaffinity(0)) // self.processes)
+        return max(1, core_count() // self.processes)
 
 
 @contextlib.contextmanager

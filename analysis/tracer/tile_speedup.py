@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.command.progress import Task
 from analysis.tracer.tiles import Picture, assembled, rendered
+from tsar.memory import core_count
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -80,7 +80,7 @@ def fitted(
     alone = np.asarray(chunk_s, np.float64)
     contention = max(1.0, float(np.sum(beside_s) / alone.sum()))
     rest = wall_s[1] - alone.sum() - assembly_s
-    cores = len(os.sched_getaffinity(0))
+    cores = core_count()
     return FarmModel(alone, max(0.0, rest / len(alone)), dispatch_s, assembly_s, contention, cores)
 
 
@@ -145,7 +145,7 @@ def study(
             task.advance()
     medians = {count: median(values) for count, values in wall_s.items()}
     chunk_s = {count: np.median(np.stack(values), axis=0) for count, values in worker_s.items()}
-    cores = len(os.sched_getaffinity(0))
+    cores = core_count()
     beside = max((count for count in wanted if count <= cores), default=1)
     dispatch = median(_dispatch_s(client, chunks, addresses) for _ in range(3))
     model = fitted(chunk_s[1].tolist(), medians, chunk_s[beside].tolist(), dispatch, median(assembly_s))

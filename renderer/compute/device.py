@@ -15,6 +15,8 @@ from types import ModuleType
 import torch
 import warp as wp
 
+from tsar.memory import core_count
+
 DEVICES = ("cpu", "cuda:0")
 WARP_TESTED = "1.19"
 """Release of Warp that this package was tested with, any patch of it: launches use what it does not promise to keep."""
@@ -157,13 +159,6 @@ def _shown(report: Callable[[str], None] | None) -> Iterator[tuple[Callable[[str
             yield lambda line: status.update(Text(line)), _STATUS_INTERVAL_S
     else:
         yield lambda line: print(line, file=sys.stderr, flush=True), _LINE_INTERVAL_S
-
-
-def core_count() -> int:
-    """Number of CPU cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 # on import: declaring the first record or kernel would otherwise start Warp with its defaults

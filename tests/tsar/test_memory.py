@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
-from tsar.memory import free_memory_bytes
+from tsar import memory
+from tsar.memory import core_count, free_memory_bytes
 
 MIB = 2**20
 
@@ -43,3 +45,13 @@ def test_the_limit_that_holds_counts(tmp_path: Path, files: dict[str, str], expe
 
 def test_this_machine_has_memory_and_so_has_one_that_says_nothing(tmp_path: Path) -> None:
     assert 2**20 < free_memory_bytes() < 2**50 and 2**20 < free_memory_bytes(tmp_path) < 2**50
+
+
+def test_systems_that_tell_less_are_served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on macOS, without affinity; as on Windows, without limits and sizes of memory too."""
+    assert 1 <= core_count() <= (os.cpu_count() or 1)
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert core_count() == (os.cpu_count() or 1)
+    monkeypatch.setattr(memory, "resource", None)
+    monkeypatch.delattr(os, "sysconf")
+    assert free_memory_bytes(tmp_path) == 1 << 62
