@@ -137,6 +137,8 @@ class SceneReader(DirectiveReader):
             shutter = 0.0, 0.0  # the default of a still
         half, mirror, shift, middle = self._window(parameters, directive)
         placed = products(keys[0], FORWARD, mirror)
+        if kind != "perspective" and {"shutteropen", "shutterclose"} & set(parameters.given):
+            self.report.hint(str(directive.place), f"the shutter of a camera {kind!r}", "open for no time")
         if parameters.number("frameaspectratio", 0.0):
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
         if kind == "perspective":

@@ -115,11 +115,6 @@ class TextureReader:
     def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
         """The texture that a ``Texture`` directive makes, of colours or of numbers."""
         where = str(parameters.place)
-        scale = (parameters.number("uscale", 1.0), parameters.number("vscale", 1.0))
-        offset = (parameters.number("udelta", 0.0), parameters.number("vdelta", 0.0))
-        mapping = parameters.text("mapping", "uv")
-        if mapping != "uv":
-            self.report.add(where, f"mapping {mapping!r} of a texture", "the mapping uv")
         if kind == "constant":
             return self.texture(parameters, "value", (1.0, 1.0, 1.0), of)
         if kind == "scale":
@@ -128,6 +123,11 @@ class TextureReader:
             amount = self.scalar(parameters, "amount", 0.5)
             parts = self.texture(parameters, "tex1", grey(0.0), of), self.texture(parameters, "tex2", grey(1.0), of)
             return MixTexture(*parts, amount)
+        scale = (parameters.number("uscale", 1.0), parameters.number("vscale", 1.0))
+        offset = (parameters.number("udelta", 0.0), parameters.number("vdelta", 0.0))
+        mapping = parameters.text("mapping", "uv")
+        if mapping != "uv":
+            self.report.add(where, f"mapping {mapping!r} of a texture", "the mapping uv")
         if kind == "checkerboard":
             if parameters.whole("dimension", 2, 2, 3) == 3:
                 self.report.add(where, "a checkerboard in space", "one over u and v")

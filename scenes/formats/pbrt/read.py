@@ -51,9 +51,10 @@ class PbrtReader(SceneReader):
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         name = self.report.kind(SAMPLERS, kind, "sampler", directive.place, picture=False)
-        count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         if kind == "stratified":
             count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
+        else:
+            count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         self.sampler = Sampler(name, count)  # type: ignore[arg-type]
         self.left_over(parameters, f"sampler {kind!r}")
 

@@ -168,9 +168,10 @@ class PbrtV4Reader(PbrtReader):
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         name = self.report.kind(SAMPLERS, kind, "sampler", directive.place, picture=False)
-        count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         if kind == "stratified":
             count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
+        else:
+            count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         for hint in ("seed", "randomization", "jitter"):
             if hint in parameters:
                 parameters.asked.add(hint)
