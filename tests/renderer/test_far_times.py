@@ -49,10 +49,7 @@ def scene(later_s: float) -> Scene:
 
 @pytest.fixture(scope="module")
 def renderers():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)  # small pictures are done sooner without a second one
-    yield {later: Renderer(scene(later), threads=1) for later in (0.0, *LATE_S)}
-    torch.set_num_threads(before)
+    return {later: Renderer(scene(later), threads=1) for later in (0.0, *LATE_S)}
 
 
 def truths_of(renderer: Renderer, start_s: float) -> Truths:

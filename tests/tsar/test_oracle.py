@@ -28,15 +28,6 @@ CONFIG = TsarConfig(
 EDGE = pictures.moving_edge(0.5, 0.2)
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    """Small pictures are done sooner without a second one."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
 # --- the choice ------------------------------------------------------------------------------------------------------
 
 
