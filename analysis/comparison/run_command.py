@@ -20,8 +20,6 @@ def main() -> None:
         from scenes import catalog
 
         catalog.require_known(options.input)  # before anything that takes long to load
-    if options.pace:
-        print(options.pace)
     summary = run_experiment(options, process_began_s())
 
     from analysis.command.console import Table, show
@@ -49,11 +47,12 @@ def main() -> None:
         "non-finite values": str(sum(summary["nonfinite"].values())),
     }
     files = ", ".join(["summary.json", *summary["files"]])
-    parts = [Table(title, ("", ""), list(rows.items()), words=2)]
+    parts: list[Table | str] = [Table(title, ("", ""), list(rows.items()), words=2)]
     if summary["choice"]:
         from analysis.comparison.choosing import choice_table
 
         parts.append(choice_table(summary["choice"]))
     page = (options.out / "report.html").resolve().as_uri()
+    parts += [options.pace] if options.pace else []
     show(*parts, f"written to {options.out}: {files}", f"look at it: {page}")
     require_unbroken([] if checked is None or checked["ok"] else [options.input])
