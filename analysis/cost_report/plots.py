@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from analysis.page.figures import ADAPTIVE, FRAMED, OTHER, save
+from analysis.page.figures import ADAPTIVE, FRAMED, label_ends, line_style, save
 from analysis.storage.files import atomic
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ __all__ = [
     "surface_picture",
 ]
 
-_STAGE_INK = ("#7a5195", "#d45087", "#2f8f8b", "#a0722a", "#5a8f29", "#4c6fa5", "0.5")
 _AXES = {
     "recon_res": "output resolution, pixels",
     "batch_size": "batch size, framelets per cycle",
@@ -71,9 +70,9 @@ def cost_figure(found: Sweep, title: str, crossing: float | None = None) -> Figu
     """
     figure, (axis,) = _axes(9.0, 5.0)
     x = found.values.numpy()
-    for (name, values), ink in zip(found.stages.items(), _STAGE_INK, strict=False):
+    for style, (name, values) in enumerate(found.stages.items(), 2):
         cost = values.numpy()
-        axis.plot(x, np.where(cost > 0, cost, np.nan), color=ink, linewidth=0.9, label=name)
+        axis.plot(x, np.where(cost > 0, cost, np.nan), **{**line_style(style), "linewidth": 1.1}, label=name)
     axis.plot(x, found.adaptive.numpy(), color=ADAPTIVE, linewidth=2.6, label="adaptive, total")
     framed = found.nonadaptive.numpy()
     framed = np.where(framed > 0, framed, np.nan)
@@ -89,7 +88,7 @@ def cost_figure(found: Sweep, title: str, crossing: float | None = None) -> Figu
     axis.set_xlabel(_AXES[found.name])
     axis.set_ylabel("FLOP per output pixel")
     axis.set_title(f"Cost per output pixel, {title}", fontsize=10, loc="left")
-    axis.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    label_ends(axis)
     return figure
 
 
@@ -98,8 +97,8 @@ def advantage_figure(
 ) -> Figure:
     """Cycles per framed image over the batch size under every ledger, with what was measured at the same output."""
     figure, (axis,) = _axes(9.0, 4.4)
-    for (name, values), ink in zip(advantages.items(), (ADAPTIVE, OTHER, FRAMED), strict=True):
-        axis.plot(batch.numpy(), values.numpy(), color=ink, linewidth=1.8, label=f"ledger {name}")
+    for style, (name, values) in enumerate(advantages.items()):
+        axis.plot(batch.numpy(), values.numpy(), **line_style(style), label=f"ledger {name}")
     if measured:
         x = [row["batch_size"] for row in measured]
         for name, mark, label in (

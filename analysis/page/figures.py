@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -52,13 +53,17 @@ def inks(runs: Sequence[str], own: str) -> dict[str, str]:
     return {name: INKS[style] for name, style in styles(runs, own).items()}
 
 
+def dashed(style: int, width: float = 1.0) -> Any:
+    """Dashes of a line of matplotlib of that width, in points: it multiplies them by the width."""
+    dashes = tuple(float(length) / width for length in DASHES[style % len(DASHES)].split())
+    return (0, dashes) if dashes else "solid"
+
+
 def line_style(style: int) -> dict:
     """Ink, dashes and width of a line of matplotlib."""
-    dashes = tuple(float(length) for length in DASHES[style % len(DASHES)].split())
     width = 2.0 if style == 0 else 1.4
-    # matplotlib multiplies dashes by the width of the line
-    pattern = (0, tuple(length / width for length in dashes)) if dashes else "solid"
-    return {"color": INKS[style % len(INKS)], "linewidth": width, "linestyle": pattern, "zorder": 3 - 0.1 * style}
+    ink = INKS[style % len(INKS)]
+    return {"color": ink, "linewidth": width, "linestyle": dashed(style, width), "zorder": 3 - 0.1 * style}
 
 
 def label_ends(axis: Axes) -> None:

@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.page.figures import line_style
 from analysis.perception.psychometrics import GUESS, THRESHOLD, correct_share
 
 _INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "0.45")
@@ -64,9 +65,9 @@ def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:
     """Just-noticeable differences against the observer's noise."""
     figure = Figure(figsize=(5.0, 3.6), layout="constrained")
     axis = figure.subplots()
-    for ink, scene in zip(_INK, scenes, strict=False):
+    for style, scene in enumerate(scenes):
         part = rows.loc[(rows["scene"] == scene) & (rows["status"] == "within")]
-        axis.loglog(part["sigma_jod"], part["jnd"], marker="o", ms=4, color=ink, label=scene)
+        axis.loglog(part["sigma_jod"], part["jnd"], marker="o", ms=4, label=scene, **line_style(style))
     sigmas = sorted({float(value) for value in rows["sigma_jod"]})
     axis.set_xticks(sigmas, [f"{value:g}" for value in sigmas], minor=False)
     axis.set_xticks([], minor=True)

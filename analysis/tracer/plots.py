@@ -13,11 +13,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
+from analysis.page.figures import ADAPTIVE, FRAMED, OTHER, line_style
 
 _STRUCTURE_INK = {"brute": OTHER, "kdtree": FRAMED, "bvh": ADAPTIVE}
 _LABEL = {"brute": "brute force", "kdtree": "kd-tree", "bvh": "tree of boxes"}
-_SET_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "#b02a2a", "0.45")
 
 
 def tests_figure(rows: pd.DataFrame) -> Figure:
@@ -89,9 +88,9 @@ def convergence_figure(errors: pd.DataFrame, sets: Sequence[str], kinds: Sequenc
     """Mean squared error against the number of points, a panel an integrand."""
     figure = Figure(figsize=(4.0 * len(kinds), 3.6), layout="constrained")
     for axis, kind in zip(np.atleast_1d(figure.subplots(1, len(kinds))), kinds, strict=True):
-        for name, ink in zip(sets, _SET_INK, strict=True):
+        for style, name in enumerate(sets):
             part = errors[(errors["set"] == name) & (errors["integrand"] == kind) & (errors["points"] > 1)]
-            axis.loglog(part["points"], np.maximum(part["mse"], 1e-12), marker="o", ms=3, color=ink, label=name)
+            axis.loglog(part["points"], np.maximum(part["mse"], 1e-12), ".", label=name, **line_style(style))
         axis.set(title=kind, xlabel="samples", ylabel="mean squared error")
         axis.grid(True, alpha=0.3)
     figure.axes[0].legend(fontsize=7)
