@@ -69,7 +69,7 @@ OPTIONS: dict[str, Any] = {
 }
 """The options of each command at their defaults."""
 
-WITHOUT_NUMBERS = {"convert.py", "same.py"}
+WITHOUT_NUMBERS = {"convert.py", "report.py", "same.py"}
 HOPELESS = (math.nan, math.inf, -math.inf, 1e300, -1e300, 10**20, -(10**20))
 PLAUSIBLE = (-1, 0)
 
