@@ -75,6 +75,7 @@ def write_all(
         file = folder / f"{name}.png"
         # a figure of an earlier study must not stand beside the results of this one
         file.unlink(missing_ok=True)
+        file.with_suffix(".svg").unlink(missing_ok=True)
         if figure is not None:
             save(figure, file)
             files.append(file)

@@ -40,6 +40,7 @@ def test_all_parts(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     assert all(part in shown for part in ("Power-spectrum slopes", "Ideal density of tile 508", "Estimate against"))
     figures = ("slopes", "spectra", "ideal_tile", "ideal_norm", "ideal_surface", "ideal_estimate", "agreement")
     made = {*(f"{name}.png" for name in figures), "summary.json"}
+    made |= {f"{name}.svg" for name in figures}
     assert {path.name for path in out.iterdir()} == {*made, "files.journal"}
     assert all(picture_is_drawn(out / f"{name}.png") for name in figures)
     found = summary(out)
