@@ -193,7 +193,7 @@ def run_process(main: Callable[[], None]) -> None:
         if isinstance(code, str):
             raise
     if not code:
-        threading._shutdown()  # waits for threads, as at any end
+        threading._shutdown()  # type: ignore[attr-defined]  # waits for threads, as at any end
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
