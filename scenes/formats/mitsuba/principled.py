@@ -6,6 +6,8 @@ what its parameters mean.
 
 from __future__ import annotations
 
+import math
+
 from scenes.canonical import ConstantTexture, Glass, Material, Metal, MixMaterial, Plastic, SceneError, Texture
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.indices import index_of_reflectance
@@ -26,7 +28,7 @@ def principled(properties: Properties, textures: MitsubaTextures) -> Material:
     roughness = _mean(properties, textures, "roughness", 0.5)
     alpha = max(roughness * roughness, 1e-3)
     specular = _mean(properties, textures, "specular", 0.5)
-    root = (0.08 * specular) ** 0.5
+    root = math.sqrt(0.08 * specular)
     ior = properties.number("eta", (1.0 + root) / (1.0 - root))
     if not 1.0 <= ior < 1e3:
         raise SceneError(f"{properties.where}: eta: expected at least 1, got {ior:g}")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from scenes import loading
-from scenes.arithmetic import norm, product, sin
+from scenes.arithmetic import cos, norm, product, sin
 from scenes.canonical import DirectionalLight, EnvironmentLight, Light, Rgb, SceneError, SpotLight
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.equal_area import latitude_longitude
@@ -50,7 +50,7 @@ class V4Lights:
             outer = parameters.number("coneangle", 30.0)
             inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
             # π times the sum of what the two cones leave of 1, as its fall-off is even in the cosine
-            whole = math.pi * (2.0 - math.cos(math.radians(inner)) - math.cos(math.radians(outer)))
+            whole = math.pi * (2.0 - cos(math.radians(inner)) - cos(math.radians(outer)))
             strength = self._strength(parameters, "I", whole)
             end = placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
             return [SpotLight(start, end, strength, inner, outer, "hermite")]
@@ -99,7 +99,7 @@ class V4Lights:
         if light > 0.0:
             height = image.shape[0]
             polar = (np.arange(height) + 0.5) / height * np.pi
-            weight = np.maximum(np.cos(polar), 0.0) * sin(polar) * 2.0 * np.pi**2 / (height * image.shape[1])
+            weight = np.maximum(cos(polar), 0.0) * sin(polar) * 2.0 * np.pi**2 / (height * image.shape[1])
             total = float((product(image.astype(np.float64), LUMINANCE) * weight[:, None]).sum())
             if total > 0.0:
                 strength = rgb(np.array(strength) * light / total)

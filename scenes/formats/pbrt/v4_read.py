@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scenes.arithmetic import product
 from scenes.canonical import Film, Instance, Integrator, Sampler, SceneError
 from scenes.formats.directives.reader import typed, word
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of, parse_directives
@@ -210,7 +211,7 @@ class PbrtV4Reader(PbrtReader):
         power, emission = self.attributes.power, instance.emission
         if emission is not None and power > 0.0:
             corners = as_mesh(instance.shape).vertices[as_mesh(instance.shape).faces].astype(np.float64)
-            placed = corners @ instance.to_world[:3, :3].T
+            placed = product(corners, instance.to_world[:3, :3].T)
             size = 0.5 * float(np.sqrt((area_normals(placed.reshape(-1, 3, 3)) ** 2).sum(axis=1)).sum())
             if size > 0.0:
                 shine = [part * power / (math.pi * size) for part in emission]
