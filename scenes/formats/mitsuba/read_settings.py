@@ -1,6 +1,7 @@
 """Cameras, films, samplers and integrators of Mitsuba 0.5, into those of the canonical scene.
 
-Source: Mitsuba 0.5 documentation; conventions measured with Mitsuba 3; Hagemann 2018, ch. 4.
+Source: Mitsuba 0.5 documentation, and ``orthographic.cpp`` of its source; conventions measured with Mitsuba 3;
+Hagemann 2018, ch. 4.
 """
 
 from __future__ import annotations
@@ -120,7 +121,11 @@ class MitsubaSettings:
                 lens, focus = 0.0, FAR
             self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, track, shutter, shift)
         elif kind == "orthographic":
-            self.camera = OrthographicCamera(to_world, track=track)
+            # its window is [-1, 1] across, whatever the aspect
+            half = min(self.film.width_px, self.film.height_px) / self.film.width_px
+            self.camera = OrthographicCamera(to_world, half, track)
+            if shift != (0.0, 0.0):
+                self.report.add(properties.where, "a parallel picture off the viewing direction", "one about it")
         elif kind == "spherical":
             self.camera = EnvironmentCamera(to_world)
         else:

@@ -87,7 +87,7 @@ class MitsubaWriter(MitsubaLightWriter):
 
     def _sensor(self, scene: Scene) -> None:
         camera, film = scene.camera, scene.film
-        made = self._camera(camera)
+        made = self._camera(camera, film.width_px / min(film.width_px, film.height_px))
         self.root.append(made)
         kind = _SAMPLERS[scene.sampler.kind]
         if self.modern and kind in ("sobol", "halton", "hammersley"):
@@ -111,7 +111,8 @@ class MitsubaWriter(MitsubaLightWriter):
         else:
             self.put(rfilter, "float", "radius", number(film.filter_radius_px))
 
-    def _camera(self, camera: Camera) -> Element:
+    def _camera(self, camera: Camera, across: float) -> Element:
+        """A camera with its place; the picture is ``across`` shorter sides wide."""
         keys, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
         local = FORWARD
         if isinstance(camera, PerspectiveCamera):
@@ -128,7 +129,7 @@ class MitsubaWriter(MitsubaLightWriter):
                     self.put(made, "float", name, number(value))
         elif isinstance(camera, OrthographicCamera):
             made = self.plugin("sensor", "orthographic")
-            half = camera.half_width
+            half = camera.half_width * across
             local = product(FORWARD, np.diag([half, half, 1.0, 1.0]))
         else:
             made = self.plugin("sensor", "spherical" if isinstance(camera, EnvironmentCamera) else "perspective")

@@ -146,6 +146,39 @@ def test_plugins_of_mitsuba_3(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("size", "columns", "rows"), [((32, 16), (12.8, 25.6), (3.2, 9.6)), ((16, 32), (6.4, 12.8), (13.6, 16.8))]
+)
+@pytest.mark.parametrize("version", ["0.6.0", "3.0.0"])
+def test_a_parallel_picture_is_two_wide(
+    size: tuple[int, int], columns: tuple[float, float], rows: tuple[float, float], version: str, tmp_path: Path
+) -> None:
+    """Mitsuba 3.9.1 lights pixels 12 to 25 of 32, and 3 to 9 of 16, with this square; 6 to 12 and 13 to 16 upright."""
+    placed, film = (
+        ("to_world" if version == "3.0.0" else "toWorld"),
+        "".join(
+            f'<integer name="{name}" value="{count}"/>' for name, count in zip(("width", "height"), size, strict=True)
+        ),
+    )
+    text = f'<scene version="{version}"><sensor type="orthographic"><film type="hdrfilm">{film}</film>'
+    text += f'<transform name="{placed}"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform></sensor>'
+    scene, losses = read(tmp_path, text + "</scene>")
+    assert losses == []
+    for target in ("mitsuba", "mitsuba3", "pbrt"):
+        name = f"b{'.pbrt' if target == 'pbrt' else '.xml'}"
+        save_scene_file(scene, tmp_path / name, target)
+        scene = load_scene_file(tmp_path / name)
+        camera, aspect = scene.camera, size[0] / size[1]
+        assert isinstance(camera, OrthographicCamera)
+        corners = np.linalg.solve(camera.to_world, np.array([(-0.2, -0.1, 0.0, 1.0), (0.6, 0.3, 0.0, 1.0)]).T)[:2]
+        spans = camera.half_width * max(aspect, 1.0), camera.half_width * max(1.0 / aspect, 1.0)
+        at = [
+            (np.sort(corner / span * side) + 1.0) / 2.0 * px
+            for corner, span, side, px in zip(corners, spans, (1.0, -1.0), size, strict=True)
+        ]
+        np.testing.assert_allclose(at, (columns, rows), atol=1e-6)
+
+
+@pytest.mark.parametrize(
     ("given", "wanted"),
     [
         ('<spectrum name="reflectance" value="0.25"/>', (0.25, 0.25, 0.25)),
