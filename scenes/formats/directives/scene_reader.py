@@ -43,7 +43,7 @@ from scenes.formats.directives.reader import DirectiveReader, typed, word
 from scenes.formats.directives.shapes import ShapeReader
 from scenes.formats.directives.surfaces import Surfaces
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
-from scenes.formats.directives.textures import Pair
+from scenes.formats.directives.window import Window, fitted, window_of
 from scenes.formats.geometry.conventions import FAR, duration_s
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import inverse, motion, moved_by, translation
@@ -64,6 +64,7 @@ class SceneReader(DirectiveReader):
     """State of a scene while its file is read; a dialect adds its film, samplers, integrators and lights."""
 
     camera: Camera | None = None
+    window: Window | None = None
     film: Film = field(default_factory=Film)
     sampler: Sampler = field(default_factory=lambda: Sampler("halton", 16))
     integrator: Integrator = field(default_factory=lambda: Integrator("path", 5))
@@ -135,22 +136,22 @@ class SceneReader(DirectiveReader):
         shutter = parameters.number("shutteropen", 0.0), parameters.number("shutterclose", 1.0)
         if not {"shutteropen", "shutterclose"} & set(parameters.given) and track is None:
             shutter = 0.0, 0.0  # the default of a still
-        half, mirror, shift, middle = self._window(parameters, directive)
-        placed = products(keys[0], FORWARD, mirror)
+        self.window = window = window_of(parameters, str(directive.place))
+        placed = products(keys[0], FORWARD, window.mirror)
         if kind != "perspective" and {"shutteropen", "shutterclose"} & set(parameters.given):
             self.report.hint(str(directive.place), f"the shutter of a camera {kind!r}", "open for no time")
         if parameters.number("frameaspectratio", 0.0):
             self.report.add(str(directive.place), "frameaspectratio of the camera", "that of the film")
         if kind == "perspective":
-            fov = self._field_of_view(parameters, half, directive)
+            fov = self._field_of_view(parameters, window.half, directive)
             lens, focus = parameters.number("lensradius", 0.0), parameters.number("focaldistance", FAR)
             if not focus > 0.0:
                 if lens > 0.0:
                     self.report.add(str(directive.place), f"a lens in focus at {focus:g}", "a pinhole")
                 lens, focus = 0.0, FAR
-            self.camera = PerspectiveCamera(placed, fov, lens, focus, track, shutter, shift)
+            self.camera = PerspectiveCamera(placed, fov, lens, focus, track, shutter, window.shift)
         elif kind == "orthographic":
-            self.camera = OrthographicCamera(product(placed, translation(*middle, 0.0)), half, track)
+            self.camera = OrthographicCamera(product(placed, translation(*window.middle, 0.0)), window.half, track)
         elif kind == "environment":
             self.camera = EnvironmentCamera(placed)
         elif kind == "realistic":
@@ -158,7 +159,9 @@ class SceneReader(DirectiveReader):
             self.camera = RealisticCamera(placed, parameters.text("lensfile", ""), *numbers)
         else:
             self.report.unknown(directive.place, "camera", kind, "perspective")
-            self.camera = PerspectiveCamera(placed, self._field_of_view(parameters, half, directive), track=track)
+            self.camera = PerspectiveCamera(
+                placed, self._field_of_view(parameters, window.half, directive), track=track
+            )
         self.left_over(parameters, f"camera {kind!r}")
 
     def _field_of_view(self, parameters: Parameters, half: float, directive: Directive) -> float:
@@ -167,23 +170,6 @@ class SceneReader(DirectiveReader):
         if not 0.0 < fov < 180.0:
             raise SceneError(f"{directive.place}: fov: expected an angle in (0, 180), got {fov:g}")
         return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
-
-    def _window(self, parameters: Parameters, directive: Directive) -> tuple[float, Matrix, Pair, Pair]:
-        """Half of the window's shorter side, its mirror where it runs from right to left, and where its middle is.
-
-        The middle is given in widths and heights of the picture, and in units of the window.
-        """
-        window = parameters.numbers("screenwindow", 4)
-        if window is None:
-            return 1.0, np.eye(4), (0.0, 0.0), (0.0, 0.0)
-        left, right, bottom, top = window.tolist()
-        sides, signs = (abs(right - left), abs(top - bottom)), np.sign([right - left, top - bottom])
-        if not signs.all():
-            raise SceneError(f"{directive.place}: screenwindow: expected left and right, bottom and top apart")
-        ends = zip((left + right, bottom + top), sides, signs.tolist(), strict=True)
-        across, up = (0.5 * sign * end if abs(end) > 1e-6 * side else 0.0 for end, side, sign in ends)
-        middle = across, up
-        return 0.5 * min(sides), np.diag([*signs, 1.0, 1.0]), (middle[0] / sides[0], middle[1] / sides[1]), middle
 
     def read_size(self, parameters: Parameters, width_px: int, height_px: int) -> None:
         """The size of the picture, by default the given one, and its file; the filter stays."""
@@ -279,6 +265,8 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
     if camera is None:
         reader.report.add(str(path), "no camera", "one of 90 degrees along z")
         camera = PerspectiveCamera(FORWARD, 90.0)
+    elif reader.window is not None:
+        camera = fitted(camera, reader.window, reader.film, reader.report)
     return Scene(
         camera,
         tuple(reader.instances),

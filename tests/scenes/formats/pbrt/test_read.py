@@ -16,6 +16,7 @@ from scenes.canonical import (
     Masked,
     Matte,
     MixMaterial,
+    OrthographicCamera,
     PerspectiveCamera,
     Sphere,
     SpotLight,
@@ -42,6 +43,42 @@ from tests.scenes.formats.files import HEAD, pbrt
 def test_field_of_view_is_that_of_the_shorter_side(parameters: str, expected: float, tmp_path: Path) -> None:
     scene, _ = pbrt(tmp_path, "", f'Camera "perspective" {parameters}\nWorldBegin\n')
     assert isinstance(scene.camera, PerspectiveCamera) and scene.camera.fov_deg == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize(
+    ("size", "window", "half", "stretched"),
+    [
+        ((32, 16), (-3, 3, -1, 1), 1.0, (1.5, 1.0)),
+        ((16, 32), (-3, 3, -1, 1), 3.0, (1.0, 1.0 / 6.0)),
+        ((16, 16), (-3, 3, -1, 1), 1.0, (3.0, 1.0)),
+        ((32, 16), (-2.001, 2.001, -1, 1), 1.0, (1.0, 1.0)),
+    ],
+)
+def test_a_window_of_another_aspect_is_stretched_or_reported(
+    size: tuple[int, int],
+    window: tuple[float, ...],
+    half: float,
+    stretched: tuple[float, float],
+    first: bool,
+    tmp_path: Path,
+) -> None:
+    film = f'Film "image" "integer xresolution" {size[0]} "integer yresolution" {size[1]}\n'
+    for kind in ("orthographic", "perspective"):
+        (tmp_path / kind).mkdir()
+        line = f'Camera "{kind}" "float screenwindow" {list(window)}\n'.replace(",", "")
+        head = (film + line if first else line + film) + "WorldBegin\n"
+        scene, losses = pbrt(tmp_path / kind, "", head)
+        camera = scene.camera
+        if isinstance(camera, OrthographicCamera):
+            np.testing.assert_allclose(np.diag(camera.to_world)[:2], stretched)
+            assert camera.half_width == half and losses == []
+            save_scene_file(scene, tmp_path / "b.pbrt")
+            assert difference(camera, load_scene_file(tmp_path / "b.pbrt").camera) is None
+        else:
+            assert isinstance(camera, PerspectiveCamera)
+            assert camera.fov_deg == pytest.approx(math.degrees(2.0 * math.atan(half)))
+            assert len(losses) == (stretched != (1.0, 1.0))
 
 
 def test_transforms_and_attribute_stacks(tmp_path: Path) -> None:
