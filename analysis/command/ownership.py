@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import socket
 import sys
@@ -11,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
+
+from filelock import lock_descriptor
 
 
 @contextmanager
@@ -31,9 +32,7 @@ def _taken(path: Path, what: str) -> TextIO:
     """A lock file that names this process, which holds it until the file is closed."""
     while True:
         file = path.open("a+", encoding="utf-8")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not lock_descriptor(file.fileno(), blocking=False):
             file.seek(0)
             owner = " ".join(file.read(300).split()) or "another process"
             file.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import math
 import os
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from filelock import lock_descriptor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +53,7 @@ def sync(path: Path) -> None:
 def locked(path: Path) -> Iterator[None]:
     """Holds a lock that the system releases even if this process is killed."""
     with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+        lock_descriptor(file.fileno())
         yield
 
 

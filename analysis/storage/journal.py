@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
+
+from filelock import lock_descriptor
 
 from analysis.storage.files import plain, sync
 
 _CHECK_BYTES = 8
 _LINE_CHECK = 2 * _CHECK_BYTES
+_POLL_S = 0.005
+"""How often a process that waits for its turn asks again, seconds: about as long as an append takes."""
 
 
 def warn(line: str) -> None:
@@ -65,14 +68,19 @@ class Journal:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         created = not self.path.exists()
         with self.path.open("a+b") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            if file.seek(0, os.SEEK_END) and os.pread(file.fileno(), 1, file.tell() - 1) != b"\n":
+            lock_descriptor(file.fileno(), poll_interval=_POLL_S)
+            if file.seek(0, os.SEEK_END) and _last_byte(file) != b"\n":
                 line = b"\n" + line  # behind one that was cut off
             file.write(line)
             file.flush()
             os.fsync(file.fileno())
         if created:
             sync(self.path.parent)
+
+
+def _last_byte(file: BinaryIO) -> bytes:
+    file.seek(-1, os.SEEK_END)
+    return file.read(1)
 
 
 def _check(body: bytes) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import resource
+import sys
 from pathlib import Path
 
 _STATUS, _FORGET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
@@ -23,20 +23,33 @@ class PeakMemory:
 
     def __init__(self) -> None:
         self.bytes = self.grown = self._before = 0
-        self._fresh = False
 
     def __enter__(self) -> PeakMemory:
         try:
             ctypes.CDLL("libc.so.6").malloc_trim(0)
             _FORGET.write_text(_RESIDENT_PEAK)
-            self._fresh, self._before = True, _status("VmRSS")
+            self._before = _status("VmRSS")
         except (OSError, AttributeError):  # not Linux, another C library, or not allowed
-            self._fresh = False
+            self._before = 0
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.bytes = _status("VmHWM") if self._fresh else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+        self.bytes = _peak()
         self.grown = self.bytes - self._before
+
+
+def _peak() -> int:
+    """The most bytes that were resident since the last new peak, or since the process began."""
+    if _STATUS.exists():
+        return _status("VmHWM")
+    if sys.platform == "win32":
+        import psutil
+
+        return psutil.Process().memory_info().peak_wset
+    import resource  # psutil tells no peak on POSIX
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024  # macOS counts bytes, others KiB
 
 
 def _status(name: str) -> int:

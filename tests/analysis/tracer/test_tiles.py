@@ -31,6 +31,7 @@ from renderer.frames import render_image
 from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 from scenes import catalog
+from tsar.memory import core_count
 
 PICTURE = Picture("quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", "hammersley"))
 
@@ -173,7 +174,7 @@ def test_one_long_chunk_or_a_slow_scheduler_bounds_the_speed_up() -> None:
 
 
 def test_the_fit_finds_the_parameters_of_made_up_timings() -> None:
-    truth = FarmModel(np.linspace(0.2, 0.4, 50), 0.02, 1e-3, 0.3, 1.1, cores=len(os.sched_getaffinity(0)))
+    truth = FarmModel(np.linspace(0.2, 0.4, 50), 0.02, 1e-3, 0.3, 1.1, cores=core_count())
     model = fitted(truth.chunk_s.tolist(), {1: truth.seconds(1)}, (truth.chunk_s * 1.1).tolist(), 1e-3, 0.3)
     assert model.overhead_s == pytest.approx(0.02, rel=2e-3) and model.contention == pytest.approx(1.1)
     assert model.seconds(2) == pytest.approx(truth.seconds(2), rel=1e-3)
