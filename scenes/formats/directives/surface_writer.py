@@ -50,6 +50,7 @@ class SurfaceWriter:
     _textures: dict[tuple[int, str], tuple[Texture, str]] = field(default_factory=dict)
     _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
+    _counts: dict[str, int] = field(default_factory=dict)
 
     # --- textures ------------------------------------------------------------------------------------------------
 
@@ -106,11 +107,12 @@ class SurfaceWriter:
 
     def label(self, prefix: str, wanted: str = "") -> str:
         """A name that nothing has yet: the wanted one where it is free and can be written."""
-        label, count = wanted or f"{prefix}1", 1
+        label, count = wanted or f"{prefix}1", self._counts.get(prefix, 1)  # lower ones are taken
         while label in self._taken or '"' in label or "\\" in label or "\n" in label:
             count += 1
             label = f"{prefix}{count}"
         self._taken.add(label)
+        self._counts[prefix] = count
         return label
 
     def material(self, material: Material, name: str = "") -> str:

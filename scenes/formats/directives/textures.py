@@ -105,11 +105,13 @@ class TextureReader:
         return found
 
     def scalar(self, parameters: Parameters, name: str, default: float) -> float:
-        """A number; a texture becomes its mean, which is reported."""
+        """A number; a texture that is not everywhere alike becomes its mean, which is reported."""
         if parameters.types.get(name) != "texture":
             return parameters.number(name, default)
-        value = float(np.mean(mean_of(self.texture(parameters, name, grey(default), "float"))))
-        self.report.add(str(parameters.place), f"{name}: a texture", f"its mean, {value:g}")
+        found = self.texture(parameters, name, grey(default), "float")
+        value = float(np.mean(mean_of(found)))
+        if not isinstance(found, ConstantTexture):
+            self.report.add(str(parameters.place), f"{name}: a texture", f"its mean, {value:g}")
         return value
 
     def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:

@@ -114,16 +114,22 @@ class MitsubaSurfaces(MitsubaTextures):
             raise SceneError(f"{properties.where}: expected a bsdf inside, got {len(found)}")
         return found[0]
 
+    def _scalar(self, properties: Properties, name: str, default: float) -> float:
+        """A number; a texture that is not everywhere alike becomes its mean, which is reported."""
+        if not any(child.tag in ("texture", "ref") and child.get("name") == name for child in properties.rest):
+            return properties.number(name, default)
+        found = self.texture(properties, name, grey(default))
+        value = sum(mean_of(found)) / 3.0
+        if not isinstance(found, ConstantTexture):
+            self.report.add(properties.where, f"{name}: a texture", f"its mean, {value:g}")
+        return value
+
     def _alphas(self, properties: Properties) -> tuple[float, float]:
-        pair = []
-        for name in ("alphaU", "alphaV"):
-            for child in properties.rest:
-                if child.get("name") in (name, "alpha") and child.tag in ("texture", "ref"):
-                    self.report.add(properties.where, "a texture as roughness", "0.1")
-            pair.append(properties.number(name, properties.number("alpha", 0.1)))
+        even = self._scalar(properties, "alpha", 0.1)
+        pair = self._scalar(properties, "alphaU", even), self._scalar(properties, "alphaV", even)
         if min(pair) < 0.0:
             raise SceneError(f"{properties.where}: alpha: expected no negative number, got {min(pair):g}")
-        return pair[0], pair[1]
+        return pair
 
     def _distribution(self, properties: Properties) -> str:
         found = properties.text("distribution", "beckmann")
@@ -136,7 +142,7 @@ class MitsubaSurfaces(MitsubaTextures):
         sigma = 0.0
         if properties.node.get("type") == "roughdiffuse":
             # alpha is sqrt(2) times the slopes' deviation that sigma is the angle of
-            sigma = math.degrees(arctan(properties.number("alpha", 0.2) / math.sqrt(2.0)))
+            sigma = math.degrees(arctan(self._scalar(properties, "alpha", 0.2) / math.sqrt(2.0)))
             properties.truth("useFastApprox", False)
         return Matte(self.texture(properties, name, grey(0.5)), sigma)
 

@@ -33,6 +33,7 @@ class ElementWriter:
     _folded: dict[int, tuple[Texture, Texture]] = field(default_factory=dict)
     _parts: dict[int, tuple[Texture, str]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
+    _counts: dict[str, int] = field(default_factory=dict)
 
     def name(self, text: str) -> str:
         """A property's name in the flavour that is written."""
@@ -118,9 +119,10 @@ class ElementWriter:
 
     def label(self, wanted: str) -> str:
         """An identifier that nothing has yet."""
-        label, count = wanted, 1
+        label, count = wanted, self._counts.get(wanted, 1)  # lower ones are taken
         while label in self._taken:
             count += 1
             label = f"{wanted}{count}"
         self._taken.add(label)
+        self._counts[wanted] = count
         return label

@@ -13,6 +13,7 @@ from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
     Matte,
+    Metal,
     MixMaterial,
     OrthographicCamera,
     PerspectiveCamera,
@@ -216,6 +217,8 @@ SILENT = [
      "several materials for one mesh: the last"),
     ('<shape type="sphere"><bsdf type="roughplastic"><float name="alphaU" value="0.1"/>'
      '<float name="alphaV" value="0.4"/></bsdf></shape>', "a coat of two roughnesses: one of alpha 0.2"),
+    ('<shape type="sphere"><bsdf type="roughdiffuse"><texture type="checkerboard" name="alpha"/></bsdf></shape>',
+     "alpha: a texture: its mean, 0.3"),
     ('<integrator type="path"><integrator type="direct"/></integrator>', "integrator 'direct' inside an integrator"),
     ('<sensor type="perspective"/>', "another sensor: the last one"),
     ('<film type="ldrfilm"><float name="exposure" value="2"/></film>', "exposure of the film: linear radiance"),
@@ -236,3 +239,25 @@ def test_holes_of_each_colour_are_a_loss_in_pbrt(tmp_path: Path) -> None:
     report = LossReport()
     save_scene_file(mitsuba(tmp_path, body)[0], tmp_path / "b.pbrt", None, report)
     assert "holes of each colour by themselves" in report.text()
+
+
+@pytest.mark.parametrize(("kind", "value"), [("constant", 0.2), ("checkerboard", 0.3)])
+def test_roughness_by_a_texture_is_its_mean_and_said_where_it_is_not_even(
+    kind: str, value: float, tmp_path: Path
+) -> None:
+    """A texture that is everywhere alike is a number; the mean of the other one is 0.3."""
+    found = []
+    for version in (3, 4):
+        values = '"float value" 0.2' if kind == "constant" else '"float tex1" 0.2 "float tex2" 0.4'
+        metal = "metal" if version == 3 else "conductor"
+        body = f'Texture "r" "float" "{kind}" {values}\nMaterial "{metal}" "texture roughness" "r" '
+        body += '"bool remaproughness" "false"\nShape "sphere"\n'
+        head = HEAD if version == 3 else f'Film "rgb"\n{HEAD}'
+        found.append(pbrt(tmp_path, body, head))
+    if kind == "checkerboard":  # Mitsuba's own is 0.4 and 0.2
+        inside = f'<texture type="{kind}" name="alpha"/>'
+        found.append(mitsuba(tmp_path, f'<shape type="sphere"><bsdf type="roughconductor">{inside}</bsdf></shape>'))
+    for scene, lost in found:
+        (one,) = scene.instances
+        assert isinstance(one.material, Metal) and one.material.roughness == pytest.approx((value, value))
+        assert sum("a texture: its mean, 0.3" in line for line in lost) == (kind == "checkerboard")

@@ -5,17 +5,17 @@ from __future__ import annotations
 import gzip
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from scenes.canonical import (
-    Mesh,
-    SceneError,
-)
+from scenes.canonical import ConstantTexture, Instance, Matte, Mesh, PerspectiveCamera, Scene, SceneError, Sphere
 from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.directives.surface_writer import SurfaceWriter
 from scenes.formats.geometry.ply_writing import ply_bytes
 from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.write_elements import ElementWriter
 from scenes.formats.text.scene_files import SceneFiles
 from tests.scenes.formats.files import HEAD, mitsuba, pbrt
 
@@ -190,3 +190,30 @@ def test_a_loss_is_an_error_where_none_is_wanted_and_nothing_is_left(tmp_path: P
     with pytest.raises(SceneError, match="expected a conversion without losses, got .*shape 'cone'"):
         save_scene_file(scene, tmp_path / "out" / "b.pbrt", None, report, strict=True)
     assert list((tmp_path / "out").iterdir()) == []
+
+
+class Asked(set[str]):
+    """A set that counts how often it is asked."""
+
+    times = 0
+
+    def __contains__(self, name: object) -> bool:
+        self.times += 1
+        return super().__contains__(name)
+
+
+@pytest.mark.parametrize("target", ["pbrt", "pbrt4", "luxrender", "mitsuba3"])
+def test_names_of_many_materials_cost_the_same_each(
+    target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = Asked()
+    for kind in (SurfaceWriter, ElementWriter):
+
+        def counted(writer: Any, *names: str, label: Callable[..., str] = kind.label) -> str:
+            writer._taken = taken
+            return label(writer, *names)
+
+        monkeypatch.setattr(kind, "label", counted)
+    shapes = (Instance(Sphere(1.0), Matte(ConstantTexture((number / 500.0,) * 3))) for number in range(500))
+    save_scene_file(Scene(PerspectiveCamera(), tuple(shapes)), tmp_path / "b", target)
+    assert 500 <= len(taken) <= taken.times <= 3 * len(taken)
