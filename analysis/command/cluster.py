@@ -9,6 +9,7 @@ import contextlib
 import logging
 import os
 import signal
+import socket
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 WAIT_S = 30
-"""How long a scheduler, or a worker, is waited for, seconds."""
+"""How long the answer of a scheduler that may be at work, or a worker, is waited for, seconds."""
+CONNECT_S = 3
+"""How long a connection to a scheduler's port may take, seconds: the system makes it, whatever the scheduler does."""
 LOOPBACK = "127.0.0.1"
 _QUIET = "ignore:resource_tracker:UserWarning"
 """An option of Python by which the process that tracks semaphores does not report those of workers that were killed: it
@@ -70,6 +73,7 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # failures are reported in one line each
     if options.scheduler:
         try:
+            _require_port(options.scheduler)
             client = Client(options.scheduler, timeout=WAIT_S)
         except (OSError, ValueError, TimeoutError) as error:
             raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({error})") from error
@@ -94,6 +98,16 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
         except KeyboardInterrupt:
             _end_workers(cluster)
             raise
+
+
+def _require_port(address: str) -> None:
+    """Raises OSError where nothing listens at an address: a client would go on trying for as long as it may wait."""
+    from distributed.comm.addressing import parse_address, parse_host_port
+
+    transport, place = parse_address(address)
+    if transport in ("tcp", "tls", "ws", "wss"):
+        host, port = parse_host_port(place)
+        socket.create_connection((host, port), CONNECT_S).close()
 
 
 @contextlib.contextmanager

@@ -26,7 +26,6 @@ SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-
 def test_a_scheduler_that_does_not_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr("analysis.command.cluster.WAIT_S", 1)
     arguments = (*SMALL, "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path), "--cache", str(tmp_path / "cache"))
     assert call_script("suitability.py", monkeypatch, *arguments) == 2
     error = capsys.readouterr().err

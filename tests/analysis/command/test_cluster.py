@@ -1,10 +1,15 @@
-"""What a local cluster leaves behind when its workers are killed."""
+"""What a local cluster leaves behind when its workers are killed, and schedulers that do not answer."""
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 
+import pytest
+
+from analysis.command import cluster
+from analysis.command.cli import InputError
 from tests.scripts.commands import ROOT
 
 LOST = """
@@ -21,3 +26,22 @@ def test_semaphores_of_killed_workers_are_not_reported() -> None:
     """The process that tracks them ends after this one, so its words would follow the one line of an interrupt."""
     done = subprocess.run([sys.executable, "-c", LOST], cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.fixture
+def port():
+    """A bound socket that does not listen: its port is closed, and nobody else takes it."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        yield taken
+
+
+def test_a_closed_port_is_told_before_a_client_tries_for_long(
+    port: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("distributed.Client", lambda *_, **__: pytest.fail("a client tries until its time is up"))
+    address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
+    with pytest.raises(InputError) as caught, cluster.connected(cluster.ClusterOptions(scheduler=address)):
+        pass
+    told = str(caught.value)
+    assert told.startswith(f"scheduler: nothing answers at '{address}' (") and "refused" in told and "\n" not in told
