@@ -9,18 +9,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
-from PIL import Image
 
 from analysis.metrics.quality import WHISKERS, percentile
 from analysis.page.figures import ADAPTIVE, FRAMED, save
-from analysis.study.cases import INPUTS, ROWS, SCALES, Case
+from analysis.study.cases import INPUTS, ROWS, Case
 from analysis.study.evaluation import Place
 from analysis.suitability.options import SuitabilityOptions
-from analysis.suitability.runs import STILLS
+from analysis.suitability.stills import finest, setting, write_strip
 from analysis.suitability.tables import Result, Results, ratios
 
 _GRID = {"color": "0.88", "linewidth": 0.6}
-_STRIP_BATCHES = (32, 128, 256, 512, 1024)
 _INK = {256: "#e8a33d", 512: "#c9570c", 1024: "#6d2077"}
 
 
@@ -75,17 +73,10 @@ def _refreshes(axis: Any, framed: Result) -> None:
     axis.vlines(changes, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
 
 
-def _finest(results: Results, label: str, name: str) -> Result | None:
-    """The run of the finest resolution, first repetition."""
-    found = [one for one in results.all if (one.run.label, one.run.case.input) == (label, name)]
-    found = [one for one in found if one.run.repetition == results.repetitions[0]]
-    return max(found, key=lambda one: one.run.side_px, default=None)
-
-
 def behaviour(results: Results) -> Figure | None:
     """Three refreshes of a framed renderer: least at a refresh (a, c), growing to the next (b)."""
     name = "approach" if "approach" in results.inputs else next(iter(results.inputs), "")
-    framed = _finest(results, "framed", name)
+    framed = finest(results, "framed", name)
     changes = np.flatnonzero(framed.times["refresh"].diff() > 0) if framed else np.array([])
     if framed is None or len(changes) < 3:
         return None
@@ -111,7 +102,7 @@ def behaviour(results: Results) -> Figure | None:
 def framed_errors(results: Results) -> Figure | None:
     """Inputs 3 and 1, as in the thesis."""
     chosen = [name for name in (INPUTS[3], INPUTS[1]) if name in results.inputs]
-    runs = [run for run in (_finest(results, "framed", name) for name in chosen) if run is not None]
+    runs = [run for run in (finest(results, "framed", name) for name in chosen) if run is not None]
     if not runs:
         return None
     figure, axes = _axes(10.0, 3.2, len(runs))
@@ -164,7 +155,7 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].yaxis.set_minor_formatter("")
     divisor = results.all[0].run.case.scale.divisor
-    here = {side: f"{side}²" + (f", at {side // divisor}²" if divisor > 1 else "") for side in _INK}
+    here = {side: f"{side // divisor}²" + (f" (thesis: {side}²)" if divisor > 1 else "") for side in _INK}
     handles = [_patch(color, here[side]) for side, color in _INK.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     note = f"; {unbounded} infinite ratios not drawn" if unbounded else ""
@@ -190,8 +181,7 @@ def errors(results: Results, name: str) -> Figure | None:
         ours = [one for one in found if one.run.side_px == side and one.run.label == "thesis"]
         ours.sort(key=lambda one: ROWS[one.run.row or 0][0])
         for place, one in enumerate(ours):
-            batch = ROWS[one.run.row or 0][0]
-            ink, label = _shade(place, len(ours)), f"batch {batch}"
+            ink, label = _shade(place, len(ours)), setting(one.run)
             axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=ink, linewidth=0.9, label=label)
         for one in found:
             if one.run.side_px == side and one.run.label == "framed":
@@ -200,7 +190,7 @@ def errors(results: Results, name: str) -> Figure | None:
         axis.set_yscale("log")
         axis.set_title(f"{name}, {side}²", loc="left", fontsize=10)
         axis.set_xlabel("simulated time, s")
-        axis.legend(fontsize=6, frameon=False, ncols=2)
+        axis.legend(fontsize=6, frameon=False)
     axes[0].set_ylabel("mean squared error")
     return figure
 
@@ -235,45 +225,9 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
     axis.set_xlabel("simulated time, s   (dotted: the framed display changes)")
     axis.set_ylabel("error of thesis / framed")
     axis.set_title(
-        f"{results.inputs[0]}, row {row}: batch {ROWS[row][0]}, {ROWS[row][1]}², drawn at {pairs[0][0].run.side_px}²",
+        f"{results.inputs[0]}, row {row}: {setting(pairs[0][0].run)}",
         loc="left",
         fontsize=10,
     )
     axis.legend(fontsize=7, frameon=False, ncols=2)
     return figure
-
-
-def write_strip(
-    path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Place
-) -> Path | None:
-    """Reference, framed renderer and ``thesis`` of growing batch at one time, finest resolution of each batch."""
-    # the fast vehicle is gone by the second
-    first, number = results.repetitions[0], 0 if name == INPUTS[4] else len(STILLS) - 1
-    found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
-    framed = _finest(results, "framed", name)
-    if framed is None:
-        return None
-    pictures = [("reference", place.still(keys[framed.run.case], "reference", number))]
-    pictures.append((f"framed {framed.run.side_px}²", place.still(keys[framed.run.case], "shown", number)))
-    for batch in _STRIP_BATCHES:
-        ours = [one for one in found if one.run.label == "thesis" and ROWS[one.run.row or 0][0] == batch]
-        best = max(ours, key=lambda one: one.run.side_px, default=None)
-        if best is not None:
-            label = f"thesis batch {batch}, {best.run.side_px}²"
-            pictures.append((label, place.still(keys[best.run.case], "shown", number)))
-    pictures = [(label, file) for label, file in pictures if file.exists()]
-    if not pictures:
-        return None
-    columns = min(4, len(pictures))
-    rows = -(-len(pictures) // columns)
-    figure = Figure(figsize=(3.0 * columns, 3.25 * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False).reshape(-1)
-    for axis in axes:
-        axis.set_axis_off()
-    for axis, (label, file) in zip(axes, pictures, strict=False):
-        axis.imshow(np.asarray(Image.open(file)), interpolation="nearest")
-        axis.set_title(label, fontsize=9, loc="left")
-    at = options.start_s + STILLS[number] * SCALES[options.scale].seconds
-    figure.suptitle(f"{name} at {at:.2f} s", fontsize=10, x=0.01, ha="left")
-    save(figure, path, dpi=150)
-    return path
