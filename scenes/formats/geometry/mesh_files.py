@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from collections.abc import Container, Iterator
 
 import numpy as np
 
@@ -40,6 +41,27 @@ def read_obj(content: bytes, name: str) -> Mesh:
         raise SceneError(f"{name}: expected faces, found none")
     same = uvs is not None and len(uvs) == len(arrays[0])
     return checked_mesh(*arrays, normals, np.array(uvs, np.float64)[:, :2] if same else None, name)
+
+
+def obj_materials(content: bytes) -> list[str]:
+    """Names behind ``usemtl`` of an OBJ file that faces follow, in their order; empty for faces before any."""
+    return list(dict.fromkeys(name for name, is_face, _ in _obj_lines(content) if is_face))
+
+
+def obj_part(content: bytes, names: Container[str]) -> bytes:
+    """An OBJ file with those faces alone that have a material of these names."""
+    return b"\n".join(line for name, is_face, line in _obj_lines(content) if not is_face or name in names)
+
+
+def _obj_lines(content: bytes) -> Iterator[tuple[str, bool, bytes]]:
+    """Lines with the material that they stand under, and whether they are faces."""
+    name = ""
+    for line in content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
+        words = line.split(maxsplit=1)
+        keyword = words[0] if words else b""
+        if keyword == b"usemtl":
+            name = words[1].decode("utf-8", "replace").strip() if len(words) > 1 else ""
+        yield name, keyword == b"f", line
 
 
 def read_serialized(content: bytes, index: int, name: str) -> Mesh:

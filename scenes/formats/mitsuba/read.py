@@ -72,7 +72,7 @@ class MitsubaReader(MitsubaSettings):
     def _within(self, root: Node, path: Path, inside: list[Path]) -> list[Node]:
         if root.tag != "scene":
             raise SceneError(f"{root.place}: expected a scene, got {root.tag!r}")
-        modern = is_modern(root.get("version"), root)
+        modern = self.shapes.modern = is_modern(root.get("version"), root)
         found = []
         for node in root.children:
             if node.tag == "default":

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.mixtures import NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
-from scenes.formats.geometry.mesh_files import read_obj, read_serialized
+from scenes.formats.geometry.mesh_files import obj_materials, obj_part, read_obj, read_serialized
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk
 from scenes.formats.geometry.orientation import FLIPPED, facing_normals, turned
 from scenes.formats.geometry.ply_files import read_ply
@@ -58,7 +59,10 @@ class MitsubaShapes:
     ) -> None:
         self.files, self.report, self.surfaces, self.find = files, report, surfaces, find
         self.groups: dict[int, list[Instance]] = {}
+        self.modern = False
         self._meshes: dict[tuple, Mesh] = {}
+        self._contents: dict[Path, bytes] = {}
+        self._used: dict[Path, list[str]] = {}
 
     def read(self, node: Node) -> list[Instance]:
         """Instances of a shape: one, those of a group, or none where it is left out, which is reported."""
@@ -85,18 +89,25 @@ class MitsubaShapes:
             return []
         keys, times_s = properties.motion()
         track = motion(keys, times_s, properties.where, self.report)
-        material, emission, one_sided = self._inside(properties)
-        if is_nothing(material) and emission is None:
-            self.report.hint(properties.where, "the border of a medium, which is not seen")
-            return []
-        made = self._made(kind, properties, material)
-        if made is None:
-            return []
-        shape, local = made
-        if properties.truth("flipNormals", False):
-            shape = turned(as_mesh(shape))
-        properties.left_over()
-        return [Instance(shape, material, product(keys[0], local), track, node.get("id"), emission, one_sided)]
+        used = self._materials_of(properties) if kind == "obj" else []
+        surfaces, emission = self._inside(properties, used)
+        found = []
+        for name, (material, one_sided) in surfaces.items():
+            if is_nothing(material) and emission is None:
+                self.report.hint(properties.where, "the border of a medium, which is not seen")
+                continue
+            faces = {name} if name is not None else set(used) - set(surfaces)
+            made = self._made(kind, properties, material, faces if len(surfaces) > 1 else None)
+            if made is None:
+                return []
+            shape, local = made
+            if properties.truth("flipNormals", False):
+                shape = turned(as_mesh(shape))
+            place = product(keys[0], local)
+            found.append(Instance(shape, material, place, track, node.get("id"), emission, one_sided))
+        if found:
+            properties.left_over()
+        return found
 
     def _instances(self, properties: Properties) -> list[Instance]:
         keys, times_s = properties.motion()
@@ -118,13 +129,42 @@ class MitsubaShapes:
                 ]
         raise SceneError(f"{properties.where}: instance: expected a reference to a shapegroup before it")
 
-    def _inside(self, properties: Properties) -> tuple[Material, Rgb | None, bool]:
-        """Material and emission of a shape, and whether its back is black; one with a medium alone is not there."""
+    def _materials_of(self, properties: Properties) -> list[str]:
+        """Materials that the faces of an OBJ file name and Mitsuba 0.5 knows; those of Mitsuba 3 have one a shape.
+
+        Source: Mitsuba 0.5 documentation, section on the shape ``obj``: a bsdf with a name is that of the faces which
+        use a material of this name.
+        """
+        if self.modern or not any(child.tag in ("bsdf", "ref") and child.get("name") for child in properties.rest):
+            return []
+        path = self.files.known(properties.text("filename", ""), properties.where, LossReport(), "", "")
+        if path is None:
+            return []
+        if path not in self._contents:
+            self._contents[path] = self.files.read(path, properties.where)
+            self._used[path] = obj_materials(self._contents[path])
+        return self._used[path]
+
+    def _inside(
+        self, properties: Properties, used: list[str]
+    ) -> tuple[dict[str | None, tuple[Material, bool]], Rgb | None]:
+        """Materials of a shape, each with whether its back is black, and its emission.
+
+        The material None is that of all faces which have none by their names; a shape with a medium alone is not there.
+        """
+        named: dict[str | None, tuple[Material, bool]] = {}
         material, emission, one_sided, default = None, None, True, _DEFAULT
+        by_name = any(name and name in used for name in (child.get("name") for child in properties.rest))
         for child in properties.rest:
             node = self.find(child) if child.tag == "ref" else child
             properties.asked.add(child.get("name"))
-            if node.tag == "bsdf":
+            name = child.get("name")
+            if node.tag == "bsdf" and name and name in used:
+                named[name] = self.surfaces.material(node), self.surfaces.one_sided(node)
+            elif node.tag == "bsdf" and name and by_name:
+                self.report.hint(str(node.place), f"the material {name!r} of a mesh, which no face has")
+            elif node.tag == "bsdf":
+                named.clear()  # it is that of all faces
                 if material is not None:
                     self.report.add(str(node.place), "several materials for one mesh", "the last")
                 material, one_sided = self.surfaces.material(node), self.surfaces.one_sided(node)
@@ -143,9 +183,13 @@ class MitsubaShapes:
                 self.report.add(str(node.place), f"{node.tag} (participating medium)")
             elif node.tag not in ("texture",):
                 raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
-        return material or default, emission, one_sided
+        if len(named) < len(used) or not named:
+            named[None] = material or default, one_sided
+        return named, emission
 
-    def _made(self, kind: str, properties: Properties, material: Material) -> tuple[Shape, Matrix] | None:
+    def _made(
+        self, kind: str, properties: Properties, material: Material, faces: set[str] | None
+    ) -> tuple[Shape, Matrix] | None:
         where, place = properties.where, np.eye(4)
         if kind == "sphere":
             radius = properties.number("radius", 1.0)
@@ -163,7 +207,7 @@ class MitsubaShapes:
             return mesh, place
         if kind == "cylinder":
             return self._cylinder(properties)
-        mesh = self._file(kind, properties)
+        mesh = self._file(kind, properties, faces, material is _DEFAULT)
         return None if mesh is None else shape_of(mesh, material, where, self.report)
 
     def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
@@ -180,7 +224,8 @@ class MitsubaShapes:
         self.report.add(properties.where, "shape 'cylinder'", f"a mesh of {len(mesh.faces)} triangles")
         return mesh, place
 
-    def _file(self, kind: str, properties: Properties) -> Mesh | None:
+    def _file(self, kind: str, properties: Properties, faces: set[str] | None, bare: bool) -> Mesh | None:
+        """The mesh of a file, or None where it is missing; ``faces`` are the materials of the faces that count."""
         name = properties.text("filename", "")
         path = self.files.known(name, properties.where, self.report, f"the mesh {name!r}", "left out")
         if path is None:
@@ -189,9 +234,12 @@ class MitsubaShapes:
         faceted, flipped = properties.truth("faceNormals", False), properties.truth("flipTexCoords", kind == "obj")
         if properties.number("maxSmoothAngle", 0.0):
             self.report.add(properties.where, "maxSmoothAngle of a mesh", "its normals as they are")
-        key = (path, index, faceted, flipped)
+        key = (path, index, faceted, flipped, None if faces is None else tuple(sorted(faces)))
         if key not in self._meshes:
-            content = self.files.read(path, properties.where)
+            content = self._contents.get(path) or self.files.read(path, properties.where)
+            if kind == "obj" and bare and not self.modern and b"mtllib" in content:
+                self.report.add(properties.where, "materials of the library of a mesh", "grey, matte")
+            content = content if faces is None else obj_part(content, faces)
             if kind == "serialized":
                 mesh = read_serialized(content, index, str(path))
             else:

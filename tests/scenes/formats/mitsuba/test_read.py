@@ -29,6 +29,7 @@ from scenes.canonical import (
 )
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.losses import LossReport
 from tests.scenes.formats.files import DATA, MITSUBA, REAL, SENSOR, mitsuba, needs_data
 
@@ -206,3 +207,50 @@ def test_mitsuba_renders_what_is_written_for_it_as_the_source_was_meant(tmp_path
         parameters.update()
         mean = np.array(mi.render(scene, spp=64))[..., :3].mean(axis=(0, 1))
         np.testing.assert_allclose(mean, [0.1963, 0.1276, 0.0360], rtol=0.05)
+
+
+SQUARES = """mtllib none.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+f 1 2 3
+usemtl glass of a window
+f 1 3 4
+f 1 2 3 4
+usemtl wood
+f 4 3 2
+usemtl glass of a window
+f 4 2 1
+"""
+
+
+def _surface(name: str, value: float) -> str:
+    return f'<bsdf type="diffuse" name="{name}"><rgb name="reflectance" value="{value} 0 0"/></bsdf>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "wanted", "lost"),
+    [
+        (_surface("wood", 0.1) + _surface("glass of a window", 0.2), {0.1: 1, 0.2: 4, 0.5: 1}, "library of a mesh"),
+        (_surface("", 0.3) + _surface("wood", 0.1), {0.1: 1, 0.3: 5}, None),
+        (_surface("wood", 0.1) + _surface("", 0.3), {0.3: 6}, None),
+        (_surface("wood", 0.1) + _surface("stone", 0.2), {0.1: 1, 0.5: 5}, "library of a mesh"),
+        (_surface("stone", 0.2), {0.2: 6}, None),
+        ("", {0.5: 6}, "library of a mesh"),
+    ],
+)
+def test_faces_of_an_obj_file_have_the_materials_of_their_names(
+    inside: str, wanted: dict[float, int], lost: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "m.obj").write_text(SQUARES)
+    shape = f'<shape type="obj"><string name="filename" value="m.obj"/>{inside}</shape>'
+    scene, losses = mitsuba(tmp_path, shape)
+    found = {}
+    for one in scene.instances:
+        assert isinstance(one.material, Matte)
+        found[one.material.reflectance.value[0]] = len(as_mesh(one.shape).faces)  # type: ignore[union-attr]
+    assert found == wanted
+    assert [lost in line for line in losses if "no face has" not in line] == [True] if lost else losses == []
+    save_scene_file(scene, tmp_path / "b.xml", "mitsuba")
+    assert len(load_scene_file(tmp_path / "b.xml").instances) == len(wanted)
