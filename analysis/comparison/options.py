@@ -43,7 +43,7 @@ CHOICES = ("preset", "budget_flops", "budget_seconds", "error_target")
 class RunOptions:
     """One comparison of a policy with its rivals at equal cost."""
 
-    input: Annotated[str, tyro.conf.Positional]
+    input: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="INPUT")]
     """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """Size, batch and seed of all policies, and the pipeline of the policy thesis."""

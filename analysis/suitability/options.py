@@ -38,11 +38,11 @@ class SuitabilityOptions:
     rivals: tuple[str, ...] = RIVALS
     """Their rivals, at every row; framed is one of them in any case."""
     beside: tuple[str, ...] = ("oracle",)
-    """Policies that stand beside all of these at one row only."""
+    """Policies that stand beside all of these at one row only, --policy-row."""
     solvers: tuple[str, ...] = ("trivial",)
-    """Solvers of thesis that are compared beside the chosen one, at that row."""
+    """Solvers of thesis that are compared beside the chosen one, at --policy-row."""
     policy_row: int = 7
-    """That row."""
+    """Row of table 7.2, 0 to 15, at which --beside and --solvers stand."""
     ledger: Ledger = "thesis"
     """How cost is counted; wall is refused, for it gives no result twice."""
     framed_rate_hz: float = 8.0

@@ -261,6 +261,7 @@ def test_help_names_the_options(tmp_path: Path) -> None:
     for name in ("--seconds", "--ledger", "--capacity", "--batch-size", "--resolution-px", "--solver", "--out"):
         assert name in done.stdout
     assert "Framelets rendered per cycle." in done.stdout and nothing_in(tmp_path)
+    assert done.stdout.splitlines()[0].endswith(" INPUT"), "an argument is called by what it is, not by its type"
 
 
 @pytest.mark.parametrize("name", ["planescene", "spheresscene", "quad-light"])
