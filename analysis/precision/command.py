@@ -14,11 +14,9 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from analysis.command.cli import bad_input, full_disk, parse, require_unbroken
+from analysis.command.cli import bad_input, parse, require_unbroken
 from analysis.command.extras import require_extra
 from analysis.precision.options import PrecisionOptions
-
-WRITTEN = ("tables/*.csv", "tables.md")
 
 
 def main() -> None:
@@ -42,13 +40,11 @@ def study(options: PrecisionOptions) -> dict[str, Any]:
     Raises:
         InputError: something asked for cannot be had.
     """
-    from analysis.command.console import markdown, show
     from analysis.precision.runs import OWN, runs
     from analysis.precision.tables import Result, format_table, least_safe, run_table, shown_tables
-    from analysis.storage.files import atomic, write_json, write_table
-    from analysis.storage.summary import with_source
     from analysis.study.evaluation import broken
     from analysis.study.farm import run_study
+    from analysis.study.written import WRITTEN, write_study
 
     with bad_input():
         planned = runs(options)
@@ -67,21 +63,5 @@ def study(options: PrecisionOptions) -> dict[str, Any]:
     )
     formats = format_table(lines, options.tolerance)
     tables = {"runs": lines, "formats": formats, "safe": least_safe(formats)}
-    shown = shown_tables(formats, options.tolerance)
-    out = options.out.resolve()
-    with full_disk(out):
-        for name, table in tables.items():
-            write_table(out / "tables" / f"{name}.csv", table)
-        with atomic(out / "tables.md") as file:
-            file.write_text(markdown(shown), encoding="utf-8")
-        found = {
-            "runs": len(outcomes.keys),
-            "runs_done": len(made),
-            "failures": dict(sorted(outcomes.reasons.items())),
-            "broken_invariants": broken(done[run.case] for run in made if run.form == OWN),
-            "tables": {name: table.to_dict("records") for name, table in tables.items()},
-        }
-        summary = with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
-        write_json(out / "summary.json", summary)
-    show(*([markdown(shown)] if options.markdown else shown))
-    return summary
+    own = broken(done[run.case] for run in made if run.form == OWN)
+    return write_study(options, outcomes, tables, shown_tables(formats, options.tolerance), own)

@@ -52,8 +52,8 @@ class SuitabilityOptions:
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
     stride: int = 6
-    """Reference images from one to the next at which FLIP, SSIM and the causes of the error are taken: at thesis scale
-    they cost four times as much as the runs at 6."""
+    """Reference images from one to the next at which FLIP, SSIM and the causes of the error are taken, which cost more
+    than the runs themselves at thesis scale."""
     jod_repetitions: int = 1
     """Repetitions that ColorVideoVDP scores."""
     jod_span_s: tuple[float, float] = (0.4, 0.9)

@@ -17,8 +17,6 @@ from analysis.command.cli import bad_input, full_disk, parse, require_unbroken
 from analysis.command.extras import require_extra
 from analysis.workloads.options import WorkloadOptions
 
-WRITTEN = ("tables/*.csv", "tables.md", "map.png")
-
 
 def main() -> None:
     """Runs what is missing; prints the tables."""
@@ -41,19 +39,18 @@ def study(options: WorkloadOptions) -> dict[str, Any]:
     Raises:
         InputError: something asked for cannot be had.
     """
-    from analysis.command.console import markdown, show
     from analysis.page.figures import save
-    from analysis.storage.files import atomic, write_json, write_table
-    from analysis.storage.summary import with_source
     from analysis.study.evaluation import broken
     from analysis.study.farm import run_study
+    from analysis.study.written import WRITTEN, write_study
     from analysis.workloads.plots import figure
     from analysis.workloads.runs import runs
     from analysis.workloads.tables import Result, map_table, paying_table, policy_table, shown_tables
 
     with bad_input():
         planned = runs(options)
-    outcomes = run_study(options, list(dict.fromkeys(run.case for run in planned if run.case)), WRITTEN)
+    written = (*WRITTEN, "map.png")
+    outcomes = run_study(options, list(dict.fromkeys(run.case for run in planned if run.case)), written)
     outcomes.tell()
     done = outcomes.summaries()
     errors = {case: float(outcomes.times(case)["mse"].to_numpy().mean()) for case in done}
@@ -62,23 +59,8 @@ def study(options: WorkloadOptions) -> dict[str, Any]:
     )
     tables = {"policies": policies, "map": map_table(policies), "pays": paying_table(policies)}
     shown = shown_tables(tables["map"], tables["pays"])
-    out = options.out.resolve()
-    with full_disk(out):
-        for name, table in tables.items():
-            write_table(out / "tables" / f"{name}.csv", table)
-        with atomic(out / "tables.md") as file:
-            file.write_text(markdown(shown), encoding="utf-8")
-        if len(tables["map"]):
-            save(figure(tables["map"]), out / "map.png")
-        found = {
-            "runs": len(outcomes.keys),
-            "runs_done": len(done),
-            "impossible": sum(run.case is None for run in planned),
-            "failures": dict(sorted(outcomes.reasons.items())),
-            "broken_invariants": broken(done.values()),
-            "tables": {name: table.to_dict("records") for name, table in tables.items()},
-        }
-        summary = with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
-        write_json(out / "summary.json", summary)
-    show(*([markdown(shown)] if options.markdown else shown))
-    return summary
+    if len(tables["map"]):
+        with full_disk(options.out.resolve()):
+            save(figure(tables["map"]), options.out.resolve() / "map.png")
+    impossible = sum(run.case is None for run in planned)
+    return write_study(options, outcomes, tables, shown, broken(done.values()), impossible=impossible)

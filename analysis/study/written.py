@@ -1,0 +1,73 @@
+"""What a study whose results are tables writes and prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import pandas as pd
+
+from analysis.command.cli import full_disk
+from analysis.command.console import Table, markdown, show
+from analysis.storage.files import atomic, write_json, write_table
+from analysis.storage.summary import with_source
+from analysis.study.outcomes import Outcomes
+
+WRITTEN = ("tables/*.csv", "tables.md")
+"""Files of every such study, beside ``summary.json``."""
+
+
+class TableOptions(Protocol):
+    """What is read of the options of a study that ends in tables."""
+
+    @property
+    def out(self) -> Path: ...
+    @property
+    def markdown(self) -> bool: ...
+    @property
+    def repetitions(self) -> int: ...
+
+
+def write_study(
+    options: TableOptions,
+    outcomes: Outcomes,
+    tables: Mapping[str, pd.DataFrame],
+    shown: Sequence[Table],
+    broken: Sequence[str],
+    **more: Any,
+) -> dict[str, Any]:
+    """Writes the tables of a study and its ``summary.json``, and prints what people read.
+
+    Args:
+        options: of the study.
+        outcomes: of its cases.
+        tables: by name.
+        shown: the tables as people read them.
+        broken: results whose cycles broke an invariant and should not have.
+        more: what else the summary holds.
+
+    Returns:
+        What ``summary.json`` holds.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    out = options.out.resolve()
+    found = {
+        "runs": len(outcomes.keys),
+        "runs_done": len(outcomes.summaries()),
+        "failures": dict(sorted(outcomes.reasons.items())),
+        "broken_invariants": list(broken),
+        **more,
+        "tables": {name: table.to_dict("records") for name, table in tables.items()},
+    }
+    summary = with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
+    with full_disk(out):
+        for name, table in tables.items():
+            write_table(out / "tables" / f"{name}.csv", table)
+        with atomic(out / "tables.md") as file:
+            file.write_text(markdown(shown), encoding="utf-8")
+        write_json(out / "summary.json", summary)
+    show(*([markdown(shown)] if options.markdown else shown))
+    return summary
