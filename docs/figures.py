@@ -66,7 +66,7 @@ def raster(field: Tensor) -> np.ndarray:
 
 
 def encoded(image: Tensor) -> np.ndarray:
-    """Linear RGB about as a display encodes it."""
+    """Linear RGB, encoded approximately as a display does."""
     return image.clamp(0.0, 1.0).pow(1 / 2.2).numpy()
 
 
@@ -87,7 +87,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def morton() -> Figure:
-    """The curve over a framelet, and a tiling whose tiles it visits one after the other."""
+    """The Morton curve through a framelet, and through the tiles of a tiling."""
     figure, (left, right) = panels(2, 8.0)
     x, y = deinterleave(torch.arange(256))
     left.plot(x, y, color=MUTED, lw=0.9)
@@ -105,7 +105,7 @@ def morton() -> Figure:
 
 
 def tiles(axis, tiling: Tiling, values: np.ndarray, cmap: str) -> PatchCollection:
-    """Tiles filled by a value each."""
+    """Tiles, each filled with its value."""
     x, y = deinterleave(tiling.index)
     size = (0.5 ** tiling.level.to(torch.float64)).tolist()
     places = zip(x.tolist(), y.tolist(), size, strict=True)
@@ -151,7 +151,7 @@ def errors(records: list[StepRecord]) -> Figure:
 
 
 def ages(display: ShownImage) -> Figure:
-    """The picture on the display, the age of its samples, and its difference from the truth of that time."""
+    """The picture on the display, the age of its samples, and its difference from the truth at that time."""
     assert display.sample_map is not None
     figure, axes = panels(3, 9.0)
     side = display.image.shape[0]
@@ -195,7 +195,7 @@ def quadrants(field: Tensor, steps: int) -> np.ndarray:
 
 
 def response() -> Figure:
-    """One element in the plane of its two densities: where its error points, and where a smaller grant takes it."""
+    """One element in the plane of its two densities: the direction of its error, and where a smaller grant takes it."""
     box, start = Box(1 / 64, 1 / 16), (0.3, 0.3)
     a_s, a_t = (torch.tensor([value], dtype=torch.float64) for value in start)
     asked = Errors(torch.tensor([0.4]), torch.tensor([0.25]))

@@ -1,9 +1,9 @@
 # # A first hour
 #
-# This page compares two renderers, looks at what the adaptive one decided, adds a metric and a renderer of its own, and
-# ends with a picture. It is one script, `docs/tutorial.py`, cut into pieces. What a piece prints or draws stands below
-# it. [Getting started](getting-started.md) says how to install what it needs, [Concepts](concepts.md) what the words
-# mean.
+# This page compares two renderers, looks at the decisions of the adaptive one, adds a metric and a renderer of its own,
+# and ends with a picture. It is one script, `docs/tutorial.py`, cut into pieces. The output of each piece stands below
+# it. [Getting started](getting-started.md) says how to install what it needs, and [Concepts](concepts.md) explains the
+# terms.
 #
 # The pieces share three numbers: seconds of animation, pixels along a side, and framelets a cycle. Smaller ones take
 # less time.
@@ -31,7 +31,7 @@ print(result.table()[["mse", "ratio", "share_suitable", "images"]].round(4))
 print(dict(result.images.sizes))
 last = result.images.isel(time_s=-1)
 
-# To look at them, encode them about as a display does.
+# To look at them, encode them approximately as a display does.
 
 from matplotlib.figure import Figure
 
@@ -46,13 +46,13 @@ for axis, run in zip(figure.subplots(1, 3), ["reference", "thesis", "framed"], s
     axis.set(title=run, xticks=[], yticks=[])
 figure.savefig("out/tutorial/shown.png", dpi=90)
 
-# The framed renderer shows its last whole image, so all that moves is late. The adaptive one shows samples of many
+# The framed renderer shows its last whole image, so all moving objects lag. The adaptive one shows samples of many
 # ages.
 #
 # ## Load the run back
 #
-# The folder `out/tutorial` holds the report, a row for each cycle, and a summary. `load` gives the numbers back with
-# names on every axis ([xarray](https://docs.xarray.dev)), in this process or in another one, next week.
+# The folder `out/tutorial` holds the report, a row for each cycle, and a summary. `load` returns the numbers with names
+# on every axis ([xarray](https://docs.xarray.dev)), in this process or in a later one.
 
 from analysis import load
 
@@ -60,8 +60,8 @@ run = load("out/tutorial")
 print(dict(run.sizes))
 print(run["mse"].median("time_s").round(4).to_series().to_string())
 
-# Errors of the policies lie over `time_s`. What the adaptive one decided lies over `cycle`, and over the `row` and
-# `column` of its field of densities.
+# Errors of the policies have the axis `time_s`. The decisions of the adaptive one have the axis `cycle`, and the axes
+# `row` and `column` of its density fields.
 
 figure = Figure(figsize=(9.0, 3.0), layout="constrained")
 errors, tiles = figure.subplots(1, 2)
@@ -75,8 +75,8 @@ figure.savefig("out/tutorial/errors.png", dpi=90)
 
 # ## Look at the densities
 #
-# Every element of the field has two densities: samples in space, and refreshes in time. Their product is what the
-# element costs in a cycle, and the sum of it does not change: what one element gains, others pay.
+# Every element of the field has two densities: samples in space, and refreshes in time. Their product is the cost of
+# the element in a cycle. The sum of these products does not change: what one element gains, others lose.
 
 spent = (run["density_spatial"] * run["density_temporal"]).sum(("row", "column")) + run["surplus"]
 print(f"spent in a cycle: {float(spent.min()):.3f} to {float(spent.max()):.3f} samples")
@@ -98,8 +98,8 @@ figure.savefig("out/tutorial/densities.png", dpi=90)
 
 # ## Measure in another way
 #
-# A metric is a function of two display-encoded images, what was shown and the reference, that is lower for what is
-# better. This one asks how bad the worst hundredth of the pixels is.
+# A metric is a function of two display-encoded images, the shown one and the reference. A lower value is better. This
+# one is the error that the worst hundredth of the pixels exceed.
 
 
 def worst_hundredth(shown, reference):
@@ -108,9 +108,8 @@ def worst_hundredth(shown, reference):
 
 # ## Render in another way
 #
-# A policy of your own says what it costs, what it wants to have rendered, and what it makes of the samples. State goes
-# in and comes out. This one renders a quarter of the pixels a cycle, each quarter in turn, and shows the newest sample
-# of each.
+# A policy of your own states its cost, requests samples, and makes an image of them. State goes in and comes out. This
+# one renders a quarter of the pixels in a cycle, each quarter in turn, and shows the newest sample of each pixel.
 
 import torch
 
@@ -146,8 +145,8 @@ class Quarters(Policy):
         return Picture(state)
 
 
-# Both are handed to `compare` as they are. They go by their own names. A folder holds one run at a time, so this one
-# gets another; the reference is found again.
+# Both are handed to `compare` as they are, and go by their own names. A folder holds one run at a time, so this run
+# gets another folder; the reference is found in the cache.
 
 again = compare(
     "fly-by",
@@ -169,16 +168,16 @@ figure.savefig("out/tutorial/off.png", dpi=90)
 # On an input in which everything moves, an image that is renewed evenly is hard to beat: compare the two ratios. [The
 # five inputs](results/comparison.md) shows where the adaptive pipeline wins and where it loses.
 #
-# [Extend](guides/extend.md) shows how a package brings policies, metrics and six other kinds of things by name, so that
+# [Extend](guides/extend.md) shows how a package adds policies, metrics and six other kinds of things by name, so that
 # every command knows them.
 #
 # ## Render a picture
 #
-# The ray tracer that all of them use renders single pictures, too. `tsar list scenes` prints the names of the scenes.
+# The ray tracer that all policies use also renders single pictures. `tsar list scenes` prints the names of the scenes.
 
 from renderer import render, write_image
 
 write_image("out/tutorial/glass.png", render("glass", size=(480, 320), samples_per_pixel=64))
 
 # Where to go from here: [Compare renderers](guides/compare.md) has all options of a comparison, [Render
-# pictures](guides/render.md) all of a picture, and [Results](results/index.md) what came out of large runs.
+# pictures](guides/render.md) all options of a picture, and [Results](results/index.md) the results of large runs.

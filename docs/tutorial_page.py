@@ -2,8 +2,8 @@
 
 Usage: python docs/tutorial_page.py [--small] [FOLDER]
 
-Lines of comments at the margin are text, all between them is code. Pictures that a piece of code writes stand below it.
-With --small the numbers that the script begins with are replaced by smaller ones.
+Lines of comments at the margin are text, all between them is code. A picture that a piece of code writes follows it.
+With --small, smaller numbers replace those at the beginning of the script.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def pieces(source: str) -> list[tuple[bool, str]]:
 
 
 def written(source: str, pictures: Path) -> str:
-    """The page. Runs the code in the folder that is current; pictures go to ``pictures``, as JPEG."""
+    """The page. Runs the code in the current folder; pictures go to ``pictures``, as JPEG."""
     names: dict[str, Any] = {"__name__": "__main__"}
     page = ["<!-- docs/tutorial_page.py writes this page from docs/tutorial.py -->"]
     for is_text, piece in pieces(source):

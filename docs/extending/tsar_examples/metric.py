@@ -1,4 +1,4 @@
-"""A metric: how much the differences between neighbouring pixels are off."""
+"""A metric: the error of the differences between neighbouring pixels."""
 
 from analysis import Metric
 

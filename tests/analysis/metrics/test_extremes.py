@@ -20,7 +20,7 @@ def test_nothing_over_nothing_is_even_and_something_over_nothing_is_endless() ->
     assert standing([0.0, 0.0], [1e-300, 1.0]).ratio == 0.0
 
 
-def test_what_is_no_number_stays_none() -> None:
+def test_the_ratio_of_nan_is_nan() -> None:
     """A moment that was not measured must not count as one at which the framed renderer was perfect."""
     assert np.isnan(quality.ratio([1.0, np.nan, 0.0], [np.nan, 1.0, np.nan])).all()
     with pytest.raises(ValueError, match="no NaN, got 2 with 1"):

@@ -114,7 +114,7 @@ def test_neighbours_at_an_edge_meet_what_each_meets_alone(distance: float, width
 
 @pytest.mark.parametrize("spoilt", ["origin", "direction", "reach"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_what_is_no_number_spoils_no_other_ray(spoilt: str, value: float) -> None:
+def test_a_nonfinite_ray_spoils_no_other(spoilt: str, value: float) -> None:
     vertices, faces = bumpy(3)
     queries = RayQueries(vertices, faces)
     origin, direction = camera_rays(16)

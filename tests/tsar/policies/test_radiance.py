@@ -43,7 +43,7 @@ SCREEN = Screen((Layer(grey(GREY)),))
 
 
 @pytest.mark.parametrize(("policy", "kind"), CASES)
-def test_single_pixels_stay_where_they_are_and_what_is_no_number_is_never_shown(policy: str, kind: StagesName) -> None:
+def test_single_pixels_stay_where_they_are_and_nonfinite_values_are_never_shown(policy: str, kind: StagesName) -> None:
     pictures = shown(policy, kind, spoiled(SCREEN, places(NOWHERE | FEATURES)))
     assert bool(pictures.isfinite().all()) and float(pictures.max()) < 1.0001e30
     beside = away_from(list(FEATURES), REACH_PX)
@@ -51,7 +51,7 @@ def test_single_pixels_stay_where_they_are_and_what_is_no_number_is_never_shown(
 
 
 @pytest.mark.parametrize(("policy", "kind"), CASES)
-def test_a_place_without_any_number_is_dark_at_worst(policy: str, kind: StagesName) -> None:
+def test_a_region_of_nan_is_dark_at_worst(policy: str, kind: StagesName) -> None:
     """Whole tiles of it: half of the picture."""
 
     def spoil(color: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:

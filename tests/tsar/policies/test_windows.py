@@ -157,7 +157,7 @@ def test_threads_of_torch_do_not_change_a_bit(policy: str) -> None:
     assert all(torch.equal(a, b) for a, b in zip(*found, strict=True))
 
 
-def test_what_is_no_number_is_replaced_from_beside_it() -> None:
+def test_nonfinite_samples_are_replaced_by_their_neighbours() -> None:
     height, width = 48, 80
     ramp = (torch.arange(height)[:, None] + torch.arange(width)).to(torch.float32)
     color = ramp.reshape(-1)[curve(height, width)][:, None].repeat(1, 3)
