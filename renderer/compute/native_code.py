@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from renderer.compute import sizes
@@ -34,10 +35,12 @@ def module_options(*headers: str, given: Mapping[str, float] | None = None) -> d
 
 
 def declarations(given: Mapping[str, float]) -> str:
-    """C++ that declares constants: whole numbers as ``int``, others as ``float``."""
-    kinds = {True: ("int", ""), False: ("float", "f")}
-    lines = []
-    for name, value in given.items():
-        kind, suffix = kinds[isinstance(value, int)]
-        lines.append(f"constexpr {kind} {name} = {value!r}{suffix};\n")
-    return "namespace given {\n" + "".join(lines) + "}\n"
+    """C++ that declares constants: whole numbers as ``int``, ``numpy.float64`` as ``double``, others as ``float``."""
+    return "namespace given {\n" + "".join(_declared(name, value) for name, value in given.items()) + "}\n"
+
+
+def _declared(name: str, value: float) -> str:
+    if isinstance(value, int):
+        return f"constexpr int {name} = {value!r};\n"
+    kind, suffix = ("double", "") if isinstance(value, np.float64) else ("float", "f")
+    return f"constexpr {kind} {name} = {float(value)!r}{suffix};\n"

@@ -18,7 +18,7 @@ from renderer.compute.launching import Command, address, require_same
 from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels, kernels, picture_kernels, plans, reconstruction_kernels
-from renderer.stages.coverage import StageName, covers
+from renderer.stages.coverage import StageName, covered, covers
 from renderer.stages.filtering import filter_stages
 from renderer.stages.reconstruction import Reconstructor
 from renderer.stages.views import PerCache
@@ -28,6 +28,7 @@ from tsar.clock import StageTimer
 from tsar.config import StagesName, TsarConfig
 from tsar.decision import Decision
 from tsar.error import replace_nonfinite
+from tsar.filtering.stages import reference as reference_filter
 from tsar.observation import Observation
 from tsar.response import respond
 from tsar.selection import Request, require_full
@@ -58,7 +59,7 @@ def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
         decide=control.decide,
         reconstruct=reconstructor.reconstruct,
         account=control.account,
-        filtering=filter_stages(config.resolution_px, threads, config.shape),
+        filtering=covered(filter_stages(config.resolution_px, threads, config.shape), reference_filter(config.window)),
     )
 
 

@@ -4,10 +4,16 @@ that they have. Whatever else the reference learns, a field or a choice, runs th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
+from functools import lru_cache
 from typing import Literal
 
+from torch import Tensor
+
 from tsar.config import TsarConfig
+from tsar.filtering.batches import Traced
+from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
+from tsar.filtering.stages import FilterStages
 
 StageName = Literal["observe", "respond", "decide", "reconstruct", "account"]
 
@@ -44,13 +50,60 @@ _DEPENDS: Mapping[StageName, tuple[str, ...]] = {
 }
 """What a stage reads of the configuration. To respond is a part of to decide, which goes on after it."""
 
+FilterStageName = Literal["chosen", "taken_in"]
+
+_OPTIONS: Mapping[str, tuple[bool, ...] | None] = dict.fromkeys(
+    (
+        *("reprojection", "prediction", "smoothing", "accumulation", "jitter", "by_gain", "spread", "shadows"),
+        *("probes", "latency_cycles", "wavelets", "share_max", "footprint", "life_min_s", "life_max_s", "reach"),
+        "memory_s",
+    )
+)
+_OPTIONS_OF: Mapping[FilterStageName, Mapping[str, tuple[bool, ...] | None]] = {
+    "chosen": _OPTIONS,
+    "taken_in": {**_OPTIONS, "wavelets": (False,)},
+}
+"""Options of the filter that each stage knows, of the stages that take them; as in :data:`_KNOWN`."""
+
 
 def covers(config: TsarConfig, stage: StageName) -> bool:
     """Whether a compiled stage does what a configuration says; where not, that of the reference runs."""
     return all(_known(getattr(config, name) if name else config, _KNOWN[name]) for name in _DEPENDS[stage])
 
 
-def _known(record: object, known: Mapping[str, tuple[str, ...] | None]) -> bool:
+@lru_cache(maxsize=64)
+def covers_options(options: FilterOptions, stage: FilterStageName) -> bool:
+    """The same for a stage of the filter, and its options."""
+    return _known(options, _OPTIONS_OF[stage])
+
+
+def covered(compiled: FilterStages, reference: FilterStages) -> FilterStages:
+    """Compiled stages of the filter that hand over to the reference where they do not cover the options."""
+
+    def of(options: FilterOptions, stage: FilterStageName) -> FilterStages:
+        return compiled if covers_options(options, stage) else reference
+
+    def chosen(
+        variance: Tensor,
+        roughness: Tensor,
+        rate: Tensor,
+        surfels: Surfels | None,
+        cycle_s: float,
+        count: int,
+        options: FilterOptions,
+    ) -> list[Tensor]:
+        stage = of(options, "chosen").chosen
+        return stage(variance, roughness, rate, surfels, cycle_s, count, options)
+
+    def taken_in(
+        estimates: Estimates, surfels: Surfels, known: Change, traced: Traced, options: FilterOptions
+    ) -> tuple[Estimates, Surfels, Change]:
+        return of(options, "taken_in").taken_in(estimates, surfels, known, traced, options)
+
+    return replace(compiled, chosen=chosen, taken_in=taken_in)
+
+
+def _known(record: object, known: Mapping[str, tuple[object, ...] | None]) -> bool:
     names = {field.name for field in fields(record)}  # type: ignore[arg-type]
     choices = ((name, listed) for name, listed in known.items() if listed is not None)
     return names <= known.keys() and all(getattr(record, name) in listed for name, listed in choices)

@@ -16,7 +16,7 @@ from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels as kernels
 from renderer.stages import picture_kernels
 from renderer.stages.poses import pose_words, rows_of
-from renderer.stages.sizes import FRAME, PIXEL_WORDS
+from renderer.stages.sizes import FRAME, LEVEL_PLANES, PIXEL_WORDS
 from tsar.filtering.batches import Traced
 from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, FilterOptions, Surfels
 from tsar.filtering.stages import FilterStages
@@ -207,7 +207,7 @@ class _Compiled:
             names, planes = [*names, "position"], [*planes, surfels.position.contiguous()]
         at = {name: self._address(name, plane) for name, plane in zip(names, planes, strict=True)}
         block = self._pictures.block().view(_F32)
-        where, (variance, levels) = block.data_ptr(), self._room
+        where, (variance, levels) = address("picture", block, _F32, 4 * self._pixels), self._room
         self._picture[:] = [
             at["color"], at["roughness"], variance,
             at["aged"], at["inverse"], at["roughness"], self._elements(rate), at.get("position", 0),
@@ -259,7 +259,7 @@ class _Compiled:
         side, pixels = self._side, self._pixels
         self._pictures = Recycled(4 * 4 * pixels)
         self._picture = np.zeros(13, np.int64)  # pyramid::Picture
-        levels = sum(5 * 4**level for level in range(side.bit_length() - 1))
+        levels = sum(LEVEL_PLANES * 4**level for level in range(side.bit_length() - 1))
         self._room = self._memory.room("variance", pixels), self._memory.room("levels", levels)
         picture = address("picture", self._picture, _I64, 13)
         spare = [self._memory.room(f"spare {number}", 16 * side) for number in range(threads)]

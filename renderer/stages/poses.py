@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from renderer.compute.launching import address
+from renderer.stages.sizes import POSE_NUMBERS
 from tsar.projection import to_camera
 from tsar.types import Viewpoint
 
@@ -20,4 +21,4 @@ def pose_words(rows: Tensor | None, view: Viewpoint | None) -> tuple[int, int, f
     """A view as a launch takes it; 0 where there is none."""
     if rows is None or view is None:
         return 0, 0, 1.0, 1.0
-    return address("rows", rows, torch.float64, rows.numel()), len(rows), view.tan_x, view.tan_y
+    return address("rows", rows, torch.float64, len(rows) * POSE_NUMBERS), len(rows), view.tan_x, view.tan_y

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tsar.error import OCTAVES_OF_FULL_ERROR
 from tsar.filtering import change, motion, records, samples, tiles
 from tsar.reconstruction import AGE_MOST, AGE_STEPS, SHIFT_CYCLES
+from tsar.response.local import AT_WALL
 from tsar.types import LUMINANCE
 
 SAMPLES_MAX = 1024
@@ -25,6 +28,7 @@ GIVEN: dict[str, float] = {
     "AGE_MOST": AGE_MOST,
     "AGE_STEPS": AGE_STEPS,
     "SHIFT_CYCLES": SHIFT_CYCLES,
+    "AT_WALL": np.float64(AT_WALL),
     **dict(zip(("LUMINANCE_RED", "LUMINANCE_GREEN", "LUMINANCE_BLUE"), LUMINANCE, strict=True)),
 }
 """As in :mod:`renderer.compute.sizes`."""
@@ -33,10 +37,16 @@ PIXEL_WORDS = 6
 """Words of eight bytes for what the samples of a pixel say together."""
 FRAME = 8
 """Columns of nothing beside each row of depths, so that every pixel has neighbours."""
+POSE_NUMBERS = 12
+"""Of what takes an instance to the camera: three rows of a matrix, and an offset."""
+LEVEL_PLANES = 5
+"""Of a level of the picture's pyramid: red, green, blue, variance, roughness."""
 
 FILTERING: dict[str, float] = {
     "PIXEL_WORDS": PIXEL_WORDS,
     "FRAME": FRAME,
+    "POSE_NUMBERS": POSE_NUMBERS,
+    "LEVEL_PLANES": LEVEL_PLANES,
     "NOTHING_KNOWN": records.NOTHING_KNOWN,
     "VARIANCE_MAX": records.VARIANCE_MAX,
     "UNSEEN": records.UNSEEN,
@@ -57,6 +67,14 @@ FILTERING: dict[str, float] = {
     "DROPPED": change.DROPPED,
     "RATE_MIN": change.RATE_MIN,
     "SPAN_MIN_S": change.SPAN_MIN_S,
+    "BETWEEN": change.BETWEEN,
+    "GAP_MOST_S": change.GAP_MOST_S,
+    "SHARE_NEAR": change.SHARE_NEAR,
+    "SHARE_AROUND": change.SHARE_AROUND,
+    "COUNT_LEAST": samples.COUNT_LEAST,
+    "SPEED_LEAST": tiles.SPEED_LEAST,
+    "EDGE_GROWTH": np.float64(tiles.EDGE_GROWTH),
+    "PRICE_ABOVE": np.float64(tiles.PRICE_ABOVE),
     "BISECTIONS": tiles.BISECTIONS,
     "PRICE_LEAST": tiles.PRICE_LEAST,
 }

@@ -15,6 +15,9 @@ SURE = 4.0  # expected residuals beyond which what was remembered is dropped
 DROPPED = 0.1
 RATE_MIN = 1e-5
 SPAN_MIN_S = 1e-3
+BETWEEN = 0.8  # share of the roughness by which a sample differs from the mean of a pixel
+GAP_MOST_S = 1e3  # longer ones fade as this one does
+SHARE_NEAR, SHARE_AROUND = 0.5, 0.25  # of the greatest rates in 3 x 3 and 5 x 5 elements
 
 
 def residuals(
@@ -30,7 +33,7 @@ def residuals(
         color, count: mean and number of the new samples of each pixel.
     """
     red, green, blue = (encoded(color) - encoded(estimates.color)).square()
-    expected = TOLERANCE * (estimates.observed + 0.8 * estimates.roughness / count.clamp(min=1.0))
+    expected = TOLERANCE * (estimates.observed + BETWEEN * estimates.roughness / count.clamp(min=1.0))
     return ((red + green + blue) / 3.0)[None], expected
 
 
@@ -66,7 +69,7 @@ def observed(
     usual = _summed(torch.where(compared, expected, nothing))
     span_s = _summed(torch.where(compared, elapsed_s.to(torch.float32), nothing))
     looked = F.max_pool2d(compared.to(torch.float32)[None], ELEMENT_PX)[0] > 0.0
-    gap = (now_s - before.seen_s).clamp(0.0, 1e3).to(torch.float32) / options.memory_s
+    gap = (now_s - before.seen_s).clamp(0.0, GAP_MOST_S).to(torch.float32) / options.memory_s
     fade = 1.0 / (1.0 + gap + 0.5 * gap * gap)
     fade = torch.where(excess > SURE * usual, fade.clamp(max=DROPPED), fade)
     total = torch.where(looked, fade * before.excess + excess, before.excess)
@@ -75,8 +78,8 @@ def observed(
     own = total.clamp(min=0.0) / span.clamp(min=SPAN_MIN_S)
     rate = own
     if options.spread:
-        rate = torch.maximum(rate, 0.5 * F.max_pool2d(own[None], 3, 1, 1)[0])
-        rate = torch.maximum(rate, 0.25 * F.max_pool2d(own[None], 5, 1, 2)[0])
+        rate = torch.maximum(rate, SHARE_NEAR * F.max_pool2d(own[None], 3, 1, 1)[0])
+        rate = torch.maximum(rate, SHARE_AROUND * F.max_pool2d(own[None], 5, 1, 2)[0])
     return Change(total, span, seen_s, rate.clamp(RATE_MIN, VARIANCE_MAX / cycle_s))
 
 

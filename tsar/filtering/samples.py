@@ -16,6 +16,7 @@ from tsar.roots import square_root
 from tsar.types import Hits, Viewpoint
 
 ROUGHNESS_MIN = 1e-6
+COUNT_LEAST = 1e-9  # that is divided by
 MOVES_PX = 0.02
 """Pixels a cycle beyond which a surface moves against another."""
 SHARE_MOVING = 1.0 / 17.0
@@ -87,7 +88,7 @@ def gathered(
     most = summed((semivariance / (spacing[:, None] / wide)).reshape(-1))
     near = _box(count)
     bounded = torch.minimum(
-        torch.maximum(roughness, _box(least) / near.clamp(min=1e-9)), _box(most) / near.clamp(min=1e-9)
+        torch.maximum(roughness, _box(least) / near.clamp(min=COUNT_LEAST)), _box(most) / near.clamp(min=COUNT_LEAST)
     )
     mixed = torch.where(near > 0.0, 0.5 * (roughness + bounded), roughness).clamp(min=ROUGHNESS_MIN)
     return Seen(

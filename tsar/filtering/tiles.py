@@ -24,6 +24,9 @@ from tsar.morton import morton_to_raster
 
 BISECTIONS = 30
 PRICE_LEAST = 2.0**-46  # of the greatest gain
+PRICE_ABOVE = 1e-12  # beyond the greatest gain, so that no tile is worth it
+SPEED_LEAST = 1e-9  # that is divided by
+EDGE_GROWTH = 0.35  # of the distance from a pixel that is not hit to the nearest sample, a pixel of spacing
 
 
 def spacings(side: int) -> tuple[float, ...]:
@@ -55,7 +58,7 @@ def gains(
         options: of the filter.
     """
     p = (variance + rate * cycle_s).clamp(max=VARIANCE_MAX)
-    crossed_s = options.reach * variance.shape[-1] / speed.clamp(min=1e-9)
+    crossed_s = options.reach * variance.shape[-1] / speed.clamp(min=SPEED_LEAST)
     longest_s = crossed_s.clamp(options.life_min_s, options.life_max_s)
     found = []
     for spacing in spacings(variance.shape[-1]):
@@ -63,7 +66,7 @@ def gains(
             gain = p * p / (p + 0.5 * spacing**2 * roughness)
         else:
             hit = 1.0 / spacing**2
-            beside = (p + (0.5 + 0.35 * (spacing - 1.0)) * roughness) * (p + 0.5 * spacing * roughness)
+            beside = (p + (0.5 + EDGE_GROWTH * (spacing - 1.0)) * roughness) * (p + 0.5 * spacing * roughness)
             gain = p * p * (hit / (p + 0.5 * roughness) + (1.0 - hit) * p / beside)
         gain = gain * torch.minimum((gain / rate).clamp(min=options.life_min_s), longest_s)
         while gain.shape[-1] * TILE_SIDE * spacing > variance.shape[-1]:
@@ -105,7 +108,7 @@ def best(gain: list[Float64[Tensor, "_ _"]], count: int) -> list[Bool[Tensor, "_
     A price on every tile is found by bisection at which the best tiles, those that gain more than they cost and more
     than the tiles within them, are at most as many.
     """
-    high = max(float(level.max()) for level in gain) + 1e-12
+    high = max(float(level.max()) for level in gain) + PRICE_ABOVE
     low = high * PRICE_LEAST
     for _ in range(BISECTIONS):
         price = sqrt(low * high)

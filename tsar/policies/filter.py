@@ -34,7 +34,6 @@ from tsar.filtering.records import (
     FilterOptions,
     Surfels,
 )
-from tsar.filtering.stages import reference
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
 from tsar.prediction import predicted
@@ -102,8 +101,6 @@ class Filter(Policy[State]):
         self._window, self._side = self.config.window, self.config.resolution_px
         self._options = replace(options, reach=options.reach * self._window.reach)
         self._stages = setting.stages_of(self.config).filtering
-        if options.wavelets:  # compiled sets know residuals alone
-            self._stages = replace(self._stages, taken_in=reference(self._window).taken_in)
         self._view = setting.view if options.reprojection else None
         most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2

@@ -25,7 +25,8 @@ from tsar.roots import square_root
 from tsar.types import Errors
 
 Field = Float[Tensor, " e"]
-_AT_WALL = 1e-9
+AT_WALL = 1e-9
+"""Share of a bound within which a density is at it."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def exit_distance(a: Field, m: Field, low: float, high: float) -> Field:
 
 def _drop_outward(a: Field, phi: Field, low: float) -> Field:
     """The error without what points out of ``[low, 1]`` from a wall (to within rounding of the wall)."""
-    at_wall = ((phi < 0) & (a <= low * (1 + _AT_WALL))) | ((phi > 0) & (a >= 1 - _AT_WALL))
+    at_wall = ((phi < 0) & (a <= low * (1 + AT_WALL))) | ((phi > 0) & (a >= 1 - AT_WALL))
     return torch.where(at_wall, 0.0, phi)
 
 

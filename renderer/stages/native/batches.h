@@ -198,7 +198,8 @@ template <class Plan> inline void roughen(const Plan& plan, const Part& own, flo
                 least = least + load<f8>(from.sums[1] + i + k % 3), most = most + load<f8>(from.sums[2] + i + k % 3);
             }
             if (!packets::bits(count > 0.0f)) continue;
-            const f8 near = packets::vmax(count / 9.0f, (f8)1e-9f), was = load<f8>(roughness + row * side + i);
+            const f8 near = packets::vmax(count / 9.0f, (f8)given::COUNT_LEAST),
+                     was = load<f8>(roughness + row * side + i);
             const f8 bounded = packets::vmin(packets::vmax(was, (least / 9.0f) / near), (most / 9.0f) / near);
             const f8 mixed = packets::vmax(0.5f * (was + bounded), (f8)given::ROUGHNESS_MIN);
             store(roughness + row * side + i, count > 0.0f ? mixed : was);

@@ -52,13 +52,13 @@ inline void observe_element(int side, int element, const Moment& moment, const i
             square[c] = off * off;
         }
         const float residual = ((square[0] + square[1]) + square[2]) / 3.0f, g = planes.roughness[at];
-        const float expected = given::TOLERANCE * (0.5f * g * planes.inverse[at] + 0.8f * g / p.count);
+        const float expected = given::TOLERANCE * (0.5f * g * planes.inverse[at] + given::BETWEEN * g / p.count);
         excess += residual - expected, usual += expected, span_s += (float)(p.time_s - planes.time_s[at]);
         looked = true;
     }
     if (!looked) return;
     double since = moment.now_s - change.seen_s[element];
-    since = since < 0.0 ? 0.0 : since > 1e3 ? 1e3 : since;
+    since = since < 0.0 ? 0.0 : since > given::GAP_MOST_S ? given::GAP_MOST_S : since;
     const float gap = (float)since / (float)moment.memory_s;
     float fade = 1.0f / (1.0f + gap + 0.5f * gap * gap);
     if (excess > given::SURE * usual) fade = smaller(fade, given::DROPPED);
@@ -107,7 +107,7 @@ inline void rate_rows(int side, const Moment& moment, const Change& change, long
                 const float beside = larger(near[1 + i], larger(near[2 + i], near[3 + i]));
                 const float around =
                     larger(larger(far[i], far[1 + i]), larger(far[2 + i], larger(far[3 + i], far[4 + i])));
-                own_rate = larger(larger(own_rate, 0.5f * beside), 0.25f * around);
+                own_rate = larger(larger(own_rate, given::SHARE_NEAR * beside), given::SHARE_AROUND * around);
             }
             rate[i] = smaller(larger(own_rate, given::RATE_MIN), (float)moment.rate_max);
         }

@@ -47,7 +47,7 @@ inline Sixteen read(const Planes& planes, const Span& span, int side, int row, i
         const f16 seen = vmax(vabs(across), vabs(down)) / span.cycle_s;
         speed = instance == given::UNSEEN ? (f16)__builtin_inff() : seen;
     }
-    const f16 crossed_s = (1.0f / vmax(speed, (f16)1e-9f)) * span.reach_px;
+    const f16 crossed_s = (1.0f / vmax(speed, (f16)given::SPEED_LEAST)) * span.reach_px;
     const f16 p = vmin(load<f16>(planes.variance + at) + rate * span.cycle_s, (f16)given::VARIANCE_MAX);
     const f16 longest_s = vmin(vmax(crossed_s, (f16)span.life_min_s), (f16)span.life_max_s);
     return {p, load<f16>(planes.roughness + at), rate, longest_s};
@@ -59,7 +59,7 @@ inline f16 of_pixels(const Sixteen& s, float spacing, float life_min_s) {
     if (spacing <= 1.0f) {
         gained = p * p / (p + 0.5f * (spacing * spacing) * g);
     } else {
-        const float share = 1.0f / (spacing * spacing), edge = (float)(0.5 + 0.35 * (spacing - 1.0));
+        const float share = 1.0f / (spacing * spacing), edge = (float)(0.5 + given::EDGE_GROWTH * (spacing - 1.0));
         const f16 beside = (p + edge * g) * (p + 0.5f * spacing * g);
         gained = p * p * (share / (p + 0.5f * g) + (1.0f - share) * p / beside);
     }
@@ -189,7 +189,7 @@ inline int best(const double* gain, int levels, int coarsest, int limit, double*
     }
     double high = most[0];
     for (int i = 1; i < coarsest * coarsest; ++i) high = larger(high, most[i]);
-    high += 1e-12;
+    high += given::PRICE_ABOVE;
     double low = high * given::PRICE_LEAST;
     for (int turn = 0; turn < given::BISECTIONS; ++turn) {
         m.price = __builtin_sqrt(low * high);

@@ -10,8 +10,6 @@
 
 namespace pyramid {
 
-constexpr int PLANES_OF_LEVEL = 5;
-
 struct Fine {
     const float *color, *roughness;
     float* variance;
@@ -159,7 +157,7 @@ inline void smooth(float* levels, int side, int width, int height, float* spare)
     // of a level whose pixels are so many of the second finest
     const auto part = [](int length, int pixels) { return (length + pixels - 1) / pixels; };
     for (int wide = side, pixels = 1; wide > 1; wide /= 2, pixels *= 2, ++number) {
-        float* const next = level + PLANES_OF_LEVEL * wide * wide;
+        float* const next = level + given::LEVEL_PLANES * wide * wide;
         const int columns = part(width, pixels), rows = part(height, pixels);
         for (int row = 0; row < (rows + 1) / 2; ++row)
             up(planes(level, wide), wide, columns, rows - 2 * row < 2 ? 1 : 2, 0.5f * (float)(1 << number), row, spare,
@@ -168,7 +166,7 @@ inline void smooth(float* levels, int side, int width, int height, float* spare)
     }
     for (int wide = 2; wide <= side; wide *= 2) {
         --number;
-        float* const finer = level - PLANES_OF_LEVEL * wide * wide;
+        float* const finer = level - given::LEVEL_PLANES * wide * wide;
         const int columns = part(width, side / wide), rows = part(height, side / wide);
         for (int row = 0; row < (rows + 1) / 2; ++row)
             down(level, wide, columns, rows, 0.5f * (float)(1 << number), row, spare, planes(finer, wide), nullptr);

@@ -50,7 +50,8 @@ struct Levels {
 template <class Plan>
 inline int gather(const Plan& plan, const double* s, const double* t, const float* phi_s, const float* phi_t,
                   const Columns& c) {
-    const double low_s = plan.spatial_min * (1.0 + 1e-9), low_t = plan.temporal_min * (1.0 + 1e-9), high = 1.0 - 1e-9;
+    const double above = 1.0 + given::AT_WALL, high = 1.0 - given::AT_WALL;
+    const double low_s = plan.spatial_min * above, low_t = plan.temporal_min * above;
     int count = 0;
     for (int first = 0; first < plan.elements; first += 8) {
         packets::f8 e_s = packets::load<packets::f8>(phi_s + first), e_t = packets::load<packets::f8>(phi_t + first);

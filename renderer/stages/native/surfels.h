@@ -24,8 +24,7 @@ typedef long long Key;
 
 constexpr double INF = __builtin_inf();
 constexpr Key NONE = 0x7fffffffffffffffll;
-constexpr int FRAME = given::FRAME;
-constexpr int ROW = 12;  // numbers of an instance: three rows of a matrix, and an offset
+constexpr int ROW = given::POSE_NUMBERS;  // of an instance
 
 // What takes each instance to the camera, and last of all what takes directions there.
 struct Poses {
@@ -190,7 +189,7 @@ template <class Plan>
 inline void choose(const Plan& plan, const Poses& poses, const long long* instance, const float* point,
                    const Uncertain& of, const Band* bands, int count, int number) {
     const Band& band = bands[number];
-    const int side = plan.side, stride = side + 4, wide = side + 2 * FRAME;
+    const int side = plan.side, stride = side + 4, wide = side + 2 * given::FRAME;
     for (int other = 0; other < count; ++other)
         for (int i = 0; other != number && i < bands[other].crossings; ++i) {
             const Crossing& crossing = bands[other].crossing[i];
@@ -201,7 +200,7 @@ inline void choose(const Plan& plan, const Poses& poses, const long long* instan
     for (int row = (int)band.first; row < band.last; ++row) {
         const Key* least = band.least + (row - band.first + 2) * stride + 2;
         int* source = (int*)plan.source + row * side;
-        double* front = (double*)plan.front + (row + 1) * wide + FRAME;
+        double* front = (double*)plan.front + (row + 1) * wide + given::FRAME;
         const int kept = row < plan.height ? plan.width : 0;
         for (int column = 0; column < side; ++column) {
             source[column] = column >= kept || least[column] == NONE ? -1 : (int)least[column];

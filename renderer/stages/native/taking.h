@@ -11,8 +11,8 @@ constexpr int PIXELS = 4096;  // of which one plane after the other is taken
 
 // Which of eight pixels keep what they took: not where most of their neighbours took what is in front.
 template <class Plan> inline void keep8(const Plan& plan, int at) {
-    const int side = plan.side, wide = side + 2 * FRAME;
-    const double* front = (const double*)plan.front + (at / side + 1) * wide + FRAME + at % side;
+    const int side = plan.side, wide = side + 2 * given::FRAME;
+    const double* front = (const double*)plan.front + (at / side + 1) * wide + given::FRAME + at % side;
     int* source = (int*)plan.source + at;
     const d8 bound = load<d8>(front) / (double)given::NEARER;
     // one of any three neighbours is among six of eight

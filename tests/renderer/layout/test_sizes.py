@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from renderer.compute import sizes as compute
@@ -14,11 +15,12 @@ from renderer.stages import sizes as stages
 
 RENDERER = Path(layout.__file__).resolve().parents[1]
 HEADERS = sorted(RENDERER.glob("*/native/*.h"))
-GIVEN = {**compute.GIVEN, **layout.GIVEN, **stages.GIVEN}
+ROOMS = (compute.GIVEN, layout.GIVEN, stages.GIVEN, stages.FILTERING)
+GIVEN = {name: value for given in ROOMS for name, value in given.items()}
 OWN_OF_C = re.compile(r"//[^\n]*|\"[^\"\n]*\"")
 TELLING = (
-    *("FAR", "TINY", "SHORT", "SPHERE_SLACK", "PATCH_LEAST", "TEXELS_MOST", "SAMPLES_MAX", "AGE_STEPS"),
-    *("LUMINANCE_RED", "LUMINANCE_GREEN", "LUMINANCE_BLUE"),
+    *("FAR", "TINY", "SHORT", "SPHERE_SLACK", "PATCH_LEAST", "TEXELS_MOST", "SAMPLES_MAX", "AGE_STEPS", "GAP_MOST_S"),
+    *("LUMINANCE_RED", "LUMINANCE_GREEN", "LUMINANCE_BLUE", "EDGE_GROWTH", "BETWEEN", "PRICE_ABOVE", "COUNT_LEAST"),
 )
 """Numbers that mean nothing else anywhere."""
 
@@ -35,8 +37,8 @@ def defined(text: str) -> set[str]:
     return names
 
 
-def test_no_two_rooms_give_one_name() -> None:
-    assert len(GIVEN) == len(compute.GIVEN) + len(layout.GIVEN) + len(stages.GIVEN)
+def test_no_name_is_given_twice() -> None:
+    assert len(GIVEN) == sum(map(len, ROOMS))
 
 
 @pytest.mark.parametrize("header", HEADERS, ids=lambda header: header.name)
@@ -59,7 +61,7 @@ def test_definitions_are_found() -> None:
 
 
 def test_declarations() -> None:
-    assert declarations({"LANES": 16, "FAR": 1e30, "SHORT": 0.9999}) == (
+    assert declarations({"LANES": 16, "FAR": 1e30, "SHORT": 0.9999, "GROWTH": np.float64(0.35)}) == (
         "namespace given {\nconstexpr int LANES = 16;\nconstexpr float FAR = 1e+30f;\n"
-        "constexpr float SHORT = 0.9999f;\n}\n"
+        "constexpr float SHORT = 0.9999f;\nconstexpr double GROWTH = 0.35;\n}\n"
     )

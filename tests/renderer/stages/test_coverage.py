@@ -13,7 +13,7 @@ import tsar.accounting
 import tsar.decision
 import tsar.error
 from renderer.stages.control import Control, compiled_stages
-from renderer.stages.coverage import _KNOWN, StageName, covers
+from renderer.stages.coverage import _KNOWN, _OPTIONS, StageName, covered, covers
 from renderer.stages.reconstruction import Reconstructor
 from tests.oracles import pictures, runs
 from tests.renderer.stages.builders import CONFIGS, CYCLE_S, small
@@ -26,6 +26,8 @@ from tsar.config import (
     TsarConfig,
     closed_choices,
 )
+from tsar.filtering.records import DEFAULT, FilterOptions
+from tsar.filtering.stages import FilterStages
 from tsar.norms import total_power
 from tsar.policies.thesis import State
 from tsar.policy import Cycle, Moment, step
@@ -150,7 +152,26 @@ def test_everything_that_there_is_today_is_compiled(name: str) -> None:
         assert covers(config, "respond") == (solver == "waterfill") and covers(config, "decide")
 
 
+@dataclass(frozen=True)
+class MoreOptions(FilterOptions):
+    unheard_of: int = 0
+
+
+def test_options_that_the_filter_is_not_compiled_for_go_to_the_reference() -> None:
+    def saying(said: str) -> FilterStages:
+        return FilterStages(chosen=lambda *arguments: said, taken_in=lambda *arguments: said)  # type: ignore[arg-type]
+
+    stages, nothing = covered(saying("compiled"), saying("reference")), [None] * 6
+    for options, expected in (
+        (DEFAULT, ("compiled", "compiled")),
+        (replace(DEFAULT, wavelets=True), ("compiled", "reference")),
+        (MoreOptions(), ("reference", "reference")),
+    ):
+        assert (stages.chosen(*nothing, options), stages.taken_in(*nothing[:4], options)) == expected  # type: ignore
+
+
 def test_what_is_known_is_there() -> None:
+    assert {field.name for field in fields(FilterOptions)} == _OPTIONS.keys()
     config = TsarConfig()
     for name, known in _KNOWN.items():
         record = getattr(config, name) if name else config
