@@ -1,5 +1,5 @@
-"""Sums over the field for the record of a cycle: the density that is handed out, the spread of the ages that are shown,
-and the number of values that are not finite."""
+"""Sums over the field for the record of a cycle: the allocated density, the spread of sample ages on the display, and
+the number of non-finite values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tsar.config import TsarConfig
 from tsar.morton import raster_to_morton, total
 from tsar.types import Densities, Errors
 
-_AT_BOUND = 1e-6  # of a bound, relative
+_AT_BOUND = 1e-6  # relative tolerance of a bound
 
 FAST_REFRESH = 0.5
 """Elements refreshed at least this often per cycle count as moving when the spread of ages is measured."""
@@ -25,9 +25,8 @@ class Account:
 
     Attributes:
         combined: Σ θ_s θ_t, samples per cycle.
-        age_spread_s: newest minus oldest sample shown among the elements that are refreshed fast, seconds; 0 if there
-            are none.
-        nonfinite: densities and errors that are not finite.
+        age_spread_s: newest minus oldest sample time shown in elements of fast refresh, seconds; 0 if there are none.
+        nonfinite: number of non-finite densities and errors.
     """
 
     combined: float
@@ -38,7 +37,13 @@ class Account:
 def account(
     densities: Densities, errors: Errors, newest_s: Float64[Tensor, "side side"], config: TsarConfig
 ) -> Account:
-    """Sums densities and errors, and the ages of the newest samples that are shown, in raster order."""
+    """Sums and counts over the field after a cycle.
+
+    Args:
+        densities, errors: after the response, Morton order.
+        newest_s: time of the newest sample shown in each finest tile, seconds, raster order.
+        config: of the run.
+    """
     fields = densities.spatial, densities.temporal, errors.spatial, errors.temporal
     nonfinite = sum(int((~torch.isfinite(field)).sum()) for field in fields)
     return Account(total(densities.combined()), _age_spread(newest_s, densities, config), nonfinite)
@@ -57,9 +62,8 @@ class Movement:
     """What a decision did to the elements of the field.
 
     Attributes:
-        elements: whose densities changed.
-        saturated: that came to lie at a bound of a density at which they did not lie before: one decision drove them as
-            far as they can go.
+        elements: number of elements whose densities changed.
+        saturated: number of those elements that the decision drove from inside the bounds of a density to one of them.
     """
 
     elements: int
@@ -67,7 +71,7 @@ class Movement:
 
 
 def movement(before: Densities, after: Densities, config: TsarConfig) -> Movement:
-    """How many elements a decision moved, and how many of them it drove to a bound."""
+    """The number of elements that a decision changed, and how many of them it drove to a bound."""
     moved = torch.zeros_like(before.spatial, dtype=torch.bool)
     struck = torch.zeros_like(moved)
     bounds = config.spatial_bounds, config.temporal_bounds

@@ -2,7 +2,7 @@
 
 The one object of the pipeline that changes in place. Its replacement policy needs no knowledge of the picture beyond
 the flags that reconstruction leaves behind: framelets older than the age field everywhere in their extent are *dead*
-and go first, oldest first; then the oldest of the rest.
+and are replaced first, from the oldest on; then the oldest of the others are.
 
 Source: Stephens 2011, sec. 3.4.4.4.
 """
@@ -26,7 +26,7 @@ class FrameletCache:
 
     Attributes:
         color: ``(slots, samples, 3)`` float32, Morton order.
-        coefficients: ``(slots, state)`` float32, what the error estimator keeps of each framelet.
+        coefficients: ``(slots, state)`` float32, the state that the error estimator keeps of each framelet.
         level, index: tile of each slot; level is ``EMPTY`` in an unused one.
         time_s: animation time of each slot, ``-inf`` in an unused one.
         slot_of_node: slot of the newest framelet of each quadtree node, coarser levels first; ``EMPTY`` where there is
@@ -59,7 +59,7 @@ class FrameletCache:
     def insert(
         self, batch: FrameletBatch, color: Float[Tensor, "n samples 3"], coefficients: Float[Tensor, "n state"]
     ) -> Int64[Tensor, " n"]:
-        """Store a batch over the slots that are worth least; returns the slots used. A batch holds a tile only once."""
+        """Stores a batch in the least valuable slots and returns these slots. A tile may occur only once in a batch."""
         # Unused slots have time -inf and are dead, so they come first. Stable: ties go to the lower slot.
         by_age = torch.sort(self.time_s, stable=True).indices
         order = by_age[torch.sort(self.dead[by_age].to(torch.int8), descending=True, stable=True).indices]
@@ -75,7 +75,8 @@ class FrameletCache:
         return slot
 
     def _forget(self, slot: Int64[Tensor, " n"]) -> None:
-        """Drop the look-up entries that still point at these slots (a newer framelet of the tile may have taken it)."""
+        """Drops the look-up entries that still point at these slots; a newer framelet of the tile may have taken the
+        entry."""
         used = slot[self.level[slot] != EMPTY]
         node = node_number(self.level[used], self.index[used])
         self.slot_of_node[node[self.slot_of_node[node] == used]] = EMPTY

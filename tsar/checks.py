@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 
 class ConfigError(ValueError):
-    """A field out of range; the message names the field, what it expects and what arrived."""
+    """A field is out of range; the message names the field, the expected values and the value given."""
 
 
 def require(condition: bool, name: str, expected: str, got: object) -> None:
@@ -22,12 +22,12 @@ Record = TypeVar("Record")
 
 
 def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
-    """Has a dataclass refuse what the ``Literal`` of a field does not list, before anything else is checked.
+    """Makes a dataclass reject values that the ``Literal`` of a field does not list, before any other check.
 
-    Stands beneath ``@dataclass``. The records made raise :class:`ConfigError`.
+    Written below ``@dataclass``. A record with such a value raises :class:`ConfigError`.
 
     Args:
-        place: what goes before the field's name in the message.
+        place: prefix of the field's name in the message.
     """
 
     def closed(record: type[Record]) -> type[Record]:
@@ -49,12 +49,12 @@ def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
 
 @cache
 def _choices(record: type) -> tuple[tuple[str, bool, tuple[Any, ...]], ...]:
-    """Fields of closed choices: name, whether the field is a tuple of them, and the choices."""
+    """Fields with closed choices: name, whether the field is a tuple of them, and the choices."""
     found = []
     for name, kind in get_type_hints(record).items():
         many = get_origin(kind) is tuple
         item = get_args(kind)[0] if many else kind
         parts = get_args(item) if get_origin(item) in (Union, UnionType) else (item,)
-        if any(get_origin(part) is Literal for part in parts):  # beside it there is None at most
+        if any(get_origin(part) is Literal for part in parts):  # the only other member is None
             found.append((name, many, tuple(choice for part in parts for choice in get_args(part) or (None,))))
     return tuple(found)

@@ -1,6 +1,6 @@
-"""What a configuration chooses by name: transport solvers, error norms and reconstructions.
+"""Tables of what a configuration selects by name: transport solvers, error norms and reconstructions.
 
-The tables hold places, so that a name can be checked before anything large is imported.
+The tables hold import paths, so that a name can be checked before any large module is imported.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ RECONSTRUCTIONS: Named[Reconstruct] = Named(
 
 
 def chosen(config: TsarConfig) -> tuple[tuple[Named[Any], str], ...]:
-    """The tables of this module, each with the name that a configuration chooses from it."""
+    """The tables of this module, each with the name that a configuration selects from it."""
     return (
         (SOLVERS, config.response.solver),
         (NORMS, config.error.norm),

@@ -1,7 +1,7 @@
 """Clocks: the only source of time in the pipeline.
 
-Simulated time advances by what the cost model says a cycle takes; wall time by what it took. Either is a function from
-the work a cycle did to seconds, so the pipeline does not know which it has.
+Simulated time advances by the duration that the cost model gives a cycle, wall time by the measured duration. Either
+clock is a function from the work of a cycle to seconds, so the pipeline does not depend on which is used.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ import time
 from collections.abc import Callable, Mapping
 
 CycleSeconds = Callable[[Mapping[str, int], float], float]
-"""``(counters, wall_s) -> seconds``: what one cycle or frame costs on the chosen clock."""
+"""``(counters, wall_s) -> seconds``: duration of one cycle or frame on the chosen clock."""
 
 
 def fixed_clock(seconds: float) -> CycleSeconds:
-    """Every cycle takes the same simulated time."""
+    """A clock on which every cycle takes ``seconds`` of simulated time."""
     return lambda counters, wall_s: seconds
 
 
 def checked(clock: CycleSeconds, counters: Mapping[str, int], wall_s: float) -> float:
-    """What the clock says; it must be finite and positive, or time would stop or run backwards.
+    """Duration of a cycle by a clock, seconds. It must be finite and positive, or time would stop or run backwards.
 
     Raises:
         ValueError: the clock returned a value that is not finite and positive.
@@ -38,7 +38,7 @@ def end_of_cycle(time_s: float, cycle_s: float) -> float:
         cycle_s: its length, seconds.
 
     Raises:
-        ValueError: float64 holds no such time between the two: the run would never end.
+        ValueError: the cycle is too short to change the time in float64: the run would never end.
     """
     end_s = time_s + cycle_s
     if not end_s > time_s:
@@ -47,7 +47,7 @@ def end_of_cycle(time_s: float, cycle_s: float) -> float:
 
 
 class Timed:
-    """A context that adds its duration to an entry of a table, also where it ends with an error."""
+    """A context manager that adds its duration to an entry of a table, even if it ends with an exception."""
 
     __slots__ = ("_seconds", "_stage", "_start")
 
@@ -68,7 +68,7 @@ class StageTimer:
         self.seconds: dict[str, float] = {}
 
     def __call__(self, stage: str) -> Timed:
-        """A context whose duration counts for a stage."""
+        """A context manager that adds its duration to a stage."""
         return Timed(self.seconds, stage)
 
     def divide(self, seconds: float, shares: Mapping[str, float]) -> None:

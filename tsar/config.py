@@ -1,4 +1,4 @@
-"""Configuration: one frozen dataclass a stage, composed into :class:`TsarConfig`. Imports nothing large, so that a
+"""Configuration: one frozen dataclass per stage, composed into :class:`TsarConfig`. Imports nothing large, so that a
 command line can be made from it quickly."""
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SIDE_MOST = 16384
 """Greatest side of an output image, pixels."""
 
 StagesName = Literal["compiled", "reference"]
-"""What runs the stages around tracing: kernels on the CPU, or the tensor operations they are checked against."""
+"""Implementation of the stages around tracing: CPU kernels, or the tensor operations they are checked against."""
 
 
 def tiles_at_most(count: int, level_min: int) -> int:
@@ -54,13 +54,13 @@ class TilingConfig:
     level_max: int = 0
     """Finest quad level; 0 means that of rate_max."""
     tile_count_max: int = 0
-    """Most tiles in a tiling; 0 means max(512, 4 * batch size), the thesis' 512 at its batch size of 128. A tiling has
-    4^level_min + 3 k tiles, so that of at most 512 has 511; it must hold a batch."""
+    """Maximum number of tiles in a tiling; 0 means max(512, 4 * batch size): 512, as in the thesis, at its batch size
+    of 128. A tiling has 4^level_min + 3 k tiles, so one of at most 512 has 511; it must hold a batch."""
     threshold_samples: float = 0.0
-    """A tile is split while the samples asked for in it exceed this; 0 means as many as a framelet holds."""
+    """A tile is split while the samples requested in it exceed this; 0 means as many as a framelet holds."""
     rate_max: int = 0
     """Most samples along a pixel's side, a power of two up to 8; 4 is the greatest rate of the thesis (sec. 5.1.2). 0
-    means 2, or less where a tile would be smaller than an element of the field. Given instead of level_max."""
+    means 2, or less where a tile would be smaller than a field element. Not to be combined with level_max."""
 
     def __post_init__(self) -> None:
         require(1 <= self.level_min <= 9, "tiling.level_min", "between 1 and 9", self.level_min)
@@ -91,15 +91,16 @@ class ErrorConfig:
     norm: str = "l2"
     """Levelwise norm: l2 (total power), linf (the greatest power of one coefficient), or one that was added."""
     form: Literal["contrast", "difference"] = "contrast"
-    """(S - T) / (S + T), or the difference of log2 powers, divided by 8 octaves of power and clamped to [-1, 1]."""
+    """Error from the powers S of the signal and T of the template: contrast is (S - T) / (S + T), difference is
+    log2(S/T) / 8, clamped to [-1, 1]."""
     octaves: Literal["greatest", "sum"] = "sum"
-    """How octaves meet the template: each for itself, and the one that is least sampled decides; or the sums of their
-    powers, for which offset and slope are one parameter."""
+    """How octaves are compared with the template: greatest compares each octave and takes the greatest error; sum
+    compares the sums of their powers, for which offset and slope act as one parameter."""
     extent: Literal["element", "tile"] = "element"
     """The part of a tile whose power is summed before it is compared: an element of the field, or the whole tile."""
     estimator: Literal["dwt", "variance", "fft"] = "dwt"
-    """What measures the power: the streaming wavelet transform, the variance of samples (sec. 5.2), or a windowed
-    Fourier transform of a tile's last eight updates (sec. 5.3.1); the norm is the wavelet transform's."""
+    """Estimator of the power: the streaming wavelet transform, the variance of samples (sec. 5.2), or a windowed
+    Fourier transform of a tile's last eight updates (sec. 5.3.1); the norm applies to the wavelet transform only."""
 
     def __post_init__(self) -> None:
         NORMS.require(self.norm, "error.norm")
@@ -114,16 +115,16 @@ class ResponseConfig:
     """The control decision of the policy thesis (chapter 6)."""
 
     solver: str = "waterfill"
-    """Density transport, how freed density is handed out: waterfill, slow_greater, scale_lesser, square, descend,
-    diffusion, trivial, or one that was added."""
+    """Solver of density transport, which distributes freed density: waterfill, slow_greater, scale_lesser, square,
+    descend, diffusion, trivial, or one that was added."""
     gain: float = 1.0
     """Distance moved in normalised density space per unit error (eq. 6.11 has 1), in [1e-6, 1e6]."""
     bias: float = 0.0
-    """Octaves by which each decision slides along the iso-product curve: positive towards space, negative to time."""
+    """Octaves by which each decision moves along the iso-product curve; positive is towards space."""
     surplus_max: float = 1.0
-    """Bound of the running surplus C as a share of the budget; at 1 a still, plain picture frees all it can."""
+    """Bound of the running surplus C as a share of the budget; at 1 a static, plain picture frees as much as it can."""
     temporal_min: float = 1.0 / 16.0
-    """Least temporal density, refreshes per cycle, in [1e-6, 1]: even a static tile is looked at this often. A batch
+    """Least temporal density, refreshes per cycle, in [1e-6, 1]: even a static tile is refreshed this often. A batch
     must hold the coarsest tiling at this rate."""
 
     def __post_init__(self) -> None:
@@ -140,7 +141,7 @@ class ReconstructionConfig:
     """Image reconstruction of the policy thesis (sec. 4.2)."""
 
     age_support_px: int = 9
-    """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off. The thesis has 128."""
+    """Width of the one-sided smoothing of the age field, output pixels, odd; 1 switches it off. The thesis uses 128."""
     method: str = "blend"
     """How cached framelets become an image: blend, or one that was added."""
 
@@ -153,13 +154,13 @@ class ReconstructionConfig:
 @dataclass(frozen=True)
 @closed_choices()
 class TsarConfig:
-    """Everything that decides a run of the pipeline, given the renderer and the cost of a cycle."""
+    """Everything that determines a run of the pipeline, given the renderer and the cost of a cycle."""
 
     batch_size: int = 128
     """Framelets rendered per cycle."""
     resolution_px: int = RESOLUTION_DEFAULT
-    """Output image width and height, pixels, a power of two; not beside width_px and height_px, from which it follows:
-    the least that holds both."""
+    """Output image width and height, pixels, a power of two; not to be combined with width_px and height_px, from which
+    it then follows as the least that holds both."""
     width_px: int = 0
     """Output image width, pixels, 16 to 16384, of a picture of any shape; 0 for a square of resolution_px."""
     height_px: int = 0
@@ -206,7 +207,7 @@ class TsarConfig:
 
     def _follow_shape(self) -> None:
         """Sets the resolution to the least power of two that holds the picture's sides."""
-        for name in sorted(("width_px", "height_px"), key=lambda name: getattr(self, name) == 0):  # given ones first
+        for name in sorted(("width_px", "height_px"), key=lambda name: getattr(self, name) == 0):  # given sides first
             value = getattr(self, name)
             require(16 <= value <= SIDE_MOST, name, f"between 16 and {SIDE_MOST}, as both sides are given", value)
         side = max(64, 1 << (max(self.width_px, self.height_px) - 1).bit_length())
@@ -217,7 +218,7 @@ class TsarConfig:
     def _require_room_for_a_batch(self, coarse: int, fine: int) -> None:
         """Refuses tilings too small for a full batch, and densities whose least sum exceeds the budget."""
         count, size = self.tile_count_max, self.batch_size
-        if size == TsarConfig.batch_size:  # which nobody asked for
+        if size == TsarConfig.batch_size:  # the default, not a choice of the caller
             needs = f"room for a batch of {size} tiles (it has {fine}; --batch-size {fine} fits)"
             require(size <= fine, "resolution_px", needs, self.resolution_px)
         require(size <= fine, "batch_size", f"at most {fine} (all tiles of the finest level)", size)
@@ -235,7 +236,7 @@ class TsarConfig:
 
     @property
     def pixels(self) -> int:
-        """Of the output image."""
+        """Number of pixels of the output image."""
         return self.shape[0] * self.shape[1]
 
     @property
@@ -250,7 +251,7 @@ class TsarConfig:
         return int(log2(self.sdf_side))
 
     def elements_of(self, level: int) -> int:
-        """Field elements that a tile of a quad level covers, at least 1."""
+        """Number of field elements that a tile of a quad level covers, at least 1."""
         return 4 ** max(self.field_level - level, 0)
 
     @property
@@ -269,7 +270,7 @@ class TsarConfig:
 
     @property
     def threshold_samples(self) -> float:
-        """Samples asked for in a tile beyond which it is split."""
+        """Number of samples requested in a tile above which the tile is split."""
         return self.tiling.threshold_samples or float(self.samples)
 
     @property
@@ -279,7 +280,7 @@ class TsarConfig:
 
     @property
     def cache_slots(self) -> int:
-        """Slots actually kept: at least four times the largest tiling, as in table 7.1."""
+        """Number of cache slots: at least four times the largest tiling, as in table 7.1."""
         return max(self.cache_size, 4 * self.tile_count_max)
 
     @property

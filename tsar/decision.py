@@ -30,7 +30,7 @@ def decide(
     """The response to the errors, the tiling and the selection, one after the other.
 
     Args:
-        timer: takes the times of ``response``, ``tiling`` and ``selection``.
+        timer: receives the durations of ``response``, ``tiling`` and ``selection``.
     """
     with timer("response"):
         densities = respond(densities, errors, config)

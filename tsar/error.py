@@ -20,10 +20,10 @@ from tsar.roots import square_root
 from tsar.types import LUMINANCE, Errors, FrameletBatch
 
 OCTAVES_OF_FULL_ERROR = 8.0
-"""Ratio of signal and template, as a power of two, from which a signed difference is ±1."""
+"""Octaves between the powers of signal and template from which on a signed difference is ±1."""
 
 RADIANCE_MAX = 1e30
-"""Radiance beyond which a sample counts as not finite, so that sums of many samples fit into float32."""
+"""Radiance beyond which a sample counts as non-finite, so that sums of many samples fit into float32."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ def estimate(
 ) -> Estimate:
     """Errors from a freshly rendered batch; zero outside its extent, temporal error zero where a tile has no past.
 
-    The power of all that lies in a part of a tile is summed, and then compared with the template (sec. 5.3.2, 5.3.3.1).
-    One pass a level; tiles of a batch never overlap, so the order cannot matter.
+    The power within a part of a tile is summed and then compared with the template (sec. 5.3.2, 5.3.3.1). Levels are
+    processed one after the other; tiles of a batch never overlap, so their order has no effect.
     """
     color, nonfinite = replace_nonfinite(color, config.framelet_side)
     state, has_state = cache.previous(batch.level, batch.index)
@@ -68,19 +68,19 @@ def errors_of(
     elements: int,
     config: ErrorConfig,
 ) -> tuple[Float[Tensor, "2 n parts"], Float[Tensor, "n state"]]:
-    """Spatial and temporal error in equal parts of tiles that cover so many elements of the field, and the state that
-    replaces the tiles' own: see :func:`tsar.estimators.measure`."""
+    """Spatial and temporal errors in equal parts of tiles that cover ``elements`` elements of the field each, and the
+    tiles' new state: see :func:`tsar.estimators.measure`."""
     parts = 1 if config.extent == "tile" else min(elements, signal.shape[1] // 4)
     *bands, after = measure(signal, state, has_state, parts, config)
     return torch.stack([signed_error(one, config) for one in bands]), after
 
 
 def count_nonfinite(color: Float[Tensor, "*n 3"]) -> int:
-    """How many samples :func:`replace_nonfinite` would replace."""
+    """Number of samples that :func:`replace_nonfinite` would replace."""
     if color.numel() == 0:
         return 0
     least, most = torch.aminmax(color)
-    # one pass over the samples where all are finite, as they nearly always are; NaN passes through
+    # one pass if all samples are finite, as they nearly always are; NaN fails the comparison
     if least >= -RADIANCE_MAX and most <= RADIANCE_MAX:
         return 0
     return int(_bad(color).sum())
@@ -93,8 +93,8 @@ def _bad(color: Float[Tensor, "*n 3"]) -> Bool[Tensor, "*n"]:
 
 def replace_nonfinite(color: Float[Tensor, "n samples 3"], side: int) -> tuple[Float[Tensor, "n samples 3"], int]:
     """Replace samples with a channel that is not finite, or beyond ``RADIANCE_MAX``, by the mean of their finite 3 x 3
-    neighbours within the framelet, or of the whole framelet where there are none, or by black where nothing is finite.
-    Returns how many were replaced."""
+    neighbours within the framelet, or of the whole framelet where no neighbour is finite, or by black where no sample
+    is. Returns the samples and the number of those replaced."""
     bad = _bad(color)
     count = int(bad.sum())
     if count == 0:
@@ -115,27 +115,28 @@ def replace_nonfinite(color: Float[Tensor, "n samples 3"], side: int) -> tuple[F
 def compressed_luminance(color: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n"]:
     """Rec. 709 luminance ``Y`` of linear RGB mapped to ``sqrt(Y / (1 + Y))`` in [0, 1).
 
-    The shoulder keeps one very bright sample from saturating a whole tile; the root spreads dark tones about as a
-    display's encoding does. Negative luminance counts as black.
+    The quotient keeps one very bright sample from saturating a whole tile; the square root resolves dark tones about as
+    well as the encoding of a display. Negative luminance counts as black.
 
-    Deviation: the thesis transforms luminance itself (sec. 5.3.4), of pictures without high dynamic range.
+    Deviation: the thesis transforms luminance itself (sec. 5.3.4); its pictures have no high dynamic range.
     """
-    # no matrix product: some libraries round it differently by the number of threads
+    # no matrix product: in some libraries its rounding depends on the number of threads
     red, green, blue = (share * part for share, part in zip(LUMINANCE, color.unbind(-1), strict=True))
     luminance = (red + green + blue).clamp(min=0.0)
     return square_root(luminance / (1.0 + luminance))
 
 
 def signed_error(bands: Bands, config: ErrorConfig) -> Float[Tensor, "n parts"]:
-    """Signal against template as a number in [-1, 1]: -1 for a constant tile, 0 where the two agree, and where nothing
-    has been measured.
+    """Error of the signal's power against the template, in [-1, 1]: -1 for a constant tile, 0 where the two agree or
+    nothing has been measured.
 
     With S and T the powers of the signal and of the template, ``contrast`` is ``(S - T) / (S + T)`` and ``difference``
-    is ``log2(S / T) / 8`` clamped. By ``octaves``, S and T are those of each band, and the greatest of the errors is
-    taken; or their sums over the bands. Source: Stephens 2011, sec. 5.3.3.1, which sums signed differences.
+    is ``log2(S / T) / 8``, clamped. If ``octaves`` is ``greatest``, S and T belong to one band each and the greatest
+    error is taken; if it is ``sum``, they are sums over the bands. Source: Stephens 2011, sec. 5.3.3.1, which sums
+    signed differences.
 
-    Deviation: the thesis does not say how a difference becomes a number in [-1, 1]. Sums of differences see the
-    template's sum only, whatever its slope; the greatest sees its shape.
+    Deviation: the thesis does not say how a difference is mapped to [-1, 1]. A sum of differences depends on the sum of
+    the template alone, whatever its slope; the greatest difference depends on its shape.
     """
     known = bands.known[..., None]
     tolerated = bands.tolerated.to(bands.power.dtype)[:, None, None]
@@ -151,6 +152,6 @@ def _compared(signal: Tensor, template: Tensor, config: ErrorConfig) -> Tensor:
     if config.form == "contrast":
         return (signal - template) / (signal + template)
     floor = torch.finfo(signal.dtype).tiny
-    # float64, for the last digit of a logarithm depends on the processor
+    # float64: the last digit of a logarithm depends on the processor
     octaves = torch.log2((signal.clamp(min=floor) / template).to(torch.float64)).to(signal.dtype)
     return (octaves / OCTAVES_OF_FULL_ERROR).clamp(-1.0, 1.0)

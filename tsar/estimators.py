@@ -1,18 +1,19 @@
-"""What a framelet's samples tell of its power in space and in time: the estimators that the error is made from.
+"""Estimators of a framelet's power in space and in time, from which the error is computed.
 
-Each turns the new samples of tiles, and what it kept of their last updates, into power by bands, spatial and temporal,
-for equal parts of a tile, and into the power that the template tolerates there. A tile's past is ``(n, state)``
-numbers, as many as :func:`state_size` says.
+Each estimator takes the new samples of tiles and the state kept from their last updates. It returns spatial and
+temporal power per band in equal parts of a tile, and the power that the template tolerates there. The state is
+``(n, state)`` for ``n`` tiles; :func:`state_size` gives its length.
 
-* ``dwt``: the streaming Haar transform and its localised levelwise norm, a band an octave (sec. 5.3.2–5.3.4).
-* ``variance``: that of a part's samples, and of each sample and the one before, in one band (sec. 5.2.1).
-* ``fft``: the Fourier transform of a tile's last ``FFT_UPDATES`` updates under a Hann window, a band an octave. It does
-  not tell where in a tile power lies (sec. 5.3.1).
+* ``dwt``: the streaming Haar transform and its localised levelwise norm, one band per octave (sec. 5.3.2–5.3.4).
+* ``variance``: the variance of a part's samples, and that of each sample and the one before it, in one band (sec.
+  5.2.1).
+* ``fft``: the Fourier transform of a tile's last ``FFT_UPDATES`` updates under a Hann window, one band per octave. It
+  does not localise power within a tile (sec. 5.3.1).
 
-All see the same template: a signal whose wavelet coefficients have power P each has, within the variance of its
-samples, ``P / 4`` of a band.
+All are compared with the same template. If the wavelet coefficients of a band have power P each, the band contributes
+``P / 4`` to the variance of the samples; the latter two estimators tolerate that variance.
 
-Deviation: sec. 5.2 and 5.3.1 name variance and Fourier transform and give no equations of an estimate.
+Deviation: sec. 5.2 and 5.3.1 name the variance and the Fourier transform but give no equation for an estimate.
 """
 
 from __future__ import annotations
@@ -32,18 +33,18 @@ from tsar.config import ErrorConfig
 from tsar.morton import raster_to_morton
 
 FFT_UPDATES = 8
-"""Updates that the window of the Fourier transform spans."""
+"""Number of updates that the window of the Fourier transform spans."""
 
 _POWER_LEAST, _POWER_MOST = torch.finfo(torch.float32).tiny, 2.0**100
 
 
 @dataclass(frozen=True)
 class Bands:
-    """Power of framelets by bands, fine to coarse, in equal parts of each, Morton order.
+    """Power of framelets per band, fine to coarse, in equal parts of each framelet, Morton order.
 
     Attributes:
-        power: per band; spatial or temporal.
-        tolerated: what the template has in its place.
+        power: power per band, spatial or temporal, of the compressed luminance squared.
+        tolerated: power that the template has in its place.
         known: whether a band of a framelet has been measured.
     """
 
@@ -59,7 +60,7 @@ quarter of the samples."""
 
 
 def state_size(samples: int, config: ErrorConfig) -> int:
-    """Numbers that the estimator of a configuration keeps per tile."""
+    """Count of the numbers that the estimator of a configuration keeps per tile."""
     sizes = {"dwt": haar.state_size(samples), "variance": samples, "fft": (FFT_UPDATES - 1) * samples + 1}
     return sizes[config.estimator]
 
@@ -71,7 +72,7 @@ def measure(
     parts: int,
     config: ErrorConfig,
 ) -> tuple[Bands, Bands, Float[Tensor, "n state"]]:
-    """Spatial and temporal power by the estimator of the configuration, and the state that replaces the tiles' own."""
+    """Spatial and temporal power by the estimator of the configuration, and the tiles' new state."""
     return _MEASURES[config.estimator](signal, state, has_state, parts, config)
 
 
@@ -80,8 +81,9 @@ def levelwise_power(
 ) -> tuple[Float[Tensor, "octaves n parts"], Float[Tensor, "octaves n parts"]]:
     """Localised levelwise norm: spatial and temporal power per octave in each of ``parts`` equal parts of a tile.
 
-    Octants ghh, hgh, ggh make the spatial norm and hhg, hgg, ghg the temporal one; ggg is not used. All coefficients
-    within a part go into its norm, and a proportional part of those that cover several (fig. 5.10).
+    With the norm l2 the spatial power is ``sum(ghh² + hgh² + ggh²)`` and the temporal one ``sum(hhg² + hgg² + ghg²)``;
+    ggg is not used. All coefficients within a part enter its norm, and a coefficient that covers several parts enters
+    each with an equal share (fig. 5.10).
 
     Source: Stephens 2011, sec. 5.3.2.
     """
@@ -99,7 +101,7 @@ def levelwise_power(
 
 
 def _shares(positions: int, parts: int) -> tuple[int, int]:
-    """Positions of an octave within a part, and parts that a position covers."""
+    """Number of an octave's positions within a part, and number of parts that a position covers."""
     return max(positions // parts, 1), max(parts // positions, 1)
 
 
@@ -108,14 +110,14 @@ def template_power(
 ) -> Float[Tensor, " octaves"]:
     """Power the template tolerates in a part, fine to coarse, on the normalisation of :func:`levelwise_power`.
 
-    ``log2 = offset + slope * f`` per coefficient with ``f = 0`` at the coarsest octave, times what the norm makes of as
-    many coefficients of power 1 as a part has positions; float64, which holds every slope and offset. Where the result
-    is beyond what float32 holds it is brought to the bound: the power of a signal is 0 or lies between the bounds.
+    Per coefficient ``log2 power = offset + slope * f`` with ``f = 0`` at the coarsest octave. It is multiplied by the
+    norm of as many coefficients of power 1 as a part has positions. Computed in float64, which holds every slope and
+    offset, and clamped to the range of a signal's powers in float32.
 
     Source: Stephens 2011, sec. 5.3.3.2.
 
     Raises:
-        ValueError: the norm gives a part nothing of a coefficient.
+        ValueError: the norm gives a part no share of a coefficient.
     """
     finest = haar.octave_count(samples) - 1
     found = []
@@ -127,7 +129,7 @@ def template_power(
 
 @lru_cache(maxsize=64)
 def _share_octaves(norm: str, within: int, repeat: int) -> float:
-    """log2 of what the norm makes of ``within`` coefficients of power 1, which ``repeat`` parts share."""
+    """log2 of the norm of ``within`` coefficients of power 1 that ``repeat`` parts share."""
     alone = torch.zeros(3 * within, 1, 1, dtype=torch.float64)
     alone[:within] = 1.0
     share = float(NORMS[norm](alone, repeat))
@@ -152,7 +154,7 @@ def _by_wavelets(
 
 
 def _variance_template(samples: int, config: ErrorConfig) -> tuple[Tensor, Tensor]:
-    """Variance of a sample by octaves where every coefficient has the power that is tolerated, spatial and temporal."""
+    """Variance of a sample per octave, spatial and temporal, if every coefficient has the tolerated power."""
     lines = config.spatial_offset, config.spatial_slope, config.temporal_offset, config.temporal_slope
     spatial, temporal = _templates(samples, samples // 4, ErrorConfig(*lines))
     return 0.25 * spatial, 0.25 * temporal
@@ -161,7 +163,8 @@ def _variance_template(samples: int, config: ErrorConfig) -> tuple[Tensor, Tenso
 def _by_variance(
     signal: Tensor, state: Tensor, has_state: Tensor, parts: int, config: ErrorConfig
 ) -> tuple[Bands, Bands, Tensor]:
-    """Eq. 5.5 over the samples of a part, and over each sample and the one before, averaged over the part."""
+    """The variance ``mean((x - mean(x))²)`` (eq. 5.5) of the samples of a part; and that of each sample and the one
+    before it, averaged over the part."""
     cut = signal.unflatten(1, (parts, -1))
     spatial = (cut - cut.mean(2, keepdim=True)).square().mean(2)
     before = torch.where(has_state[:, None], state, signal)
@@ -174,13 +177,13 @@ def _by_variance(
 def _by_fourier(
     signal: Tensor, state: Tensor, has_state: Tensor, parts: int, config: ErrorConfig
 ) -> tuple[Bands, Bands, Tensor]:
-    """Power of the last updates by octaves of frequency. Before there are enough of them the oldest stands for those
-    that are missing, and temporal bands are not known."""
+    """Power of the last updates per octave of frequency. While there are too few updates, the oldest one replaces those
+    that are missing, and the temporal bands are unknown."""
     count, samples = signal.shape
     updates = torch.where(has_state, state[:, -1], 0.0)
     past = state[:, :-1].reshape(count, FFT_UPDATES - 1, samples)
     past = torch.where(has_state[:, None, None], past, signal[:, None])
-    volume = torch.cat((signal[:, None], past), dim=1)  # newest first: power does not see the direction of time
+    volume = torch.cat((signal[:, None], past), dim=1)  # newest first: power does not depend on the direction of time
     power_s, power_t = (one[..., None].expand(-1, -1, parts) for one in octave_power(volume))
     tolerated_s, tolerated_t = _variance_template(samples, config)
     known = (updates >= FFT_UPDATES - 1).expand(len(power_t), count)
@@ -194,10 +197,11 @@ def _by_fourier(
 def octave_power(
     volume: Float[Tensor, "n t samples"],
 ) -> tuple[Float[Tensor, "spatial n"], Float[Tensor, "temporal n"]]:
-    """Variance of the samples of tiles by octaves of frequency, fine to coarse, under a Hann window over all axes.
+    """Variance of the samples of tiles per octave of frequency, fine to coarse, under a Hann window along all axes.
 
-    A frequency counts where it is finer, in space or in time, and in time where it is as fine in both. One cycle a span
-    counts as none, for the window spreads what stands still that far.
+    A frequency belongs to the spatial or to the temporal bands, by the finer of its two octaves, and to the temporal
+    ones if the octaves are equal. One period per span counts as static, because the window spreads static content that
+    far.
     """
     frames, samples = volume.shape[1:]
     side = math.isqrt(samples)
@@ -217,7 +221,7 @@ def octave_power(
 
 @lru_cache(maxsize=4)
 def _bands(frames: int, side: int) -> tuple[Int64[Tensor, " frequencies"], Int64[Tensor, " frequencies"]]:
-    """For each frequency of a real transform: 0 where it counts in space and 1 in time, and its octave."""
+    """For each frequency of a real transform, 0 if it is spatial or 1 if it is temporal, and its octave."""
     none = 99
     t, y, x = (torch.fft.fftfreq(n, 1.0 / n).abs() for n in (frames, side, side))
     space = torch.maximum(y[:, None], x[: side // 2 + 1])

@@ -1,4 +1,4 @@
-"""Numbers as formats of fewer bits hold them."""
+"""Rounding of numbers to formats of fewer bits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tsar.roots import square_root
 
 FORMATS = ("float64", "float32", "bfloat16", "float16", "float8", "unorm8")
 """``float8`` has five bits of exponent and two of mantissa; ``unorm8`` has 256 equal steps of the square root of values
-in [0, 1.5], for colours, which are clipped there."""
+in [0, 1.5], for colours, which are clipped to that range."""
 UNORM_MAX = 1.5
 _STEPS = 255.0
 _KINDS = {
@@ -23,12 +23,12 @@ _KINDS = {
 
 
 def rounded(values: Tensor, form: str) -> Tensor:
-    """Values as a format holds them, in the type that they have, but float64 where that is the format.
+    """Values rounded to a format. The result has the type of the values, or float64 where that is the format.
 
-    Finite values beyond what the format holds become its greatest; infinite ones and NaN stay.
+    Finite values beyond the range of the format become its greatest value; infinities and NaN stay.
 
     Raises:
-        ConfigError: the format is none of :data:`FORMATS`.
+        ConfigError: the format is not one of :data:`FORMATS`.
     """
     require(form in FORMATS, "format", f"one of {', '.join(FORMATS)}", form)
     if form == "float64":

@@ -1,16 +1,16 @@
 """Streaming Haar wavelet transform of square tiles in Morton order. Knows nothing of rendering.
 
 Normalisation: ``h = (a + b) / 2`` and ``g = a - b`` along every axis, so approximations keep the signal's scale and a
-detail coefficient is the plain difference of two means. An orthonormal Haar step gives ours times ``sqrt 2`` for
-every ``h`` and ``1 / sqrt 2`` for every ``g`` in their names.
+detail coefficient is the plain difference of two means. The coefficients of an orthonormal Haar step are these times
+``sqrt 2`` for every ``h`` and ``1 / sqrt 2`` for every ``g`` in their names.
 
 Octants are named in the order x, y, t: ``hgh`` is low in x, high in y, low in time.
 
-Time is dyadic as space is: octave ``o`` pairs fields that are ``2^o`` updates apart, so that it takes in ``2^(o + 1)``
-updates (fig. 5.9). At the leading edge an octave is evaluated at every update, not at every ``2^o``-th only; for that
-it keeps its last ``2^o`` fields.
+Time is dyadic, as space is: octave ``o`` pairs fields that are ``2^o`` updates apart and so spans ``2^(o + 1)`` updates
+(fig. 5.9). At the leading edge an octave is evaluated at every update, not only at every ``2^o``-th; for that it keeps
+its last ``2^o`` fields.
 
-Deviation: sec. 5.3.1.3 keeps one field an octave, which would be right only if an octave were evaluated when both of
+Deviation: sec. 5.3.1.3 keeps one field per octave, which would be correct only if an octave were evaluated when both of
 its fields are complete.
 
 Source: Stephens 2011, sec. 5.3.4, eq. 5.15–5.16, fig. 5.9 and 5.15.
@@ -30,8 +30,8 @@ class Octave:
     """Detail octants of one octave, each ``(n, positions)`` in Morton order.
 
     Attributes:
-        known: whether the tile has been updated often enough for the octave to have a past; else the temporal octants
-            are exactly zero.
+        known: whether the tile has had enough updates for the octave's temporal octants; before that they are exactly
+            zero.
     """
 
     ghh: Float[Tensor, "n p"]
@@ -45,18 +45,18 @@ class Octave:
 
 
 def octave_count(samples: int) -> int:
-    """Octaves until one coefficient remains: 4 for a 16 x 16 tile."""
+    """Number of octaves until one coefficient remains: 4 for a 16 x 16 tile."""
     return (samples.bit_length() - 1) // 2
 
 
 def state_size(samples: int) -> int:
-    """Numbers kept per tile between updates: the last ``2^o`` fields of octave ``o``, newest first, octaves from fine
-    to coarse, and how many updates there have been (481 for 16 x 16)."""
+    """Count of the numbers kept per tile between updates (481 for 16 x 16): the last ``2^o`` fields of octave ``o``,
+    newest first, octaves from fine to coarse, and the number of updates."""
     return sum(samples >> o for o in range(octave_count(samples))) + 1
 
 
 def updates_needed(octave: int) -> int:
-    """Earlier updates of a tile from which on an octave has a past."""
+    """Number of earlier updates of a tile that an octave needs for its temporal octants: ``2^(o + 1) - 1``."""
     return (2 << octave) - 1
 
 
@@ -90,7 +90,7 @@ def transform(
         has_state: false for tiles without a past.
 
     Returns:
-        Octaves from fine to coarse, and the state that replaces the cached one.
+        Octaves from fine to coarse, and the state for the tile's next update.
 
     Source: Stephens 2011, sec. 5.3.4 and fig. 5.9.
     """
@@ -109,6 +109,6 @@ def transform(
         octaves.append(Octave(ghh, hgh, ggh, hhg, ghg, hgg, ggg, known))
         kept += [now, fields[:, :-width]]
         approximation, first = hhh, first + lag * width
-    # once the coarsest octave has a past, no more need be counted
+    # the count stops once the coarsest octave is known
     kept.append((updates + 1.0).clamp(max=updates_needed(count - 1))[:, None])
     return octaves, torch.cat(kept, dim=1)

@@ -1,4 +1,4 @@
-"""Packages whose names are imported when they are first asked for, so that to import a package costs nothing."""
+"""Lazy imports: the names of a package are imported at their first access, so importing the package itself is cheap."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 
 def lazily(package: str, where: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """What a package sets as its ``__getattr__`` and its ``__dir__``.
+    """The ``__getattr__`` and the ``__dir__`` of a package that imports lazily.
 
     Args:
         package: its ``__name__``.
-        where: names that it offers, separated by spaces, by the module that defines them.
+        where: for each defining module, the names that the package exports from it, separated by spaces.
     """
     modules = {name: module for module, names in where.items() for name in names.split()}
 

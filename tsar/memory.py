@@ -1,5 +1,5 @@
-"""Memory that this process can still allocate, the least of what the machine, containers and its own limits leave; and
-the cores that it may use. Systems other than Linux tell less of it."""
+"""Memory that this process can still allocate, the least of what the machine, its containers and its own limits leave;
+and the cores that it may use. Systems other than Linux report fewer of these limits."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ except ModuleNotFoundError:  # Windows
 
 
 def core_count() -> int:
-    """Number of CPU cores this process may use; all of the machine's where the system does not tell."""
+    """Number of CPU cores this process may use; all cores of the machine where the system does not report it."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def free_memory_bytes(root: Path = Path("/")) -> int:
-    """Bytes that can be allocated. The cache of files counts as free, for the system gives it back.
+    """Bytes that can be allocated. The page cache counts as free, because the system releases it on demand.
 
     Args:
-        root: where ``proc`` and ``sys`` lie.
+        root: directory that contains ``proc`` and ``sys``.
     """
     found = [*_machine(root), *_groups(root), *_process(root)]
     return max(0, min(found) if found else _whole())
 
 
 def _whole() -> int:
-    """What the machine has where it does not tell what is free; without a bound where it tells neither."""
+    """Total memory of the machine, bytes, for systems that do not report free memory; 2^62 where it is unknown too."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
@@ -45,7 +45,7 @@ def _machine(root: Path) -> Iterator[int]:
 
 
 def _process(root: Path) -> Iterator[int]:
-    """What ``ulimit -v`` and ``ulimit -d`` leave."""
+    """Bytes left by ``ulimit -v`` and by ``ulimit -d``."""
     if resource is None:
         return
     used = dict(_table(root / "proc/self/status"))
@@ -56,7 +56,7 @@ def _process(root: Path) -> Iterator[int]:
 
 
 def _groups(root: Path) -> Iterator[int]:
-    """What the control groups of this process, of either version, and those above them leave."""
+    """Bytes left by the control groups of this process and by their ancestors, in versions 1 and 2 of cgroups."""
     for line in _lines(root / "proc/self/cgroup"):
         _, controllers, name = line.split(":", 2)
         if controllers and "memory" not in controllers.split(","):
@@ -64,7 +64,7 @@ def _groups(root: Path) -> Iterator[int]:
         mount = root / "sys/fs/cgroup" / ("memory" if controllers else "")
         names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
         limit, usage, cached = names if controllers else ("memory.max", "memory.current", "inactive_file")
-        # within a container the name may be that outside of it, and the mount is the group itself
+        # within a container the name may be the one outside of it, and the mount point is the group itself
         for folder in {mount, *(mount / part for part in (Path(name[1:]), *Path(name[1:]).parents))}:
             most, used = (_number(folder / file) for file in (limit, usage))
             if most is not None and used is not None:
@@ -72,13 +72,13 @@ def _groups(root: Path) -> Iterator[int]:
 
 
 def _number(path: Path) -> int | None:
-    """The number in a file; None where there is no such file, or where it holds the word ``max``."""
+    """The number in a file; None if there is no such file or it does not hold a number, as ``max``."""
     text = "".join(_lines(path)).strip()
     return int(text) if text.isdecimal() else None
 
 
 def _table(path: Path) -> Iterator[tuple[str, int]]:
-    """Names and numbers of lines that begin with both."""
+    """The name and the number of every line that begins with both."""
     for line in _lines(path):
         name, _, rest = line.replace("\t", " ").partition(" ")
         value = rest.strip().partition(" ")[0]

@@ -1,7 +1,7 @@
 """Morton curves, kd- and quadtree indices, and means over tiles.
 
 All functions are element-wise over int64 tensors of any shape. ``x`` takes the even bits of a Morton index and ``y``
-the odd ones. A *kd index* puts the depth in front: ``2^depth + Morton index`` where the tree halves one axis a level.
+the odd ones. A *kd index* encodes the depth too: ``2^depth + Morton index``, in a tree that halves one axis per level.
 
 Source: Stephens 2011, sec. 4.1.
 """
@@ -38,7 +38,7 @@ def deinterleave(index: Int64[Tensor, "*n"]) -> tuple[Int64[Tensor, "*n"], Int64
 
 
 def first_node(level):
-    """Number of the first node of a level, ``(4^level - 1) / 3``: nodes are numbered level after level, coarsest first.
+    """Number of the first node of a level, ``(4^level - 1) / 3``: nodes are numbered level by level, coarsest first.
 
     ``level`` is an int or an int64 tensor, and so is the result.
     """
@@ -46,7 +46,7 @@ def first_node(level):
 
 
 def node_number(level, index):
-    """Number of the node with a Morton index within its level."""
+    """Number of the node that has the Morton index ``index`` within ``level``."""
     return first_node(level) + index
 
 
@@ -69,10 +69,10 @@ def tile_interval(
 def tile_mean(
     field: Float[Tensor, " e"], level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], field_level: int
 ) -> Float[Tensor, " n"]:
-    """Mean of the field over each tile, by way of the means of all nodes of the quadtree, one pass a level.
+    """Mean of the field over each tile, from the means of all nodes of the quadtree, one pass per level.
 
-    Deviation: not from a prefix sum, as sec. 4.1.5 has it. Tiles of equal elements come out as equal, which differences
-    of a prefix sum do not, and the sums of several nodes can be made side by side.
+    Deviation: sec. 4.1.5 uses a prefix sum. Here tiles of equal elements have equal means, which differences of a
+    prefix sum do not give, and the sums of several nodes can be computed in parallel.
     """
     found = torch.empty(level.shape, dtype=field.dtype)
     for node_level in range(field_level, -1, -1):
@@ -84,21 +84,23 @@ def tile_mean(
 
 
 def total(field: Float[Tensor, " e"]) -> float:
-    """Sum of a field, the same bits for any number of threads: a scan adds in one order, a parallel sum does not."""
+    """Sum of a field, with the same bits for any number of threads: a scan adds in a fixed order, a parallel sum does
+    not."""
     return float(torch.cumsum(field, 0)[-1]) if field.numel() else 0.0
 
 
 @lru_cache(maxsize=32)
 def raster_to_morton(side: int) -> Int64[Tensor, " cells"]:
-    """For each cell in raster order (row by row), its Morton index: ``field[raster_to_morton(s)]`` is the raster."""
+    """For each cell in raster order (row by row), its Morton index: ``field[raster_to_morton(s)]`` is in raster
+    order."""
     row = torch.arange(side)
     return interleave(row[None, :].expand(side, side).reshape(-1), row[:, None].expand(side, side).reshape(-1))
 
 
 @lru_cache(maxsize=8)
 def curve(height: int, width: int) -> Int64[Tensor, " cells"]:
-    """Raster indices ``y * width + x`` of the cells of a rectangle, as the Morton curve over a square around it meets
-    them; of a square of a power of two it is :func:`morton_to_raster`."""
+    """Raster indices ``y * width + x`` of the cells of a rectangle, in the order of the Morton curve over the enclosing
+    square. For a square whose side is a power of two it equals :func:`morton_to_raster`."""
     row, column = torch.arange(height)[:, None], torch.arange(width)[None, :]
     return torch.argsort(interleave(column.expand(height, width).reshape(-1), row.expand(height, width).reshape(-1)))
 

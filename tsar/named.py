@@ -1,7 +1,7 @@
-"""Tables of what has a name: policies, solvers, norms and whatever else people bring.
+"""Tables of named entries: policies, solvers, norms and other extensions.
 
-An entry is an object, or the place of one as ``module:attribute``, which is imported when it is first asked for.
-Installed packages add entries through entry points of the group that a table names; Python adds them by :meth:`add`.
+An entry is an object, or its import path ``module:attribute``, which is imported at the first access. Installed
+packages add entries through entry points of the table's group, Python code by :meth:`Named.add`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class Origin:
     """Where an entry comes from.
 
     Attributes:
-        module: that it is imported from, or that it was made in.
-        distribution: the installed package that brought it; None where none did.
+        module: module from which it is imported or in which it was made.
+        distribution: installed package that provides it; None if there is none.
         version: of that package.
     """
 
@@ -36,15 +36,15 @@ class Origin:
 
 
 class Named(Generic[Entry]):
-    """Entries by name. Changes in place when one is added.
+    """A table of entries by name. It changes in place when an entry is added.
 
     Attributes:
-        kind: what an entry is, in one word or two, for messages.
-        group: group of entry points in which installed packages offer entries.
+        kind: kind of the entries in one or two words, for messages.
+        group: group of entry points through which installed packages provide entries.
     """
 
     def __init__(self, kind: str, group: str, entries: dict[str, Entry | str]) -> None:
-        """Takes the project's own entries."""
+        """Creates a table of the project's own entries."""
         self.kind, self.group = kind, group
         self._entries: dict[str, Entry | str] = dict(entries)
         self._places: dict[str, str] = {name: place for name, place in entries.items() if isinstance(place, str)}
@@ -53,7 +53,7 @@ class Named(Generic[Entry]):
         self._searched = False
 
     def add(self, name: str, entry: Entry | str) -> None:
-        """Adds an entry, or puts it in the place of the one of that name."""
+        """Adds an entry, or replaces the entry of that name."""
         self._entries[name] = entry
         self._places.pop(name, None)
         self._brought_by.pop(name, None)
@@ -63,8 +63,8 @@ class Named(Generic[Entry]):
 
     @contextmanager
     def lent(self, **entries: Entry | str) -> Iterator[None]:
-        """Holds further entries for the length of a block; then the table is as it was before."""
-        self._search()  # what is found within the block would be forgotten after it
+        """Adds entries for the duration of a ``with`` block, and restores the table after it."""
+        self._search()  # entry points found within the block would be lost after it
         before = dict(self._entries), dict(self._places), set(self._own), dict(self._brought_by)
         for name, entry in entries.items():
             self.add(name, entry)
@@ -74,7 +74,7 @@ class Named(Generic[Entry]):
             self._entries, self._places, self._own, self._brought_by = before
 
     def names(self) -> tuple[str, ...]:
-        """All names: the project's own first, then those that were added, then those of installed packages."""
+        """All names: the project's own first, then added ones, then those of installed packages."""
         self._search()
         return tuple(self._entries)
 
@@ -91,8 +91,8 @@ class Named(Generic[Entry]):
         """The entry of a name.
 
         Raises:
-            ConfigError: no entry has this name, or it cannot be imported; the message has the known names and the
-                nearest of them.
+            ConfigError: the entry cannot be imported, or no entry has this name; the message then lists the known names
+                and the nearest one.
         """
         self.require(name)
         entry = self._entries[name]
@@ -104,8 +104,8 @@ class Named(Generic[Entry]):
         """Checks a name without importing its entry.
 
         Args:
-            name: to be found.
-            field: of the configuration that holds it; by default the kind of entry.
+            name: name to look up.
+            field: field of the configuration that holds the name, for the message; by default the kind of entry.
 
         Raises:
             ConfigError: no entry has this name.
@@ -118,11 +118,11 @@ class Named(Generic[Entry]):
         raise ConfigError(f"{field or self.kind}: expected one of {known}, got {name!r}{hint}")
 
     def is_own(self, name: str) -> bool:
-        """Whether an entry is one of the project's own, rather than one that was added."""
+        """Whether an entry is one of the project's own and not an added one."""
         return name in self._own
 
     def origin(self, name: str) -> Origin:
-        """Where an entry comes from; nothing is imported where the table holds a place.
+        """The origin of an entry. Nothing is imported where the table holds an import path.
 
         Raises:
             ConfigError: no entry has this name.
@@ -138,7 +138,7 @@ class Named(Generic[Entry]):
         return Origin(module, package.name, package.version) if package else Origin(module, None, None)
 
     def _search(self) -> None:
-        """Looks for entry points once; what has a name already stays."""
+        """Collects entry points once; existing names are kept."""
         if self._searched:
             return
         self._searched = True
@@ -161,5 +161,5 @@ class Named(Generic[Entry]):
 
 @cache
 def _distributions() -> Mapping[str, list[str]]:
-    """Names of the installed distributions by those of their packages; to list them takes most of a second."""
+    """Names of the installed distributions by the names of their packages. Listing them takes most of a second."""
     return importlib.metadata.packages_distributions()

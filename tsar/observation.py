@@ -1,4 +1,5 @@
-"""The first stage after tracing: errors of a batch, and its colours and wavelet states into the cache."""
+"""The first stage after tracing: it estimates the errors of a batch and stores its colours and wavelet states in the
+cache."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from tsar.types import Errors, FrameletBatch
 
 @dataclass(frozen=True)
 class Observation:
-    """Errors on the field, and how many samples were not finite."""
+    """Errors on the field, and the number of non-finite samples."""
 
     errors: Errors
     nonfinite: int
@@ -32,7 +33,7 @@ def observe(
     """Estimates the errors of a batch (:func:`tsar.error.estimate`) and stores the batch in the cache, in place.
 
     Args:
-        timer: takes the times of ``error`` and ``cache``.
+        timer: receives the durations of ``error`` and ``cache``.
     """
     with timer("error"):
         found = estimate(batch, color, cache, config)

@@ -1,7 +1,8 @@
-"""What decides where and when samples are spent: the interface of all renderers that are compared, and their one loop.
+"""Policies, which decide where and when samples are taken: the interface of all compared renderers, and their common
+loop.
 
-A policy is asked for a batch, told what the renderer answered, and asked for the image to show. State goes in and comes
-out; what it costs and how late it shows what it sampled are declared beside it.
+A policy requests a batch, receives the samples of the renderer, and returns the image to show. Its methods take and
+return the state; its price and its latency are declared beside them.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ Truth = Callable[[float], Float[Tensor, "h w 3"]]
 
 @dataclass(frozen=True)
 class Price:
-    """What the cost model charges a cycle of a policy.
+    """The price of a policy's cycle for the cost model.
 
     Attributes:
-        samples: samples traced a cycle.
-        adaptive_stages: whether selection, error estimate, response, tiling and reconstruction come on top, as table
-            7.1 of Stephens 2011 prices them.
+        samples: samples traced per cycle.
+        adaptive_stages: whether selection, error estimate, response, tiling and reconstruction are charged too, as
+            priced in table 7.1 of Stephens 2011.
         pixel_flops, sample_flops: further operations per output pixel and per sample.
     """
 
@@ -45,14 +46,14 @@ class Price:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a policy is made from.
+    """What a policy is created from.
 
     Attributes:
         config: of the run.
-        stages_of: what runs the stages around tracing of the adaptive pipeline, made when they are needed.
-        truth: the picture at any time; None where nothing may look at it.
-        trace: a renderer that is not charged, for policies that look at the truth.
-        view: where the camera and all instances are at a time, seconds; None where the scene cannot tell.
+        stages_of: creates the stages of the adaptive pipeline around tracing, when they are needed.
+        truth: true picture at any time; None where no policy may use it.
+        trace: renderer that is not charged, for policies that use the truth.
+        view: poses of the camera and all instances at a time in seconds; None where the scene does not give them.
     """
 
     config: TsarConfig
@@ -64,7 +65,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Moment:
-    """When a cycle takes place.
+    """The time of a cycle.
 
     Attributes:
         time_s: animation time at its start, seconds.
@@ -78,10 +79,10 @@ class Moment:
 
 
 def require_square(config: TsarConfig, policy: str) -> None:
-    """Refuses a picture that is no square of a power of two, for policies that know no other.
+    """Rejects a picture other than a square whose side is a power of two, for policies that support no other.
 
     Raises:
-        ConfigError: it is not.
+        ConfigError: the picture has another shape.
     """
     height, width = config.shape
     expected = f"a square of resolution_px for the policy {policy}"
@@ -89,10 +90,10 @@ def require_square(config: TsarConfig, policy: str) -> None:
 
 
 class WhenAsked(Mapping[str, MapShown]):
-    """Maps that are made when somebody draws them: most cycles are never looked at."""
+    """Maps that are computed on access, because those of most cycles are never drawn."""
 
     def __init__(self, made_by: Mapping[str, Callable[[], MapShown]]) -> None:
-        """Takes a function for each name."""
+        """``made_by`` has a function for the map of each name."""
         self._made_by = made_by
 
     def __getitem__(self, name: str) -> MapShown:
@@ -107,13 +108,14 @@ class WhenAsked(Mapping[str, MapShown]):
 
 @dataclass(frozen=True)
 class Picture:
-    """What a policy puts on the display.
+    """The picture that a policy shows.
 
     Attributes:
-        image: ``(height, width, 3)`` float32 linear RGB, of the picture, or of the whole plane of which it is a window.
+        image: ``(height, width, 3)`` float32 linear RGB, for the picture, or for the whole plane of which it is a
+            window.
         sample_map: age and density of its samples, likewise; None where the policy cannot tell.
         counters: work done for it, by name; ``framelet_pixels`` are the pixels of all framelets that were accumulated.
-        maps: what else the policy knows of every place, by name, for a page.
+        maps: further maps of the policy's state, by name, for reports.
         carried: see :class:`tsar.types.ShownImage`.
     """
 
@@ -126,11 +128,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class Cycle(Generic[State]):
-    """One cycle as it went, for its record.
+    """One cycle and its results, for its record.
 
     Attributes:
         before, after: state at its start and at its end.
-        samples: what the renderer answered.
+        samples: samples of the renderer.
         shown: image at its end.
         timer: measured seconds of its stages.
     """
@@ -143,27 +145,27 @@ class Cycle(Generic[State]):
 
     @property
     def counters(self) -> dict[str, int]:
-        """Work done, by name: by the renderer, and for the image."""
+        """Counts of the work done by the renderer and for the image, by name."""
         return {**self.samples.counters, **self.shown.counters}
 
 
 class Policy(ABC, Generic[State]):
-    """Who decides what is sampled.
+    """A policy, which decides what is sampled.
 
     Attributes:
-        latency_cycles: cycles between sampling and display.
-        probe_cycles: throw-away cycles before a run, the last of which tells how long a cycle takes; the first may
-            compile kernels.
-        footprint: samples along a pixel's side that textures are filtered for; below 1 where samples are farther apart
-            than pixels.
-        price: what a cycle costs.
+        latency_cycles: number of cycles between sampling and display.
+        probe_cycles: number of throw-away cycles before a run, the last of which measures the duration of a cycle; the
+            first may compile kernels.
+        footprint: number of samples along a pixel's side for which textures are filtered; below 1 where samples are
+            farther apart than pixels.
+        price: price of a cycle.
     """
 
     latency_cycles: ClassVar[int] = 1
     probe_cycles: ClassVar[int] = 2
 
     def __init__(self, setting: Setting) -> None:
-        """Takes what the run is made from."""
+        """Takes the setting of the run."""
         self.config = setting.config
 
     @property
@@ -172,12 +174,12 @@ class Policy(ABC, Generic[State]):
 
     @property
     def warmup_cycles(self) -> int:
-        """Cycles before the start time, so that measurement begins in the steady state."""
+        """Number of cycles before the start time, so that measurement begins in the steady state."""
         return self.config.warmup_cycles
 
     @property
     def price(self) -> Price:
-        """By default that of a cycle of the adaptive pipeline."""
+        """Price of a cycle; by default that of the adaptive pipeline."""
         return Price(self.config.batch_size * self.config.samples, adaptive_stages=True)
 
     @abstractmethod
@@ -186,24 +188,24 @@ class Policy(ABC, Generic[State]):
 
     @abstractmethod
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
-        """What is to be rendered in a cycle."""
+        """The batch to render in a cycle."""
 
     @abstractmethod
     def observe(
         self, state: State, batch: FrameletBatch, samples: SampleBatch, moment: Moment, timer: StageTimer
     ) -> State:
-        """Takes in what the renderer answered; ``timer`` takes the seconds of the stages by name."""
+        """Updates the state by the renderer's samples; ``timer`` receives the durations of the stages by name."""
 
     @abstractmethod
     def image(self, state: State, moment: Moment) -> Picture:
         """The image at the end of a cycle."""
 
     def fitted(self, shown: Picture) -> Picture:
-        """What goes onto the display, of the shape of the output: the window of a picture of the whole plane."""
+        """The picture in the shape of the output: the window of a picture of the whole plane."""
         return cropped(shown, self.config.window)
 
     def probe(self, trace: Trace, time_s: float) -> tuple[Mapping[str, int], float]:
-        """What a cycle takes, from throw-away ones before a run: work counted, and wall seconds."""
+        """Cost of a cycle, from throw-away ones before a run: counts of work, and wall seconds."""
         state = self.start()
         for cycle in range(self.probe_cycles):
             done = step(self, state, trace, Moment(time_s, cycle, 1.0))
@@ -211,7 +213,7 @@ class Policy(ABC, Generic[State]):
         return done.counters, done.timer.total
 
     def record(self, cycle: Cycle[State], moment: Moment, cost_s: float) -> StepRecord | None:
-        """What is kept of a cycle; None where there is nothing to keep."""
+        """The record of a cycle; None where there is none."""
         return None
 
 
@@ -224,7 +226,7 @@ def run(
     from them.
 
     Args:
-        policy: who decides.
+        policy: policy to run.
         trace: the renderer.
         cycle_seconds: the clock.
         start_s, end_s: span of animation time to cover, seconds.
@@ -249,7 +251,7 @@ def run(
 
 
 def cropped(shown: Picture, window: Window) -> Picture:
-    """The picture of one that may be of the whole plane."""
+    """The window of a picture that may cover the whole plane."""
     if window.whole:
         return shown
     samples, carried = shown.sample_map, shown.carried

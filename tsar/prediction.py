@@ -1,4 +1,4 @@
-"""Poses of a time that is still to come, from those that are known."""
+"""Prediction of future poses from known ones."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from torch import Tensor
 from tsar.types import Viewpoint
 
 STEADY = 0.5
-"""Greatest change of a step from that before, as a share of it, at which a motion is taken to go on."""
+"""Greatest change between successive steps of a motion, as a share of the step, up to which it is extrapolated."""
 
 
 def predicted(known: Sequence[Viewpoint], time_s: float) -> Viewpoint:
-    """The poses of a later time, if what moves goes on as it did.
+    """The poses of a later time, by linear extrapolation of steady motions.
 
-    With the poses ``T`` of the newest time, ``T'`` and ``T''`` of those before, a pose becomes ``T + a (T - T')``,
-    where ``a`` is the time to come over that between the newest two. Rotation and translation of camera and rigid
-    motions go on each for itself, and only where they are steady: no entry of ``(T - T') - (T' - T'')`` is beyond half
-    of the greatest of ``T - T'``. What starts, stops or jumps stays where it was last known.
+    Let ``T``, ``T'`` and ``T''`` be the newest pose and the two before it. The predicted pose is ``T + a (T - T')``,
+    where ``a`` is the time to the prediction over the time between the newest two. The rotation and the translation of
+    the camera and of each rigid motion are extrapolated separately, and only where they are steady: no entry of
+    ``(T - T') - (T' - T'')`` is beyond half of the greatest of ``T - T'``. A motion that starts, stops or jumps keeps
+    its last known pose.
 
     Args:
-        known: the newest poses last, at equal steps of time; fewer than three are not continued.
-        time_s: of the prediction.
+        known: poses at equal steps of time, the newest last; fewer than three are not extrapolated.
+        time_s: time of the prediction, seconds.
 
     Returns:
-        The newest view with poses of ``time_s``. Matrices are continued entry by entry: they are rotations up to the
-        square of the angle between views.
+        The newest view with the poses of ``time_s``. Matrices are extrapolated entry by entry, so they are rotations up
+            to the square of the angle between views.
     """
     now = known[-1]
     if len(known) < 3 or not now.time_s > known[-2].time_s:
@@ -53,7 +54,7 @@ def foretold(view: Callable[[float], Viewpoint], now_s: float, cycle_s: float) -
     """The poses a cycle later, :func:`predicted` from those of now and of one and two cycles before.
 
     Args:
-        view: tells the poses of a time.
+        view: gives the poses of a time.
         now_s: start of the cycle, seconds.
         cycle_s: its length, seconds.
     """

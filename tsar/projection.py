@@ -1,4 +1,4 @@
-"""Where on the image what was hit earlier is seen, by the poses of another time."""
+"""Projection of first hits onto the image at the poses of another time."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from tsar.types import Viewpoint
 def project(
     view: Viewpoint, instance: Int[Tensor, "*shape"], point: Float[Tensor, "*shape 3"]
 ) -> tuple[Float64[Tensor, "*shape 2"], Float64[Tensor, "*shape"]]:
-    """Takes first hits (:class:`tsar.types.Hits`) to the image.
+    """Projects first hits (:class:`tsar.types.Hits`) onto the image.
 
-    A point ``p`` of track ``k`` lies at ``q = C (R_k p + t_k) + c`` before the camera, with ``C, c`` from the world to
-    the camera. A perspective camera sees it at ``x = (1 + q_x / (-q_z tan_x)) / 2`` and
-    ``y = (1 - q_y / (-q_z tan_y)) / 2``; where rays are parallel ``-q_z`` is left out. A lens is a pinhole at its
-    centre. All of it is in float64, element by element: the same bits on any number of threads.
+    A point ``p`` of track ``k`` has the camera coordinates ``q = C (R_k p + t_k) + c``, with ``C, c`` from the world to
+    the camera. A perspective camera shows it at ``x = (1 + q_x / (-q_z tan_x)) / 2`` and
+    ``y = (1 - q_y / (-q_z tan_y)) / 2``; where rays are parallel, ``-q_z`` is omitted. A lens is treated as a pinhole
+    at its centre. All arithmetic is in float64, element by element, and gives the same bits for any number of threads.
 
     Args:
         view: camera and poses.
-        instance: number of the instance, -1 for what is seen at infinity.
-        point: in the space of the instance's track, scene units; a direction in the world for what is seen at infinity.
+        instance: number of the instance, -1 for a hit at infinity.
+        point: in the space of the instance's track, scene units; for a hit at infinity, a direction in the world.
 
     Returns:
         Position on the image plane, ``(x, y)`` from the top left corner, in ``[0, 1)`` where the picture shows it; and
-        depth along the axis of the camera, in scene units (times the scale of the camera's placement), ``inf`` for what
-        is seen at infinity. What lies behind the camera has a depth of 0 or below, ``-inf`` at infinity, and a position
-        of NaN with a perspective camera. A camera of parallel rays sees a point at infinity everywhere or nowhere, so
-        that its position is NaN.
+            depth along the axis of the camera, in scene units (times the scale of the camera's placement), ``inf`` at
+            infinity. A point behind the camera has a depth of at most 0, ``-inf`` at infinity, and with a perspective
+            camera the position NaN. With parallel rays a point at infinity is visible everywhere or nowhere, so its
+            position is NaN.
 
     Raises:
-        ValueError: the view is a panorama, whose angles differ in the last bit between processors.
+        ValueError: the view is a panorama, whose angles would differ in the last bit between processors.
     """
     if view.kind == "panorama":
         raise ValueError("project: expected a perspective or parallel camera, got a panorama")
@@ -58,8 +58,9 @@ def project(
 
 
 def to_camera(view: Viewpoint) -> tuple[Float64[Tensor, "rows 3 3"], Float64[Tensor, "rows 3"]]:
-    """Matrix and offset from each instance's track to the camera; the last row is for directions in the world."""
-    # by rows and columns: a matrix product's bits may depend on the library
+    """Matrix and offset from each instance's track to the camera; the last row is for directions in the world (hits at
+    infinity)."""
+    # by rows and columns: the bits of a matrix product may depend on the library
     camera = view.to_camera
     rotation = sum(camera[:, k, None] * view.rotation[:, k, None, :] for k in range(3))
     offset = sum(camera[:, k] * view.translation[:, k, None] for k in range(3)) + view.to_camera_offset

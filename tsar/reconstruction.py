@@ -3,11 +3,11 @@
 Source: Stephens 2011, sec. 4.2.
 
 Deviation: framelets finer than the pixel grid are box-filtered to pixels before they are accumulated (a bilinear kernel
-as narrow as their sample spacing would skip samples); the age field is taken over each tile's own extent, not the
-extent enlarged by half a sample, so that across a border the older neighbour still passes and the two blend.
+as narrow as their sample spacing would skip samples); the age field of a tile covers its own extent, not that enlarged
+by half a sample, so that across a border the older neighbour still passes and the two blend.
 
-Deviation: the ages are smoothed over 9 pixels by default; table 7.1 has 128, which makes nearly everything as old as
-the oldest tile around and so blends moving objects with what lay there before.
+Deviation: the ages are smoothed over 9 pixels by default. Table 7.1 has 128, which makes nearly every pixel as old as
+the oldest tile around it and so blends moving objects with outdated framelets.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ from tsar.morton import deinterleave, morton_to_raster, raster_to_morton
 from tsar.types import SampleMap
 
 SHIFT_CYCLES = 0.5
-"""Added to the cycles by which a framelet is newer than the age field; the sum is its temporal weight."""
+"""Offset in cycles: the temporal weight of a framelet is this plus the cycles by which it is newer than the age
+field."""
 AGE_STEPS = 2.0**16
-"""Ages are rounded to this fraction of a cycle, one in so many, before they are smoothed."""
+"""Steps per cycle to which ages are rounded before they are smoothed."""
 AGE_MOST = 1.0e6
 """Greatest age, cycles."""
 
@@ -41,7 +42,7 @@ class Reconstruction:
     Attributes:
         image: ``(resolution, resolution, 3)`` float32 linear RGB, finite everywhere.
         sample_map: age and density of the newest samples over each tile of the finest level.
-        overdraw: framelets that were accumulated, in units of the image area.
+        overdraw: total area of the accumulated framelets, in units of the image area.
     """
 
     image: Float[Tensor, "h w 3"]
@@ -50,27 +51,27 @@ class Reconstruction:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Work done, by name."""
+        """Counts of the work done, by name."""
         return {"framelet_pixels": round(self.overdraw * self.image.shape[0] * self.image.shape[1])}
 
 
 def reconstruct(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
-    """The image of a cache by the method of the configuration; arguments are those of :func:`blend`."""
+    """Reconstructs the image of a cache by the method of the configuration; arguments are those of :func:`blend`."""
     return RECONSTRUCTIONS[config.reconstruction.method](cache, config, cycle_s)
 
 
 def blend(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
-    """Accumulate every cached sample that is not older than the smoothed age field.
+    """Accumulates every cached sample that is not older than the smoothed age field.
 
-    Marks the framelets that did not pass anywhere as dead in the cache.
+    Framelets that are older everywhere are marked as dead in the cache.
 
     Args:
-        cache: framelets; changed in place only by its ``dead`` flags.
+        cache: cached framelets; only its ``dead`` flags are changed, in place.
         config: resolution and smoothing width.
         cycle_s: length of a cycle, the unit of the temporal weight, seconds.
 
     Returns:
-        The image. The same cache gives the same bits.
+        The image, with the same bits for the same cache.
     """
     sample_map = newest_samples(cache, config)
     newest = sample_map.newest_s
@@ -86,7 +87,8 @@ def blend(cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstru
 
 
 def newest_samples(cache: FrameletCache, config: TsarConfig) -> SampleMap:
-    """Newest timestamp over each tile of the finest level, and the level it came from, the finer of two."""
+    """Newest sample time over each tile of the finest level, and the level of its framelet; of two equally new ones the
+    finer level."""
     newest = torch.full((4**config.level_min,), -torch.inf, dtype=torch.float64)
     source = torch.full((4**config.level_min,), config.level_min)
     for level in range(config.level_min, config.level_max + 1):
@@ -105,8 +107,9 @@ def smooth_age(newest: Float[Tensor, "side side"], resolution: int, support_px: 
     """The age field at output pixels after one-sided smoothing: it may only become older, never newer.
 
     A box filter of ``support_px`` over pixels, borders repeated. The field is constant over each finest tile, so the
-    filter is a product with one small matrix on either side. It sums whole numbers, of pixels and of ``1 / 65536``
-    cycles, which float64 holds exactly: the order in which a matrix product adds depends on the number of threads.
+    filter is a product with one small matrix on either side. It sums integers, pixels times units of ``1 / 65536``
+    cycle, which float64 holds exactly; so the order of the additions, which depends on the number of threads, has no
+    effect.
 
     Source: Stephens 2011, sec. 4.2.3 and fig. 4.6.
     """
@@ -121,7 +124,7 @@ def smooth_age(newest: Float[Tensor, "side side"], resolution: int, support_px: 
 
 @lru_cache(maxsize=8)
 def _box_matrix(resolution: int, side: int, support_px: int) -> Float[Tensor, "h side"]:
-    """Pixels of each of ``side`` cells in the box around each pixel along one axis, float64."""
+    """Number of pixels of each of ``side`` cells within the box around each pixel along one axis, float64."""
     half = support_px // 2
     reach = torch.arange(resolution)[:, None] + torch.arange(-half, half + 1)
     cell = reach.clamp(0, resolution - 1) // (resolution // side)
@@ -130,11 +133,11 @@ def _box_matrix(resolution: int, side: int, support_px: int) -> Float[Tensor, "h
 
 @lru_cache(maxsize=32)
 def spatial_weights(side: int, width_px: int) -> tuple[Float[Tensor, "p side"], int]:
-    """Weights of a tile's samples at output pixels along one axis, and the pixels of margin on either side.
+    """Weights of a tile's samples at output pixels along one axis, and the width of the margin on either side, pixels.
 
-    Bilinear about each sample, reaching half a sample spacing beyond the tile. Edge rows hold only their share of the
-    interpolation: the neighbouring tile, whose margin covers them, adds the rest. For tiles whose samples are at least
-    a pixel apart.
+    The weights are bilinear about each sample and reach half a sample spacing beyond the tile. Rows at the edge hold
+    only their share of the interpolation; the neighbouring tile, whose margin covers them, adds the rest. Valid for
+    tiles whose samples are at least a pixel apart.
     """
     spacing = width_px / side
     margin = max(0, int(torch.tensor(spacing / 2 + 0.5).ceil()) - 1)
@@ -146,11 +149,11 @@ def spatial_weights(side: int, width_px: int) -> tuple[Float[Tensor, "p side"], 
 
 
 def round_bits(value: Float[Tensor, "*n"], bits: int) -> Float[Tensor, "*n"]:
-    """Float32 values rounded to so many significant bits.
+    """Float32 values rounded to ``bits`` significant bits.
 
-    A product of such a value with a bilinear weight, a multiple of ``1 / (2 spacing)``, is then exact, and a sum of the
-    two that meet at a pixel rounds once, in whatever order, fused or not. So a matrix product that interpolates gives
-    the same bits for any number of threads, which the libraries behind it do not promise.
+    The product of such a value with a bilinear weight, a multiple of ``1 / (2 spacing)``, is exact, and the sum of the
+    two products at a pixel is rounded once, in any order, fused or not. So a matrix product that interpolates gives the
+    same bits for any number of threads, which libraries do not guarantee otherwise.
     """
     dropped = 24 - bits
     return ((value.view(torch.int32) + (1 << dropped - 1)) & -(1 << dropped)).view(torch.float32)
@@ -159,9 +162,9 @@ def round_bits(value: Float[Tensor, "*n"], bits: int) -> Float[Tensor, "*n"]:
 class _Accumulator:
     """Sums of weighted colour and weight over the output image.
 
-    Two layouts, added up at the end. Tiles whose samples are at most a pixel apart reach no further than their own
-    pixels, so they accumulate in Morton order, where a tile is one contiguous row and no sample moves. Coarser tiles
-    overlap their neighbours by half a sample and accumulate in raster order, with a margin around the image.
+    It has two layouts, which are added at the end. Tiles whose samples are at most a pixel apart cover only their own
+    pixels, so they accumulate in Morton order, where a tile is contiguous and no sample is moved. Coarser tiles overlap
+    their neighbours by half a sample and accumulate in raster order, with a margin around the image.
     """
 
     def __init__(
@@ -178,7 +181,7 @@ class _Accumulator:
         self.pairs = 0
 
     def add_level(self, level: int) -> None:
-        """Splat all framelets of one level that are not older than the age field everywhere."""
+        """Splats all framelets of one level that are not older than the age field everywhere."""
         width = self.config.resolution_px >> level
         slot = (self.cache.level == level).nonzero().squeeze(1)
         if slot.numel() == 0:
@@ -197,7 +200,7 @@ class _Accumulator:
         slot = self._passing(slot, threshold.amin(1)[self.cache.index[slot]])
         tile = self.cache.index[slot]
         weight = self._temporal_weight(slot, threshold.index_select(0, tile))
-        # Pixels of a tile are runs of its samples, both being in Morton order.
+        # Each pixel of a tile is a run of its samples, as both are in Morton order.
         per_pixel = self.config.samples // width**2
         color = self.cache.color.index_select(0, slot)
         color = color if per_pixel == 1 else color.unflatten(1, (width**2, per_pixel)).mean(2)
@@ -208,7 +211,7 @@ class _Accumulator:
     def _add_coarse(self, level: int, width: int, slot: Int64[Tensor, " n"]) -> None:
         side = self.config.framelet_side
         weights, margin = spatial_weights(side, width)
-        # Least threshold over each tile with its margin decides whether a framelet can contribute at all.
+        # The least threshold over a tile and its margin decides whether a framelet can contribute at all.
         inset = self.margin - margin
         field = self.threshold[inset : self.stride - inset, inset : self.stride - inset]
         least = -F.max_pool2d(-field[None, None], width + 2 * margin, stride=width)[0, 0]
@@ -238,7 +241,7 @@ class _Accumulator:
         return torch.where(newer >= 0, newer + SHIFT_CYCLES, 0.0)
 
     def normalised(self) -> Float[Tensor, "h w 3"]:
-        """Divide by the weight; where nothing passed, fill from the surroundings."""
+        """The image: sums divided by weights, with holes filled from their surroundings."""
         resolution = self.config.resolution_px
         inner = slice(self.margin, self.margin + resolution)
         total = self.fine.index_select(0, raster_to_morton(resolution)).reshape(resolution, resolution, 4)

@@ -13,16 +13,16 @@ _NEWTON_STEPS = 5
 def square_root(value: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
     """Square roots on the CPU, correctly rounded as IEEE 754 demands; NaN below zero.
 
-    ``torch.sqrt`` does not serve: the library behind it misses the last bit of some roots (one in five on an AMD EPYC),
-    and which ones these are depends on the processor.
+    ``torch.sqrt`` is not used: its library gets the last bit of some roots wrong (one in five on an AMD EPYC), and
+    which ones depends on the processor.
     """
     with np.errstate(invalid="ignore"):
         return torch.as_tensor(np.sqrt(value.numpy()))
 
 
 def cube_root(value: Float64[Tensor, "*n"]) -> Float64[Tensor, "*n"]:
-    """Cube roots of positive numbers, to a few units of the last place, by Newton's steps on ``x = m 2^(3k)``: sums,
-    products and quotients alone."""
+    """Cube roots of positive numbers, to a few units in the last place, by Newton's method on ``x = m 2^(3k)``, which
+    uses only sums, products and quotients."""
     _, exponent = np.frexp(value.numpy())
     third = exponent // 3
     part = np.ldexp(value.numpy(), -3 * third)  # in [1/2, 4)
@@ -33,5 +33,5 @@ def cube_root(value: Float64[Tensor, "*n"]) -> Float64[Tensor, "*n"]:
 
 
 def encoded(color: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
-    """Linear radiance to a scale on which equal differences look about equal: the root of what is clipped to [0, 1]."""
+    """Linear radiance on a scale on which equal differences look about equal: ``sqrt(clip(c, 0, 1))``."""
     return square_root(color.clamp(0.0, 1.0))

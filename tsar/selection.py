@@ -1,4 +1,4 @@
-"""Which tiles are rendered next, and where their samples lie.
+"""Selection of the tiles to render next, and the positions of their samples.
 
 Source: Stephens 2011, sec. 3.4.4.1.
 """
@@ -20,11 +20,11 @@ from tsar.types import FrameletBatch, Tiling
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be rendered next.
+    """The tiles to render next.
 
     Attributes:
-        selected: tiles by their number in the tiling.
-        history: credit that is left on the field.
+        selected: indices of the tiles in the tiling.
+        history: remaining credit of the field's elements.
         level, index, position: as in :class:`tsar.types.FrameletBatch`.
     """
 
@@ -35,13 +35,13 @@ class Request:
     position: Float[Tensor, "b samples 2"]
 
     def at(self, time_s: float, cycle: int, config: TsarConfig) -> FrameletBatch:
-        """The request to the renderer: every sample of the batch at one animation time."""
+        """The batch for the renderer: all its samples have one animation time."""
         return FrameletBatch(self.level, self.index, self.position, time_s, cycle=cycle, seed=config.seed)
 
 
 def initial_history(config: TsarConfig) -> Float64[Tensor, " e"]:
-    """Credit of every element before the first cycle: a seeded permutation in [0, 1), so that tiles of equal temporal
-    density fall due in an order that differs between seeds and is the same for equal seeds."""
+    """Credit of every element before the first cycle: a seeded permutation in [0, 1), so that the order in which tiles
+    of equal temporal density fall due depends on the seed alone."""
     generator = torch.Generator().manual_seed(config.seed)
     count = config.sdf_side**2
     return torch.randperm(count, generator=generator).to(torch.float64) / count
@@ -52,11 +52,11 @@ def select(
 ) -> tuple[Int64[Tensor, " b"], Float64[Tensor, " e"]]:
     """The ``batch_size`` most overdue tiles.
 
-    Each element gathers its temporal density every cycle, a tile is as overdue as the mean credit of the elements it
-    covers, and rendering a tile takes one refresh off its credit. Credit lives on the field, so it survives re-tiling.
-    The credit that is left after a refresh is kept in [-1, 1]. Fractional rates then come out right on average. Where
-    more or fewer tiles fall due than a batch holds, all rates shrink or grow in proportion. As every density is
-    positive, every tile is rendered at some time.
+    Each element accumulates its temporal density as credit every cycle. The priority of a tile is the mean credit of
+    its elements, and rendering it subtracts one refresh; the remaining credit is clamped to [-1, 1]. Credit belongs to
+    the field, so it survives re-tiling. Fractional rates are then met on average. Where more or fewer tiles fall due
+    than a batch holds, all rates shrink or grow in proportion. Every density is positive, so every tile is rendered
+    eventually.
 
     Returns:
         Indices into the tiling in Morton order, and the history for the next cycle. Ties go to the earlier tile.
@@ -77,10 +77,10 @@ def select(
 
 
 def require_full(tile_count: int, batch_size: int) -> None:
-    """Refuses a tiling that cannot fill a batch.
+    """Rejects a tiling that cannot fill a batch.
 
     Raises:
-        ValueError: it has fewer tiles.
+        ValueError: the tiling has fewer tiles than a batch.
     """
     if tile_count < batch_size:
         raise ValueError(f"selection: expected at least {batch_size} tiles, a full batch, got {tile_count}")
@@ -94,8 +94,8 @@ def cell_centres(side: int) -> Float[Tensor, "samples 2"]:
 
 
 def sample_positions(level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], side: int) -> Float[Tensor, "n samples 2"]:
-    """Where each tile's samples lie on the image plane, in ``[0, 1)``: the centres of a regular grid, always the same
-    for the same tile, so that a static picture gives identical samples and no temporal error.
+    """Positions of each tile's samples on the image plane, in ``[0, 1)``: the centres of a regular grid, fixed for each
+    tile, so that a static picture gives identical samples and no temporal error.
 
     Every coordinate is a multiple of ``1 / 65536`` and exact in float32. Source: Stephens 2011, sec. 3.4.4.2.
     """
@@ -107,7 +107,7 @@ def sample_positions(level: Int64[Tensor, " n"], index: Int64[Tensor, " n"], sid
 def request(
     tiling: Tiling, temporal_density: Float64[Tensor, " e"], history: Float64[Tensor, " e"], config: TsarConfig
 ) -> Request:
-    """The most overdue tiles by :func:`select`, and where their samples lie."""
+    """The most overdue tiles by :func:`select`, and the positions of their samples."""
     selected, credit = select(tiling, temporal_density, history, config)
     level, index = tiling.level[selected], tiling.index[selected]
     return Request(selected, credit, level, index, sample_positions(level, index, config.framelet_side))

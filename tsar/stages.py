@@ -1,7 +1,7 @@
-"""The stages as the pipeline sees them: a record of functions, handed in as the renderer is.
+"""The stages as the pipeline calls them: a record of functions that is passed in, as the renderer is.
 
-The functions of this package are the reference: any tensor, any device, one operation a line. A compiled set computes
-the same within rounding; where it does not cover a configuration it holds the function of the reference.
+The functions of this package are the reference, tensor operations on any device. A compiled set computes the same up to
+rounding; for a configuration that it does not cover it contains the function of the reference.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ Field = Float64[Tensor, " e"]
 
 @dataclass(frozen=True)
 class Stages:
-    """One function a group of stages; arguments and results are those of the reference, which is the default.
+    """One function per group of stages; arguments and results are those of the reference, which is the default.
 
     Attributes:
-        observe: errors of a batch; its colours and wavelet states into the cache, in place.
-        decide: new densities, their tiling, and what is due in it.
-        reconstruct: image; flags dead framelets in the cache, in place.
-        account: sums for the record of the cycle.
-        filtering: those of the policies ``filter`` and ``tsar``.
+        observe: estimates the errors of a batch and stores its colours and wavelet states in the cache, in place.
+        decide: returns new densities, their tiling, and the tiles due in it.
+        reconstruct: returns the image and flags dead framelets in the cache, in place.
+        account: returns the sums for the record of the cycle.
+        filtering: stages of the policies ``filter`` and ``tsar``.
     """
 
     observe: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig, StageTimer], Observation] = observe
@@ -47,9 +47,9 @@ class Stages:
 
 
 REFERENCE = Stages()
-"""Tensor operations throughout, for a picture that is a square of a power of two."""
+"""The reference, for a square picture whose side is a power of two."""
 
 
 def reference(config: TsarConfig) -> Stages:
-    """Tensor operations throughout, for the picture of a configuration."""
+    """The reference, for the picture of a configuration."""
     return Stages(filtering=filtering_of(config.window))

@@ -3,7 +3,7 @@
 Source: Stephens 2011, sec. 4.1.6.
 
 Deviation: the thesis walks intervals of the curve with a token stack per thread and restarts the kernel until the
-tiling is full. Here every node of the quadtree decides at once: a node splits when the samples asked for within it
+tiling is full. Here every node of the quadtree decides at once: a node splits when the samples requested within it
 exceed the threshold. A parent's integral is never below its child's, so the split nodes are closed under ancestors and
 the tiling is the set of nodes that do not split under a parent that does. A bound on the number of tiles is then a
 bound on the number of splits, met by raising the threshold to the right order statistic: no stack, no restart, no loop
@@ -30,7 +30,7 @@ def uniform(level: int) -> Tiling:
 
 
 def build(spatial_density: Float[Tensor, " e"], config: TsarConfig) -> Tiling:
-    """Tiling whose tiles hold about ``threshold_samples`` of the asked-for samples each.
+    """A tiling whose tiles hold about ``threshold_samples`` of the requested samples each.
 
     Args:
         spatial_density: θ_s, samples per element, Morton order, non-negative and finite.
@@ -61,10 +61,10 @@ def build(spatial_density: Float[Tensor, " e"], config: TsarConfig) -> Tiling:
 
 
 def require_densities(field: Float[Tensor, " e"], where: str) -> None:
-    """Refuses a field that holds negative or non-finite values.
+    """Rejects a field that holds negative or non-finite values.
 
     Raises:
-        ValueError: it does.
+        ValueError: the field holds such values.
     """
     if not bool(torch.isfinite(field).all()) or bool((field < 0).any()):
         raise ValueError(f"{where}: expected finite, non-negative densities")
@@ -73,10 +73,10 @@ def require_densities(field: Float[Tensor, " e"], where: str) -> None:
 def node_integrals(
     field: Float[Tensor, " e"], field_level: int, level_low: int, level_high: int
 ) -> list[Float[Tensor, " nodes"]]:
-    """Sum of the field over every quadtree node, for levels ``level_low`` to ``level_high``, in float64.
+    """Sums of the field over every quadtree node, for levels ``level_low`` to ``level_high``, in float64.
 
-    Sums of four children at a time: unlike a difference of prefix sums, a parent can then never come out smaller than
-    its child through rounding, whatever the range of the field.
+    Each sum is that of its four children: unlike a difference of prefix sums, a parent can then never be less than its
+    child through rounding, whatever the range of the field.
     """
     sums = [field.to(torch.float64)]
     for _ in range(field_level - level_low):
@@ -94,7 +94,7 @@ def split_bounds(config: TsarConfig) -> tuple[int, int]:
 
 
 def _choose_splits(candidates: Float[Tensor, " nodes"], integrals: list[Tensor], config: TsarConfig) -> list[Tensor]:
-    """Which nodes of the levels above the finest split, as one boolean tensor a level."""
+    """The nodes that split, one boolean tensor for each level above the finest."""
     least, most = split_bounds(config)
     wanted = int((candidates > config.threshold_samples).sum())
     count = min(max(wanted, least), most, candidates.numel())

@@ -17,7 +17,7 @@ from torch import Tensor
 from tsar.checks import closed_choices
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Shares of linear red, green and blue in luminance, by Rec. 709."""
+"""Weights of linear red, green and blue in the luminance of Rec. 709."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Tiling:
 
 @dataclass(frozen=True)
 class FrameletBatch:
-    """What the renderer is asked for: tiles of ``s * s`` samples.
+    """A request to the renderer: tiles of ``s * s`` samples.
 
     Attributes:
         level, index: the tile of each framelet, as in :class:`Tiling`.
@@ -47,11 +47,11 @@ class FrameletBatch:
             within a framelet. Multiples of ``1 / 65536`` where the image is a square, so exact in float32.
         time_s: animation time of each sample, seconds, float64 (float32 is 4 ms off at 1e5 s); one number where they
             have the same.
-        cycle: pipeline cycle that asked for it.
-        seed: of the run that asked for it. What a renderer draws itself it derives from positions and times.
-        hits: whether the first hits are asked for.
-        footprint: what the width that a renderer filters textures over is multiplied by for each sample; below 1 is
-            sharper. Finite and above 0; None for 1 everywhere.
+        cycle: pipeline cycle that requests it.
+        seed: seed of the run. A renderer derives its own random numbers from positions and times.
+        hits: whether first hits are requested.
+        footprint: factor of the width over which textures are filtered, for each sample; below 1 is sharper. Finite and
+            above 0; None for 1 everywhere.
     """
 
     level: Int64[Tensor, " n"]
@@ -65,7 +65,7 @@ class FrameletBatch:
 
     @property
     def times(self) -> Float64[Tensor, "n samples"]:
-        """Animation time of each sample, seconds; one number in memory where they have the same."""
+        """Animation time of each sample, seconds; stored as one number if it is the same for all."""
         if isinstance(self.time_s, Tensor):
             return self.time_s
         return torch.full((1, 1), self.time_s, dtype=torch.float64).expand(self.position.shape[:2])
@@ -73,18 +73,18 @@ class FrameletBatch:
 
 @dataclass(frozen=True)
 class Hits:
-    """What the camera rays of a batch meet first.
+    """First hits of the camera rays of a batch.
 
     Attributes:
-        instance: number of the instance as the renderer holds them, where meshes that move together are one; -1 for
-            what is seen at infinity.
-        point: on the camera ray, in the space of the instance's track, in scene units: the space that the rigid motion
-            acts on, or the world for what stands still. For what is seen at infinity, the unit direction of the ray in
-            the world. :func:`tsar.projection.project` takes both back to the image.
-        occluder: instance that keeps the first light from the point, -1 where that light is seen, -2 where it is not
-            asked: it lies behind the surface, the surface reflects none of it, or nothing was hit. Of several instances
-            it is one that stands still, if any does. Lamps that are instances come before other lights; of a lamp with
-            an extent it is what the first shadow ray meets.
+        instance: number of the instance in the renderer, where meshes that move together are one instance; -1 at
+            infinity.
+        point: hit point in the space of the instance's track, in scene units: the space on which the rigid motion acts,
+            or the world for a static instance. At infinity, the unit direction of the ray in the world.
+            :func:`tsar.projection.project` projects both back onto the image.
+        occluder: instance that hides the first light from the point; -1 where that light is visible; -2 where no shadow
+            ray is traced, because the light lies behind the surface, the surface reflects none of it, or nothing was
+            hit. Of several instances it is a static one, if there is any. Lamps that are instances precede other
+            lights; for a lamp with an extent it is the first hit of the first shadow ray.
     """
 
     instance: Int32[Tensor, "n samples"]
@@ -95,16 +95,16 @@ class Hits:
 @dataclass(frozen=True)
 @closed_choices()
 class Viewpoint:
-    """Where the camera and all instances are at one time, in the world of the renderer that made it.
+    """Poses of the camera and all instances at one time, in the world of the renderer.
 
     Attributes:
         time_s: animation time, seconds.
-        track_of_instance: the rigid motion of each instance; 0 does not move.
-        rotation, translation: of each rigid motion, from its space to the world.
+        track_of_instance: number of the rigid motion of each instance; 0 is static.
+        rotation, translation: pose of each rigid motion, from its space to the world.
         to_camera, to_camera_offset: matrix and offset from the world to the camera, which looks along -z with x to the
-            right and y up. It holds the scale of the camera's own placement, if that has one.
-        kind: of the projection. A lens is a pinhole at its centre.
-        tan_x, tan_y: tangents of the half angles of the image; its half size where rays are parallel.
+            right and y up. It includes the scale of the camera's placement, if there is one.
+        kind: kind of the projection. A lens is treated as a pinhole at its centre.
+        tan_x, tan_y: tangents of the half angles of the image; half of its size where rays are parallel.
     """
 
     time_s: float
@@ -120,13 +120,13 @@ class Viewpoint:
 
 @dataclass(frozen=True)
 class SampleBatch:
-    """What the renderer answers.
+    """The renderer's answer to a batch.
 
     Attributes:
         color: linear RGB radiance, float32, Morton order within a framelet. May hold non-finite values: the next stage
             counts and replaces them.
         counters: work done, by name (``primary_rays``, ``shadow_rays``, ``reflection_rays``, …).
-        hits: what the camera rays meet first, where it was asked for.
+        hits: first hits, where they were requested.
     """
 
     color: Float[Tensor, "n samples 3"]
@@ -135,7 +135,7 @@ class SampleBatch:
 
 
 Trace = Callable[[FrameletBatch], SampleBatch]
-"""The renderer as the pipeline sees it."""
+"""The renderer as the pipeline calls it."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Densities:
     Attributes:
         spatial: θ_s, samples per element.
         temporal: θ_t, refreshes per pipeline cycle, in (0, 1].
-        surplus: C, combined density not handed out, carried over cycles.
+        surplus: C, combined density that is not allocated, carried over between cycles.
     """
 
     spatial: Float64[Tensor, " e"]
@@ -159,7 +159,7 @@ class Densities:
 
 @dataclass(frozen=True)
 class Errors:
-    """Signed sample-rate errors over the elements in [-1, 1], float32; positive is undersampled, zero outside the
+    """Signed sample-rate errors over the elements in [-1, 1], float32; positive is undersampled, zero is outside the
     batch."""
 
     spatial: Float[Tensor, " e"]
@@ -168,11 +168,12 @@ class Errors:
 
 @dataclass(frozen=True)
 class SampleMap:
-    """What the samples shown in each part of an image are, raster order; the parts are equal squares, or the image.
+    """Time and density of the samples shown in each part of an image, raster order; the parts are equal squares, or the
+    image.
 
     Attributes:
         newest_s: animation time of the newest sample, seconds; ``-inf`` where nothing has been sampled yet.
-        level: quad level of the framelet it came in, which tells how densely it was sampled there.
+        level: quad level of its framelet, which determines the sampling density there.
     """
 
     newest_s: Float64[Tensor, "rows columns"]
@@ -181,8 +182,7 @@ class SampleMap:
 
 @dataclass(frozen=True)
 class MapShown:
-    """What a policy knows of every place of its image, for a page: positive values that are drawn on a logarithmic
-    scale.
+    """A map of a policy's state over its image, for reports: positive values that are drawn on a logarithmic scale.
 
     Attributes:
         values: raster order; the parts are equal squares.
@@ -197,7 +197,7 @@ class MapShown:
 
 @dataclass(frozen=True)
 class Spent:
-    """What one cycle took.
+    """The cost of one cycle.
 
     Attributes:
         cycle: its number, negative during warm-up.
@@ -217,14 +217,14 @@ class ShownImage:
     """An image as it goes onto the display.
 
     Attributes:
-        display_time_s: when it appears.
-        sample_time_s: animation time of its newest samples.
+        display_time_s: time at which it appears, seconds.
+        sample_time_s: animation time of its newest samples, seconds.
         image: ``(height, width, 3)`` float32 linear RGB.
-        sample_map: of what age and density its samples are.
-        maps: what else the policy knows of every place, by name.
-        spent: what the cycle that made it took; None where that was not counted.
-        carried: what the same blends of pixels make of another picture of the same time, linear RGB; None where pixels
-            are shown as they are.
+        sample_map: time and density of its samples.
+        maps: further maps of the policy's state, by name.
+        spent: cost of the cycle that made it; None where it was not counted.
+        carried: applies the same blends of pixels to another picture of the same time, linear RGB; None where pixels
+            are shown without blending.
     """
 
     display_time_s: float
@@ -238,13 +238,13 @@ class ShownImage:
 
 @dataclass(frozen=True)
 class StepRecord:
-    """What one cycle did, for the records on disk.
+    """The record of one cycle, for storage.
 
     Attributes:
         cycle: its number, negative during warm-up.
-        sim_time_s: animation time sampled.
-        cost_s: duration of the cycle on the chosen clock.
-        tiling: the tiling that was selected from.
+        sim_time_s: animation time of the samples, seconds.
+        cost_s: duration of the cycle on the chosen clock, seconds.
+        tiling: tiling from which tiles were selected.
         selected: indices of the selected tiles into ``tiling``.
         densities: after the response.
         errors: estimated from this cycle's batch.
@@ -252,10 +252,11 @@ class StepRecord:
         conservation_residual: ``|sum(θ_s θ_t) + C - budget| / budget``.
         stage_s: measured wall seconds per stage.
         counters: rays and other counts.
-        nonfinite: non-finite samples replaced.
-        nonfinite_fields: densities and errors that are not finite; there should be none.
+        nonfinite: number of non-finite samples replaced.
+        nonfinite_fields: number of non-finite densities and errors; it should be 0.
         age_spread_s: newest minus oldest sample time shown inside regions of fast refresh, seconds.
-        moved, saturated: elements whose densities the response changed, and those of them that it drove to a bound.
+        moved, saturated: number of elements whose densities the response changed, and of those that it drove to a
+            bound.
     """
 
     cycle: int

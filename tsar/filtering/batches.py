@@ -1,4 +1,4 @@
-"""A batch of samples taken into the estimates, the surfels and what is known of change."""
+"""The update of the estimates, the surfels and the observed change by a batch of samples."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from tsar.types import Hits, Viewpoint
 
 @dataclass(frozen=True)
 class Traced:
-    """What was traced in a cycle.
+    """The samples traced in a cycle.
 
     Attributes:
-        color: finite, at most :data:`tsar.filtering.samples.COLOR_MAX`.
-        position: on the image, pixels.
-        time_s: animation time.
-        spacing: of each tile, pixels.
-        now_s: start of the cycle.
-        cycle_s: length of the one before, seconds.
-        hits, view: first hits, and the poses that estimates were moved to; None where nothing is reprojected.
-        earlier: those of the cycle before; None where there was none.
+        color: linear RGB, finite, at most :data:`tsar.filtering.samples.COLOR_MAX`.
+        position: sample positions on the image, pixels.
+        time_s: animation time of each sample, seconds.
+        spacing: distance between samples of each tile, pixels.
+        now_s: start of the cycle, seconds.
+        cycle_s: length of the cycle before, seconds.
+        hits, view: first hits, and the poses to which estimates were moved; None without reprojection.
+        earlier: poses of the cycle before; None where there was none.
     """
 
     color: Float[Tensor, "n samples 3"]
@@ -54,8 +54,8 @@ def taken_in(
     A sample belongs to the pixel in which its first hit is seen at the start of the cycle.
 
     Args:
-        estimates, surfels: moved and aged to the start of the cycle. A compiled set writes into those that were moved.
-        known: change observed so far.
+        estimates, surfels: moved and aged to the start of the cycle. A compiled set of stages overwrites them.
+        known: change observed before the batch.
         traced: the batch.
         options: of the filter.
         picture: height and width of the part of the plane beyond which samples are left out; None for all of it.

@@ -1,4 +1,5 @@
-"""How fast the picture changes, from what new samples say of estimates that time alone had left as they were."""
+"""The rate at which the picture changes, observed from the residuals between new samples and the estimates in their
+pixels."""
 
 from __future__ import annotations
 
@@ -10,23 +11,24 @@ from torch import Tensor
 from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates, FilterOptions
 from tsar.roots import encoded
 
-TOLERANCE = 4.0  # variances that a squared residual may have before it speaks of change
-SURE = 4.0  # expected residuals beyond which what was remembered is dropped
+TOLERANCE = 4.0  # a squared residual beyond this many variances indicates change
+SURE = 4.0  # an excess beyond this many expected residuals discards most of the memory
 DROPPED = 0.1
 RATE_MIN = 1e-5
 SPAN_MIN_S = 1e-3
 BETWEEN = 0.8  # share of the roughness by which a sample differs from the mean of a pixel
-GAP_MOST_S = 1e3  # longer ones fade as this one does
-SHARE_NEAR, SHARE_AROUND = 0.5, 0.25  # of the greatest rates in 3 x 3 and 5 x 5 elements
+GAP_MOST_S = 1e3  # longer gaps fade as this one does
+SHARE_NEAR, SHARE_AROUND = 0.5, 0.25  # shares of the greatest rates in 3 x 3 and 5 x 5 elements
 
 
 def residuals(
     estimates: Estimates, color: Float[Tensor, "3 h w"], count: Float[Tensor, "1 h w"]
 ) -> tuple[Float[Tensor, "1 h w"], Float[Tensor, "1 h w"]]:
-    """What new samples differ by, and what is expected at most, variances.
+    """Residuals of new samples against the estimates, and the greatest that noise explains; variances.
 
     A pixel with ``k`` new samples has the residual ``d²``, the mean over the channels of the squared difference of
-    encoded colours, and ``4 (P + 0.8 g / k)`` is expected at most.
+    encoded colours, and at most ``4 (g i / 2 + 0.8 g / k)`` is expected from noise, with ``g`` the roughness and ``i``
+    the inverse of the estimate.
 
     Args:
         estimates: before the batch.
@@ -47,20 +49,21 @@ def observed(
     cycle_s: float,
     options: FilterOptions,
 ) -> Change:
-    """The rates after a batch.
+    """The rates of change after a batch.
 
     Per element ``N <- f N + sum(residual - expected)`` and ``D <- f D + sum(time between the samples)``; the rate is
-    ``max(N, 0) / D``, at least half of the greatest in the 3 x 3 elements around and a quarter of that in 5 x 5. What
-    is remembered fades with ``f``, and at once where the residuals are far beyond what was expected.
+    ``max(N, 0) / D``, at least half of the greatest in the 3 x 3 elements around it and a quarter of the greatest in 5
+    x 5. The factor ``f`` fades earlier observations; it is at most 0.1 where the residuals exceed the expected ones by
+    far.
 
-    Deviation: ``f = 1 / (1 + x + x²/2)`` with ``x`` the time since the element was seen over the memory, in place of
-    ``exp(-x)``, whose last bit is the processor's.
+    Deviation: ``f = 1 / (1 + x + x²/2)``, where ``x`` is the time since the element was last sampled divided by
+    ``memory_s``, in place of ``exp(-x)``, whose last bit depends on the processor.
 
     Args:
-        before: as it was.
-        residual, expected: what new samples differ by, and what is expected at most.
-        elapsed_s: time between the new samples of a pixel and those before.
-        compared: pixels that have both.
+        before: change observed before the batch.
+        residual, expected: residuals of new samples, and the greatest that noise explains.
+        elapsed_s: time between the new samples of a pixel and the samples before them, seconds.
+        compared: pixels that have both new and earlier samples.
         now_s, cycle_s: start of the cycle and length of the one before, seconds.
         options: of the filter.
     """

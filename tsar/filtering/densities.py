@@ -1,12 +1,12 @@
-"""Which tiles to sample, as the dissertation pictures it: densities of samples in space and in time, whose product is
-conserved, a tiling that follows the one and credit that gathers the other.
+"""Selection of tiles after the dissertation: densities of samples in space and in time, the sum of whose products is
+conserved; a tiling that follows the spatial density; and credit that accumulates the temporal one.
 
-Elements are those of change, of :data:`tsar.filtering.records.ELEMENT_PX` pixels a side.
+Elements are those in which change is observed, of :data:`tsar.filtering.records.ELEMENT_PX` pixels a side.
 
 Source: Stephens 2011, sec. 3.1.1, 4.1.6 and 3.4.4.1 for densities, tiling and selection.
 
-Deviation: the densities are the best ones for what is known of every element, in closed form, in place of a response
-that moves them by a step (chapter 6). Their sum is the budget, and there is no surplus.
+Deviation: the densities are optimal for the state of every element, in closed form; in the thesis a response moves them
+step by step (chapter 6). Their products sum to the budget, and there is no surplus.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from tsar.filtering.tiles import doubled, spacings
 from tsar.roots import cube_root, square_root
 
 SPATIAL = 1.0 / SPACINGS[0] ** 2, 1.0 / SPACINGS[-1] ** 2
-"""Least and greatest θ_s, samples per pixel: those of the coarsest and the finest tiles."""
+"""Least and greatest θ_s, samples per pixel: the densities of the coarsest and the finest tiles."""
 TEMPORAL = 1.0 / 128.0, 1.0
 """Least and greatest θ_t, refreshes per cycle."""
 _BISECTIONS = 40
@@ -36,18 +36,20 @@ def best(coarse: Field, stale: Field, mean: float) -> tuple[Field, Field]:
     """The densities θ_s, samples per pixel, and θ_t, refreshes per cycle, that minimise ``Σ (a / θ_s + b / θ_t)`` at
     ``Σ θ_s θ_t = budget``, within :data:`SPATIAL` and :data:`TEMPORAL`.
 
-    Inside the bounds ``θ_s = (a² / λb)^⅓`` and ``θ_t = (b² / λa)^⅓``. Where one of them is at a bound the other is
-    ``sqrt(a / λθ_t)`` or ``sqrt(b / λθ_s)``. The multiplier λ is found by bisection.
+    With ``a`` and ``b`` the arguments ``coarse`` and ``stale``, inside the bounds ``θ_s = (a² / λb)^⅓`` and
+    ``θ_t = (b² / λa)^⅓``. Where one of them is at a bound the other is ``sqrt(a / λθ_t)`` or ``sqrt(b / λθ_s)``. The
+    multiplier λ is found by bisection.
 
     Args:
-        coarse: ``a``, error that falls with θ_s: roughness. Above 0.
-        stale: ``b``, error that falls with θ_t: variance by change in a cycle. Above 0.
+        coarse: error ``a`` that falls with θ_s, the roughness; above 0.
+        stale: error ``b`` that falls with θ_t, the variance from change in a cycle; above 0.
         mean: budget, samples per pixel and cycle; between the products of the least and of the greatest densities.
     """
     spatial, temporal = cube_root(coarse * (coarse / stale)), cube_root(stale * (stale / coarse))
 
     def at(scale: float) -> tuple[Field, Field]:
-        """Both for ``λ = scale⁻³``; of the two ways to meet the bounds the better one, element by element."""
+        """Both densities for ``λ = scale⁻³``. A bound may be applied to either first; each element takes the better
+        result."""
         price = 1.0 / scale**3
         time = (temporal * scale).clamp(*TEMPORAL)
         space = (spatial * scale).clamp(*SPATIAL)
@@ -70,10 +72,10 @@ def best(coarse: Field, stale: Field, mean: float) -> tuple[Field, Field]:
 
 
 def tiling(spatial: Field) -> list[Bool[Tensor, "_ _"]]:
-    """Tiles that cover the image once, for every spacing which ones: a tile splits while more samples are asked for in
-    it than it holds. Of :func:`tsar.filtering.tiles.spacings`, coarsest first."""
+    """Tiles that cover the image once: a mask for every spacing of :func:`tsar.filtering.tiles.spacings`, coarsest
+    first. A tile is split while more samples are requested in it than it holds."""
     kinds = spacings(spatial.shape[-1] * ELEMENT_PX)
-    asked = [spatial * float(ELEMENT_PX**2)]  # of the finest tiles, each an element
+    asked = [spatial * float(ELEMENT_PX**2)]  # in the finest tiles, one per element
     for _ in kinds[1:]:
         asked.append(4.0 * F.avg_pool2d(asked[-1][None], 2)[0])
     found, there = [], torch.ones_like(asked[-1][0], dtype=torch.bool)
@@ -89,9 +91,9 @@ def due(
 ) -> tuple[list[Bool[Tensor, "_ _"]], Field]:
     """The ``count`` most overdue tiles of a tiling, and the credit that is left.
 
-    Every element gathers its θ_t each cycle. A tile is as overdue as the mean credit of its elements; a refresh takes 1
-    from it, and what is left is kept in [-1, 1]. Of equals the coarser comes first, and then the earlier in raster
-    order. All tiles, where there are fewer.
+    Every element accumulates its θ_t each cycle as credit. The priority of a tile is the mean credit of its elements; a
+    refresh subtracts 1, and the remainder is clamped to [-1, 1]. Among equal tiles the coarser comes first, then the
+    earlier in raster order. If the tiling has fewer than ``count`` tiles, all are taken.
     """
     credit = credit + temporal
     overdue = [credit]

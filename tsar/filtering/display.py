@@ -1,4 +1,4 @@
-"""Estimates as a picture: what is uncertain takes the colours of its surroundings."""
+"""The picture of the estimates: uncertain pixels take the colours of their surroundings."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ def displayed(
     seconds: float,
     picture: tuple[int, int] | None = None,
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
-    """Picture and variance of its errors some seconds later, :func:`smoothed`; surfels are those of the estimates, None
-    where nothing is reprojected. Pixels of the greatest variance do not count in their surroundings. Both are 0 outside
-    ``picture``, its height and width where it is not the whole plane, and it takes nothing from there."""
+    """Picture and variance of its errors ``seconds`` later, :func:`smoothed`. The surfels belong to the estimates; None
+    without reprojection. Pixels of the greatest variance do not contribute to their surroundings. ``picture`` is the
+    height and width of the picture where it is not the whole plane: both results are 0 outside it, and nothing outside
+    contributes."""
     later = estimates.later(rate, seconds)
     if surfels is not None:
         later = later.beside(surfels)
@@ -39,10 +40,10 @@ def smoothed(
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
     """Picture and variance of its errors, over a pyramid of means.
 
-    With ``s_l = g 2^l / 2`` at level ``l``, up: a parent is the mean of its children, weighted with
-    ``w = 1 / (P_l + s_l)``, and ``P_(l+1) = 1 / sum(w)``. Down: with ``J = P_l / (P_l + s_l)`` and the coarser level
-    enlarged bilinearly to ``x', V'``, ``x = m_l + J (x' - m_l)`` and ``V = P_l + J² (V' - P_l - s_l)``. Of an odd
-    number of rows or columns the last has parents of fewer children.
+    Let ``s_l = g 2^l / 2`` at level ``l``. Upwards, a parent is the mean of its children, weighted with
+    ``w = 1 / (P_l + s_l)``, and ``P_(l+1) = 1 / sum(w)``. Downwards, with ``J = P_l / (P_l + s_l)`` and the coarser
+    level enlarged bilinearly to ``x', V'``, ``x = m_l + J (x' - m_l)`` and ``V = P_l + J² (V' - P_l - s_l)``. Where the
+    number of rows or columns is odd, the last parent has fewer children.
     """
     levels = [(color, variance, roughness)]
     while max(levels[-1][0].shape[1:]) > 1:

@@ -1,4 +1,4 @@
-"""Estimates that go with their surfaces: every pixel takes the surfel that serves it best at new poses."""
+"""Estimates that move with their surfaces: at new poses, every pixel takes the best surfel that reaches it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tsar.types import Viewpoint
 
 NEARER = 1.0625  # a surface in front is nearer by this factor
 NEARER_COUNT = 6
-DEPTH_SHIFT = 18  # of the bits of a float32: steps of 1/32
+DEPTH_SHIFT = 18  # bits of a float32 that are dropped: depths in steps of 1/32
 DEPTHS = 1 << 13
 SCORES = 1 << 14
-SCORE_SCALE = 8e4  # scores of variances up to 0.2
-BESIDE = 0.5  # variance per roughness and pixel of distance
+SCORE_SCALE = 8e4  # scores cover variances up to 0.2
+BESIDE = 0.5  # variance per unit of roughness and pixel of distance
 
 
 def advanced(
@@ -30,7 +30,7 @@ def advanced(
     view: Viewpoint,
     picture: tuple[int, int] | None = None,
 ) -> tuple[Estimates, Surfels]:
-    """Estimates some seconds later, at a rate of change, and :func:`moved` to the poses of that time."""
+    """Estimates ``seconds`` later at a given rate of change, :func:`moved` to the poses of that time."""
     return moved(estimates.later(rate, seconds), surfels, view, picture)
 
 
@@ -46,14 +46,14 @@ def moved(
     A surfel serves the four pixels whose centres are nearest. A pixel prefers surfels that lie within it, the nearest
     to the camera first, and among those at the same depth the one of least ``P + g d / 2`` at a distance of ``d``
     pixels from its centre; then those beside it, the farthest from the camera first, so that surfaces do not grow.
-    Every pixel keeps its surfel's true place, so nothing is blurred however often it moves. Then surfels go that show
-    through gaps of a surface in front: six of their eight neighbours are nearer to the camera by 6 %.
+    Every pixel keeps its surfel's exact position, so repeated moves do not blur. Finally, surfels that show through
+    gaps of a surface in front are dropped: those of whose eight neighbours six are nearer to the camera by 6 %.
 
     Args:
-        estimates, surfels: as they were.
+        estimates, surfels: before the move.
         view: new poses.
         picture: height and width of the part of the plane beyond which nothing is kept; None for all of it.
-        points: whether a surfel serves no more than the pixel in which it lies.
+        points: whether a surfel serves only the pixel in which it lies.
     """
     side = estimates.color.shape[-1]
     position, depth = projected(surfels, view, side)
@@ -88,7 +88,7 @@ def moved(
 def projected(
     surfels: Surfels, view: Viewpoint, side: int
 ) -> tuple[Float64[Tensor, "pixels 2"], Float64[Tensor, " pixels"]]:
-    """Where surfels are now, pixels, and their depth; NaN or at most 0 where nothing is seen."""
+    """Positions of surfels in a view, pixels, and their depth; depth is NaN or at most 0 where nothing is seen."""
     instance = surfels.instance.reshape(-1)
     position, depth = project(view, instance.clamp(min=-1), surfels.point.reshape(3, -1).T.contiguous())
     return position * side, torch.where(instance > UNSEEN, depth, -1.0)
@@ -101,7 +101,7 @@ def _sources(
     depth: Float64[Tensor, " pixels"],
     points: bool,
 ) -> Int64[Tensor, " pixels"]:
-    """The surfel of each pixel, by number; -1 where there is none."""
+    """Raster index of the surfel that each pixel takes; -1 where there is none."""
     side, count = estimates.color.shape[-1], depth.numel()
     seen = (depth > 0.0) & (position > -1.0).all(1) & (position < side + 1.0).all(1)
     at = torch.where(seen[:, None], position, -9.0)
@@ -126,7 +126,7 @@ def _sources(
 
 
 def _behind(depth: Float64[Tensor, " pixels"]) -> Bool[Tensor, " pixels"]:
-    """Which surfels most of their neighbours are in front of."""
+    """Mask of the surfels that lie behind most of their neighbours."""
     side = round(depth.numel() ** 0.5)
     plane = depth.reshape(side, side)
     around = F.pad(plane, (1, 1, 1, 1), value=inf)

@@ -1,4 +1,4 @@
-"""What the filter knows of every pixel, and its constants."""
+"""State of the filter in every pixel, and its constants."""
 
 from __future__ import annotations
 
@@ -12,38 +12,40 @@ from torch import Tensor
 TILE_SIDE = 8
 """Samples along a tile's side."""
 SPACINGS = (8.0, 4.0, 2.0, 1.0, 0.5)
-"""Pixels from one sample to the next in the tiles that can be asked for, coarsest first; a tile is 8 of them wide."""
+"""Distances between samples in the tiles that can be requested, pixels, coarsest first; a tile is 8 of them wide."""
 ELEMENT_PX = 4
 """Pixels along a side of the elements in which change is observed."""
 VARIANCE_MAX = 0.1
-"""Variance of a pixel that nothing is known of, in squared encoded colour."""
+"""Variance of a pixel without information, in squared encoded colour."""
 NOTHING_KNOWN = 10.0
-"""Variance at which a pixel is shown whose own has reached :data:`VARIANCE_MAX`: it takes its surroundings alone."""
+"""Variance assumed for display once that of a pixel has reached :data:`VARIANCE_MAX`: the pixel takes the colour of its
+surroundings alone."""
 UNSEEN = -2
-"""Instance of a pixel without a surfel; -1 is what is seen at infinity."""
+"""Instance of a pixel without a surfel; -1 stands for infinity."""
 
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """Parts of the filter and its constants. They were chosen on the five inputs at phase 0, and hold for all scenes.
+    """Switches and constants of the filter. They were chosen on the five inputs at phase 0 and are used for all scenes.
 
     Attributes:
         reprojection: whether estimates move with the surfaces that they belong to.
         prediction: whether steady motion is continued to the time at which the picture is first shown.
         smoothing: whether uncertain pixels are blended with their surroundings when they are shown.
-        accumulation: whether samples are averaged over time; without, the newest replaces what was known.
+        accumulation: whether samples are averaged over time; otherwise the newest replaces the estimate.
         jitter: whether samples move within their pixels from cycle to cycle.
-        by_gain: whether tiles are chosen by what they gain; without, pixels are sampled in turn.
+        by_gain: whether tiles are chosen by their gain; otherwise pixels are sampled in turn.
         spread: whether change is expected beside elements that changed.
-        shadows: whether change is expected where shadows of what moves lie.
-        probes: whether a tile now and then looks where nothing is expected.
-        latency_cycles: cycles from the start of one to the display of its picture, at least 1.
+        shadows: whether change is expected in the shadows of moving objects.
+        probes: whether some tiles sample places where no change is expected.
+        latency_cycles: cycles from the start of a cycle to the display of its picture, at least 1.
         wavelets: whether roughness and change are measured by the wavelets of the dissertation.
-        share_max: most samples of a cycle, as a share of the output's pixels; a batch of more becomes several cycles.
-        footprint: samples along a pixel's side that textures are filtered for.
-        life_min_s, life_max_s: bounds of how long a sample is taken to be of use.
-        reach: share of the image's side beyond which a surface that moves is taken to be out of sight.
-        memory_s: how long observed change is remembered.
+        share_max: maximum number of samples of a cycle, as a share of the output's pixels; a larger batch is divided
+            into several cycles.
+        footprint: number of samples along a pixel's side for which textures are filtered.
+        life_min_s, life_max_s: bounds of the time for which a sample is assumed to be useful, seconds.
+        reach: distance after which a moving surface is assumed to be out of sight, as a share of the image's side.
+        memory_s: time constant of the memory of observed change, seconds.
     """
 
     reprojection: bool = True
@@ -70,13 +72,13 @@ DEFAULT = FilterOptions()
 
 @dataclass(frozen=True)
 class Estimates:
-    """Of the pixels of the output, raster order. Colours are linear; variances are of ``sqrt`` of the colour clipped to
-    [0, 1], averaged over the channels.
+    """Estimates of the pixels of the output, raster order. Colours are linear; variances are those of the encoded
+    colour, ``sqrt`` of the colour clipped to [0, 1], averaged over the channels.
 
     Attributes:
         color: mean colour.
-        aged: variance of its error by change since it was sampled.
-        inverse: one over the number of samples that it is worth.
+        aged: variance of its error from change since it was sampled.
+        inverse: reciprocal of the effective number of samples.
         time_s: animation time of the newest sample; ``-inf`` where there is none.
         roughness: semivariance per pixel of distance, at least 1e-6.
     """
@@ -93,7 +95,7 @@ class Estimates:
 
     @property
     def observed(self) -> Float[Tensor, "1 h w"]:
-        """Variance of the mean of its samples: half the roughness for each of one."""
+        """Variance of the mean of the samples, ``g i / 2``: half the roughness times the inverse."""
         return 0.5 * self.roughness * self.inverse
 
     @property
@@ -102,11 +104,11 @@ class Estimates:
         return (self.aged + self.observed).clamp(max=VARIANCE_MAX)
 
     def later(self, rate: Float[Tensor, "1 e e"], seconds: float) -> Estimates:
-        """Some seconds later, at a rate of variance per second in each element."""
+        """The estimates ``seconds`` later, which age at ``rate``, variance per second of each element."""
         return replace(self, aged=(self.aged + by_pixels(rate) * seconds).clamp(max=VARIANCE_MAX))
 
     def beside(self, surfels: Surfels) -> Estimates:
-        """With the variance of surfels that lie beside their pixels."""
+        """The estimates with the additional variance of surfels that lie beside their pixels."""
         return replace(self, aged=self.aged + self.roughness * surfels.outside_px)
 
     @staticmethod
@@ -118,13 +120,13 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Surfels:
-    """The surface in every pixel, for estimates that move. A surfel may lie up to a pixel beside its pixel.
+    """The surface element of every pixel, for estimates that move. A surfel may lie up to a pixel outside its pixel.
 
     Attributes:
         instance: of the first hit, -1 at infinity, :data:`UNSEEN` where there is none.
-        point: in the space of the instance's track, or a direction.
-        position: on the image, pixels.
-        step: how far it moved on the image in the last cycle, pixels.
+        point: first hit in the space of the instance's track, or the direction to infinity.
+        position: position on the image, pixels.
+        step: its displacement on the image in the last cycle, pixels.
     """
 
     instance: Int64[Tensor, "1 h w"]
@@ -139,20 +141,20 @@ class Surfels:
 
     @property
     def outside_px(self) -> Float[Tensor, "1 h w"]:
-        """How far it lies beside its pixel, along the axis where that is most."""
+        """Distance of each surfel from its pixel, pixels; the greater of both axes."""
         away = (self.position - centres(self.position.shape[-1])).abs().amax(0, keepdim=True)
         return (away - 0.5).clamp(min=0.0)
 
 
 @dataclass(frozen=True)
 class Change:
-    """What was observed of change, by elements.
+    """Observed change of every element.
 
     Attributes:
         excess: sum of squared residuals beyond those expected, faded.
         span_s: sum of the times between the samples that they compare, faded.
-        seen_s: animation time at which an element was last looked at.
-        rate: variance per second by which estimates age.
+        seen_s: animation time at which an element was last sampled.
+        rate: variance per second that estimates gain.
     """
 
     excess: Float[Tensor, "1 e e"]
@@ -169,16 +171,16 @@ class Change:
 
     @property
     def rate_px(self) -> Float[Tensor, "1 h w"]:
-        """The rate, by pixels."""
+        """The rate of every pixel."""
         return by_pixels(self.rate)
 
 
 def by_pixels(element: Float[Tensor, "1 e e"]) -> Float[Tensor, "1 h w"]:
-    """Each element's value in all its pixels."""
+    """The value of each element, repeated in all its pixels."""
     return element.repeat_interleave(ELEMENT_PX, 1).repeat_interleave(ELEMENT_PX, 2)
 
 
 def centres(side: int) -> Float[Tensor, "2 h w"]:
-    """Centres of the pixels, ``(x, y)``."""
+    """Centres of the pixels, ``(x, y)``, pixels."""
     at = torch.arange(side) + 0.5
     return torch.stack((at.expand(side, side), at[:, None].expand(side, side)))

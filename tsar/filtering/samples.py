@@ -1,4 +1,4 @@
-"""What a batch says of every pixel, and estimates that take it in."""
+"""A batch gathered by pixels, and the update of the estimates by it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tsar.roots import square_root
 from tsar.types import Hits, Viewpoint
 
 ROUGHNESS_MIN = 1e-6
-COUNT_LEAST = 1e-9  # that is divided by
+COUNT_LEAST = 1e-9  # avoids division by 0
 MOVES_PX = 0.02
-"""Pixels a cycle beyond which a surface moves against another."""
+"""Difference of displacements, pixels per cycle, above which one surface moves against another."""
 SHARE_MOVING = 1.0 / 17.0
 """Least share of new samples in the estimate of a surfel that moves."""
 COLOR_MAX = 1.5
@@ -31,9 +31,9 @@ class Seen:
 
     Attributes:
         color, time_s: means of each pixel's samples.
-        count: how many there are.
+        count: number of each pixel's samples.
         newest: number of the pixel's last sample in the batch, -1 where there is none.
-        roughness: as :class:`tsar.filtering.records.Estimates` has it, with the batch taken in.
+        roughness: as in :class:`tsar.filtering.records.Estimates`, updated by the batch.
     """
 
     color: Float[Tensor, "3 h w"]
@@ -50,8 +50,8 @@ class Seen:
 def pixels_of(
     position: Float[Tensor, "samples 2"], side: int, picture: tuple[int, int] | None = None
 ) -> Int64[Tensor, " samples"]:
-    """Raster index of the pixel under positions in pixels; ``side²`` outside the image, or outside the part of it whose
-    height and width are given."""
+    """Raster index of the pixel at each position, in pixels; ``side²`` outside the image, or outside the part of it
+    with the height and width ``picture``."""
     end = side if picture is None else position.new_tensor(picture[::-1])
     inside = (position >= 0.0).all(1) & (position < end).all(1)
     cell = torch.where(inside[:, None], position, 0.0).floor().to(torch.int64)
@@ -67,12 +67,11 @@ def gathered(
     roughness: Float[Tensor, "1 h w"],
     semivariance: Float[Tensor, "n samples"],
 ) -> Seen:
-    """Sums the samples of a batch up by pixels.
+    """Gathers the samples of a batch by pixels.
 
-    The roughness of a sample is its semivariance, per pixel of the distance from one to the next. Those of a coarse
-    tile bound it: a semivariance ``v`` at ``h`` pixels says that the roughness lies between ``v / sqrt(h)``, for
-    surfaces between smooth and random ones, and ``v``. The mean over 3 x 3 pixels is mixed half and half with what was
-    known.
+    The roughness is the semivariance of samples per pixel of distance between them. The samples of a coarse tile only
+    bound it: a semivariance ``v`` at ``h`` pixels implies a roughness between ``v / sqrt(h)`` and ``v``, for surfaces
+    between smooth and random ones. The mean over 3 x 3 pixels is averaged with the roughness before the batch.
     """
     side = roughness.shape[-1]
 
@@ -109,22 +108,22 @@ def updated(
     least_share: Float[Tensor, "1 h w"],
     options: FilterOptions,
 ) -> tuple[Estimates, Float[Tensor, "1 h w"]]:
-    """Estimates with a batch taken in, and the share that new samples have in each pixel.
+    """Estimates updated by a batch, and the share of the new samples in each pixel.
 
     A pixel with ``k`` new samples of mean ``c`` takes the share ``K = P / (P + g / 2k)``, as the Kalman filter does:
-    ``m <- m + K (c - m)``. Of its variance ``P = a + g i / 2`` the part by change becomes ``a <- (1 - K)² a`` and one
-    over the samples ``i <- (1 - K)² i + K² / k``, which holds for any ``K``. The first samples of a pixel, and those
-    that replace what was there, have ``K = 1``.
+    ``m <- m + K (c - m)``. In its variance ``P = a + g i / 2`` the part from change becomes ``a <- (1 - K)² a`` and the
+    reciprocal of the samples ``i <- (1 - K)² i + K² / k``, which holds for any ``K``. The first samples of a pixel have
+    ``K = 1``, as have those that replace its estimate.
 
-    Deviation: the Kalman filter keeps ``P`` alone. Here what is learnt later of the roughness corrects the trust in
+    Deviation: the Kalman filter keeps ``P`` alone. Here a later estimate of the roughness corrects the weight of
     earlier samples.
 
     Args:
         estimates: aged to the start of the cycle, ``now_s``.
         seen: the batch.
-        rate: variance per second by which they age until the samples' time.
-        now_s: seconds.
-        replaced: pixels whose estimates are of no use any more.
+        rate: variance per second that they gain until the time of the samples.
+        now_s: start of the cycle, seconds.
+        replaced: pixels whose estimates are discarded.
         least_share: the least ``K`` of each pixel.
         options: of the filter.
     """
@@ -149,12 +148,12 @@ def updated(
 
 @dataclass(frozen=True)
 class Met:
-    """Surfels of the newest samples of a batch, and how they relate to those that were there.
+    """Surfels of the newest samples of a batch, and their relation to the surfels before it.
 
     Attributes:
         surfels: of the samples.
-        same: pixels in which both are of one instance.
-        replaced: pixels in which another surface is seen, and moves against the one that was there.
+        same: pixels in which both surfels belong to one instance.
+        replaced: pixels in which another surface is seen that moves against the one before.
         least_share: the least share of new samples.
     """
 
@@ -165,7 +164,7 @@ class Met:
 
 
 def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewpoint | None) -> Met:
-    """The surfels of a batch, by the poses of a view and those of the cycle before."""
+    """The surfels of a batch at the poses of a view; their displacement is that since the poses of the cycle before."""
     side = before.step.shape[-1]
     pixel = (seen.newest >= 0).nonzero().squeeze(1)
     newest = seen.newest[pixel]
@@ -190,7 +189,8 @@ def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewp
 
 
 def joined(before: Surfels, found: Met, hit: Bool[Tensor, "1 h w"], share: Float[Tensor, "1 h w"]) -> Surfels:
-    """Surfels after a batch: at the mean place of the samples of one instance, or at that of the newest."""
+    """Surfels after a batch: at the mean position of the samples where the instance is the same, else at the newest
+    sample."""
     new = found.surfels
     weight = torch.where(found.same, share, 1.0)
     other = hit & ~found.same
@@ -214,8 +214,8 @@ def _image(
 
 
 def semivariance_of(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:
-    """Half the mean squared difference of each sample from its four neighbours in the tile, Morton order; encoded
-    colours."""
+    """Half the mean squared difference of each sample from its four neighbours in the tile. Colours are encoded,
+    samples in Morton order."""
     plane = color[:, raster_to_morton(TILE_SIDE)].reshape(-1, TILE_SIDE, TILE_SIDE, 3)
     across, down = (
         0.5 * ((square[..., 0] + square[..., 1] + square[..., 2]) / 3.0)

@@ -1,4 +1,4 @@
-"""Shadows of what moves: where they lie, the picture will change although the surface that is seen stands still."""
+"""Shadows of moving objects: where they lie, the picture will change although the visible surface stands still."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tsar.projection import to_camera
 from tsar.types import Hits, Viewpoint
 
 CONTRAST = 0.01
-"""Variance of a pixel that a shadow's edge crosses, in squared encoded colour: a difference of 0.2, a quarter of the
-time. The shadows of moving things are taken to be crossed as long as a surface is taken to be in sight."""
+"""Variance of a pixel that the edge of a shadow crosses, in squared encoded colour: a difference of 0.2, a quarter of
+the time. A shadow is assumed to take as long to cross a pixel as it takes to move by :attr:`FilterOptions.reach`."""
 CROSSINGS_MAX = 4.0
-"""Most crossings that are expected in a second."""
+"""Maximum number of crossings that are expected in a second."""
 
 
 def drifted(
@@ -25,13 +25,13 @@ def drifted(
     earlier: Viewpoint,
     cycle_s: float,
 ) -> Float[Tensor, "1 e e"]:
-    """How fast shadows move over each element, image sides per second, after a batch: as its newest samples met them.
+    """Speed of the shadows over each element after a batch, image sides per second, as observed by its newest samples.
 
     Args:
         before: as it was.
         position: of the samples on the image plane, in ``[0, 1)``.
         hits: of the samples.
-        view, earlier: poses of one time, and of an earlier one.
+        view, earlier: poses of one time and of an earlier one.
         cycle_s: seconds between the two.
     """
     across = before.shape[-1]
@@ -40,16 +40,17 @@ def drifted(
 
 
 def drift(hits: Hits, view: Viewpoint, earlier: Viewpoint) -> Float64[Tensor, " samples"]:
-    """How far the shadow on each hit has moved over its surface since an earlier view.
+    """Distance that the shadow on each hit has moved over the surface since an earlier view.
 
-    A point ``p`` on track ``r`` in the shadow of what moves on track ``k`` was, had it moved with ``k``, at
-    ``P' T'_k T_k^-1 T_r p`` on the image, and it was at ``P' T'_r p``: ``T`` takes a track to the world, ``P`` the
-    world to the image, and a prime marks the earlier view. The distance is what the shadow of a rigid body has moved
-    where it does not turn against the light and light and shadow lie close.
+    Consider a point ``p`` on track ``r`` in the shadow of an object on track ``k``. Had it moved with ``k``, it would
+    have been at ``P' T'_k T_k^-1 T_r p`` on the earlier image; in fact it was at ``P' T'_r p``. ``T`` takes a track to
+    the world, ``P`` the world to the image, and a prime marks the earlier view. The distance between the two
+    approximates the motion of the shadow of a rigid body that does not rotate against the light, where object and
+    shadow are close to each other.
 
     Returns:
-        The greater distance of both axes, as a share of the image's side; 0 without a shadow, and where body and
-        surface move together. Finite.
+        The greater distance of both axes, as a share of the image's side; 0 without a shadow and where object and
+            surface move together. Always finite.
     """
     instance, occluder = hits.instance.reshape(-1).to(torch.int64), hits.occluder.reshape(-1).to(torch.int64)
     track = view.track_of_instance
@@ -75,7 +76,7 @@ def drift(hits: Hits, view: Viewpoint, earlier: Viewpoint) -> Float64[Tensor, " 
 def last_seen(
     before: Float[Tensor, "1 e e"], drift_s: Float64[Tensor, " samples"], element: Int64[Tensor, " samples"]
 ) -> Float[Tensor, "1 e e"]:
-    """The fastest shadow that the newest samples of each element met.
+    """Speed of the fastest shadow that the newest samples of each element have hit, image sides per second.
 
     Args:
         before: as it was, in image sides per second.
@@ -88,8 +89,8 @@ def last_seen(
 
 
 def expected_rate(drift_s: Float[Tensor, "1 e e"], reach: float) -> Float[Tensor, "1 e e"]:
-    """Variance per second to expect in elements and those beside them, of shadows that cross the share ``reach`` of the
-    image's side."""
+    """Variance per second to expect in elements, and in those beside them, from shadows that cross the share ``reach``
+    of the image's side: ``0.01 min(drift / reach, 4)``."""
     wide = F.pad(drift_s, (1, 1, 1, 1))
     rows = torch.maximum(torch.maximum(wide[:, :-2], wide[:, 1:-1]), wide[:, 2:])
     near = torch.maximum(torch.maximum(rows[..., :-2], rows[..., 1:-1]), rows[..., 2:])
@@ -102,20 +103,20 @@ def _camera_space(
     row: Int64[Tensor, " n"],
     point: Float64[Tensor, "n 3"],
 ) -> Float64[Tensor, "n 3"]:
-    # by columns: a matrix product's bits may depend on the library
+    # by columns: the bits of a matrix product may depend on the library
     m, x = matrix[row], point
     return m[:, :, 0] * x[:, None, 0] + m[:, :, 1] * x[:, None, 1] + m[:, :, 2] * x[:, None, 2] + offset[row]
 
 
 def _image(seen: Float64[Tensor, "n 3"], view: Viewpoint) -> Float64[Tensor, "n 2"]:
-    """Places on the image up to a shift; NaN behind the camera."""
+    """Positions on the image up to a shift, in image sides; NaN behind the camera."""
     unit = -seen[:, 2:] if view.kind == "perspective" else torch.ones_like(seen[:, 2:])
     tangent = torch.tensor([view.tan_x, view.tan_y], dtype=torch.float64)
     return torch.where(unit > 0.0, seen[:, :2] / (2.0 * tangent * unit), torch.nan)
 
 
 def _inverse(matrix: Float64[Tensor, "rows 3 3"]) -> Float64[Tensor, "rows 3 3"]:
-    """By cofactors: the same bits on any processor."""
+    """Inverse matrices from cofactors: the same bits on any processor."""
     rows = matrix.unbind(1)
     columns = [_cross(rows[1], rows[2]), _cross(rows[2], rows[0]), _cross(rows[0], rows[1])]
     product = rows[0] * columns[0]

@@ -1,7 +1,7 @@
-"""Surfels that are points, drawn over the pixels around them.
+"""Surfels as points, splatted over the pixels around them.
 
-In :mod:`tsar.filtering.motion` a surfel may serve several pixels. As a point it has one place, and what lies between
-points is a matter of the display.
+In :mod:`tsar.filtering.motion` a surfel may serve several pixels. As a point it occupies one pixel, and the display
+fills the gaps between points.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from tsar.types import Viewpoint
 def advanced(
     estimates: Estimates, surfels: Surfels, rate: Float[Tensor, "1 e e"], seconds: float, view: Viewpoint
 ) -> tuple[Estimates, Surfels]:
-    """As :func:`tsar.filtering.motion.advanced`, each surfel a point."""
+    """As :func:`tsar.filtering.motion.advanced`, with each surfel as a point."""
     return moved(estimates.later(rate, seconds), surfels, view, points=True)
 
 
 def depths(surfels: Surfels, view: Viewpoint) -> Float64[Tensor, "1 h w"]:
-    """Of all pixels; ``inf`` where there is no surfel."""
+    """Depths of the surfels of all pixels; ``inf`` where there is none."""
     _, depth = projected(surfels, view, surfels.step.shape[-1])
     return torch.where(depth > 0.0, depth, inf).reshape(surfels.instance.shape)
 
@@ -39,13 +39,14 @@ def drawn(
     """Picture and variance of its errors: in every pixel the mean of the surfels within a pixel of its centre, by
     bilinear weights over their variances.
 
-    Surfels count that lie at the depth of the pixel's own, within 1/16; in a hole, at the depth of the farthest. One
-    that stands still gathers samples from all of its pixel: it is drawn in its centre. What is uncertain is blended
-    with its surroundings, as in :mod:`tsar.filtering.display`; a hole without surfels takes them alone.
+    Only surfels within 1/16 of the depth of the pixel's own surfel count; in a hole, those within 1/16 of the farthest.
+    A surfel that stands still gathers samples from its whole pixel, so it is drawn in the centre. Uncertain pixels are
+    blended with their surroundings, as in :mod:`tsar.filtering.display`; a hole without surfels takes the colour of its
+    surroundings alone.
 
     Args:
         estimates, surfels: of the pixels.
-        depth: of the surfels.
+        depth: of the surfels, scene units.
     """
     side = depth.shape[-1]
     seen = depth.isfinite() | estimates.known
@@ -61,7 +62,7 @@ def drawn(
     share = torch.where(alike, share, 0.0)
     heavy = share * near[5]
     area, total, color = share[0][None], heavy[0][None], heavy[0] * near[:3, 0]
-    for number in range(1, len(share)):  # in this order whatever the threads
+    for number in range(1, len(share)):  # in this order for any number of threads
         area, total = area + share[number], total + heavy[number]
         color = color + heavy[number] * near[:3, number]
     found = total > 0.0
@@ -71,5 +72,5 @@ def drawn(
 
 
 def _around(planes: Shaped[Tensor, "c h w"]) -> Shaped[Tensor, "c 9 h w"]:
-    """The 3 x 3 values around each, by rows; 0 outside."""
+    """The 3 x 3 values around each pixel, row by row; 0 outside."""
     return F.unfold(planes[None], 3, padding=1).reshape(len(planes), 9, *planes.shape[1:])

@@ -1,4 +1,4 @@
-"""The stages of the filter as its policy sees them: functions, of which compiled sets give the same bits."""
+"""The stages of the filter as its policy calls them. A compiled set gives the same bits as the reference."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from tsar.window import Window
 
 @dataclass(frozen=True)
 class FilterStages:
-    """One function a stage; arguments and results are those of the reference, which is the default.
+    """One function per stage; arguments and results are those of the reference, which is the default.
 
     Attributes:
-        advanced: estimates and surfels of a later time, as its poses show them.
+        advanced: estimates and surfels at a later time, moved to its poses.
         chosen: the tiles to sample.
         taken_in: estimates, surfels and change after a batch.
-        drifted: how fast shadows move over each element, after a batch.
+        drifted: speed of the shadows over each element, after a batch.
         displayed: the picture, and the variance of its errors.
     """
 
@@ -40,12 +40,11 @@ class FilterStages:
 
 
 REFERENCE = FilterStages()
-"""Tensor operations throughout."""
+"""The reference: all stages by tensor operations."""
 
 
 def reference(window: Window) -> FilterStages:
-    """Tensor operations throughout, for a picture that is a window of the plane: nothing is known, taken in or sampled
-    beyond it."""
+    """The reference for a picture that is a window of the plane: nothing outside it is estimated or sampled."""
     if window.whole:
         return REFERENCE
     shape = window.height_px, window.width_px

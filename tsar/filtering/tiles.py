@@ -1,4 +1,4 @@
-"""Which tiles to sample: the best disjoint ones of the quadtree, by what they gain."""
+"""Selection of the tiles to sample: the disjoint nodes of the quadtree with the greatest gain."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from tsar.filtering.records import (
 from tsar.morton import morton_to_raster
 
 BISECTIONS = 30
-PRICE_LEAST = 2.0**-46  # of the greatest gain
-PRICE_ABOVE = 1e-12  # beyond the greatest gain, so that no tile is worth it
-SPEED_LEAST = 1e-9  # that is divided by
-EDGE_GROWTH = 0.35  # of the distance from a pixel that is not hit to the nearest sample, a pixel of spacing
+PRICE_LEAST = 2.0**-46  # as a share of the greatest gain
+PRICE_ABOVE = 1e-12  # added to the greatest gain: no tile is worth that price
+SPEED_LEAST = 1e-9  # pixels per second; avoids division by 0
+EDGE_GROWTH = 0.35  # growth of the distance from a pixel without a sample to the nearest one, per pixel of spacing
 
 
 def spacings(side: int) -> tuple[float, ...]:
@@ -42,18 +42,19 @@ def gains(
     cycle_s: float,
     options: FilterOptions,
 ) -> list[Float64[Tensor, "_ _"]]:
-    """What sampling a tile gains, for the tiles of every spacing: variance removed times how long that lasts, summed.
+    """Gain from sampling a tile, for the tiles of every spacing: the sum over its pixels of the variance removed times
+    the duration of that improvement.
 
     With ``P = min(V + q cycle, 0.1)`` a pixel gains ``P² / (P + g h²/2)`` at a spacing of ``h <= 1``, and beyond that
     ``P² (c / (P + g/2) + (1 - c) P / ((P + g (0.5 + 0.35 (h - 1))) (P + g h/2)))`` with ``c = 1/h²``, the share of
-    pixels that are hit. It lasts ``gain / q``, at least ``life_min_s``, at most ``life_max_s``, and at most until the
-    surface has crossed the share ``reach`` of the image.
+    pixels that receive a sample. The improvement lasts ``gain / q``, at least ``life_min_s``, at most ``life_max_s``,
+    and at most until the surface has crossed the share ``reach`` of the image.
 
     Args:
-        variance: of what was last shown, ``V``.
-        roughness: semivariance per pixel, ``g``.
-        rate: of change, variance per second, ``q``.
-        speed: of surfaces over the image, pixels per second.
+        variance: variance ``V`` of the last picture shown.
+        roughness: semivariance ``g`` per pixel of distance.
+        rate: rate of change ``q``, variance per second.
+        speed: speed of surfaces over the image, pixels per second.
         cycle_s: length of a cycle, seconds.
         options: of the filter.
     """
@@ -85,11 +86,12 @@ def chosen(
     options: FilterOptions,
     picture: tuple[int, int] | None = None,
 ) -> list[Bool[Tensor, "_ _"]]:
-    """The ``count`` tiles that gain most, for every spacing whether each is one of them; fewer where none is free.
-    Tiles that do not fit into ``picture``, its height and width where it is not the whole plane, gain nothing.
+    """The ``count`` tiles of greatest gain, as a mask for every spacing; fewer where no more are free. Tiles that do
+    not fit into ``picture``, the height and width of a picture that is not the whole plane, have no gain.
 
-    Arguments are those of :func:`gains`, but for the rate by elements and the surfels, None where nothing moves. What
-    was not seen yet lies where much moves, and is not of use for long.
+    Arguments are those of :func:`gains`, except for the rate, which is given per element, and the surfels, which are
+    None where nothing moves. A pixel without a surfel counts as infinitely fast: it lies where much moves, and its
+    samples are not useful for long.
     """
     speed = torch.zeros_like(variance)
     if surfels is not None:
@@ -103,10 +105,10 @@ def chosen(
 
 
 def best(gain: list[Float64[Tensor, "_ _"]], count: int) -> list[Bool[Tensor, "_ _"]]:
-    """The disjoint tiles, at most ``count``, whose gains sum to most.
+    """At most ``count`` disjoint tiles with the greatest sum of gains.
 
-    A price on every tile is found by bisection at which the best tiles, those that gain more than they cost and more
-    than the tiles within them, are at most as many.
+    Every tile has the same price. A tile is taken if its gain exceeds the price and its profit exceeds that of the best
+    tiles within it. The least price at which at most ``count`` tiles are taken is found by bisection.
     """
     high = max(float(level.max()) for level in gain) + PRICE_ABOVE
     low = high * PRICE_LEAST
@@ -122,7 +124,8 @@ def best(gain: list[Float64[Tensor, "_ _"]], count: int) -> list[Bool[Tensor, "_
 def filled_up(
     chosen: list[Bool[Tensor, "_ _"]], gain: list[Float64[Tensor, "_ _"]], spacing: int, count: int
 ) -> list[Bool[Tensor, "_ _"]]:
-    """Adds the best tiles of one spacing, by number, that overlap none of those chosen, until there are ``count``."""
+    """Adds the best tiles of one spacing, given by its number, that overlap no chosen tile, until there are
+    ``count``."""
     missing = count - sum(int(level.sum()) for level in chosen)
     above = torch.zeros_like(chosen[0])
     for level in chosen[:spacing]:
@@ -141,7 +144,8 @@ def filled_up(
 def covered(
     x: Float64[Tensor, " n"], y: Float64[Tensor, " n"], spacing: Float64[Tensor, " n"], side: int
 ) -> Int64[Tensor, "1 e e"]:
-    """How many tiles, at most one of a spacing, lie on each element; ``x`` and ``y`` are their edges, pixels."""
+    """Number of tiles on each element, at most one per spacing; ``x`` and ``y`` are the left and upper edges,
+    pixels."""
     total = torch.zeros(1, 1, 1, dtype=torch.int64)
     for kind in spacings(side):
         width = int(TILE_SIDE * kind)
@@ -153,13 +157,13 @@ def covered(
 
 
 def in_turn(side: int, sampled: Bool[Tensor, " tiles"], first: int, count: int) -> list[Bool[Tensor, "_ _"]]:
-    """The next ``count`` tiles of one sample a pixel, in Morton order, for every spacing whether each is one of them.
+    """The next ``count`` tiles of one sample per pixel in Morton order, as a mask for every spacing.
 
     Args:
         side: pixels along the plane's side.
-        sampled: which of :func:`places` may be sampled.
-        first: tiles before them.
-        count: how many.
+        sampled: mask of the tiles of :func:`places` that may be sampled.
+        first: number of tiles before them.
+        count: number of tiles.
     """
     kinds = spacings(side)
     chosen = [torch.zeros(2 * (int(side / (TILE_SIDE * kind)),), dtype=torch.bool) for kind in kinds]
@@ -173,7 +177,7 @@ def in_turn(side: int, sampled: Bool[Tensor, " tiles"], first: int, count: int) 
 
 @lru_cache(maxsize=8)
 def places(side: int) -> Float64[Tensor, "n 3"]:
-    """Upper and left edge and spacing of all tiles, pixels, spacing after spacing, by rows."""
+    """Upper edge, left edge and spacing of all tiles, pixels; one spacing after the other, each row by row."""
     found = []
     for kind in spacings(side):
         tile = torch.ones(int(side / (TILE_SIDE * kind)), int(side / (TILE_SIDE * kind))).nonzero()
@@ -182,7 +186,7 @@ def places(side: int) -> Float64[Tensor, "n 3"]:
 
 
 def _enlarged(plane: Int64[Tensor, "1 e e"], across: int) -> Int64[Tensor, "1 a a"]:
-    """Each value in all the places that it covers."""
+    """The plane enlarged: each value is repeated over the cells that it covers."""
     side, times = plane.shape[-1], across // plane.shape[-1]
     return plane[0, :, None, :, None].expand(side, times, side, times).reshape(1, across, across)
 
@@ -206,5 +210,5 @@ def _worth(gain: list[Float64[Tensor, "_ _"]], price: float) -> list[Bool[Tensor
 
 
 def doubled(tiles: Shaped[Tensor, "rows columns"]) -> Shaped[Tensor, "rows2 columns2"]:
-    """What tiles have, in the four tiles within each."""
+    """The value of each tile, repeated in the four tiles within it."""
     return tiles.repeat_interleave(2, 0).repeat_interleave(2, 1)

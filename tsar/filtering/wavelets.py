@@ -1,13 +1,13 @@
-"""Roughness and change by the wavelets of the dissertation: power of the Haar transform of a tile's samples, and of
-their differences from what was expected of them where they lie.
+"""Roughness and change from the wavelets of the dissertation: the power of the Haar transform of a tile's samples, and
+that of their differences from the estimates in their pixels.
 
-The octants of space are those of the new samples, those of time those of the differences: the transform is linear, so
-that ``hhg`` of two fields is ``hh`` of their difference. Power is localised by squares of 2 x 2 samples.
+The spatial octants are those of the new samples, the temporal octants those of the differences: the transform is
+linear, so ``hhg`` of two fields is ``hh`` of their difference. Power is localised to squares of 2 x 2 samples.
 
 Source: Stephens 2011, sec. 5.3.2 and 5.3.4.
 
-Deviation: expectations by samples that were moved with their surfaces stand for what a tile held before, so that there
-is one pair of fields at all octaves. Power is of encoded colours, a mean over the channels, not of luminance.
+Deviation: estimates that were moved with their surfaces replace the previous samples of a tile, so all octaves use the
+same pair of fields. Power is that of encoded colours, averaged over the channels, not of luminance.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from tsar.filtering.records import Estimates
 from tsar.roots import encoded
 
 OCTAVES = 3
-"""Of a tile of 8 x 8 samples."""
+"""Octaves of a tile of 8 x 8 samples."""
 BROWNIAN = 7.372
-"""Power in a square of a surface on which semivariance grows with distance and is 1 from one sample to the next."""
+"""Power in a square of a surface whose semivariance is proportional to distance and 1 between adjacent samples."""
 _NOISE = 2.25
 _TOLERANCE = 8.0
 
 
 def semivariance_of(color: Float[Tensor, "n samples 3"]) -> Float[Tensor, "n samples"]:
-    """Of each sample and the next, Morton order, encoded colours: by the power of all octaves, of which a square has
-    its part."""
+    """Semivariance of adjacent samples, one value per sample in Morton order, from encoded colours: the power of all
+    octaves in the sample's square of 2 x 2, ``sum_o 4^-o (hg² + gh² + gg²)``, over :data:`BROWNIAN`."""
     power, share = torch.zeros(len(color), color.shape[1] // 4), 1.0
     for _, sides, corner in octants(color):
         own = sides + corner
@@ -45,20 +45,21 @@ def residuals(
     pixel: Int64[Tensor, " flat"],
     count: Float[Tensor, "1 h w"],
 ) -> tuple[Float[Tensor, "1 h w"], Float[Tensor, "1 h w"]]:
-    """What new samples differ by, and what is expected at most, as :func:`tsar.filtering.change.residuals` has them, by
-    the octants ``hhg``, ``hgg`` and ``ghg`` of the coarsest octave: of a whole tile.
+    """Residuals of new samples, and the greatest that noise explains, as in :func:`tsar.filtering.change.residuals`,
+    from the octants ``hhg``, ``hgg`` and ``ghg`` of the coarsest octave, which spans the tile.
 
-    The power of a change that is the same at all samples is its square. Of independent samples of variance ``v`` it is
-    ``2.25 v / 4^o`` at octave ``o``, and eight times as much is expected at most, with ``v = P + 0.8 g``.
+    The power of a change that is equal at all samples is its square. The power of independent samples of variance ``v``
+    is ``2.25 v / 4^o`` at octave ``o``. At most eight times as much is expected from noise, with
+    ``v = g i / 2 + 0.8 g``.
 
-    Deviation: one octave. All of them together see the residual's whole power, hardly more than residuals do; the
-    greatest excess of any octave takes noise for change.
+    Deviation: only one octave is used. All octaves together measure the whole power of the residual, hardly more than
+    plain residuals do; the greatest excess of any octave mistakes noise for change.
 
     Args:
         estimates: before the batch.
-        color: of the samples, encoded.
+        color: encoded colours of the samples.
         pixel: raster index of the pixel of each, ``side²`` outside the image.
-        count: samples of each pixel.
+        count: number of samples of each pixel.
     """
     side, (n, samples, _) = count.shape[-1], color.shape
     known = estimates.known.to(torch.float32)
@@ -77,8 +78,8 @@ def residuals(
 
 
 def octants(field: Float[Tensor, "n samples c"]) -> list[tuple[Float[Tensor, "n p"], ...]]:
-    """Power of the octants ``hh``, of ``hg`` and ``gh`` together, and of ``gg``, by octaves, fine to coarse; means over
-    the channels."""
+    """Power of the octants ``hh``, of ``hg`` and ``gh`` together, and of ``gg``, per octave from fine to coarse,
+    averaged over the channels."""
     n, samples, channels = field.shape
     low, found = field.permute(0, 2, 1).reshape(n * channels, samples), []
     for _ in range(OCTAVES):

@@ -1,4 +1,4 @@
-"""Policies by name: the project's own, those of installed packages, and those that are added from Python."""
+"""The table of policies: the project's own, those of installed packages, and those added from Python."""
 
 from __future__ import annotations
 
@@ -43,5 +43,5 @@ RIVALS = (
     *("framed-1", "framed-super", "framed-half", "framed-quarter", "framed-taa", "framed-late", "framed-taa-late"),
     *("frameless", "afr", "afr-simple", "interruptible"),
 )
-"""Rivals beside ``framed`` that look at no truth: a policy is compared with all of them, and with the best at each
-moment."""
+"""Rivals other than ``framed`` that do not use the reference image: a policy is compared with each of them, and with
+the best at each time."""

@@ -1,7 +1,8 @@
-"""Temporal accumulation: jittered frames are averaged where their surfaces were before.
+"""Temporal accumulation: jittered frames are averaged along the motion of their surfaces.
 
-Each pixel finds by its first hit where its surface was in the frame before, reads the accumulated image there, clips
-what it finds to the colours around it, and takes in its own sample. Where it has nothing to read it begins anew.
+The first hit of a pixel gives the position of its surface in the previous frame. The accumulated image is read there,
+clipped to the range of the colours around the pixel, and averaged with the new sample. A pixel without history begins
+anew.
 
 Source: Karis 2014, High-quality temporal supersampling (jitter, the nearest surface's motion, a history read by a cubic
 filter); Salvi 2016, An excursion in temporal supersampling (the box of mean and standard deviation).
@@ -22,8 +23,8 @@ from tsar.roots import square_root
 from tsar.types import Viewpoint
 
 BRIGHTEST = 1e4
-"""Samples are clipped here before they are accumulated: of what is much brighter the square does not fit into float32,
-and a sum of nine colours loses the others."""
+"""Samples are clipped to this radiance before they are accumulated: the square of a much brighter one overflows
+float32, and in a sum of nine colours the others are lost to rounding."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,10 @@ class Accumulation:
     """Constants of the accumulation.
 
     Attributes:
-        count_most: samples a pixel that count at most; the newest has a share of at least ``1 / count_most``.
-        deviations: half the side of the box to which what was accumulated is clipped, standard deviations of the nine
-            colours around.
+        count_most: maximum number of samples in the average of a pixel; the newest has a share of at least
+            ``1 / count_most``.
+        deviations: half the side of the box to which the history is clipped, in standard deviations of the nine colours
+            around the pixel.
     """
 
     count_most: float = 8.0
@@ -42,11 +44,11 @@ class Accumulation:
 
 @dataclass(frozen=True)
 class History:
-    """What has been accumulated.
+    """The accumulated image.
 
     Attributes:
         color: mean colour of each pixel, linear RGB.
-        count: samples that it is made of.
+        count: number of samples in it.
     """
 
     color: Float[Tensor, "h w 3"]
@@ -54,8 +56,9 @@ class History:
 
 
 ACCUMULATE_FLOPS = 2 * PROJECT_FLOPS + 8.0 + 6.0 + CUBIC_FLOPS + 21.0 + 9.0 * 9.0 + 21.0 + 30.0 + 22.0
-"""Of :func:`accumulated` for a pixel: its surface now and before; the nearest of nine depths; motion and place; the
-reading; luminance and chroma of both; sums of nine colours and squares; mean and deviation; clipping; averaging."""
+"""Operations of :func:`accumulated` per pixel: projection of its surface now and before; the nearest of nine depths;
+motion and position; interpolation; luminance and chroma of both; sums of nine colours and squares; mean and deviation;
+clipping; averaging."""
 
 
 def accumulated(
@@ -69,11 +72,11 @@ def accumulated(
     """The history after a frame.
 
     Args:
-        color: samples of the frame, one a pixel.
+        color: samples of the frame, one per pixel.
         surfaces: their first hits.
-        now: the poses of the frame.
-        before: those of the frame before; None where there is none.
-        history: after that frame.
+        now: poses of the frame.
+        before: poses of the previous frame; None for the first.
+        history: after the previous frame; None for the first.
         constants: of the accumulation.
     """
     color = color.clamp(-BRIGHTEST, BRIGHTEST)
@@ -89,8 +92,8 @@ def accumulated(
 
 
 def _motion(surfaces: Surfaces, now: Viewpoint, before: Viewpoint) -> Float64[Tensor, "h w 2"]:
-    """From each pixel's centre to where what it shows was before, pixels; the motion of the nearest of nine pixels, so
-    that edges move with what is in front."""
+    """Displacement from each pixel's centre to the previous position of its surface, pixels: that of the nearest of
+    nine pixels, so that edges move with the surface in front."""
     _, depth = seen(surfaces, now)
     place, _ = seen(surfaces, before)
     height, width = depth.shape
@@ -108,7 +111,7 @@ def _motion(surfaces: Surfaces, now: Viewpoint, before: Viewpoint) -> Float64[Te
 
 
 def _clipped(found: Float[Tensor, "h w 3"], color: Float[Tensor, "h w 3"], deviations: float) -> Float[Tensor, "h w 3"]:
-    """What was found, moved towards the mean of the nine colours around until it is in their box."""
+    """The history, moved towards the mean of the nine colours around each pixel until it lies in their box."""
     planes = _luma_chroma(color).permute(2, 0, 1)[None]
     padded = F.pad(planes, (1, 1, 1, 1), mode="replicate")
     mean = F.avg_pool2d(padded, 3, 1)
@@ -121,7 +124,7 @@ def _clipped(found: Float[Tensor, "h w 3"], color: Float[Tensor, "h w 3"], devia
 
 
 def _luma_chroma(color: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n 3"]:
-    """Luminance and two differences of colour, YCoCg."""
+    """Luma and two colour differences, YCoCg."""
     red, green, blue = color.unbind(-1)
     half = 0.5 * (red + blue)
     return torch.stack([0.5 * (green + half), 0.5 * (red - blue), 0.5 * (green - half)], dim=-1)

@@ -1,23 +1,23 @@
-"""Adaptive frameless rendering: crosshairs of samples in tiles of equal sampling, whose size follows variance, and a
-filter over space and time that follows the gradients in each tile.
+"""Adaptive frameless rendering: crosshairs of samples in equally sampled tiles whose size follows the variance, and a
+filter over space and time whose extents follow the gradients in each tile.
 
-A cycle samples *crosshairs*: a random place in a tile and the four places one pixel beside it. Their differences give
-the tile's spatial gradient. A deep buffer keeps all recent samples with their first hits, and takes them to the poses
-at which the picture is first shown, as far as the newest ones foretell them (reprojection); what it holds in a pixel,
-compared with a new sample there, gives the temporal gradient, which is of what reprojection does not explain. The tiles
-are split and merged by :mod:`tsar.policies.tiles`.
+A cycle samples *crosshairs*: a random position in a tile and the four positions one pixel beside it. Their differences
+give the tile's spatial gradient. A deep buffer keeps all recent samples with their first hits and reprojects them to
+the poses at which the picture is first shown, as predicted from the newest ones. The difference between a new sample
+and the reprojected one in its pixel gives the temporal gradient, so that it covers only changes that reprojection does
+not explain. The tiles are split and merged by :mod:`tsar.policies.tiles`.
 
-The filter has a volume in which one sample is expected, ``e_x e_y e_t = 1 / R`` at a sampling rate of ``R`` samples per
-pixel and second, and extents along which colour changes alike, ``G_s e_x = G_s e_y = G_t e_t``: so
-``e_t = (G_s² / (R G_t²))^⅓``. Where the picture stands old samples count, and the picture becomes sharp and
-antialiased; where it changes new ones from farther away do. Samples in a pixel are weighted by ``exp(-age / e_t)``, and
-summed; pixels whose sum is below one take the rest from coarser levels of a pyramid, which is the extent in space.
+The volume of the filter is the one in which one sample is expected, ``e_x e_y e_t = 1 / R`` at a sampling rate of ``R``
+samples per pixel and second. Colour changes equally along its extents, ``G_s e_x = G_s e_y = G_t e_t``, so
+``e_t = (G_s² / (R G_t²))^⅓``. In a static picture old samples count, and it becomes sharp and antialiased; in a
+changing one new samples from farther away count. Samples in a pixel are weighted by ``exp(-age / e_t)`` and summed.
+Pixels whose sum is below one take the rest from coarser levels of a pyramid, which realises the extent in space.
 
 Source: Dayal, Woolley, Watson and Luebke 2005, *Adaptive frameless rendering*, as described in its abstract and in
 Stephens 2011, sec. 2.5 and 7.3.2.
 
 Deviation: all samples of a crosshair are traced in one cycle, and the temporal gradient comes from the buffer, not from
-a sample that is traced again. A pyramid stands for the splats of the original. Poses are foretold, as ``tsar`` does.
+a sample that is traced again. A pyramid replaces the splats of the original. Poses are predicted, as in ``tsar``.
 """
 
 from __future__ import annotations
@@ -44,18 +44,19 @@ from tsar.window import GRID
 LEAVES = 1024
 SAMPLES_KEPT_PER_PIXEL = 4
 COLOR_MAX = 1.5
-"""Radiance beyond which samples are clipped before they are averaged: a glint would spread."""
+"""Radiance to which samples are clipped before they are averaged: a glint would spread over its neighbours."""
 _CROSSHAIR = torch.tensor([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 _MEMORY_CYCLES = 4.0
 _GOLDEN = 0.6180339887498949
-_LEAST_GRADIENT = 1e-6, 1e-9  # squared, per pixel and per second
-_EXTENT_S = 4.0  # greatest
-_LEAST_INTERVALS = 0.1  # least extent, in refresh intervals of a pixel
+_LEAST_GRADIENT = 1e-6, 1e-9  # squared gradients, per pixel and per second
+_EXTENT_S = 4.0  # greatest temporal extent
+_LEAST_INTERVALS = 0.1  # least temporal extent, in refresh intervals of a pixel
 
 
 @dataclass(frozen=True)
 class Crosshairs:
-    """What was asked for: the tile of each crosshair, and places, centres first, then each arm's; then single ones."""
+    """The requested samples: the tile of each crosshair, and the positions: the centres, then each arm in turn, then
+    single samples."""
 
     node: Int64[Tensor, " crosshairs"]
     place: Float[Tensor, "samples 2"]
@@ -63,7 +64,8 @@ class Crosshairs:
 
 @dataclass(frozen=True)
 class Sampled:
-    """The tiles, the buffer, which changes in place, where its samples are now, and what was asked for."""
+    """The tiles; the buffer, which changes in place; the reprojected samples of the buffer; and the requested
+    samples."""
 
     tree: Tree
     buffer: DeepBuffer
@@ -80,14 +82,14 @@ class Afr(Policy[Sampled]):
 
     @property
     def footprint(self) -> float:
-        """Samples of a pixel are averaged; 2 had the least error of 1, 2 and 4."""
+        """2, as samples of a pixel are averaged: it had the least error of 1, 2 and 4."""
         return 2.0
 
     @property
     def price(self) -> Price:
-        """Per pixel: what the buffer holds, placed and summed (weight 3, sums 7), and the pyramid: up 20, down 26,
-        times 4/3, with means 4. Per sample: replacement of what is not finite 6, luminance 10,
-        gradients 14, sums of tiles 12, comparison 8."""
+        """Per pixel: projection and summation of the buffer's samples (weight 3, sums 7), and the pyramid: up 20, down
+        26, times 4/3, with means 4. Per sample: replacement of non-finite values 6, luminance 10, gradients 14, sums of
+        tiles 12, comparison 8."""
         stored = SAMPLES_KEPT_PER_PIXEL * (deep_buffer.SAMPLE_FLOPS + 10)
         return Price(int(self.config.budget), pixel_flops=stored + 65, sample_flops=50)
 
@@ -100,7 +102,7 @@ class Afr(Policy[Sampled]):
         return Sampled(tiles.initial(self._depth, LEAVES, 6, self.config.window), DeepBuffer.empty(room))
 
     def request(self, state: Sampled, moment: Moment) -> tuple[Sampled, FrameletBatch]:
-        """Crosshairs in tiles in turn, and at random places of the picture as many as are left over."""
+        """Crosshairs in successive tiles, and single samples at random positions for the remainder of the batch."""
         config = self.config
         node, place = draw(state.tree, self._depth, config, moment.cycle)
         nothing = torch.zeros(config.batch_size, dtype=torch.int64)
@@ -152,10 +154,10 @@ class Afr(Policy[Sampled]):
 def draw(
     tree: Tree, depth: int, config: TsarConfig, cycle: int
 ) -> tuple[Int64[Tensor, " crosshairs"], Float[Tensor, "samples 2"]]:
-    """Tile of each crosshair, and all places, of a cycle.
+    """Tile of each crosshair and all sample positions of a cycle.
 
-    Tiles come in turn by the golden ratio along the curve, so that those of a cycle are spread. Arms that leave the
-    picture are turned round.
+    Tiles are visited in steps of the golden ratio along the curve, which spreads those of a cycle over the picture.
+    Arms that leave the picture are reflected.
     """
     count = int(config.budget)
     crosshairs, random = count // len(_CROSSHAIR), generator(config, cycle)
@@ -174,7 +176,7 @@ def draw(
 
 
 def extents(tree: Tree, depth: int, config: TsarConfig, cycle_s: float) -> Float64[Tensor, " leaves"]:
-    """How far back in time, seconds, the filter of each tile reaches."""
+    """Temporal extent ``e_t`` of the filter of each tile, seconds."""
     leaves = tree.leaves
     sums = tree.sums[:, leaves].to(torch.float64)
     spatial = sums[3] / sums[0].clamp(min=1e-9) + _LEAST_GRADIENT[0]
@@ -192,8 +194,9 @@ def _values(
     now_s: float,
     shape: tuple[int, int],
 ) -> Float[Tensor, "6 arms"]:
-    """What tiles gather of the samples of crosshairs: weight, luminance and its square; squared spatial gradient; and
-    squared change since the newest sample that the buffer held in the pixel, and the square of that sample's age."""
+    """Values of the crosshairs' samples that tiles accumulate: weight, luminance and its square; squared spatial
+    gradient; squared change since the newest sample that the buffer held in the pixel, and the square of that sample's
+    age."""
     arms = len(_CROSSHAIR) * asked.node.numel()
     luminance = compressed_luminance(color)[:arms]
     centre, right, left, below, above = luminance.reshape(len(_CROSSHAIR), -1)

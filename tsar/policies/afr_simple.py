@@ -1,8 +1,8 @@
-"""Adaptive frameless rendering in its simplest form: single samples, no reprojection, one age for all of a tile.
+"""Adaptive frameless rendering in its simplest form: single samples, no reprojection, one time scale per tile.
 
-Samples are drawn from tiles of equal probability whose size follows variance (:mod:`tsar.policies.tiles`). An image is
-filled from the newest samples, each weighted down with its age in units of its tile's refresh interval, by pull and
-push over a pyramid. :mod:`tsar.policies.afr` has what Dayal et al. describe beside that.
+Samples are drawn from tiles of equal probability whose size follows variance (:mod:`tsar.policies.tiles`). The image is
+filled from the newest samples by pull and push over a pyramid; the weight of a sample falls with its age in units of
+its tile's refresh interval. :mod:`tsar.policies.afr` has the other parts that Dayal et al. describe.
 
 Source: Dayal et al. 2005, as described in Stephens 2011, sec. 2.5 and 7.3.2.
 
@@ -32,9 +32,9 @@ _MEMORY_CYCLES = 8.0
 
 @dataclass(frozen=True)
 class Scattered:
-    """The tree, the newest sample of each pixel, and the leaves and pixels that were asked for.
+    """The tree, the newest sample of each pixel, and the requested leaves and pixels.
 
-    Frozen, but the buffer within changes in place.
+    Frozen, except that the buffer changes in place.
     """
 
     tree: Tree
@@ -44,17 +44,17 @@ class Scattered:
 
 
 class AfrSimple(Policy[Scattered]):
-    """Cycles of ``batch_size * s²`` samples, as many in every leaf."""
+    """Cycles of ``batch_size * s²`` samples, equally many in every leaf."""
 
     @property
     def footprint(self) -> float:
-        """2 had less error than 1 on three of the five inputs, and 3 % more on the others."""
+        """2: it had less error than 1 on three of the five inputs, and 3 % more on the others."""
         return 2.0
 
     @property
     def price(self) -> Price:
         """Per pixel: weight 3, and the pyramid: up 20, down 26, times 4/3, with means 4. Per sample: replacement of
-        what is not finite 6, luminance 10, moments 6, place 4."""
+        non-finite values 6, luminance 10, moments 6, position 4."""
         return Price(int(self.config.budget), pixel_flops=68.0, sample_flops=26.0)
 
     @property

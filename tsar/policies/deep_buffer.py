@@ -1,4 +1,4 @@
-"""A buffer of all recent samples, which are taken to the newest poses: their colours, times and first hits.
+"""A buffer of all recent samples, with their colours, times and first hits, that reprojects them to the newest poses.
 
 Source: the temporally deep buffer of Dayal et al. 2005.
 
@@ -27,11 +27,11 @@ _NEARER, _NEARER_AROUND, _AROUND = 1.3, 1.07, 6
 
 @dataclass(frozen=True)
 class Placed:
-    """Where the samples of a buffer are, from the oldest to the newest.
+    """Visible samples of a buffer, from the oldest to the newest.
 
     Attributes:
-        sample: which of the buffer; those that are outside the picture or hidden are left out.
-        pixel: raster index.
+        sample: index in the buffer; samples that are hidden or outside the picture are left out.
+        pixel: raster index of the pixel that shows the sample.
     """
 
     sample: Int64[Tensor, " n"]
@@ -40,14 +40,14 @@ class Placed:
 
 @dataclass(frozen=True)
 class DeepBuffer:
-    """The newest samples, as many as fit, in the order of a ring. Changes in place.
+    """The newest samples in a ring buffer. Changes in place.
 
     Attributes:
         color: linear RGB.
         time_s: animation time; ``-inf`` where nothing has been stored yet.
-        position: on the image plane, where they were sampled.
-        instance, point: first hits, where there are any.
-        head: place of the next sample, in one element.
+        position: position on the image plane at the time of sampling.
+        instance, point: first hits, where they are known.
+        head: index of the next sample, one element.
     """
 
     color: Float[Tensor, "room 3"]
@@ -71,7 +71,7 @@ class DeepBuffer:
     def add(
         self, color: Float[Tensor, "n 3"], time_s: float, position: Float[Tensor, "n 2"], hits: Hits | None
     ) -> None:
-        """Stores samples in the place of the oldest; of more than there is room for, the last."""
+        """Replaces the oldest samples. Of more samples than the buffer can hold, only the last are stored."""
         room = self.time_s.numel()
         keep = slice(max(0, color.shape[0] - room), None)
         place = (self.head + torch.arange(min(room, color.shape[0]))) % room
@@ -83,8 +83,8 @@ class DeepBuffer:
         self.head[0] = (self.head + place.numel()) % room
 
     def seen(self, view: Viewpoint | None, shape: tuple[int, int]) -> Placed:
-        """Samples that are seen, by the poses of a view, in a picture of so many rows and columns; without poses,
-        all that are stored, where they were sampled."""
+        """Samples that are visible at the poses of a view in a picture of ``shape``, height and width. Without poses,
+        all stored samples at the positions where they were taken."""
         room = self.time_s.numel()
         order = (self.head + torch.arange(room)) % room
         order = order[self.time_s[order].isfinite()]

@@ -1,7 +1,7 @@
-"""``tsar`` with ideas of the dissertation: densities in space and in time, whose product is conserved, in place of what
-tiles gain; and wavelets, in place of semivariance and residuals.
+"""``tsar`` with parts of the dissertation: densities in space and in time, the sum of whose products is conserved,
+instead of the gain of tiles; and wavelets instead of semivariance and residuals.
 
-Everything else is as in :mod:`tsar.policies.filter`, so that what each of the two contributes can be measured.
+Everything else is as in :mod:`tsar.policies.filter`, so that the contribution of each part can be measured.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from tsar.policies.filter import Filter, State
 from tsar.policy import Moment, Price, Setting, require_square
 
 _AGED = 4.0
-"""Weight of the variance by change so far, beside that of the next cycle; 1 to 8 give the same within 5 %."""
+"""Weight of the variance from change so far, relative to that of the next cycle; values from 1 to 8 give the same error
+within 5 %."""
 
 PIXEL_FLOPS = 310.0
 """Operations per output pixel and cycle, as a test counts them: aging, moving, densities and smoothing."""
@@ -28,10 +29,10 @@ PIXEL_FLOPS = 310.0
 
 @dataclass(frozen=True)
 class DenseState(State):
-    """With what elements have gathered of their θ_t since they were sampled.
+    """The state of the filter, and the θ_t that elements have accumulated since they were sampled.
 
     Attributes:
-        credit: refreshes that are due.
+        credit: number of refreshes that are due.
     """
 
     credit: Float64[Tensor, "1 e e"]
@@ -49,15 +50,15 @@ class ByDensities(Filter):
         return replace(super().price, pixel_flops=PIXEL_FLOPS)
 
     def start(self) -> DenseState:
-        """Credit is a seeded permutation in [0, 1), as in :func:`tsar.selection.initial_history`."""
+        """The initial credit is a seeded permutation in [0, 1), as in :func:`tsar.selection.initial_history`."""
         side = self._side // ELEMENT_PX
         generator = torch.Generator().manual_seed(self.config.seed)
         credit = torch.randperm(side**2, generator=generator).to(torch.float64).reshape(1, side, side) / side**2
         return DenseState(**vars(super().start()), credit=credit)
 
     def _picked(self, state: State, moment: Moment) -> tuple[State, list[Bool[Tensor, "_ _"]]]:
-        """Roughness asks for samples in space; change for refreshes: what is expected of the next cycle, and what there
-        has been since the last sample. It is greatest where a surface comes into sight."""
+        """Roughness determines the samples in space, change the refreshes: the change expected in the next cycle and
+        that since the last sample. It is greatest where a surface comes into sight."""
         assert isinstance(state, DenseState)
         rough = F.avg_pool2d(state.estimates.roughness[None], ELEMENT_PX)[0].to(torch.float64)
         aged = F.avg_pool2d(state.estimates.aged[None], ELEMENT_PX)[0].to(torch.float64)
@@ -69,6 +70,6 @@ class ByDensities(Filter):
 
 
 by_wavelets = partial(Filter, options=replace(DEFAULT, wavelets=True))
-"""Tiles by what they gain; roughness and change by wavelets."""
+"""Tiles chosen by gain; roughness and change from wavelets."""
 dense_by_wavelets = partial(ByDensities, options=replace(DEFAULT, wavelets=True))
-"""Both of the dissertation."""
+"""Tiles chosen by densities; roughness and change from wavelets."""

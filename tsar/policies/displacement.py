@@ -1,4 +1,4 @@
-"""How much a picture changes by the motion of what it shows."""
+"""The change of a picture that the motion of its surfaces causes."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from tsar.roots import encoded
 from tsar.types import Viewpoint
 
 PIXEL_FLOPS = 42
-"""Operations per pixel of :func:`change`: for one in four, two projections 62, the filling of displacements 45, and the
-comparison 60."""
+"""Operations per pixel of :func:`change`: for one pixel in four, two projections 62, the interpolation of displacements
+45, and the comparison 60."""
 
 
 @dataclass(frozen=True)
 class FirstHits:
-    """Newest sample of each pixel, raster order: its place on the image plane and its first hit, where there is one."""
+    """Newest sample of each pixel, raster order: its position on the image plane and its first hit, where there is
+    one."""
 
     known: Bool[Tensor, " pixels"]
     position: Float[Tensor, "pixels 2"]
@@ -34,18 +35,18 @@ class FirstHits:
 def change(image: Float[Tensor, "side side 3"], hits: FirstHits, now: Viewpoint, before: Viewpoint) -> float:
     """Mean squared change of an encoded picture whose pixels move as their first hits do.
 
-    They move from where they were sampled to where they will be as long after ``now`` as that is after ``before``, at
-    the same speed. One hit for each four pixels is followed, and one pixel in four is compared.
+    The pixels move from their sampled positions to those at the time as long after ``now`` as ``now`` is after
+    ``before``, extrapolated linearly. One hit in four pixels is projected, and one pixel in four is compared.
 
     Args:
         image: linear RGB, a power of two of pixels along a side.
-        hits: of its samples.
+        hits: first hits of its samples.
         now, before: newest poses, and earlier ones.
     """
     side = image.shape[0]
     half = side // 2
     pixel = torch.where(hits.known, torch.arange(side * side), -1)
-    pixel = pixel.reshape(half, 2, half, 2).amax((1, 3)).reshape(-1)  # one for each four
+    pixel = pixel.reshape(half, 2, half, 2).amax((1, 3)).reshape(-1)  # one pixel in four
     known = (pixel >= 0).nonzero().squeeze(1)
     some = pixel[known]
     here, there = (project(at, hits.instance[some], hits.point[some])[0] for at in (now, before))

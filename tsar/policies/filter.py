@@ -1,13 +1,13 @@
 """The project's own policies: estimates of every pixel, filtered over time and space, moving with their surfaces.
 
-Every pixel has an estimate of its colour and of the variance of its error. A cycle moves the estimates with the
-surfaces that they belong to, to where the poses known at its start say that they will be when it is shown; chooses the
-tiles whose samples remove most of the error for longest; averages the new samples into the estimates; learns from the
-residuals how fast the picture changes, and from the shadows of what moves where it soon will; and shows the estimates,
-blended with their surroundings where they are uncertain. ``filter`` leaves the moving out.
+Every pixel has an estimate of its colour and of the variance of its error. A cycle moves the estimates with their
+surfaces to the positions predicted, from the poses known at its start, for the time of display. It chooses the tiles
+whose samples remove the most error for the longest time and averages the new samples into the estimates. From the
+residuals it learns how fast the picture changes, and from the shadows of moving objects where it will change soon. It
+shows the estimates, blended with their surroundings where they are uncertain. ``filter`` omits the reprojection.
 
-The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is sampled in
-several cycles, so that the picture is late by little.
+The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is divided into
+several cycles, which keeps the latency low.
 """
 
 from __future__ import annotations
@@ -43,33 +43,34 @@ from tsar.window import GRID
 
 PIXEL_FLOPS = {True: 340.0, False: 185.0}
 """Operations per output pixel and cycle, with and without reprojection, as a test counts them in the code: aging,
-moving, choosing and smoothing. A batch is taken in where its samples lie, which they pay for."""
+moving, choosing and smoothing. The update by a batch is priced per sample."""
 SAMPLE_FLOPS = 740.0
-"""Operations per sample, an upper bound: replacing 6, encoding 6, roughness 24, sums 16, projection 40, taking in the
-pixel 135, a shadow's drift 85, and 3 x 3 pixels of roughness around it 9 x 35, with about 100 to spare."""
-_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # golden ratio of two dimensions
-_WARMUP_FRAMES = 12  # as many as framed renderers that accumulate have
+"""Operations per sample, an upper bound: replacement of non-finite values 6, encoding 6, roughness 24, sums 16,
+projection 40, update of the pixel 135, drift of a shadow 85, and 3 x 3 pixels of roughness around it 9 x 35, with about
+100 to spare."""
+_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # 2-D golden ratio
+_WARMUP_FRAMES = 12  # as many as accumulating framed renderers have
 _TILES_A_PROBE = 64
-_FIRST_CYCLE = 1 << 20  # cycles before the start have numbers down to its negative
+_FIRST_CYCLE = 1 << 20  # numbers of warm-up cycles are above its negative
 
 
 @dataclass(frozen=True)
 class State:
-    """What one cycle hands to the next.
+    """The state that one cycle passes to the next.
 
     Attributes:
-        estimates: of all pixels, aged to ``now_s``.
-        surfels: in all pixels.
-        change: observed so far.
-        drift_s: how fast shadows move over each element, image sides per second, as its newest samples met them.
-        rate: variance per second by which estimates age: what was observed, or what shadows make likely.
+        estimates: estimates of all pixels, aged to ``now_s``.
+        surfels: surfels of all pixels.
+        change: change observed so far.
+        drift_s: speed of the shadows over each element, image sides per second, as observed by its newest samples.
+        rate: variance per second that estimates gain: the greater of the observed rate and that expected from shadows.
         now_s: start of the newest cycle; None before the first.
-        known: poses at the start of the newest cycles, three at most; none where nothing is reprojected.
-        view: poses that estimates are moved to: those of the time at which the picture is first shown, as far as they
-            follow from the known ones; None where nothing is reprojected.
-        earlier: those of the cycle before; None where there was none.
-        spacing: of the tiles that were asked for, pixels.
-        visits: cycles that sampled each element.
+        known: poses at the start of the newest cycles, three at most; empty without reprojection.
+        view: poses to which estimates are moved, predicted from the known ones for the time at which the picture is
+            first shown; None without reprojection.
+        earlier: the ``view`` of the cycle before; None where there was none.
+        spacing: distance between samples of each requested tile, pixels.
+        visits: number of cycles that sampled each element.
         shown, remaining: the picture, and the variance of its errors.
     """
 
@@ -89,12 +90,12 @@ class State:
 
     @property
     def reprojected(self) -> Surfels | None:
-        """Surfels, where anything moves with them."""
+        """Surfels; None without reprojection."""
         return self.surfels if self.view is not None else None
 
 
 class Filter(Policy[State]):
-    """Samples accumulated in pixels, or on surfaces."""
+    """Samples are accumulated in pixels, or on surfaces."""
 
     def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
         super().__init__(setting)
@@ -123,7 +124,7 @@ class Filter(Policy[State]):
 
     @property
     def warmup_cycles(self) -> int:
-        """Enough to sample every pixel twelve times, however short the cycles are."""
+        """Enough cycles to sample every pixel twelve times, whatever their length."""
         return max(self.config.warmup_cycles, _WARMUP_FRAMES * self.config.pixels // (self._tiles * TILE_SIDE**2))
 
     @property
@@ -140,7 +141,7 @@ class Filter(Policy[State]):
                      torch.ones(self._tiles), visits, nothing.color, self._window.inside(nothing.variance))  # fmt: skip
 
     def request(self, state: State, moment: Moment) -> tuple[State, FrameletBatch]:
-        """Moves the estimates to the start of the cycle and asks for what they need."""
+        """Moves the estimates to the poses of the cycle and requests the samples that they need."""
         state = self._advanced(state, moment)
         state, (x, y, spacing) = self._chosen(state, moment)
         if self._probes(moment):
@@ -152,10 +153,10 @@ class Filter(Policy[State]):
         place = torch.stack((x, y), dim=1)
         offset = torch.full((self._tiles, 2), 0.5, dtype=torch.float64)
         if self._options.jitter:
-            # the next point of the sequence for each tile, so that a pixel sees consecutive ones
+            # each tile uses its next point of the sequence, so that a pixel receives consecutive points
             middle = ((place + 0.5 * TILE_SIDE * spacing[:, None]) / ELEMENT_PX).to(torch.int64)
             offset = ((state.visits[0][middle[:, 1], middle[:, 0]][:, None] + 1) * _STEP) % 1.0
-        # tiles that hang over the picture are sampled at its border
+        # tiles that extend beyond the picture are shifted to its border
         place = torch.minimum(place, self._size - TILE_SIDE * spacing[:, None])
         position = place[:, None] + (self._cell + offset[:, None]) * spacing[:, None, None]
         position = self._window.of_picture((position / self._side * GRID).floor() / GRID)
@@ -166,7 +167,7 @@ class Filter(Policy[State]):
             none, none, position.to(torch.float32), times, cycle=moment.cycle, seed=self.config.seed,
             hits=state.view is not None,
         )  # fmt: skip
-        counted = slice(1 if self._probes(moment) else 0, None)  # a probe leaves the points of other tiles to them
+        counted = slice(1 if self._probes(moment) else 0, None)  # a probe does not advance the points of other tiles
         visits = state.visits + tiles.covered(x[counted], y[counted], spacing[counted], self._side)
         return replace(state, spacing=spacing.to(torch.float32), visits=visits), batch
 
@@ -184,7 +185,7 @@ class Filter(Policy[State]):
         return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=_maps(state), carried=carried)
 
     def _carried(self, state: State, moment: Moment, image: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
-        """What would be shown if these were the colours of all estimates, of the same variances."""
+        """The picture that would be shown if all estimates had these colours, with the same variances."""
         color = image.permute(2, 0, 1).clamp(0.0, samples.COLOR_MAX).contiguous()
         shown = self._displayed(replace(state, estimates=replace(state.estimates, color=color)), moment).shown
         return shown.permute(1, 2, 0).contiguous()
@@ -209,7 +210,8 @@ class Filter(Policy[State]):
     def _chosen(
         self, state: State, moment: Moment
     ) -> tuple[State, tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]]:
-        """Left and upper edge of the tiles, and their spacing, pixels; those where most changes are sampled last."""
+        """Left and upper edges of the tiles and their spacing, pixels. Tiles are ordered by their rate of change: those
+        that change fastest are sampled last."""
         state, chosen = self._picked(state, moment)
         found = torch.cat([level.reshape(-1) for level in chosen]).nonzero().squeeze(1)
         tile = self._places[found[self._sampled[found]]]
@@ -221,7 +223,7 @@ class Filter(Policy[State]):
         return state, (x, y, spacing)
 
     def _picked(self, state: State, moment: Moment) -> tuple[State, list[Bool[Tensor, "_ _"]]]:
-        """Which tiles of every spacing are sampled."""
+        """The tiles to sample, a mask for every spacing."""
         if not self._options.by_gain:
             first = (moment.cycle + _FIRST_CYCLE) * self._tiles
             return state, tiles.in_turn(self._side, self._sampled, first, self._tiles)
@@ -231,12 +233,12 @@ class Filter(Policy[State]):
         )  # fmt: skip
 
     def _probes(self, moment: Moment) -> bool:
-        """Whether the first tile of a cycle looks where nothing is expected."""
+        """Whether the first tile of a cycle is a probe where no change is expected."""
         return self._options.probes and self._options.by_gain and moment.cycle % self._every == 0
 
     @property
     def _every(self) -> int:
-        """Cycles from one probe to the next."""
+        """Number of cycles from one probe to the next."""
         return max(1, _TILES_A_PROBE // self._tiles)
 
     def _updated(self, state: State, batch: FrameletBatch, answered: SampleBatch, moment: Moment) -> State:
@@ -273,7 +275,7 @@ class Filter(Policy[State]):
 
 
 def _maps(state: State) -> Mapping[str, MapShown]:
-    """How fast the picture is taken to change, and how far off each pixel is taken to be."""
+    """The estimated rate of change of the picture, and the expected error of each pixel."""
     return WhenAsked({
         "rate of change": lambda: MapShown(state.rate[0], (1e-4, 1.0), "variance per second"),
         "expected error": lambda: MapShown(square_root(state.remaining[0]), (0.003, 0.3), "RMS"),
@@ -283,6 +285,6 @@ def _maps(state: State) -> Mapping[str, MapShown]:
 WITHOUT_REPROJECTION = FilterOptions(
     reprojection=False, probes=False, share_max=1.0, life_min_s=0.1, life_max_s=1.0, memory_s=0.1
 )
-"""The filter alone: its samples are of use for less long, as they stay behind when surfaces move on."""
+"""The filter alone. Its samples are useful for a shorter time, because they do not follow moving surfaces."""
 unmoved = partial(Filter, options=WITHOUT_REPROJECTION)
 """The filter without reprojection."""

@@ -1,7 +1,7 @@
 """The ordinary framed renderer: a whole frame is traced, then shown until the next one is done.
 
-A frame has one sample a pixel, several, or one for a square of several pixels, in which case it is shown enlarged. Each
-takes the time that its samples cost, so a small frame is soon followed by the next.
+A frame has one sample per pixel, several, or one per square of several pixels, in which case it is shown enlarged. It
+takes as long as its samples cost, so a small frame is soon followed by the next.
 
 Source: Stephens 2011, sec. 7.1.2 (nonadaptive renderer); its latency is two frames by sec. 3.4.4 and one by sec. 3.4.2.
 """
@@ -28,24 +28,24 @@ from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 @dataclass(frozen=True)
 class Frame:
-    """The newest frame: its image, and the animation time it shows."""
+    """The newest frame: its image and its animation time, seconds."""
 
     image: Float[Tensor, "h w 3"] | None = None
     time_s: float = -float("inf")
 
 
 class Framed(Policy[Frame]):
-    """Whole frames with ``samples_per_axis`` samples along a pixel's side; the start is early enough for the latency.
+    """Whole frames with ``samples_per_axis`` samples along a pixel's side; the run starts early enough for the latency.
 
-    Two frames of latency: the first is traced, and shown while the second is (Stephens 2011, sec. 3.4.4). It is what
-    ratios are relative to.
+    The latency is two frames: a frame is traced, and then shown while the next is traced (Stephens 2011, sec. 3.4.4).
+    Ratios of errors are relative to this policy.
     """
 
     latency_cycles = 2
     probe_cycles = 1
 
     def __init__(self, setting: Setting, samples_per_axis: float = 1.0) -> None:
-        """Takes the samples along a pixel's side; 1/2 is one sample for a square of 2² pixels.
+        """Sets the number of samples along a pixel's side; 1/2 is one sample per square of 2 x 2 pixels.
 
         Raises:
             ConfigError: ``samples_per_axis`` is not a power of two, or leaves less than one sample.
@@ -71,8 +71,8 @@ class Framed(Policy[Frame]):
 
     @property
     def price(self) -> Price:
-        """Enlarging by ``k`` weights two values of each channel: three operations, in a ``k``-th of the rows for the
-        width and in all for the height. The box filter over several samples is not charged."""
+        """Enlargement by ``k`` interpolates two values of each channel with three operations, in a ``k``-th of the rows
+        for the width and in all rows for the height. The box filter over several samples is not charged."""
         enlarge = 9.0 * (1.0 + self._axis) if self._axis < 1 else 0.0
         return Price(self._shape[0] * self._shape[1], pixel_flops=enlarge)
 
@@ -80,7 +80,7 @@ class Framed(Policy[Frame]):
         return Frame()
 
     def request(self, state: Frame, moment: Moment) -> tuple[Frame, FrameletBatch]:
-        """A whole frame, along the curve."""
+        """A whole frame, in the order of the Morton curve."""
         position = curve_positions(*self._shape, *self.config.shape, self._axis)
         position = position.reshape(-1, gcd(len(position), self.config.samples), 2)
         nothing = torch.zeros(len(position), dtype=torch.int64)
@@ -101,13 +101,13 @@ class Framed(Policy[Frame]):
 
 
 class PromptlyFramed(Framed):
-    """One frame of latency: a frame is shown as soon as it is traced (Stephens 2011, sec. 3.4.2)."""
+    """The latency is one frame: a frame is shown as soon as it is traced (Stephens 2011, sec. 3.4.2)."""
 
     latency_cycles = 1
 
 
 def supersampled(setting: Setting) -> Framed:
-    """Four samples a pixel, one frame of latency."""
+    """Four samples per pixel, one frame of latency."""
     return PromptlyFramed(setting, 2.0)
 
 
@@ -127,9 +127,9 @@ def finite(
     """Samples along :func:`tsar.morton.curve`, repaired by :func:`tsar.error.replace_nonfinite` in square blocks.
 
     Args:
-        color: as many samples as ``shape`` says, height and width.
-        shape: of the samples. Blocks are the largest that it consists of.
-        side_most: samples along the side of a block at most, a power of two.
+        color: samples of a raster of ``shape``, linear RGB.
+        shape: height and width of the samples. Blocks are the largest squares of a power of two that divide it.
+        side_most: maximum number of samples along the side of a block, a power of two.
     """
     side = gcd(*shape, side_most)
     return replace_nonfinite(color.reshape(-1, side**2, 3), side)[0]
@@ -138,14 +138,14 @@ def finite(
 def frame_image(
     color: Float[Tensor, "n samples 3"], shape: tuple[int, int], picture: tuple[int, int], samples_per_axis: float
 ) -> Float[Tensor, "h w 3"]:
-    """Image of samples along :func:`tsar.morton.curve`.
+    """The image of samples along :func:`tsar.morton.curve`.
 
     Args:
-        color: as many samples as ``shape`` says, height and width.
+        color: samples of a raster of ``shape``, linear RGB.
         shape: of the samples.
-        picture: height and width of the image, pixels; these are box averages of several samples, or bilinear between
-            few.
-        samples_per_axis: of a pixel's side.
+        picture: height and width of the image. Its pixels are box averages of several samples, or bilinear
+            interpolations where there are fewer samples than pixels.
+        samples_per_axis: number of samples along a pixel's side.
     """
     raster = torch.empty(shape[0] * shape[1], 3)
     raster[curve(*shape)] = color.reshape(-1, 3)
@@ -157,8 +157,8 @@ def frame_image(
 def curve_positions(
     rows: int, columns: int, height: int, width: int, samples_per_axis: float = 1.0
 ) -> Float[Tensor, "samples 2"]:
-    """Where regular samples lie on an image of ``width x height`` pixels, along :func:`tsar.morton.curve`. Where a
-    square of pixels that has one sample hangs over the image, that lies in the centre of the last pixel."""
+    """Positions of regular samples on an image of ``width x height`` pixels, along :func:`tsar.morton.curve`. If a
+    square of pixels with one sample extends beyond the image, the sample lies in the centre of the last pixel."""
     number = curve(rows, columns)
     x, y = ((at + 0.5) / samples_per_axis for at in (number % columns, number // columns))
     last = 0.5 * min(1.0, 1.0 / samples_per_axis)
@@ -166,7 +166,7 @@ def curve_positions(
 
 
 def _resampled(raster: Float[Tensor, "h w 3"], factor: float) -> Float[Tensor, "h2 w2 3"]:
-    """Enlarged, or averaged where the factor is below 1."""
+    """The raster enlarged, or averaged where the factor is below 1."""
     planes = raster.permute(2, 0, 1)
     if factor == 1.0:
         return raster

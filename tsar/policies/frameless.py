@@ -1,4 +1,4 @@
-"""Frameless rendering: as many pixels as a batch has samples, in random order over the image, shown at once.
+"""Frameless rendering: each batch samples pixels in random order over the image and is shown at once.
 
 Source: Bishop et al. 1994, as described in Stephens 2011, sec. 2.5.
 """
@@ -20,9 +20,9 @@ from tsar.types import FrameletBatch, SampleBatch
 
 @dataclass(frozen=True)
 class Sweep:
-    """The newest sample of each pixel, the pixels asked for, and those that are still to be visited.
+    """The newest sample of each pixel, the requested pixels, and those still to be visited.
 
-    Frozen, but the buffer within changes in place.
+    Frozen, except that the buffer changes in place.
     """
 
     buffer: PixelBuffer
@@ -33,8 +33,8 @@ class Sweep:
 class Frameless(Policy[Sweep]):
     """Every pixel is visited once per sweep, each sweep in a new random order.
 
-    Charged are its samples and the four operations that place each; whether holes are filled is not, for there are none
-    after the first sweep.
+    The price is that of the samples and of the four operations that store each. Filling holes is not charged, because
+    none are left after the first sweep.
     """
 
     @property

@@ -1,24 +1,25 @@
-"""Interruptible rendering: a frame of one time is refined from coarse to fine until the scene has moved on too far.
+"""Interruptible rendering: a frame of one animation time is refined from coarse to fine until the scene has changed too
+much.
 
-The frame in the making, the back buffer, gets every cycle's samples, all of the animation time at which the frame was
-begun, where they remove most of its error. Two errors of it are followed, in one unit, squared encoded colour: the
-*static* one, which coarseness causes and refinement removes, and the *dynamic* one, by which the picture will have
-changed since its time when it is shown. Once the second exceeds the first the frame is interrupted: it is shown, and
-the next one is begun. A frame is shown before that, and refined while it is shown, if the sum of its errors is below
-that of the picture on the display, so that sometimes the back buffer is drawn into and sometimes the front buffer.
+The back buffer holds the frame in progress. Every cycle adds samples where they remove most of its error, all at the
+animation time at which the frame was begun. Two errors are tracked, both in squared encoded colour: the *static* error,
+which coarseness causes and refinement removes, and the *dynamic* error, the change of the picture between that time and
+its display. Once the dynamic error exceeds the static one, the frame is interrupted: it is shown, and the next one is
+begun. A frame is shown earlier, and refined while it is shown, if the sum of its errors is below that of the picture on
+the display; so rendering goes sometimes into the back buffer and sometimes into the front buffer.
 
-The static error is that of :func:`tsar.policies.refinement.remaining`, calibrated by the colours of new samples against
-what the picture had in their places. The dynamic one is how much the picture changes when every pixel moves as the
-first hits do: from their places at the frame's time to those at the end of the cycle, extrapolated from the poses at
-its start and those a cycle earlier. What changes without motion is seen by a few samples that are traced again at the
-present time: where they tell of more than the motion explains, they are believed.
+The static error is that of :func:`tsar.policies.refinement.remaining`, calibrated by the differences between new
+samples and the picture at their positions. The dynamic error is the change of the picture when every pixel moves with
+its first hit, from its position at the frame's time to that at the end of the cycle, extrapolated from the poses at its
+start and those a cycle earlier. Changes without motion are detected by probes, a few samples that are traced again at
+the present time: where they show more change than the motion explains, their estimate is used.
 
-Source: Woolley, Luebke, Watson and Dayal 2003, *Interruptible rendering*, as its abstract and Stephens 2011, sec. 2.4,
-describe it.
+Source: Woolley, Luebke, Watson and Dayal 2003, *Interruptible rendering*, as described in its abstract and in Stephens
+2011, sec. 2.4.
 
-Deviation: the original measures both errors as distances in pixels on the image plane, and refines geometric detail or
-the resolution of a ray caster alike everywhere. Here both are errors of colour, which is what they stand for, and the
-refinement is adaptive.
+Deviation: the original measures both errors as distances in pixels on the image plane, and refines geometric detail, or
+the resolution of a ray caster, uniformly. Here both are errors of colour, for which those distances are a proxy, and
+the refinement is adaptive.
 """
 
 from __future__ import annotations
@@ -40,26 +41,26 @@ from tsar.roots import encoded
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 
 SAMPLES_PER_PIXEL = 16
-"""A frame is complete when it has this many, whatever moves."""
+"""A frame is complete when it has this many samples per pixel, whatever its dynamic error."""
 PROBE_SHARE = 1.0 / 32.0
-"""Share of the samples of a cycle that look for changes without motion."""
-_SURE = 3.0  # standard errors by which probes must exceed what motion explains
-_STILL = 0.1  # or motion explains less than this share of what they tell
-_CALIBRATION = 0.5  # of a frame of which nothing has been predicted yet
+"""Share of the samples of a cycle that are probes for changes without motion."""
+_SURE = 3.0  # standard errors by which the probes must exceed the change from motion
+_STILL = 0.1  # or motion explains less than this share of their change
+_CALIBRATION = 0.5  # initial value
 _CALIBRATION_RANGE = 0.1, 3.0
-_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532])  # golden ratio of two dimensions
+_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532])  # 2-D golden ratio
 
 
 @dataclass(frozen=True)
 class Frame:
-    """What has been sampled of one frame, pixels in raster order. Changes in place.
+    """The samples of one frame, pixels in raster order. Changes in place.
 
     Attributes:
         time_s: animation time of all its samples; ``-inf`` for a frame that was never begun.
         color, count: sum and number of each pixel's samples.
-        position: of the pixel's newest sample, on the image plane.
-        instance, point: its first hit.
-        grid, grid_color: pixels of the first, regular samples, which probes look at again, and their colours.
+        position: position of each pixel's newest sample on the image plane.
+        instance, point: first hit of that sample.
+        grid, grid_color: pixels of the first, regular samples, which probes trace again, and their colours.
     """
 
     time_s: float
@@ -88,11 +89,11 @@ class View:
     """A frame as a picture.
 
     Attributes:
-        frame: that it shows; it may have got more samples since.
+        frame: frame that it shows, which may have received more samples since.
         image: ``(height, width, 3)`` linear RGB.
-        error: squared error expected per pixel, and its mean.
-        tree: that it was refined by.
-        samples: how many it has.
+        error, static: expected squared error of each pixel, and its mean.
+        tree: quadtree that refines it.
+        samples: number of its samples.
         changed: dynamic error when the frame was interrupted.
     """
 
@@ -107,7 +108,8 @@ class View:
 
 @dataclass(frozen=True)
 class Asked:
-    """Pixels of a cycle's samples, and indices into the frame's grid of those that probe, which come after them."""
+    """The requested samples: pixels of the refining samples, and indices into the frame's grid of the probes that
+    follow them."""
 
     pixel: Int64[Tensor, " samples"]
     probe: Int64[Tensor, " probes"]
@@ -115,14 +117,14 @@ class Asked:
 
 @dataclass(frozen=True)
 class Buffers:
-    """The frame in the making, the picture on the display, and what was asked for.
+    """The frame in progress, the picture on the display, and the requested samples.
 
     Attributes:
-        frame: that is refined; None when one is to be begun.
-        back: it as a picture, before its first samples None.
-        front: on the display, before the first picture None.
-        calibration: of the static error.
-        asked: of the renderer.
+        frame: frame that is refined; None when a new one is to be begun.
+        back: that frame as a picture; None before its first samples.
+        front: picture on the display; None before the first.
+        calibration: factor of the static error.
+        asked: samples requested from the renderer.
     """
 
     frame: Frame | None = None
@@ -133,7 +135,7 @@ class Buffers:
 
 
 class Interruptible(Policy[Buffers]):
-    """Cycles of ``batch_size * s²`` samples of one frame each."""
+    """Cycles of ``batch_size * s²`` samples, each for one frame."""
 
     def __init__(self, setting: Setting) -> None:
         super().__init__(setting)
@@ -142,14 +144,14 @@ class Interruptible(Policy[Buffers]):
 
     @property
     def footprint(self) -> float:
-        """Samples are averaged later on; 2 had the least error of 1, 2 and 4."""
+        """2, as samples are averaged later on: it had the least error of 1, 2 and 4."""
         return 2.0
 
     @property
     def price(self) -> Price:
-        """Beside refinement, per pixel: image 75 (pyramid up 20 and down 26, of three channels, and means 3, times
-        4/3); and displacement, for back and front. Per sample: replacement of what is not finite 6, sums 8, encoding
-        and calibration 20.
+        """Besides refinement, per pixel: image 75 (pyramid up 20 and down 26, of three channels, and means 3, times
+        4/3); and displacement, for back and front buffer. Per sample: replacement of non-finite values 6, sums 8,
+        encoding and calibration 20.
         """
         return Price(
             int(self.config.budget),
@@ -161,7 +163,7 @@ class Interruptible(Policy[Buffers]):
         return Buffers()
 
     def request(self, state: Buffers, moment: Moment) -> tuple[Buffers, FrameletBatch]:
-        """The pixels that refine the frame most, and probes; where the last frame was interrupted, a coarse grid."""
+        """The pixels that refine the frame most, and probes; for a new frame, a coarse grid."""
         config, count = self.config, int(self.config.budget)
         random = generator(config, moment.cycle)
         if state.frame is None or state.back is None:
@@ -205,8 +207,8 @@ class Interruptible(Policy[Buffers]):
         return Picture(front.image, SampleMap(age, torch.full((1, 1), level)))
 
     def _dynamic(self, view: View, moment: Moment, probes: tuple[float, float] | None) -> float:
-        """By how much a picture will differ at the end of the cycle, from motion or, where that falls short of what the
-        probes (their mean and its standard error) tell, from them."""
+        """Dynamic error of a picture at the end of the cycle: the change from motion or, where the probes show more
+        change than that, the change that they extrapolate to. ``probes`` is their mean and its standard error."""
         moved, age_s = 0.0, moment.time_s - view.frame.time_s
         if self._view is not None:
             now, before = self._view(moment.time_s), self._view(moment.time_s - moment.cycle_s)
@@ -219,7 +221,8 @@ class Interruptible(Policy[Buffers]):
 
 
 def _batch(frame: Frame, asked: Asked, config: TsarConfig, moment: Moment, hits: bool) -> FrameletBatch:
-    """Samples of the frame's time at pixel centres, further ones of a pixel elsewhere in it; and probes, at present."""
+    """Samples at the frame's time, the first of a pixel at its centre and further ones elsewhere in it; and probes at
+    the present time."""
     side = config.resolution_px
     count = frame.count[asked.pixel][:, None]
     offset = torch.where(count > 0, (0.5 + count * _STEP) % 1.0, 0.5)
@@ -249,7 +252,7 @@ def _add(
     color: Float[Tensor, "samples 3"],
     first: bool,
 ) -> None:
-    """Puts the samples of a cycle into the frame; those of its first cycle begin with its grid."""
+    """Adds the samples of a cycle to the frame; those of its first cycle begin with its grid."""
     pixel, count = asked.pixel, asked.pixel.numel()
     frame.color.index_add_(0, pixel, color)
     frame.count.index_add_(0, pixel, torch.ones(count))
@@ -264,7 +267,7 @@ def _add(
 
 
 def _seen(frame: Frame, calibration: float, samples: int, config: TsarConfig) -> View:
-    """The frame as a picture: means of pixels, empty ones filled from coarser levels."""
+    """The frame as a picture: means of the pixels, with empty ones filled from coarser levels."""
     side = config.resolution_px
     color, count = frame.color.T.reshape(3, side, side), frame.count.reshape(side, side)
     image = pull_push(color / count.clamp(min=1.0), (count > 0).to(torch.float32)[None])
@@ -274,7 +277,7 @@ def _seen(frame: Frame, calibration: float, samples: int, config: TsarConfig) ->
 
 
 def _calibrated(state: Buffers, asked: Asked, color: Float[Tensor, "samples 3"]) -> float:
-    """Squared error found by samples of pixels that were empty, over the one that was expected of them."""
+    """Squared error observed by samples of pixels that were empty, over the expected one."""
     assert state.frame is not None and state.back is not None
     fresh = state.frame.count[asked.pixel] == 0
     if int(fresh.sum()) < asked.pixel.numel() // 4:
@@ -287,7 +290,7 @@ def _calibrated(state: Buffers, asked: Asked, color: Float[Tensor, "samples 3"])
 
 
 def _probed(frame: Frame, asked: Asked, color: Float[Tensor, "probes 3"]) -> tuple[float, float] | None:
-    """Mean squared change of the colours that were traced again, and its standard error; None where there are none."""
+    """Mean squared change of the colours of the probes, and its standard error; None with fewer than two probes."""
     if asked.probe.numel() < 2:
         return None
     change = encoded(color) - encoded(frame.grid_color[asked.probe])

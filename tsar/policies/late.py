@@ -1,11 +1,13 @@
 """A finished image, warped to the poses of a later time.
 
-Every pixel is taken to where its surface is seen then. Of those that arrive in the same place the nearest counts; the
-image is read between its pixels there. A gap of a pixel takes what lies deepest beside it. Of wider ones, those that
-lay outside the image before repeat its border, and those that were hidden are filled from around, from what does not
-move by itself if there is any: what comes into view from behind something is the background.
+Every pixel moves to the later position of its surface. Of several that arrive in the same pixel the nearest counts; the
+image is interpolated at the position from which it came. A gap of one pixel takes the deepest of its neighbours. A
+wider gap repeats the border of the image where it lay outside of it. A gap that was hidden is filled from its
+surroundings, from static surfaces if there are any, because a surface that comes into view from behind an object is
+background.
 
-Source: McMillan and Bishop 1995 (forward warping); Mark, McMillan and Bishop 1997 (of a frame to the newest poses).
+Source: McMillan and Bishop 1995 (forward warping); Mark, McMillan and Bishop 1997 (warping of a frame to the newest
+poses).
 """
 
 from __future__ import annotations
@@ -21,20 +23,20 @@ from tsar.policies.surfaces import PROJECT_FLOPS, Surfaces, centres, seen, withi
 from tsar.types import Viewpoint
 
 NEARER = 0.93
-"""What is nearer than this share of a depth lies before it, not on the same surface."""
+"""A surface nearer than this share of a depth lies in front of it and is not the same surface."""
 
 WARP_FLOPS = PROJECT_FLOPS + 4.0 + 17.0 + 4.0 + 2.0 + BILINEAR_FLOPS + 4.0 / 3.0 * 2.0 * 64.0
-"""Of a warp for a pixel: its projection; rounding and comparing; the deepest of eight neighbours, for gaps; the place
-to read from; whether something covers it; the reading; and two pyramids, of motion and of colours, whose levels have a
-third more pixels than the image. In each: shares times channels and their sums, a division, two enlargements and a
-blend."""
+"""Operations of a warp per pixel: its projection; rounding and comparison; the deepest of eight neighbours, for gaps;
+the source position; whether a surface covers it; interpolation; and two pyramids, of motion and of colours, whose
+levels have a third more pixels than the image. Each takes products of weights and channels, their sums, a division, two
+enlargements and a blend."""
 
 
 def warped(image: Float[Tensor, "h w 3"], surfaces: Surfaces, view: Viewpoint) -> Float[Tensor, "h w 3"]:
-    """The image as another view sees its surfaces.
+    """The image as its surfaces appear in another view.
 
     Args:
-        image: what is shown of the surfaces.
+        image: linear RGB of the surfaces.
         surfaces: first hits of the same pixels.
         view: the poses to warp to.
     """
@@ -46,7 +48,7 @@ def warped(image: Float[Tensor, "h w 3"], surfaces: Surfaces, view: Viewpoint) -
     known, place = source >= 0, source.clamp(min=0)
     back = torch.where(known[..., None], (centre - landing).reshape(-1, 2)[place], 0.0)
     at_depth = torch.where(known, depth.reshape(-1)[place], 0.0)
-    # a narrow gap may lie on the same surface, or beside what is nearer, which must not be read
+    # a narrow gap may lie on the same surface, or beside a nearer one, which must not be read
     read_at = centre + back
     covered = (arrived < 0) & (nearest(depth, read_at) < NEARER * at_depth)
     read_at = torch.where(covered[..., None], centre.reshape(-1, 2)[place], read_at)
@@ -64,12 +66,12 @@ def warped(image: Float[Tensor, "h w 3"], surfaces: Surfaces, view: Viewpoint) -
 
 
 def _winners(landing: Float64[Tensor, "h w 2"], depth: Float[Tensor, "h w"]) -> Int64[Tensor, "h w"]:
-    """Number of the nearest pixel that arrives in each place, -1 where none does; of equals the first."""
+    """Index of the nearest pixel that arrives in each pixel, -1 where none does; among equals the first."""
     (height, width), count = landing.shape[:2], landing.shape[0] * landing.shape[1]
     target = (landing + 0.5).nan_to_num(nan=-1.0, posinf=-1.0, neginf=-1.0).floor()
     inside = ((target >= 0) & (target < target.new_tensor((width, height)))).all(-1) & (depth > 0)
     cell = torch.where(inside, target[..., 1] * width + target[..., 0], count).to(torch.int64).reshape(-1)
-    # the bits of positive floats rise as the floats do
+    # the bits of positive floats are ordered as the floats are
     key = (depth.view(torch.int32).to(torch.int64).reshape(-1) << 32) | torch.arange(count)
     none = torch.iinfo(torch.int64).max
     best = torch.full((count + 1,), none).scatter_reduce(0, cell, key, "amin")[:-1]
@@ -77,7 +79,7 @@ def _winners(landing: Float64[Tensor, "h w 2"], depth: Float[Tensor, "h w"]) -> 
 
 
 def _deepest_beside(arrived: Int64[Tensor, "h w"], depth: Float[Tensor, "h w"]) -> Int64[Tensor, "h w"]:
-    """Of what arrived in the eight places around, the deepest pixel; -1 where nothing did; of equals the first."""
+    """Index of the deepest pixel that arrived in the eight pixels around; -1 where none did; among equals the first."""
     height, width = arrived.shape
     sources = F.pad(arrived, (1, 1, 1, 1), value=-1)
     depths = torch.where(sources >= 0, depth.reshape(-1)[sources.clamp(min=0)], -1.0)
@@ -92,6 +94,6 @@ def _deepest_beside(arrived: Int64[Tensor, "h w"], depth: Float[Tensor, "h w"]) 
 
 
 def _spread(back: Float64[Tensor, "h w 2"], known: Bool[Tensor, "h w"]) -> Float64[Tensor, "h w 2"]:
-    """The motion of what is known around, where nothing is."""
+    """The motion, with unknown pixels filled from the known ones around them."""
     planes = F.pad(back.permute(2, 0, 1), (0, 0, 0, 0, 0, 1)).to(torch.float32)
     return pull_push(planes, known[None].to(torch.float32))[:2].permute(1, 2, 0).to(torch.float64)

@@ -1,11 +1,11 @@
-"""A controller that may look at the answer: what an allocation could gain at the same cost.
+"""An oracle controller, which knows the true picture: a bound on what allocation could gain at the same cost.
 
-Every cycle it traces, without being charged, a framelet of every tile of every level, compares each with the picture
-that will be true when the cycle is displayed, and keeps the ``batch_size`` non-overlapping tiles that lower the error
-of the display most. Cache, reconstruction, latency and cost are those of the adaptive pipeline.
+Every cycle it traces a framelet of every tile of every level without being charged, compares each with the true picture
+at the time of display, and keeps the ``batch_size`` non-overlapping tiles that lower the error of the display most.
+Cache, reconstruction, latency and cost are those of the adaptive pipeline.
 
-It is greedy: a cycle is chosen for its own display, not for those after it. So it bounds from below what could be
-gained, and a policy that plans ahead could in principle do better.
+It is greedy: a cycle is optimised for its own display, not for later ones. So its gain is a lower bound, and a policy
+that plans ahead could in principle do better.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ _BISECTIONS = 40
 
 @dataclass(frozen=True)
 class Foresight:
-    """The cache, which changes in place, and whether the batch asked for is of any use."""
+    """The cache, which changes in place, and whether the requested batch is useful."""
 
     cache: FrameletCache
     useful: bool = True
 
 
 class Oracle(Policy[Foresight]):
-    """The adaptive pipeline's cache, display, latency and cost under a controller that looks at the truth."""
+    """The adaptive pipeline's cache, display, latency and cost under a controller that knows the truth."""
 
     latency_cycles = Thesis.latency_cycles
 
     def __init__(self, setting: Setting) -> None:
-        """Takes the truth and a renderer that is not charged.
+        """Sets the truth and the renderer that is not charged.
 
         Raises:
             ValueError: the setting has no truth or no such renderer.
@@ -62,11 +62,11 @@ class Oracle(Policy[Foresight]):
 
     @property
     def warmup_cycles(self) -> int:
-        """At most 16: its first cycles already go where the error is."""
+        """At most 16, because its first cycles already sample where the error is."""
         return min(16, self.config.warmup_cycles)
 
     def probe(self, trace: Trace, time_s: float) -> tuple[Mapping[str, int], float]:
-        """Work of a batch's worth of samples spread over the picture; nothing is looked at."""
+        """Cost of a batch of samples spread over the picture; the truth is not used."""
         return trace(self._spread(self.config.batch_size, Moment(time_s, 0, 1.0))).counters, 1.0
 
     def start(self) -> Foresight:
@@ -105,7 +105,7 @@ class Oracle(Policy[Foresight]):
         return Picture(made.image, made.sample_map, made.counters)
 
     def _spread(self, count: int, moment: Moment) -> FrameletBatch:
-        """At most so many tiles of the finest level, evenly spread."""
+        """At most ``count`` tiles of the finest level, evenly spread."""
         level = self.config.level_max
         count = min(count, 4**level)
         index = torch.arange(count) * (4**level // count)
@@ -123,7 +123,7 @@ class Oracle(Policy[Foresight]):
 
 
 def _shown(image: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
-    """Linear radiance to a scale on which equal differences look about equal: clipped, power 1 / 2.2."""
+    """Linear radiance on a scale on which equal differences look about equal: ``clip(c, 0, 1)^(1 / 2.2)``."""
     return image.clamp(0.0, 1.0).pow(1.0 / 2.2)
 
 
@@ -134,7 +134,7 @@ def _benefit(
     wanted: Float[Tensor, "h w 3"],
     config: TsarConfig,
 ) -> Float[Tensor, " n"]:
-    """Squared error that showing each tile of a level would remove, Morton order; negative where it would add some."""
+    """Squared error that showing each tile of a level would remove, Morton order; negative where it would add error."""
     grid = config.framelet_side << level
     image = color.reshape(-1, 3)[raster_to_morton(grid)].reshape(grid, grid, 3).permute(2, 0, 1)
     if grid > config.resolution_px:
@@ -149,17 +149,17 @@ def _benefit(
 
 
 def choose(benefit: list[Float[Tensor, " _"]], count: int) -> list[Int64[Tensor, " _"]]:
-    """At most ``count`` disjoint nodes of a quadtree of greatest total benefit.
+    """At most ``count`` disjoint nodes of a quadtree with the greatest total benefit.
 
     Args:
         benefit: per level, coarse to fine, each four times as long as the one before, Morton order.
-        count: most nodes to take.
+        count: maximum number of nodes to take.
 
     Returns:
         Indices of the nodes taken, per level.
 
-    With a price on every node the best set is found from the leaves to the root; the price is bisected until the set
-    is as large as it may be. Sets between two prices are not found: the set is optimal for its own size.
+    With a price on every node the best set is found from the leaves to the root. The price is bisected until the set is
+    as large as allowed. Sets between two prices are not found: the set is optimal for its own size.
     """
     low, high = 0.0, max(float(level.max()) for level in benefit) + 1.0
     best = _take(benefit, high)

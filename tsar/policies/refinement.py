@@ -1,11 +1,11 @@
-"""Refinement of one picture from coarse to fine: the error that is left, and the pixels that are worth a sample next.
+"""Refinement of one picture from coarse to fine: the remaining error, and the pixels to sample next.
 
-A quadtree stands over the pixels. A cell is known once a sample lies in it. Its contrast is the mean squared difference
-of its encoded colour from that of the known cells beside it. A picture of which little is known is refined by giving a
-sample to the empty children of known cells, those of greatest contrast times area first; where all four children are
-known they are refined in turn, down to the pixel, which takes further samples.
+A quadtree covers the pixels. A cell is known once a sample lies in it. Its contrast is the mean squared difference of
+its encoded colour from that of the known cells beside it. The picture is refined by sampling the empty children of
+known cells, those of greatest contrast times area first. Where all four children are known they are refined in turn,
+down to the pixel, which takes further samples.
 
-Source: adaptive refinement of Painter and Sloan 1989, by levels of a quadtree.
+Source: Painter and Sloan 1989 (adaptive refinement), here by levels of a quadtree.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tsar.roots import encoded
 WITHIN_PIXEL = 0.5
 """Squared error of a pixel's only sample, as a share of the pixel's contrast with its neighbours."""
 LEAST_CONTRAST = 1e-5
-"""Contrast that any cell may hide: what looks plain is refined last, but it is refined."""
+"""Contrast added to every cell, so that plain cells are refined last but are refined."""
 PIXEL_FLOPS = 130
-"""Operations per pixel of :func:`levels`, :func:`remaining` and :func:`worthiest`: sums up the tree 16, per cell (4/3 a
-pixel) mean and encoding 12, contrast 30, error 6, score 10, and its share of the sort, 2 comparisons a level of which
-there are at most 20, of which the coarser half is never reached: 30."""
+"""Operations per pixel of :func:`levels`, :func:`remaining` and :func:`worthiest`: sums up the tree 16; per cell (4/3
+of them per pixel) mean and encoding 12, contrast 30, error 6, score 10, and a share of the sort: 2 comparisons for each
+of at most 20 levels, whose coarser half is never reached, 30 in all."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Level:
     """One level of the tree, raster order.
 
     Attributes:
-        contrast: of its cells, squared encoded value; 0 where the cell or all cells beside it are empty.
-        count: samples in its cells.
+        contrast: contrast of its cells, squared encoded colour; 0 where the cell or all cells beside it are empty.
+        count: number of samples in its cells.
     """
 
     contrast: Float[Tensor, "side side"]
@@ -48,7 +48,8 @@ class Level:
 
 
 def levels(color: Float[Tensor, "3 side side"], count: Float[Tensor, "side side"]) -> list[Level]:
-    """The tree over sums of colours and numbers of samples per pixel, from 2 x 2 cells to the pixels."""
+    """The tree of a picture, from 2 x 2 cells to the pixels, given the sum of colours and the number of samples of each
+    pixel."""
     found: list[Level] = []
     while count.shape[0] > 1:
         mean = encoded(color / count.clamp(min=1.0))
@@ -59,8 +60,8 @@ def levels(color: Float[Tensor, "3 side side"], count: Float[Tensor, "side side"
 
 
 def remaining(tree: list[Level], calibration: float) -> Float[Tensor, "side side"]:
-    """Squared error expected per pixel: of an empty one, ``calibration`` times the contrast of the finest known cell
-    around it; of one with ``n`` samples, ``WITHIN_PIXEL / n`` of its own contrast."""
+    """Expected squared error of each pixel: for an empty one, ``calibration`` times the contrast of the finest known
+    cell around it; for one with ``n`` samples, ``WITHIN_PIXEL / n`` of its own contrast."""
     error = torch.zeros(1, 1)
     for level in tree:
         error = torch.where(level.known, level.contrast, _doubled(error))
@@ -70,10 +71,10 @@ def remaining(tree: list[Level], calibration: float) -> Float[Tensor, "side side
 
 
 def worthiest(tree: list[Level], count: int, random: torch.Generator) -> Int64[Tensor, " pixels"]:
-    """Raster indices of ``count`` pixels to sample next; of an empty cell, a random pixel.
+    """Raster indices of the ``count`` pixels to sample next; in an empty cell, a random pixel.
 
-    What a sample removes is estimated as a quarter of the contrast times the area of the cell that is refined, and for
-    a pixel with ``n`` samples as ``WITHIN_PIXEL / (n (n + 1))`` of its contrast.
+    The error that a sample removes is estimated as a quarter of the contrast times the area of the refined cell, and
+    for a pixel with ``n`` samples as ``WITHIN_PIXEL / (n (n + 1))`` of its contrast.
     """
     side = tree[-1].count.shape[0]
     cells = [level.count.numel() for level in tree]
@@ -94,10 +95,10 @@ def worthiest(tree: list[Level], count: int, random: torch.Generator) -> Int64[T
 
 
 def spread(side: int, count: int, random: torch.Generator) -> tuple[Int64[Tensor, " pixels"], int]:
-    """``count`` different pixels spread over an empty picture, and how many of them, the first, lie in a regular grid.
+    """``count`` pixels spread over an empty picture, and how many of the first of them form a regular grid.
 
-    Half of the samples at most, a power of four, go one each to the cells of a level, and the rest to random empty ones
-    of the next. Each is at a random pixel of its cell.
+    At most half of the samples, a power of four, lie one each in the cells of a level; the others lie in random empty
+    cells of the next level. Each is at a random pixel of its cell.
     """
     level = min(side.bit_length() - 1, max((count // 2).bit_length() - 1, 0) // 2)
     cells = 2**level
@@ -114,7 +115,7 @@ def spread(side: int, count: int, random: torch.Generator) -> tuple[Int64[Tensor
 
 
 def mean(values: Float[Tensor, "*n"]) -> float:
-    """Mean of all values, the same bits for any number of threads."""
+    """Mean of all values, with the same bits for any number of threads."""
     return total(values.reshape(-1).to(torch.float64)) / max(values.numel(), 1)
 
 
@@ -134,8 +135,8 @@ def _contrast(color: Float[Tensor, "3 side side"], known: Float[Tensor, "side si
 
 
 def _offer(level: Level, finer: Level | None) -> tuple[Float[Tensor, "side side"], Int64[Tensor, "side side"]]:
-    """What a sample in each cell of a level removes, 0 where none is on offer, and how many samples its refinement
-    takes; in units of the area of the level's cells times their number."""
+    """Error that a sample in each cell of a level removes, times its share of the picture's area, and the number of
+    samples that its refinement takes. The former is 0 where the cell cannot be refined at this level."""
     area = 1.0 / level.count.numel()
     if finer is None:
         own = WITHIN_PIXEL * (level.contrast + 0.01 * LEAST_CONTRAST) * area / (level.count * (level.count + 1.0))
@@ -148,7 +149,7 @@ def _offer(level: Level, finer: Level | None) -> tuple[Float[Tensor, "side side"
 def _empty_children(
     cell: Int64[Tensor, " cells"], level: Level, finer: Level, side: int, random: torch.Generator
 ) -> Int64[Tensor, " pixels"]:
-    """A random pixel of each empty child of some cells of a level."""
+    """A random pixel of each empty child of the given cells of a level."""
     across = level.count.shape[0]
     column = (2 * (cell % across)[:, None] + torch.tensor([0, 1, 0, 1])).reshape(-1)
     row = (2 * (cell // across)[:, None] + torch.tensor([0, 0, 1, 1])).reshape(-1)
@@ -159,7 +160,7 @@ def _empty_children(
 def _pixel_within(
     cell: Int64[Tensor, " cells"], across: int, side: int, random: torch.Generator
 ) -> Int64[Tensor, " cells"]:
-    """A random pixel of each of some cells, of which ``across`` lie along the side of the picture."""
+    """A random pixel of each given cell, of which ``across`` lie along the side of the picture."""
     width = side // across
     within = torch.randint(width * width, cell.shape, generator=random)
     return (cell // across * width + within // width) * side + cell % across * width + within % width

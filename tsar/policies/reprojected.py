@@ -1,8 +1,8 @@
-"""Framed renderers that know where surfaces go: temporal accumulation, a warp of the last image to newer poses.
+"""Framed renderers with reprojection: temporal accumulation, and warping of the last image to newer poses.
 
-A frame is traced in parts, one a cycle; at the end of every cycle the last finished image is shown, warped to the poses
-of that time, predicted from those at the cycle's start and before. No pose that is used is later than that. A frame
-without warp is one part.
+A frame is traced in parts, one per cycle. At the end of every cycle the last finished image is shown, warped to the
+poses of that time, which are predicted from those at the start of the cycle and before; later poses are never used.
+Without warping a frame has one part.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from tsar.prediction import foretold
 from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
 
 _GOLDEN = 0.7548776662466927, 0.5698402909980532
-"""Steps of the jitter along both axes: powers of the golden ratio of two dimensions, the root of ``x³ = x + 1``."""
+"""Steps of the jitter along both axes: ``1/x`` and ``1/x²`` of the golden ratio in two dimensions, the root of
+``x³ = x + 1``."""
 _GRID = 65536
-"""Positions of samples are multiples of one over this."""
+"""Sample positions are multiples of its reciprocal."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +37,10 @@ class Finished:
     """The last finished frame.
 
     Attributes:
-        color: its image, or what has been accumulated up to it.
+        color: its image, or the accumulated image.
         surfaces: its first hits.
-        view: the poses of its time.
-        history: what has been accumulated; None without accumulation.
+        view: poses of its time.
+        history: accumulated image and its sample counts; None without accumulation.
     """
 
     color: Float[Tensor, "h w 3"]
@@ -53,10 +54,10 @@ class Progress:
     """The frame that is being traced, and the one that is shown.
 
     Attributes:
-        number: of the frame that is being traced, from 0.
+        number: number of the frame that is being traced, from 0.
         time_s: its animation time, seconds.
-        parts: what has been traced of it.
-        finished: the frame before; None before the first.
+        parts: traced parts of it.
+        finished: last finished frame; None before the first.
     """
 
     number: int = 0
@@ -66,7 +67,7 @@ class Progress:
 
 
 class Reprojected(Policy[Progress]):
-    """Frames with one sample a pixel, accumulated, shown warped, or both; one cycle of latency for the poses."""
+    """Frames with one sample per pixel that are accumulated, warped, or both; the poses have one cycle of latency."""
 
     def __init__(
         self,
@@ -76,17 +77,18 @@ class Reprojected(Policy[Progress]):
         warm_frames: int = 3,
         footprint: float = 1.0,
     ) -> None:
-        """Takes what is done with frames.
+        """Sets the processing of the frames.
 
         Args:
-            setting: of the run; it must tell poses.
-            parts: cycles that a frame is traced in, each of which shows a warped image; 1 shows frames as they are.
-            accumulation: constants; None for none.
-            warm_frames: frames before the start.
+            setting: setting of the run; it must have poses.
+            parts: number of cycles over which a frame is traced, each of which shows a warped image; 1 shows frames
+                without warping.
+            accumulation: constants of the accumulation; None for none.
+            warm_frames: number of frames before the start.
             footprint: samples along a pixel's side that textures are filtered for.
 
         Raises:
-            ConfigError: ``parts`` is not a power of two, the renderer tells no poses, or the camera is a panorama.
+            ConfigError: ``parts`` is not a power of two, the renderer gives no poses, or the camera is a panorama.
         """
         super().__init__(setting)
         require(parts >= 1 and parts & (parts - 1) == 0, "parts", "a power of two", parts)
@@ -106,7 +108,7 @@ class Reprojected(Policy[Progress]):
 
     @property
     def probe_cycles(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """A frame, so that an image is warped in the last one."""
+        """One frame, so that the last cycle warps an image."""
         return self._parts
 
     @property
@@ -115,7 +117,7 @@ class Reprojected(Policy[Progress]):
 
     @property
     def price(self) -> Price:
-        """A part of a frame's samples, of its accumulation, and a warp."""
+        """Price of one part of a frame's samples and accumulation, and of a warp."""
         accumulate = ACCUMULATE_FLOPS / self._parts if self._accumulation else 0.0
         warp = WARP_FLOPS if self._warps else 0.0
         return Price(self.config.pixels // self._parts, pixel_flops=accumulate + warp)
@@ -124,7 +126,7 @@ class Reprojected(Policy[Progress]):
         return Progress()
 
     def request(self, state: Progress, moment: Moment) -> tuple[Progress, FrameletBatch]:
-        """The next part of a frame, in Morton order; all parts are of the time at which the first is traced."""
+        """The next part of a frame, in Morton order; all parts have the animation time at which the first is traced."""
         if not state.parts:
             state = replace(state, time_s=moment.time_s)
         height, width = self.config.shape
@@ -148,8 +150,8 @@ class Reprojected(Policy[Progress]):
             return Progress(state.number + 1, finished=self._finish(state, parts))
 
     def image(self, state: Progress, moment: Moment) -> Picture:
-        """The last finished frame, warped to the poses of the time at which it is first shown, as those of the cycle's
-        start and before foretell them; black before the first."""
+        """The last finished frame, warped to the poses at which it is first shown, as predicted from those at the
+        cycle's start and before; black before the first frame."""
         last = state.finished
         if last is None:
             return Picture(torch.zeros(*self.config.shape, 3))
@@ -180,7 +182,7 @@ class Reprojected(Policy[Progress]):
         return Finished(history.color, surfaces, view, history)
 
     def _jitter_px(self, number: int) -> tuple[float, float]:
-        """Where the samples of a frame lie beside the centres of pixels, in [-1/2, 1/2) pixels."""
+        """Offset of a frame's samples from the centres of the pixels, in [-1/2, 1/2) pixels."""
         if self._accumulation is None:
             return 0.0, 0.0
         pixel = _GRID // self.config.resolution_px
@@ -189,13 +191,14 @@ class Reprojected(Policy[Progress]):
 
 
 PARTS = 8
-"""Cycles that a frame is traced in where it is warped: with half as many poses are late, twice as many gain nothing.
+"""Number of cycles over which a warped frame is traced: with half as many, poses are late; with twice as many, nothing
+is gained.
 
-It, the constants of the accumulation and the footprints below were chosen by errors on the five inputs, row 7 of table
-7.2 at a quarter of the side, seed 0, phase 0.
+This number, the constants of the accumulation and the footprints below minimise the error on the five inputs, row 7 of
+table 7.2 at a quarter of the side, seed 0, phase 0.
 """
 ACCUMULATED_FOOTPRINT, LATE_FOOTPRINT = 4.0, 2.0
-"""Samples that are averaged must not be filtered for as large a pixel; one that is not, for some less."""
+"""Averaged samples need textures filtered over less than a pixel; a single sample needs that to a lesser degree."""
 WARM_FRAMES = 12
 
 

@@ -1,7 +1,8 @@
-"""Images read at positions between their pixels. All of it is gathering and arithmetic element by element: the same
-bits on any number of threads.
+"""Images interpolated at positions between their pixels. All operations gather or act element by element, so they give
+the same bits for any number of threads.
 
-Positions are in pixels: the centre of column ``x`` of row ``y`` is ``(x, y)``. Beyond the border its pixels repeat.
+Positions are in pixels: the centre of column ``x`` of row ``y`` is ``(x, y)``. Beyond the border, the border pixels are
+repeated.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ from jaxtyping import Float, Float64, Int64, Shaped
 from torch import Tensor
 
 BILINEAR_FLOPS = 38.0
-"""Of a pixel of three channels by :func:`bilinear`: 8 for the shares, 6 for their products, 24 for the sum."""
+"""Operations of :func:`bilinear` per position and three channels: 8 for the fractions, 6 for their products, 24 for the
+sum."""
 CUBIC_FLOPS = 160.0
-"""Of a pixel of three channels by :func:`cubic`: 4 for the shares, 2 x 22 for the weights, 16 for their products, 96
-for the sum."""
+"""Operations of :func:`cubic` per position and three channels: 4 for the fractions, 2 x 22 for the weights, 16 for
+their products, 96 for the sum."""
 
 
 def nearest(plane: Shaped[Tensor, "h w *c"], position: Float64[Tensor, "*n 2"]) -> Shaped[Tensor, "*m"]:
-    """The pixel that each position lies in."""
+    """The value of the pixel in which each position lies."""
     x, y = _columns(position)
     return plane[_within(y.add(0.5).floor(), plane.shape[0]), _within(x.add(0.5).floor(), plane.shape[1])]
 
@@ -32,8 +34,8 @@ def bilinear(image: Float[Tensor, "h w c"], position: Float64[Tensor, "*n 2"]) -
 
 
 def cubic(image: Float[Tensor, "h w c"], position: Float64[Tensor, "*n 2"]) -> Float[Tensor, "*n c"]:
-    """Of the sixteen nearest pixels, by the cubic spline of Catmull and Rom: repeated, it blurs far less than bilinear
-    weights do. May overshoot.
+    """Weighted mean of the sixteen nearest pixels by the cubic spline of Catmull and Rom. Applied repeatedly, it blurs
+    far less than bilinear weights do. It may overshoot.
 
     Source: Catmull and Rom 1974; Keys 1981, a = -1/2.
     """
@@ -51,7 +53,7 @@ def cubic(image: Float[Tensor, "h w c"], position: Float64[Tensor, "*n 2"]) -> F
 
 
 def _weighted(image: Tensor, position: Tensor, weights, first: int) -> Tensor:
-    """Sum over a square of pixels of the products of the weights along both axes."""
+    """Sum over a square of pixels, weighted by the products of the weights along both axes."""
     x, y = _columns(position)
     left, top = x.floor(), y.floor()
     across, down = (weights((at - low).to(image.dtype)) for at, low in ((x, left), (y, top)))
@@ -66,7 +68,7 @@ def _weighted(image: Tensor, position: Tensor, weights, first: int) -> Tensor:
 
 
 def _columns(position: Float64[Tensor, "*n 2"]) -> tuple[Float64[Tensor, "*n"], Float64[Tensor, "*n"]]:
-    """Both coordinates; one that is not finite counts as 0."""
+    """The two coordinates of positions; non-finite ones are replaced by 0."""
     x, y = position.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0).unbind(-1)
     return x.contiguous(), y.contiguous()
 
@@ -76,7 +78,8 @@ def _within(at: Float64[Tensor, "*n"], count: int) -> Int64[Tensor, "*n"]:
 
 
 def averaged(image: Float[Tensor, "h w c"], height: int, width: int) -> Float[Tensor, "h2 w2 c"]:
-    """A smaller image, each of whose pixels is the mean of what it covers, parts of pixels by their share."""
+    """A smaller image, each pixel of which is the mean of the area that it covers; pixels covered in part count in
+    proportion."""
     for axis, count in ((0, height), (1, width)):
         old = image.shape[axis]
         edge = torch.arange(count + 1, dtype=torch.float64) * old / count
@@ -97,8 +100,8 @@ def double_width(plane: Float[Tensor, "c h w"]) -> Float[Tensor, "c h w2"]:
 
 
 def widened(plane: Float[Tensor, "c h w"], factor: int) -> Float[Tensor, "c h w2"]:
-    """``factor`` times as many columns, bilinear, the border repeated. Not ``F.interpolate``: it takes another path,
-    with other rounding, when there is one thread."""
+    """``factor`` times as many columns by bilinear interpolation, with the border repeated. ``F.interpolate`` is not
+    used, because with one thread it takes another path with different rounding."""
     padded = F.pad(plane, (1, 1), mode="replicate")
     parts = []
     for column in range(factor):

@@ -1,4 +1,5 @@
-"""What policies of single samples share: scattered requests, a buffer of the newest sample per pixel, its display."""
+"""Common parts of policies of single samples: scattered requests, a buffer of the newest sample per pixel, its
+display."""
 
 from __future__ import annotations
 
@@ -36,19 +37,19 @@ class PixelBuffer:
 
 
 def sample_map(buffer: PixelBuffer, config: TsarConfig) -> SampleMap:
-    """One sample a pixel, each of its own age."""
+    """The sample map of a buffer: one sample per pixel, each with its own time."""
     level = torch.full(config.shape, int(log2(config.resolution_px / config.framelet_side)))
     return SampleMap(buffer.time_s.reshape(config.shape).clone(), level)
 
 
 def generator(config: TsarConfig, cycle: int) -> torch.Generator:
-    """Random numbers of one cycle: a function of seed and cycle only."""
+    """Random number generator of one cycle, a function of seed and cycle only."""
     return torch.Generator().manual_seed((config.seed * 1_000_003 + cycle + 500_000) % 2**63)
 
 
 def pixel_batch(pixel: Int64[Tensor, " samples"], config: TsarConfig, moment: Moment) -> FrameletBatch:
-    """The centres of output pixels (raster indices), grouped into as many framelets as fit; their count must be a
-    multiple of ``config.samples``."""
+    """A batch of samples at the centres of output pixels (raster indices), grouped into framelets. The number of pixels
+    must be a multiple of ``config.samples``."""
     height, width = config.shape
     position = torch.stack((pixel % width, pixel // width), dim=1).to(torch.float32).add_(0.5)
     position = (position / position.new_tensor((width, height))).reshape(-1, config.samples, 2)
@@ -57,14 +58,14 @@ def pixel_batch(pixel: Int64[Tensor, " samples"], config: TsarConfig, moment: Mo
 
 
 def pixel_colors(samples: SampleBatch, config: TsarConfig) -> Float[Tensor, "samples 3"]:
-    """Colours of such a batch, one row a pixel; non-finite samples are replaced as in the adaptive pipeline."""
+    """Colours of such a batch, one row per pixel. Non-finite samples are replaced as in the adaptive pipeline."""
     return replace_nonfinite(samples.color, config.framelet_side)[0].reshape(-1, 3)
 
 
 def write(
     buffer: PixelBuffer, pixel: Int64[Tensor, " samples"], color: Float[Tensor, "samples 3"], time_s: float
 ) -> None:
-    """Put samples into the buffer; where a pixel occurs twice, the last one stays."""
+    """Writes samples into the buffer; where a pixel occurs twice, the last sample stays."""
     last = torch.full(buffer.time_s.shape, -1).scatter_reduce(0, pixel, torch.arange(pixel.numel()), "amax")
     hit = (last >= 0).nonzero().squeeze(1)
     buffer.color[hit] = color[last[hit]]
@@ -72,8 +73,9 @@ def write(
 
 
 def pull_push(color: Float[Tensor, "c h w"], weight: Float[Tensor, "1 h w"]) -> Float[Tensor, "c h w"]:
-    """Fill by pyramid: a pixel of weight 1 keeps its colour, one of less is blended with the coarser level, whose
-    weights are the sums of its children's, at most 1. Beyond the picture there is no weight."""
+    """Fills an image by pull and push over a pyramid. A pixel of weight 1 keeps its colour; one of less weight is
+    blended with the coarser level, whose weights are the sums over its children, at most 1. The weight outside the
+    picture is 0."""
     height, width = color.shape[1:]
     side = 1 << (max(height, width) - 1).bit_length()
     if (height, width) != (side, side):

@@ -1,8 +1,8 @@
-"""A policy whose state is kept in numbers of another precision between its stages: what fewer bits would cost.
+"""A policy whose state is stored in another precision between its stages, to measure the effect of fewer bits.
 
-Arithmetic stays that of the stages; what they hand on is rounded. In float64 the stages themselves run in float64, as
-far as their tensors do: the reference ones, since compiled ones know float32 alone. Places on the image stay float32,
-and so does the reconstruction of ``thesis``, which decides nothing but what is out of date.
+The arithmetic of the stages is unchanged; the values that they pass on are rounded. With float64 the reference stages
+run, in float64 as far as their tensors allow, because compiled ones support only float32. Positions on the image stay
+float32, and so does the reconstruction of ``thesis``, which only decides which framelets are out of date.
 """
 
 from __future__ import annotations
@@ -40,21 +40,22 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "densities": ("densities.spatial", "densities.temporal"),
     "picture": ("shown",),
 }
-"""What can be stored in another format, and the fields of the states of ``tsar``, ``filter`` and ``thesis`` that it is.
-``samples`` are what the renderer answers, ``errors`` what the response is told; ``picture`` is what is shown."""
+"""Quantities that can be stored in another format, with their fields in the states of ``tsar``, ``filter`` and
+``thesis``. ``samples`` are the answers of the renderer, ``errors`` the input of the response, and ``picture`` is the
+displayed image."""
 ALL = "all"
 Decide = Callable[[Densities, Errors, Tensor, TsarConfig, StageTimer], Decision]
 Reconstruct = Callable[[FrameletCache, TsarConfig, float], Reconstruction]
 
 
 class Stored(Policy[Any]):
-    """Another policy, with some of what it keeps in other formats."""
+    """Another policy with parts of its state stored in other formats."""
 
     def __init__(self, setting: Setting, make: Callable[[Setting], Policy[Any]], formats: Mapping[str, str]) -> None:
-        """Makes the policy, and takes a format for each of some of :data:`FIELDS`, or for ``all`` of them.
+        """Creates the policy; ``formats`` maps some names of :data:`FIELDS`, or ``all``, to a format.
 
         Raises:
-            ConfigError: a name or a format is not known, or the policy keeps no such thing.
+            ConfigError: a name or a format is unknown, or the policy has no such field.
         """
         self._formats: dict[str, str] = {}
         for name, form in formats.items():
@@ -137,7 +138,7 @@ def _has(state: Any, field: str) -> bool:
 
 
 def _with(state: Any, path: list[str], form: str) -> Any:
-    """A state with one field, dotted, as a format holds it; the cache of framelets changes in place."""
+    """A state with one field, a dotted path, rounded to a format; the cache of framelets changes in place."""
     value = getattr(state, path[0])
     value = rounded(value, form) if len(path) == 1 else _with(value, path[1:], form)
     if isinstance(state, FrameletCache):
@@ -149,7 +150,7 @@ def _with(state: Any, path: list[str], form: str) -> Any:
 def _reconstructed(
     reconstruct: Reconstruct, cache: FrameletCache, config: TsarConfig, cycle_s: float
 ) -> Reconstruction:
-    single = copy(cache)  # what reconstruction flags in it is flagged in both
+    single = copy(cache)  # flags that reconstruction sets in the copy are set in both
     single.color = cache.color.to(torch.float32)
     return reconstruct(single, config, cycle_s)
 

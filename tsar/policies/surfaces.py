@@ -1,4 +1,4 @@
-"""What a frame shows where: the first hit of every pixel, and where it is seen at another time."""
+"""Surfaces of a frame: the first hit of every pixel, and its position in the view of another time."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from tsar.projection import project
 from tsar.types import Viewpoint
 
 PROJECT_FLOPS = 42.0
-"""Of :func:`seen` for a pixel: 18 for the three coordinates before the camera, 10 for the position on the image, 2 for
-the tests of depth, 4 to pixels, 4 for the offset, 4 for the sample's place."""
+"""Operations of :func:`seen` per pixel: 18 for the three camera coordinates, 10 for the position on the image, 2 for
+the tests of depth, 4 for the conversion to pixels, 4 for the offset, 4 for the sample's position."""
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """First hits of a frame with one sample a pixel, raster order.
+    """First hits of a frame with one sample per pixel, raster order.
 
     Attributes:
         instance, point: as in :class:`tsar.types.Hits`.
-        jitter_px: where the samples lie beside the centres of their pixels, ``(x, y)``, pixels.
+        jitter_px: offset ``(x, y)`` of the samples from the centres of their pixels, pixels.
     """
 
     instance: Int[Tensor, "h w"]
@@ -31,13 +31,13 @@ class Surfaces:
 
 
 def seen(surfaces: Surfaces, view: Viewpoint) -> tuple[Float64[Tensor, "h w 2"], Float64[Tensor, "h w"]]:
-    """Where the centre of each pixel is seen by another view, and how deep.
+    """Position and depth at which another view shows the centre of each pixel.
 
-    A pixel's centre moves as its sample does.
+    The centre of a pixel moves as its sample does.
 
     Returns:
-        Positions in pixels, as in :mod:`tsar.policies.resampling`, and depths, scene units; NaN and 0 or below where
-        the view does not see it.
+        Positions in pixels, as in :mod:`tsar.policies.resampling`, and depths, scene units. Where the view does not
+            show it, the position is NaN and the depth at most 0.
     """
     height, width = surfaces.instance.shape
     position, depth = project(view, surfaces.instance, surfaces.point)
@@ -52,6 +52,6 @@ def centres(height: int, width: int) -> Float64[Tensor, "h w 2"]:
 
 
 def within(place: Float64[Tensor, "h w 2"]) -> Bool[Tensor, "h w"]:
-    """Which positions lie on a picture of as many pixels."""
+    """Mask of the positions that lie on a picture with as many pixels as there are positions."""
     height, width = place.shape[:2]
     return ((place >= -0.5) & (place < place.new_tensor((width, height)) - 0.5)).all(-1)

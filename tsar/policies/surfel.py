@@ -1,12 +1,13 @@
-"""Reprojected surfels under the control of the dissertation: a point a pixel, errors after reprojection.
+"""Reprojected surfels under the control of the dissertation: one point per pixel, with errors measured after
+reprojection.
 
-A cycle moves the points to where new poses show them, takes in the new samples, and draws them. What is left of the
-error after reprojection is told to the response of ``thesis``: in space the variance of an estimate, in time what
-change has added to it. All elements have an error in every cycle, not only those that were sampled. Transport, tiling
-and selection are those of ``thesis``. How estimates are kept is as in :mod:`tsar.policies.filter`.
+A cycle moves the points to their positions at the new poses, updates them by the new samples, and draws them. The
+response of ``thesis`` receives the error that remains after reprojection: in space the variance of the mean, in time
+the variance from change. All elements have an error in every cycle, not only the sampled ones. Transport, tiling and
+selection are those of ``thesis``; estimates are those of :mod:`tsar.policies.filter`.
 
-Deviation: what is tolerated follows the picture's mean, where the dissertation has a fixed template. By a fixed one all
-elements of a fast pan need more, so none gives, and densities stay what they were.
+Deviation: the tolerated power follows the mean of the picture; the dissertation has a fixed template. With a fixed one
+all elements of a fast pan ask for density, none frees it, and densities do not change.
 """
 
 from __future__ import annotations
@@ -32,19 +33,19 @@ from tsar.types import Densities, Errors
 PIXEL_FLOPS = 435.0
 """Operations per output pixel and cycle, as a test counts them: aging, moving, errors, points and smoothing."""
 ELEMENT_FLOPS = 147.0
-"""Of response, tiling and selection for an element of the field. Source: Stephens 2011, table 7.1; about 136 are
-counted."""
+"""Operations of response, tiling and selection per element of the field. Source: Stephens 2011, table 7.1; a count of
+the code gives about 136."""
 SPATIAL = 2.0**-12
 TEMPORAL = 2.0**-11
-"""Variances that are tolerated in any picture, in space and in time."""
+"""Variances that are tolerated in every picture, in space (``SPATIAL``) and in time."""
 
 
 @dataclass(frozen=True)
 class SurfelState(State):
-    """With what the response keeps.
+    """The state of the filter, and that of the response.
 
     Attributes:
-        densities: of samples.
+        densities: sample densities.
         history: credit of every element.
     """
 
@@ -53,7 +54,7 @@ class SurfelState(State):
 
 
 class Surfel(Filter):
-    """Points, sampled where densities of space and time say."""
+    """Points, sampled by densities in space and in time."""
 
     def __init__(self, setting: Setting, options: FilterOptions = DEFAULT) -> None:
         super().__init__(setting, options)
@@ -79,13 +80,13 @@ class Surfel(Filter):
     def _chosen(
         self, state: State, moment: Moment
     ) -> tuple[State, tuple[Float64[Tensor, " n"], Float64[Tensor, " n"], Float64[Tensor, " n"]]]:
-        """Framelets, each as tiles of 8 x 8 samples."""
+        """The framelets that are due, each divided into tiles of 8 x 8 samples."""
         assert isinstance(state, SurfelState)
         made = self._decide(state.densities, self._errors(state, moment), state.history, self.config, StageTimer())
         across = self.config.framelet_side // TILE_SIDE
         part_x, part_y = deinterleave(torch.arange(across**2))
         column, row = deinterleave(made.due.index)
-        tiles = torch.exp2(made.due.level.to(torch.float64)) * across  # along the image's side, of the size of each
+        tiles = torch.exp2(made.due.level.to(torch.float64)) * across  # tiles of this size along the image's side
         width = (self._side / tiles)[:, None].expand(-1, across**2).reshape(-1)
         x, y = ((of[:, None] * across + part).reshape(-1) * width for of, part in ((column, part_x), (row, part_y)))
         return replace(state, densities=made.densities, history=made.due.history), (x, y, width / TILE_SIDE)
@@ -97,12 +98,13 @@ class Surfel(Filter):
         return replace(state, shown=shown, remaining=remaining)
 
     def _errors(self, state: State, moment: Moment) -> Errors:
-        """Errors of all elements of the field: ``(S - T) / (S + T)`` of the variances ``S`` that are left and those
-        that are tolerated. A pixel that nothing is known of has the variance of one sample in space, and all that there
-        can be in time: a coarse look is what it needs first.
+        """Errors of all elements of the field: ``(S - T) / (S + T)`` with the remaining variance ``S`` and the
+        tolerated one ``T``. A pixel without estimate has the spatial variance of one sample and the greatest temporal
+        variance, because it needs coarse samples first.
 
-        ``T`` is the mean over the picture of the sum of both, at least :data:`SPATIAL` or :data:`TEMPORAL`. So there
-        are elements that give in every picture, and where all need more, space is traded for time or time for space.
+        ``T`` is the mean over the picture of the sum of both variances, at least :data:`SPATIAL` or :data:`TEMPORAL`.
+        So some elements free density in every picture, and where all ask for more, space is traded for time or time for
+        space.
         """
         estimates = state.estimates
         left = torch.where(estimates.known, estimates.observed, 0.5 * estimates.roughness).clamp(max=VARIANCE_MAX)
@@ -113,7 +115,7 @@ class Surfel(Filter):
         return Errors(*(self._field((signal - least) / (signal + least)) for signal, least in pairs))
 
     def _field(self, plane: Float[Tensor, "1 e e"]) -> Float[Tensor, " elements"]:
-        """On the field of the densities, Morton order."""
+        """A plane resampled to the field of the densities, Morton order."""
         side, wide = self.config.sdf_side, plane.shape[-1]
         if wide > side:
             plane = F.avg_pool2d(plane[None], wide // side)[0]
@@ -123,8 +125,8 @@ class Surfel(Filter):
 
 
 def _smaller(config: TsarConfig, batch_size: int) -> TsarConfig:
-    """A configuration of smaller batches and of as many tiles, which fall due as often, of spacings that the filter
-    knows: from :data:`tsar.filtering.records.SPACINGS`."""
+    """A configuration with smaller batches and equally many tiles, whose spacings are limited to
+    :data:`tsar.filtering.records.SPACINGS`. The least temporal density shrinks in proportion to the batch."""
     pixels = config.resolution_px // config.framelet_side
     fine = min(config.level_max, int(pixels / SPACINGS[-1]).bit_length() - 1)
     coarse = min(max(config.level_min, int(pixels / SPACINGS[0]).bit_length() - 1), fine)

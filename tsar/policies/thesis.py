@@ -4,8 +4,8 @@ Contains no mathematics; every stage is a function of its own module.
 
 Source: Stephens 2011, sec. 3.4.4 and fig. 3.13.
 
-Deviation: a picture that is no square of a power of two is spread over the square of the least power of two that holds
-it, so that tiles have the picture's shape.
+Deviation: a picture whose sides are not equal powers of two is stretched over the least such square that holds it, so
+that tiles have the picture's aspect ratio.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, SampleMap,
 
 @dataclass(frozen=True)
 class State:
-    """What one cycle hands to the next. Frozen, but the cache within changes in place.
+    """The state that one cycle passes to the next. Frozen, except that the cache changes in place.
 
     Attributes:
         densities, tiling: sample densities, and the tiling built from them.
-        due: what is rendered next.
-        cache: framelets that the display is made of.
-        errors, nonfinite: of the last batch; None and 0 before the first.
+        due: tiles that are rendered next.
+        cache: framelets from which the display is reconstructed.
+        errors, nonfinite: errors and number of non-finite samples of the last batch; None and 0 before the first.
     """
 
     densities: Densities
@@ -48,14 +48,14 @@ class Thesis(Policy[State]):
     """The faithful pipeline: render, estimate, cache, respond, re-tile, select, reconstruct."""
 
     latency_cycles = 3
-    """What was sampled three cycles ago is shown (sec. 3.4.4)."""
+    """The display shows the samples of three cycles ago (sec. 3.4.4)."""
 
     def __init__(self, setting: Setting) -> None:
         super().__init__(setting)
         self._stages = setting.stages_of(setting.config)
 
     def start(self) -> State:
-        """A uniform field, its tiling, what is due at first, and an empty cache."""
+        """A uniform field, its tiling, the first tiles that are due, and an empty cache."""
         densities = initial_densities(self.config)
         tiling = build(densities.spatial, self.config)
         due = request(tiling, densities.temporal, initial_history(self.config), self.config)
@@ -77,7 +77,7 @@ class Thesis(Policy[State]):
         return Picture(made.image, made.sample_map, {name: round(share * one) for name, one in made.counters.items()})
 
     def fitted(self, shown: Picture) -> Picture:
-        """The square that is reconstructed, averaged over the pixels of a picture of another shape."""
+        """The reconstructed square, averaged over the pixels of a picture of another shape."""
         if self.config.window.whole:
             return shown
         samples, (height, width) = shown.sample_map, self.config.shape

@@ -1,13 +1,13 @@
-"""A cut through a kd-tree over the picture, of a fixed number of leaves, that follows the error.
+"""A cut through a kd-tree over the picture, with a fixed number of leaves, that adapts to the error.
 
-Every leaf is sampled alike, so a small leaf is sampled densely. Each keeps sums over its samples that fade with age;
-the leaves of greatest error (variance times area) are split, and sibling leaves whose merger would have the least are
-merged, as many as were split.
+Every leaf is sampled equally, so a small leaf is sampled densely. Each keeps sums over its samples that fade with age.
+The leaves of greatest error (variance times area) are split, and as many pairs of sibling leaves are merged, those
+whose parents would have the least error.
 
 Source: Dayal et al. 2005, as described in Stephens 2011, sec. 2.5 and 7.3.2.
 
-Deviation: the original splits and merges one pair at a time from priority queues. Here all splits and mergers of a
-cycle are picked at once.
+Deviation: the original splits and merges one pair at a time from priority queues. Here all splits and merges of a cycle
+are chosen at once.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Tree:
     """A cut through a kd-tree, by kd index.
 
     Attributes:
-        leaf: which nodes are in the cut.
+        leaf: mask of the nodes in the cut.
         shown_px: pixels of the picture in each node.
-        sums: per node, over its samples, weights that fade with age, and these times luminance, squared luminance, and
-            whatever else is gathered; only leaves' are in use.
+        sums: sums over the samples of each node: weights that fade with age, and these times luminance, squared
+            luminance and any further values; only those of leaves are in use.
     """
 
     leaf: Bool[Tensor, " nodes"]
@@ -46,14 +46,14 @@ class Tree:
 
     @property
     def sampled(self) -> Int64[Tensor, " leaves"]:
-        """Leaves that show any of the picture."""
+        """Leaves that contain pixels of the picture."""
         leaves = self.leaves
         return leaves[self.shown_px[leaves] > 0]
 
 
 def initial(depth: int, leaves: int, rows: int, window: Window) -> Tree:
-    """The uniform cut of a power of two of leaves through a tree whose pixels are nodes of ``depth``, over the plane of
-    a window."""
+    """The uniform cut into ``leaves`` leaves, a power of two, through the tree over the plane of a window; its pixels
+    are the nodes of ``depth``."""
     nodes = 2 ** (depth + 1)
     leaf = torch.zeros(nodes, dtype=torch.bool)
     leaf[leaves : 2 * leaves] = True
@@ -69,8 +69,8 @@ def _shown(depth: int, window: Window) -> Int64[Tensor, " nodes"]:
 
 
 def place(node: Int64[Tensor, " n"], share: Float64[Tensor, " n"], depth: int, window: Window) -> Int64[Tensor, " n"]:
-    """Raster index on the picture of the pixel at a share in [0, 1) of the picture's in each node: by rows; along the
-    curve where the picture is the whole plane."""
+    """Raster index on the picture of one pixel of each node: the one at ``share``, in [0, 1), of the node's pixels
+    within the picture. They are ordered by rows, or along the curve where the picture is the whole plane."""
     first = first_cell(node, depth)
     if window.whole:
         return morton_to_raster(window.side_px)[first + (share * area_px(node, depth)).to(torch.int64)]
@@ -85,12 +85,12 @@ def place(node: Int64[Tensor, " n"], share: Float64[Tensor, " n"], depth: int, w
 
 
 def area_px(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
-    """Pixels of nodes."""
+    """Number of pixels of each node."""
     return torch.ones_like(node) << (depth - floor_log2(node))
 
 
 def first_cell(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
-    """Morton index of the first pixel of nodes; the others follow it."""
+    """Morton index of the first pixel of each node; the others follow it."""
     return (node << (depth - floor_log2(node))) - 2**depth
 
 
@@ -115,17 +115,18 @@ def gather(
 
 
 def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"], tree: Tree) -> Float[Tensor, " n"]:
-    """Variance times area of the picture; area in units of the plane."""
+    """Variance times area within the picture, as a share of the plane."""
     weight = sums[0].clamp(min=1e-12)
     variance = (sums[2] / weight - (sums[1] / weight).square()).clamp(min=0.0)
     return variance * (tree.shown_px[node] / (len(tree.shown_px) // 2)).to(torch.float32)
 
 
 def adapt(tree: Tree, depth: int) -> Tree:
-    """Splits the worst leaves and merges as many of the best sibling pairs, while a split gains more than a merger
-    costs.
+    """Splits the leaves of greatest error and merges as many sibling pairs of least error, as long as a split gains
+    more than a merge costs.
 
-    Children take half their parent's sums each; a merged leaf takes those of both. The number of leaves stays the same.
+    Each child takes half of its parent's sums; a merged leaf takes the sums of both children. The number of leaves
+    stays the same.
     """
     leaves = tree.leaves
     leaf_error = error(tree.sums[:, leaves], leaves, tree)

@@ -20,7 +20,7 @@ from tsar.types import Densities, Errors
 def respond(densities: Densities, errors: Errors, config: TsarConfig) -> Densities:
     """One control decision over the whole field.
 
-    The surplus takes up what the decision freed or used, computed from the densities that came out: the sum of combined
+    The surplus takes the density that the decision freed or used, computed from the new densities: the sum of combined
     density and surplus stays equal to the budget up to rounding.
     """
     spatial_low, spatial_high = config.spatial_bounds
@@ -45,7 +45,8 @@ def respond(densities: Densities, errors: Errors, config: TsarConfig) -> Densiti
 
 
 def initial_densities(config: TsarConfig) -> Densities:
-    """A uniform field that spends the whole budget: as many equal tiles as the tiling may hold, refreshed alike."""
+    """A uniform field that spends the whole budget: as many equal tiles as the tiling may hold, all with the same
+    refresh rate."""
     elements = config.sdf_side**2
     low, high = config.spatial_bounds
     spatial = min(max(config.tile_count_max * config.samples / elements, low), high)

@@ -15,7 +15,8 @@ from tsar.roots import square_root
 
 
 def smallest_root(a: Field, b: Field, d: Field) -> Field:
-    """Smallest non-negative ``k`` with ``a k² + b k + d = 0``, 0 where there is none; discriminant clamped at 0."""
+    """Smallest non-negative ``k`` with ``a k² + b k + d = 0``, 0 where there is none; the discriminant is clamped at
+    0."""
     q = -0.5 * (b + torch.where(b < 0, -1.0, 1.0) * square_root((b * b - 4.0 * a * d).clamp(min=0.0)))
     first = torch.where(a != 0, q / torch.where(a != 0, a, 1.0), torch.inf)
     second = torch.where(q != 0, d / torch.where(q != 0, q, 1.0), torch.inf)
@@ -24,12 +25,12 @@ def smallest_root(a: Field, b: Field, d: Field) -> Field:
 
 
 def mix(local: LocalConstraints, change: Field, box: Box, bias: float) -> tuple[Field, Field]:
-    """Point b on the ray with the granted combined density, then slid along the iso-product curve to c.
+    """The point b on the ray with the granted combined density, then moved along the iso-product curve to c.
 
     Where the errors have opposite signs and no more change was granted than desired, the rest of the response needs no
-    density at all: b is then the point with the granted product and the ratio of the axes that b* has (sec. 6.3 and
-    6.4 say that such elements may redistribute; the ray alone would leave them where they are, for it meets the curve
-    again only at ``2 k*``, if at all). It is b* itself when everything was granted.
+    density: b is then the point with the granted product and the ratio of the axes of b*, and b* itself if the whole
+    change was granted. Sec. 6.3 and 6.4 say that such elements may redistribute; the ray alone would not move them,
+    because it meets the curve again only at ``2 k*``, if at all.
 
     Deviation: the redistribution, of which the thesis gives no equation.
 
@@ -37,7 +38,7 @@ def mix(local: LocalConstraints, change: Field, box: Box, bias: float) -> tuple[
         local: densities, mixture and distances, normalised.
         change: granted change of the normalised combined density.
         box: bounds.
-        bias: octaves to slide by, positive towards space; only where there is an error.
+        bias: octaves to move by along the curve, positive towards space; applied only where there is an error.
 
     Returns:
         New normalised spatial and temporal densities, inside the box.

@@ -1,13 +1,14 @@
-"""Density transport: how much of each element's desired change is granted, so that the total is conserved.
+"""Density transport: the change granted to each element, so that the total density is conserved.
 
 Every solver takes ``desired`` and ``bound`` (same sign, ``|bound| >= |desired|``) and the surplus C with its bound, and
 returns ``change`` with ``0 <= change / desired``, ``|change| <= |bound|`` and ``0 <= C - sum(change) <= C_max``.
 
-A is the set of elements that ask for density and B the set that frees it.
+A is the set of elements that ask for density, and B the set of those that free it.
 
 Source: Stephens 2011, sec. 6.3.
 
-Deviation: eq. 6.27 has a sign slip. Freed density that nobody takes adds to the surplus: ``C' = C - sum(change)``.
+Deviation: eq. 6.27 has a sign slip. Freed density that no element takes is added to the surplus:
+``C' = C - sum(change)``.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ from tsar.morton import morton_to_raster, raster_to_morton, total
 from tsar.response.local import Field
 
 TransportSolver = Callable[[Field, Field, float, float], Field]
-"""``(desired, bound, surplus, surplus_max) -> change``: one way to pick a solution out of the set of eq. 6.36."""
+"""``(desired, bound, surplus, surplus_max) -> change``: one way to choose a solution from the set of eq. 6.36."""
 
 _DIFFUSION_STEPS = 32
-"""Explicit steps of diffusion: density travels about the square root of that many elements a decision."""
+"""Explicit steps of diffusion: density travels about the square root of that many elements per decision."""
 _EXACT_SHARE = 1e-4
-"""Of all weights: above it a difference of sums is exact to a trillionth."""
+"""Share of all weights above which a difference of sums has a relative error of at most 1e-12."""
 
 
 def fill(direction: Field, bound: Field, target: float) -> Field:
-    """``min(λ * direction, bound)`` with the λ that makes it sum to ``target``: water poured into vessels.
+    """``min(λ * direction, bound)`` with the λ for which it sums to ``target`` (water filling).
 
     All arguments are non-negative. Exact up to rounding: the sum is piecewise linear in λ with a knee at every
     ``bound / direction``, so sorting the knees finds the segment and one division finds λ.
@@ -45,7 +46,7 @@ def fill(direction: Field, bound: Field, target: float) -> Field:
     full = torch.cumsum(vessel[order], 0)
     whole = total(weight)
     open_weight = whole - torch.cumsum(weight[order], 0)
-    # A difference loses weights that are many decades below the whole: what is left of it is summed from the far end.
+    # A difference loses weights many decades below the total: the remainder is summed from the other end.
     left = F.pad(torch.cumsum(weight[order].flip(0), 0).flip(0)[1:], (0, 1))
     open_weight = torch.where(open_weight > _EXACT_SHARE * whole, open_weight, left)
     at_knee = full + torch.where(open_weight > 0, knee * open_weight, 0.0)
@@ -60,7 +61,7 @@ def fill(direction: Field, bound: Field, target: float) -> Field:
 
 
 def _sides(desired: Field, bound: Field) -> tuple[Field, Field, Field, Field]:
-    """Magnitudes of desired change and bound for A and for B, zero outside each set."""
+    """Magnitudes of desired change and bound for the sets A and B, zero outside each set."""
     asks, frees = desired > 0, desired < 0
     zero = torch.zeros_like(desired)
     return (
@@ -72,7 +73,7 @@ def _sides(desired: Field, bound: Field) -> tuple[Field, Field, Field, Field]:
 
 
 def _max_weight(desired: Field, bound: Field) -> float:
-    """The greatest common weight of one side: ``min(bound / desired)`` over it (eq. 6.40–6.41)."""
+    """The greatest common weight of one set: ``min(bound / desired)`` over its elements (eq. 6.40–6.41)."""
     active = desired > 0
     return float((bound[active] / desired[active]).min()) if bool(active.any()) else 0.0
 
@@ -83,21 +84,22 @@ def trivial(desired: Field, bound: Field, surplus: float, surplus_max: float) ->
 
 
 def slow_greater(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-    """Point b: the side that wants more is slowed to the other; no surplus is used or made (fig. 6.5d, 6.8)."""
+    """Point b: the change of the set with the greater total is scaled down to the other; the surplus is unchanged (fig.
+    6.5d, 6.8)."""
     ask, _, free, _ = _sides(desired, bound)
     return _slowed(ask, free)
 
 
 def _slowed(ask: Field, free: Field) -> Field:
-    """The greater side scaled down to the sum of the lesser."""
+    """Change in which the set with the greater sum is scaled down to the sum of the other."""
     total_ask, total_free = total(ask), total(free)
     flux = min(total_ask, total_free)
     return _scaled(ask, total_ask, flux) - _scaled(free, total_free, flux)
 
 
 def scale_lesser(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-    """Point e with a running surplus: the lesser side is sped up by one weight as far as its tightest element allows,
-    and the surplus takes or gives what is left (sec. 6.3.2.3)."""
+    """Point e with a running surplus: the change of the set with the lesser total is scaled up by one weight, as far as
+    its tightest element allows, and the surplus takes or gives the difference (sec. 6.3.2.3)."""
     ask, ask_bound, free, free_bound = _sides(desired, bound)
     total_ask, total_free = total(ask), total(free)
     if total_ask >= total_free:
@@ -116,8 +118,8 @@ def _scaled(side: Field, present: float, wanted: float) -> Field:
 
 
 def square(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-    """The side that wants more is squared before it is normalised to the other, so that large responses are slowed
-    least (fig. 6.5e); elements at their bound pass the rest on."""
+    """The set with the greater total is squared before it is normalised to the other, so that large responses are
+    reduced least (fig. 6.5e); the excess of elements at their bound is passed on to the others."""
     ask, ask_bound, free, free_bound = _sides(desired, bound)
     total_ask, total_free = total(ask), total(free)
     flux = min(total_ask, total_free)
@@ -127,8 +129,8 @@ def square(desired: Field, bound: Field, surplus: float, surplus_max: float) -> 
 
 
 def descend(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-    """The lesser side goes to its bounds; the greater is served in descending order until the sums meet, the rest gets
-    nothing (fig. 6.5f)."""
+    """The set with the lesser total is filled up to its bounds; the other is served in descending order until the sums
+    are equal, and the rest gets nothing (fig. 6.5f)."""
     ask, ask_bound, free, free_bound = _sides(desired, bound)
     total_ask, total_free = total(ask), total(free)
     if total_ask >= total_free:
@@ -139,8 +141,8 @@ def descend(desired: Field, bound: Field, surplus: float, surplus_max: float) ->
 
 
 def _largest_first(side: Field, flux: float) -> Field:
-    """Full desired change in descending order while the sum stays within ``flux``; the element that would pass it gets
-    what is left."""
+    """Full desired change in descending order while the sum stays within ``flux``; the element that would exceed it
+    gets the remainder."""
     ordered, order = torch.sort(side, descending=True, stable=True)
     before = torch.cumsum(ordered, 0) - ordered
     granted = torch.zeros_like(side)
@@ -149,11 +151,11 @@ def _largest_first(side: Field, flux: float) -> Field:
 
 
 def waterfill(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-    """``clip(λ * desired, bound)`` with one λ a side: each element is sped up or slowed alike until its own bound, so
-    that the many elements at a bound do not hold back the few that are not (sec. 6.3.2.4).
+    """``clip(λ * desired, bound)`` with one λ for A and one for B. All elements of a set are scaled equally up to their
+    own bounds, so that the many elements at a bound do not restrict the few others (sec. 6.3.2.4).
 
-    The side that wants less is sped up towards the other as far as its bounds allow; what is missing comes out of the
-    surplus, what is left over goes into it.
+    The set with the lesser total is scaled up towards the other as far as its bounds allow. The surplus provides
+    missing density and takes excess density.
     """
     ask, ask_bound, free, free_bound = _sides(desired, bound)
     total_ask, total_free = total(ask), total(free)
@@ -163,18 +165,19 @@ def waterfill(desired: Field, bound: Field, surplus: float, surplus_max: float) 
     else:
         given = min(total(ask_bound), total_free)
         freed = min(total_free, given + surplus_max - surplus)
-    # A side that gets all it wants gets exactly that: what an element may do beside hangs on it, and must not hang
-    # on how a sum was rounded.
+    # A set that is granted all of its change gets it exactly: later decisions compare granted and desired changes, and
+    # must not depend on the rounding of a sum.
     gains = ask if given == total_ask else fill(ask, ask_bound, given)
     return gains - (free if freed == total_free else fill(free, free_bound, freed))
 
 
 def diffusion(desired: Field, bound: Field, surplus: float, surplus_max: float) -> Field:
-    """Density flows between neighbouring elements, from those that free it to those that ask, as heat does.
+    """Density flows between neighbouring elements, from those that free it to those that ask for it, as heat does.
 
-    What is left to hand out is a field that starts as the desired change and diffuses over the elements that have an
-    error; what flowed into or out of an element is its change, as far as its sign and its bound allow, and the greater
-    side is slowed to the lesser. The field is in Morton order, ``4^k`` elements. No surplus is used or made.
+    A field starts as the desired change and diffuses over the elements that have an error,
+    ``x <- x + sum(x_neighbour - x) / 4`` per step. The net flow of an element is its change, as far as its sign and its
+    bound allow, and the set with the greater sum is scaled down to the other. The field is in Morton order, ``4^k``
+    elements. The surplus is unchanged.
 
     Source: Stephens 2011, sec. 8.4, which names transport by a physical process and gives no equation.
     """
