@@ -1,6 +1,6 @@
 """Measurement: cost model, quality, run records, figures, reports, and the wiring of experiments.
 
-What Python programs use is offered here; each is imported when it is first asked for.
+This module offers the Python interface. Each name is imported when it is first used.
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
 """Measure what each part of the policy tsar is worth, where its error lies, and how far it is from a perfect picture.
 
 Each run leaves one part out, or changes one number, on the five inputs. The error of the whole policy is divided into
-latency, blur, disocclusion, shadows and aliasing, and compared with that of a perfect picture shown as late.
+latency, blur, disocclusion, shadows and aliasing, and compared with that of a perfect picture of the same latency.
 
 Examples: python scripts/ablation.py --out out/ablation
           python scripts/ablation.py --inputs fly-by --parts jitter smoothing --repetitions 1 --rivals --out out/two

@@ -1,4 +1,4 @@
-"""Options of the study of the parts of the project's own policy."""
+"""Options of the study of the parts of the policy tsar."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from tsar.policies import POLICIES, RIVALS
 @dataclass(frozen=True)
 @closed_choices()
 class AblationOptions:
-    """The policy tsar with each of its parts alone left out, what its error consists of, and how far it is from a
-    perfect picture as late as its own. Runs that are on disk are not repeated."""
+    """The policy tsar with each part left out alone, the terms of its error, and its distance from a
+    perfect picture of the same latency. Runs that are on disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs."""
     rows: tuple[int, ...] = (7,)
     """Rows of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as of the suitability study. quick: a quarter of the thesis' side, against a reference half as often."""
+    """Sizes, as in the suitability study. quick: a quarter of the thesis' side, and half the rate of the reference."""
     repetitions: int = 3
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     parts: tuple[str, ...] = ()
-    """Names of the changes to make, a run each; none makes all. A wrong name lists them."""
+    """Names of the parts to change, a run each; all parts where none is named. An unknown name prints the list."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
-    """Of all runs; batch and resolution come from the row, the seed from the repetition."""
+    """The pipeline of all runs; batch and resolution come from the row, the seed from the repetition."""
     rivals: tuple[str, ...] = RIVALS
-    """Rivals whose lowest error at each moment is the best rival's; framed is one of them in any case."""
+    """Rivals whose lowest error at each moment is that of the best rival; framed is always one of them."""
     before_s: float = 0.1
-    """Surfaces not in sight so long before count as disocclusion, those lit or shaded otherwise as shadows, seconds."""
+    """Seconds: a surface out of sight this long before counts as disocclusion, one whose light changed as a shadow."""
     ledger: Ledger = "thesis"
-    """How cost is counted; wall is refused, for it gives no result twice."""
+    """How cost is counted; wall is refused, because its results are not repeatable."""
     framed_rate_hz: float = 8.0
-    """Images a second that the framed renderer shows at every resolution; the machine is as fast as that takes."""
+    """Images a second that the framed renderer shows at every resolution, which sets the speed of the machine."""
     trace_segments: float = 4.0
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
@@ -48,7 +48,7 @@ class AblationOptions:
     markdown: bool = False
     """Print the tables as Markdown."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
-    """Where the runs are made."""
+    """Where the runs are computed."""
     out: Path = Path("out/ablation")
     """Folder for the results."""
     cache: References = REFERENCES

@@ -1,4 +1,4 @@
-"""What can be changed in the policy ``tsar``: each switch that it has, and some of its numbers."""
+"""Changes to the policy ``tsar``: each of its switches, and some of its numbers."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Part:
 
 
 def all_parts() -> tuple[Part, ...]:
-    """Every switch that is on, put off alone; then other numbers: latency, length of cycles, texture footprints."""
+    """Every switch that is on, turned off alone; then other numbers: latency, length of cycles, texture footprints."""
     switches = [one.name for one in dataclasses.fields(DEFAULT) if getattr(DEFAULT, one.name) is True]
     found = [Part(name.replace("_", "-"), _SWITCHED_OFF.get(name, f"no {name}"), ((name, False),)) for name in switches]
     unfiltered = (("footprint", _PIXEL), ("jitter", False))
@@ -59,10 +59,10 @@ def all_parts() -> tuple[Part, ...]:
 
 
 def chosen_parts(names: Sequence[str]) -> tuple[Part, ...]:
-    """Parts by their names; all of them where there are none.
+    """Parts by their names; all parts where no name is given.
 
     Raises:
-        ConfigError: no part has a name, or one is there twice.
+        ConfigError: a name is unknown, or given twice.
     """
     known = {part.name: part for part in all_parts()}
     for name in names:

@@ -1,4 +1,4 @@
-"""The study of parts as a figure; computes only places on the paper."""
+"""The study of parts as a figure; computes only positions on the paper."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _GRID = {"color": "0.88", "linewidth": 0.6}
 
 
 def figure(parts: pd.DataFrame, budget: pd.DataFrame, floor: pd.DataFrame, row: int) -> Figure:
-    """Left: the error with each part changed over that of the whole policy, a dot an input. Right: what the error of
-    the whole consists of, stacked, and the floor."""
+    """Left: the error with each part changed over that of the whole policy, one dot per input. Right: the terms of the
+    error of the whole policy, stacked, and the floor."""
     changes = {label: values for label, values in by_input(parts, "change", row).items() if label != WHOLE}
     height = 1.6 + 0.32 * max(len(changes), 6)
     drawn = Figure(figsize=(12.5, height), layout="constrained")
@@ -71,7 +71,7 @@ def _stacks(axis: Axes, budget: pd.DataFrame, floor: pd.DataFrame) -> None:
         values = floor["floor"].to_numpy()
         for place, value in enumerate(values):
             axis.plot([value, value], [place - 0.42, place + 0.42], color="k", linewidth=2.0)
-        axis.plot([], [], color="k", linewidth=2.0, label="floor: a perfect picture as late")
+        axis.plot([], [], color="k", linewidth=2.0, label="floor: a perfect picture of the same latency")
         axis.legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.02, 1.0))
     axis.axvline(0.0, color="0.2", linewidth=0.8)
     axis.set_xlabel("share of the error of tsar, over that of framed")

@@ -29,10 +29,10 @@ def study(options: AblationOptions) -> tuple[dict[str, Any], Tables]:
     """Runs what is missing and writes everything to ``options.out``.
 
     Returns:
-        What is in ``summary.json``, and the tables.
+        The content of ``summary.json``, and the tables.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         parts = chosen_parts(options.parts)

@@ -1,4 +1,4 @@
-"""Which runs the study of parts has."""
+"""The runs of the study of parts."""
 
 from __future__ import annotations
 

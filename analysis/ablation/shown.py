@@ -1,4 +1,4 @@
-"""The tables of the study of parts as people read them: on the terminal, and as Markdown."""
+"""The tables of the study of parts as text: on the terminal, and as Markdown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Tables = Mapping[str, pd.DataFrame]
 
 
 def shown_tables(tables: Tables) -> list[Table]:
-    """For each row of table 7.2 what every part is worth, what the error consists of, and the distance to the floor."""
+    """For each row of table 7.2 the worth of every part, the terms of the error, and the distance to the floor."""
     found = []
     for row in sorted(set(tables["parts"]["row"])) if len(tables["parts"]) else ():
         found += [_parts(tables["parts"], row), _changes(tables["parts"], row)]
@@ -64,7 +64,7 @@ def _floor(floor: pd.DataFrame, row: int) -> Table:
         [line["input"], *(_number(line[name], digits) for name, digits in columns), _percent(line["at most twice"])]
         for line in _lines(floor, row)
     ]
-    header = ["input", "a perfect picture as late", "tsar", "ratio", "moments at most twice the floor"]
+    header = ["input", "a perfect picture of the same latency", "tsar", "ratio", "moments at most twice the floor"]
     return Table(f"Distance to the floor: errors over framed's, row {row}", header, rows)
 
 

@@ -1,4 +1,4 @@
-"""From the results of the study of parts to its tables. The order in which runs were made does not matter."""
+"""Tables from the results of the study of parts. They do not depend on the order of the runs."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from analysis.metrics.rivals import BEST, best_of
 from analysis.study.cases import INPUTS
 
 ALL = "all inputs"
-"""In place of an input: all of them together."""
+"""Stands in the column of inputs for all inputs together."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What is on disk of a run: its place in the study, and the table over the reference times."""
+    """A run as read from disk: its place in the study, and its table over the reference times."""
 
     run: Run
     times: pd.DataFrame
 
 
 def moment_table(results: Iterable[Result], rivals: Sequence[str]) -> pd.DataFrame:
-    """A line a run of the policy and reference time: ``mse``, ``framed``, ``best-rival`` and, of the whole policy, the
-    columns ``budget_*``. Places whose framed renderer is missing are left out."""
+    """A line for each run of the policy and reference time: ``mse``, ``framed``, ``best-rival`` and, for the whole
+    policy, the columns ``budget_*``. Runs without their framed renderer are left out."""
     by_place: dict[tuple[int, str, int], dict[str, Result]] = {}
     for one in results:
         place = one.run.row, one.run.case.input, one.run.repetition
@@ -54,7 +54,7 @@ def moment_table(results: Iterable[Result], rivals: Sequence[str]) -> pd.DataFra
 
 
 def part_table(moments: pd.DataFrame) -> pd.DataFrame:
-    """A line a row, policy and input, and one for all inputs together.
+    """A line for each row, policy and input, and one for all inputs together.
 
     ``ratio`` is the mean error over that of the framed renderer, means over all moments of all repetitions; ``least``
     and ``most`` are those of single repetitions. ``change`` is the ratio over that of the whole policy. ``at most
@@ -99,7 +99,7 @@ def _geometric(values: Sequence[float]) -> float:
 
 
 def budget_table(moments: pd.DataFrame) -> pd.DataFrame:
-    """A line a row and input of the whole policy: means over all moments and repetitions, over the mean of framed.
+    """A line for each row and input of the whole policy: means over moments and repetitions, over the mean of framed.
 
     The shares of the error (:mod:`analysis.metrics.budget`) add up to ``ratio``. ``uncovered`` and ``relit`` are shares
     of the pixels, and ``late_ms`` is the mean age of the time that the display shows.
@@ -117,10 +117,11 @@ def budget_table(moments: pd.DataFrame) -> pd.DataFrame:
 
 
 def floor_table(moments: pd.DataFrame) -> pd.DataFrame:
-    """A line a row and input: the whole policy beside a perfect picture as late as its own, errors over the framed one.
+    """A line for each row and input: the errors of the whole policy and of a perfect picture of the same latency (the
+    floor), both over that of framed.
 
-    ``policy / floor`` is the ratio of their mean errors, and ``at most twice`` the share of the moments at which that
-    of the policy is at most twice the floor's.
+    ``policy / floor`` is the ratio of their mean errors, and ``at most twice`` the share of the moments at which the
+    error of the policy is at most twice that of the floor.
     """
     return pd.DataFrame(
         [
@@ -151,13 +152,13 @@ def _groups(frame: pd.DataFrame, by: list[str]) -> list[tuple[tuple[Any, ...], p
 
 
 def where(frame: pd.DataFrame, column: str, value: object) -> pd.DataFrame:
-    """The lines that have a value in a column; a frame without lines may have no columns."""
+    """The lines with a given value in a column; a frame without lines may have no columns."""
     found: Any = frame[frame[column] == value] if len(frame) else frame
     return found
 
 
 def by_input(parts: pd.DataFrame, column: str, row: int) -> dict[str, dict[str, float]]:
-    """A column of the table of parts at a row: for each policy its values by input, :data:`ALL` the last."""
+    """A column of the table of parts at a row: for each policy its values by input, with :data:`ALL` last."""
     return {
         str(label): dict(zip(found["input"].tolist(), found[column].tolist(), strict=True))
         for (label,), found in _groups(where(parts, "row", row), ["policy"])

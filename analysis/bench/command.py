@@ -1,4 +1,4 @@
-"""Measure how fast the simulator is beside Embree, Mitsuba 3 and PyWavelets, and how little its machinery costs.
+"""Measure the speed of the simulator beside Embree, Mitsuba 3 and PyWavelets, and the overhead of its stages.
 
 Examples: python scripts/bench.py --out out/bench
           python scripts/bench.py --only coherent,incoherent --out out/rays

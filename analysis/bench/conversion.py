@@ -1,4 +1,4 @@
-"""Group conversion: how long scenes of other renderers take to convert, and how much memory large ones need."""
+"""Group conversion: the time to convert scenes of other renderers, and the memory that large ones need."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from analysis.command.progress import Bars, Task
 
 CONVERSION_LIMIT_S = 0.5
-"""Time a scene may take, without its meshes' copying (Hagemann 2018, sec. 5)."""
+"""Seconds that a scene may take, without copying its meshes (Hagemann 2018, sec. 5)."""
 
 SIZES_MB = (4, 8, 16, 32)
 LARGE_MB = 200
@@ -69,7 +69,7 @@ def _scenes_row(options: BenchOptions, work: Path, task: Task) -> Row:
             for ending in ENDINGS:
                 begin = time.perf_counter()
                 save_scene_file(load_scene_file(file, options.scene_root), work / f"scene{ending}")
-                if turn:  # the first builds parsers
+                if turn:  # the first conversion builds the parsers
                     seconds.append(time.perf_counter() - begin)
         if turn:
             task.advance()
@@ -94,7 +94,7 @@ def relief(side: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write_text_scene(path: Path, megabytes: float) -> int:
-    """A PBRT scene with one mesh within the file, of about that size; its bytes."""
+    """Writes a PBRT scene of about the given size with one mesh inside the file; returns the size in bytes."""
     points, faces = relief(max(8, int((megabytes * 1e6 / 72.0) ** 0.5)))
     with path.open("w") as file:
         file.write(f'{_HEAD}Shape "trianglemesh" "integer indices" [')
@@ -106,7 +106,7 @@ def write_text_scene(path: Path, megabytes: float) -> int:
 
 
 def write_mesh_scene(path: Path, megabytes: float) -> int:
-    """A PBRT scene with one mesh in a file of its own; the bytes of both."""
+    """Writes a PBRT scene with one mesh in a separate file; returns the size of both in bytes."""
     from scenes.canonical import Mesh
 
     mesh = path.with_suffix(".ply")

@@ -1,4 +1,4 @@
-"""A pipeline that the benchmark runs a few cycles at a time, and a renderer that costs next to nothing."""
+"""A pipeline that the benchmark runs a few cycles at a time, and a renderer of negligible cost."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tsar.stages import Stages
 from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, StepRecord, Trace
 
 CYCLE_S = 0.02
-"""Animation time that a cycle takes, seconds: about what the cost model gives at the defaults."""
+"""Animation time of a cycle, seconds: about that of the cost model at the defaults."""
 _TILINGS_PER_CALL = 20
 
 
@@ -28,7 +28,7 @@ def steady(config: TsarConfig) -> TsarConfig:
 
 
 def default_stages(config: TsarConfig) -> Stages:
-    """The stages that a run takes unless told otherwise, on all cores."""
+    """The stages that a run uses by default, on all cores."""
     from renderer.compute.device import core_count
     from renderer.stages.control import stages
 
@@ -36,14 +36,14 @@ def default_stages(config: TsarConfig) -> Stages:
 
 
 def cycles(config: TsarConfig, trace: Trace, cycle_s: float = CYCLE_S) -> Iterator[StepRecord]:
-    """Records of an endless run, those of the warm-up too, of which the numbers are negative."""
+    """Records of an endless run, including those of the warm-up, which have negative numbers."""
     policy = Thesis(Setting(config, default_stages))
     return unbroken(run(policy, trace, fixed_clock(cycle_s), 0.0, math.inf))
 
 
 @dataclass
 class Turns:
-    """A pipeline past its warm-up that goes on some cycles at each call. Changes in place.
+    """A pipeline past its warm-up that runs a few more cycles at each call. Changes in place.
 
     Attributes:
         stage_s: wall seconds of every stage, one entry a cycle.
@@ -69,10 +69,10 @@ class Turns:
 
 
 class Tilings:
-    """Decisions over one density field without errors, which keep it; each call notes what its tilings took.
+    """Decisions over one density field with zero errors, which leave it unchanged; each call times its tilings.
 
     Attributes:
-        seconds: of a tiling, one entry a call.
+        seconds: time of a tiling, one entry a call.
     """
 
     def __init__(self, config: TsarConfig, field: torch.Tensor) -> None:
@@ -89,7 +89,7 @@ class Tilings:
 
 
 def synthetic_trace(batch: FrameletBatch) -> SampleBatch:
-    """Ripples that run over the picture: enough for densities to move, at next to no cost."""
+    """Ripples that run over the picture: enough for densities to move, at negligible cost."""
     phase = 40.0 * batch.position[..., 0] * batch.position[..., 1] + 6.0 * batch.times.to(torch.float32)
     value = 0.5 + 0.5 * torch.sin(phase)
     return SampleBatch(value[..., None].expand(*value.shape, 3), {"primary_rays": value.numel()})

@@ -1,4 +1,4 @@
-"""Embree as a peer, through embreex: one ray after the other on one thread."""
+"""Embree as a peer, through embreex: single rays on one thread."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Points = NDArray[np.float32]
 
 
 class EmbreeMesh:
-    """A mesh in Embree's tree, which is built when rays are first asked for.
+    """A mesh in Embree's tree, which is built at the first query.
 
-    Embree traces without its robust mode, and for closest hits returns nothing but the face: its fastest.
+    Embree traces without its robust mode, and for closest hits returns the face alone: this is its fastest way.
     """
 
     def __init__(self, vertices: Points, faces: NDArray[np.int32]) -> None:
@@ -28,10 +28,10 @@ class EmbreeMesh:
         return self._scene.run(origin, direction)
 
     def blocked(self, origin: Points, direction: Points, t_max: Points) -> NDArray[np.int32]:
-        """Zero where a ray hits something nearer than ``t_max`` of its direction's lengths, -1 elsewhere."""
+        """0 where a ray hits something nearer than ``t_max``, -1 elsewhere; lengths are in units of the direction."""
         return self._scene.run(origin, direction, dists=t_max, query="OCCLUDED")
 
     def hits(self, origin: Points, direction: Points) -> tuple[NDArray[np.int32], Points]:
-        """Faces as :meth:`closest` and how far they are, in the direction's lengths; not what is timed."""
+        """Faces as in :meth:`closest` and their distances in units of the direction's length; not timed."""
         found = self._scene.run(origin, direction, output=True)
         return found["primID"], found["tfar"]

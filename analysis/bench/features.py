@@ -1,4 +1,4 @@
-"""Group features: kernels for what a scene requires against kernels for everything there is, sample by sample."""
+"""Group features: kernels for the features of a scene against kernels for all features, traced sample by sample."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _SIDE_PX, _SAMPLES_PER_AXIS = 192, 2
 
 
 def _scenes(options: BenchOptions) -> dict[str, Scene]:
-    """The driving scenes, and those of the effects where no scene is named."""
+    """The driving scenes, and also those of the effects where no scene is named."""
     shown = {} if options.scenes else {name: effects.load(name) for name in effects.EFFECTS}
     return {**driving_scenes(options), **shown}
 
 
 def features(options: BenchOptions, bars: Bars) -> Iterator[Row]:
-    """Pictures of every scene, the same to the bit, by both kernels; says how many kernels were compiled."""
+    """Rows that time pictures of every scene by both kernels; the note says whether their bits are the same."""
     from renderer.kernels.entry import compiled_count
     from renderer.tables.requirements import required
     from renderer.trace import Renderer

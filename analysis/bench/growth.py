@@ -1,4 +1,4 @@
-"""Group growth: how cost grows with the batch, the picture and the tiling, and that memory does not grow with time."""
+"""Group growth: the growth of cost with the batch, the picture and the tiling, and of memory with time."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def growth(options: BenchOptions, bars: Bars) -> Iterator[Row]:
 
 
 def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
-    """Power by which seconds grow with the size: the slope of the straight line through their logarithms."""
+    """Exponent of the growth of seconds with size: the slope of the least-squares line through their logarithms."""
     x, y = [math.log(size) for size in sizes], [math.log(value) for value in seconds]
     mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
     rise = sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True))
@@ -61,9 +61,9 @@ def exponent_row(
 
     Args:
         name: of the row.
-        sizes: what grows.
+        sizes: the sizes ``n``, ascending.
         rounds: seconds of every round, of each size.
-        order: what seconds are divided by before the fit, such as ``log n``.
+        order: function of ``n`` that divides the seconds before the fit, such as ``log n``.
 
     Returns:
         The row; its ratio is the growth allowed over the growth measured when the size doubles, which is meaningful
@@ -94,7 +94,7 @@ def batch_row(options: BenchOptions, task: Task) -> Row:
 
 
 def picture_row(options: BenchOptions, task: Task) -> Row:
-    """Reconstruction time against pixels, of pictures that ripple."""
+    """Reconstruction time against pixels, for pictures of moving ripples."""
     configs = [steady(TsarConfig(batch_size=options.batch_size, resolution_px=side)) for side in SIDES_PX]
     cases = {str(config.resolution_px): Turns(config, synthetic_trace, cycles_per_turn=2) for config in configs}
     take_turns(cases, options.repetitions, task)
@@ -107,7 +107,7 @@ def tiling_row(options: BenchOptions, task: Task) -> Row:
     generator = torch.Generator().manual_seed(0)
     config = TsarConfig(resolution_px=2048)
     field = torch.exp(2.0 * torch.randn(config.sdf_side**2, generator=generator, dtype=torch.float64))
-    # more is asked for than any bound allows, so that every bound is reached
+    # densities ask for more tiles than any bound allows, so every bound is reached
     field *= 4.0 * max(TILE_BOUNDS) * config.samples / field.sum()
     configs = [TsarConfig(resolution_px=2048, tiling=TilingConfig(tile_count_max=bound)) for bound in TILE_BOUNDS]
     cases = {str(found.tile_count_max): Tilings(found, field) for found in configs}
@@ -138,10 +138,10 @@ def memory_rows(options: BenchOptions, task: Task) -> Iterator[Row]:
 
 
 def watched(config: TsarConfig, count: int, task: Task) -> tuple[int, list[int]]:
-    """Resident bytes before the pipeline is built, and every so many cycles of a run past its warm-up.
+    """Resident bytes before the pipeline is built, and at regular numbers of cycles of a run past its warm-up.
 
-    The first is taken with libraries and kernels loaded. A new process does it, for this one has filled its memory with
-    other things.
+    The first is taken with libraries and kernels loaded. A new process measures them, because this one holds
+    other data.
     """
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -168,7 +168,7 @@ def _watch(sender: Connection, config: TsarConfig, count: int) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
     resident = psutil.Process().memory_info
-    default_stages(TsarConfig(batch_size=16, resolution_px=64))  # loads what is the same for all sizes
+    default_stages(TsarConfig(batch_size=16, resolution_px=64))  # loads libraries and kernels, the same for all sizes
     sender.send(resident().rss)
     config = steady(config)
     for record in islice(cycles(config, synthetic_trace), config.warmup_cycles + count):

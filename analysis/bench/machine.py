@@ -1,4 +1,4 @@
-"""The machine and the versions that a benchmark's figures belong to."""
+"""The machine and the versions on which a benchmark was measured."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def machine(device: str = "cpu") -> dict[str, Any]:
 
 
 def versions() -> dict[str, str | None]:
-    """Version of each package that ours is made of or compared with; None where it is not installed."""
+    """Version of each package that ours depends on or is compared with; None where it is not installed."""
     found: dict[str, str | None] = {"python": platform.python_version()}
     for name, distribution in PACKAGES.items():
         try:

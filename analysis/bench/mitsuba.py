@@ -1,7 +1,7 @@
 """Mitsuba 3 as a peer: its variants in one process, and pictures of a scene by one of them.
 
-Its LLVM variant compiles with a shared library of LLVM that it looks for when it is imported. The newest version that
-is known to work is named in the environment variable that it reads, unless that is set.
+Its LLVM variant looks for a shared library of LLVM when it is imported. The environment variable that it reads names
+the newest version that is known to work, unless the user has set it.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from analysis.bench.rows import NOT_INSTALLED
 from scenes.canonical import Scene
 
 VARIANTS = {"llvm_ad_rgb": 1.2, "scalar_rgb": 3.0}
-"""Variants on the CPU, both on all cores, and the least ratio that is asked for."""
+"""Variants on the CPU, both on all cores, and the least ratio to reach."""
 
 _LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
-_LLVM_NAMES = ("libLLVM.so.19*", "libLLVM-19.so*")  # libllvm14 and 15 were found and failed
+_LLVM_NAMES = ("libLLVM.so.19*", "libLLVM-19.so*")  # libllvm14 and 15 load but fail
 _LLVM_FOLDERS = ("/usr/lib/*-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/lib/llvm-19/lib", "/usr/local/lib")
 
 Integrator = Literal["direct", "path"]
@@ -44,7 +44,7 @@ def find_llvm() -> str | None:
 
 
 def missing(variant: str) -> str:
-    """Why a variant cannot run here, or nothing."""
+    """Why a variant cannot run here; empty where it can."""
     if not installed("mitsuba"):
         return NOT_INSTALLED
     if variant.startswith("llvm") and find_llvm() is None:
@@ -53,7 +53,7 @@ def missing(variant: str) -> str:
 
 
 def select(variant: str) -> Any:
-    """Mitsuba's module with one variant in force."""
+    """Mitsuba's module with one variant selected."""
     library = find_llvm()
     if library is not None:
         os.environ.setdefault(_LLVM_VARIABLE, library)
@@ -66,11 +66,11 @@ def select(variant: str) -> Any:
 
 @dataclass(frozen=True)
 class MitsubaPicture:
-    """A still of a scene, as one variant of Mitsuba renders it.
+    """A still of a scene, rendered by one variant of Mitsuba.
 
     Attributes:
         variant: see :data:`VARIANTS`.
-        scene: Mitsuba's own, of that variant.
+        scene: Mitsuba's scene object, of that variant.
     """
 
     variant: str
@@ -79,12 +79,12 @@ class MitsubaPicture:
     def render(self, samples_per_pixel: int, seed: int = 0) -> NDArray[np.float32]:
         """``(height, width, 3)`` linear RGB; an array on the host, so that all work is done when it is returned.
 
-        Goes past ``mitsuba.render``, which needs the variant in force: to change it takes some 50 ms.
+        Bypasses ``mitsuba.render``, which needs the variant to be selected: selecting one takes about 50 ms.
         """
         return np.array(self.scene.integrator().render(self.scene, seed=seed, spp=samples_per_pixel))
 
     def repeated(self, samples_per_pixel: int) -> Callable[[], object]:
-        """Renders anew, with another seed, at each call."""
+        """A function that renders with another seed at each call."""
         seeds = iter(range(2**31))
         return lambda: self.render(samples_per_pixel, next(seeds))
 
@@ -94,16 +94,16 @@ def still(scene: Scene, time_s: float, resolution_px: int, integrator: Integrato
 
     Args:
         scene: ours.
-        time_s: animation time; what moves stands still in its pose at that time.
+        time_s: animation time, seconds; moving objects stand still in their pose at that time.
         resolution_px: side of the picture, pixels.
-        integrator: ``direct`` takes one sample of one light a camera ray and no other; ``path`` goes as deep as ours
-            mirrors, and one vertex further for light.
+        integrator: ``direct`` takes one light sample per camera ray and nothing else; ``path`` has the depth of our
+            mirrors, and one more vertex for light.
         variant: see :data:`VARIANTS`.
     """
     mitsuba = select(variant)
     options: dict[str, Any] = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
     if integrator == "path":
-        # edges of the longest path: to the surface seen, a mirror's each, to the light
+        # edges of the longest path: to the first surface, one for each mirror, to the light
         options = {"type": "path", "max_depth": scene.integrator.depth + 2}
     film = {
         "type": "hdrfilm",

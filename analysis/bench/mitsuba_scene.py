@@ -1,15 +1,15 @@
-"""Our scenes in Mitsuba's terms, a still at one time, as nearly as its plugins allow.
+"""Our scenes translated to Mitsuba, as a still at one time, as closely as its plugins allow.
 
-Geometry, framing, lights and textures are the same. Surfaces are diffuse, with on top of it
+Geometry, framing, lights and textures are the same. Surfaces are diffuse, with one of these on top:
 
 * a highlight without a mirror: ``roughconductor`` of ``alpha = sqrt(2 / (exponent + 2))``, which has the width of the
   Phong lobe, blended in by the colour of the highlight;
-* a mirror with a Fresnel term: ``plastic`` of the index that reflects ``fresnel_min`` at normal incidence, or above
-  0.15, where no dielectric is like it, a smooth conductor blended in by the mean of the term over the hemisphere. The
-  highlight of the sun on a mirror is left out: a smooth mirror sees no directional light.
+* a mirror with a Fresnel term: ``plastic`` of the index that reflects ``fresnel_min`` at normal incidence or, above
+  0.15, which no dielectric reaches, a smooth conductor blended in by the mean of the term over the hemisphere. The
+  highlight of the sun on a mirror is left out: a smooth mirror does not reflect a directional light.
 
-Differences that remain: the constant ambient term is replaced by the light of the environment map, so that paths go on
-from diffuse surfaces too, and textures have no mip maps.
+Remaining differences: the light of the environment map replaces the constant ambient term, so paths also continue
+at diffuse surfaces, and textures have no mip maps.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.textures import WHITE
 
-# their camera looks along +z with +x to the left
+# Mitsuba's camera looks along +z with +x to the left
 _CAMERA_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 _GREATEST_DIELECTRIC = 0.15  # reflectance of an index of 2.3
 _SQUARE = Mesh(
@@ -69,7 +69,7 @@ def translate(mitsuba: Any, scene: Scene, time_s: float) -> dict[str, Any]:
         time_s: animation time of the still.
 
     Raises:
-        SceneError: the scene holds what cannot be put in Mitsuba's terms here.
+        SceneError: the scene holds something that this module cannot translate.
     """
     found: dict[str, Any] = {"sensor": _sensor(mitsuba, scene, time_s)}
     for number, instance in enumerate(scene.instances):
@@ -137,7 +137,7 @@ def _shape(mitsuba: Any, instance: Instance, time_s: float) -> Any:
         normals = mesh.normals @ np.linalg.inv(pose[:3, :3])
         values["vertex_normals"] = _flat(normals / np.linalg.norm(normals, axis=1, keepdims=True))
     if mesh.uvs is not None:
-        # their pictures have v = 0 at the top
+        # Mitsuba's textures have v = 0 at the top
         values["vertex_texcoords"] = _flat(np.stack([mesh.uvs[:, 0], 1.0 - mesh.uvs[:, 1]], axis=1))
     values.update()
     return shape
@@ -183,12 +183,12 @@ def _texture(mitsuba: Any, texture: Texture) -> dict[str, Any]:
 
 
 def _bsdf(mitsuba: Any, material: Material) -> dict[str, Any]:
-    """Two-sided, as our surfaces are; light passes glass and holes."""
+    """A material, two-sided as our surfaces are, except for glass and holes, which transmit light."""
     if isinstance(material, Glass):
         return _glass(mitsuba, material)
     if isinstance(material, Masked):
         if material.cutoff is not None:
-            raise SceneError("holes by a cutoff have no translation")
+            raise SceneError("holes by an alpha cutoff have no translation")
         inner = _bsdf(mitsuba, material.base)
         return {"type": "mask", "opacity": _texture(mitsuba, material.opacity), "nested": inner}
     if isinstance(material, NormalMapped):

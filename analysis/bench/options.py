@@ -28,7 +28,7 @@ GROUPS = (
 """Groups of rows, in the order of the table."""
 
 ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "conversion", "start")
-"""Groups of what does not run on a GPU."""
+"""Groups that do not run on a GPU."""
 
 FRAMELET_SIDE = 16
 _FEWEST_REPETITIONS = 7
@@ -37,7 +37,7 @@ _FEWEST_REPETITIONS = 7
 @dataclass(frozen=True)
 @closed_choices()
 class BenchOptions:
-    """How fast the simulator is, and beside whom: rays, shaded samples, overhead, growth, start."""
+    """The speed of the simulator beside its peers: rays, shaded samples, overhead, growth, start."""
 
     out: Path = Path("out/bench")
     """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
@@ -45,11 +45,11 @@ class BenchOptions:
     """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
     cores, order, hits, features, overhead, tsar, growth, conversion, start."""
     compare: tuple[Path, Path] | None = None
-    """Two bench.json whose figures of ours are compared; runs nothing."""
+    """Two bench.json whose figures of our side are compared; nothing is run."""
     device: Literal["cpu", "cuda:0"] = "cpu"
     """Where our side runs; peers stay on the CPU."""
     repetitions: int = 9
-    """Turns of each case; medians count."""
+    """Turns of each case; the medians are reported."""
     resolution_px: int = 512
     """Side of the pictures, pixels, a power of two."""
     subdivisions: tuple[int, ...] = (4, 5, 6, 8)
@@ -63,7 +63,7 @@ class BenchOptions:
     scene_files: tuple[Path, ...] = ()
     """Scene files that the group conversion converts; the delivered Cornell boxes where none is named."""
     scene_root: Path | None = None
-    """Folder that they may read from; by default their own."""
+    """Folder that the scene files may read from; by default their own."""
 
     def __post_init__(self) -> None:
         for name in self.groups:
@@ -86,5 +86,5 @@ class BenchOptions:
 
     @property
     def file_ending(self) -> str:
-        """What sets apart the names of files that hold figures of a GPU."""
+        """Ending of the names of files that hold figures of a GPU; empty for the CPU."""
         return "" if self.device == "cpu" else "-cuda"

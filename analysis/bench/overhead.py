@@ -1,4 +1,4 @@
-"""Group overhead: what the stages around tracing take of a cycle, and the wavelet transform beside PyWavelets."""
+"""Group overhead: the time of the stages around tracing, and the wavelet transform beside PyWavelets."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MEASURED_CYCLES = 60
 
 
 class Cycle(NamedTuple):
-    """Wall seconds of every stage of a cycle, and its rays."""
+    """Wall seconds of every stage of a cycle, and its number of rays."""
 
     stage_s: Mapping[str, float]
     counters: Mapping[str, int]
@@ -59,7 +59,7 @@ def overhead(options: BenchOptions, bars: Bars) -> Iterator[Row]:
 
 
 def measured_cycles(config: TsarConfig, trace: Trace, task: Task) -> list[Cycle]:
-    """Cycles of a run that has filled its cache."""
+    """Cycles of a run after its cache is full."""
     found = []
     config = steady(config)
     for record in islice(cycles(config, trace), config.warmup_cycles, config.warmup_cycles + MEASURED_CYCLES):
@@ -69,12 +69,12 @@ def measured_cycles(config: TsarConfig, trace: Trace, task: Task) -> list[Cycle]
 
 
 def seconds_of(cycle: Cycle, names: Sequence[str]) -> float:
-    """Seconds of some stages together."""
+    """Seconds of the named stages together."""
     return sum(cycle.stage_s[name] for name in names)
 
 
 def limit_rows(name: str, found: Sequence[Cycle]) -> Iterator[Row]:
-    """Control stages and reconstruction of one scene against what they may take of the time of tracing."""
+    """Time of the control stages and of the reconstruction on one scene, against their limits relative to tracing."""
     traced_ms = 1e3 * median(cycle.stage_s["tracing"] for cycle in found)
     for what, stages, limit in (
         ("control stages", CONTROL, CONTROL_LIMIT),
@@ -87,7 +87,7 @@ def limit_rows(name: str, found: Sequence[Cycle]) -> Iterator[Row]:
 
 
 def stage_rows(config: TsarConfig, found: Sequence[Cycle]) -> Iterator[Row]:
-    """Each stage's share of a cycle, over all scenes, beside the share that the cost model gives it."""
+    """Each stage's share of a cycle over all scenes, beside its share in the cost model."""
     rays = sum(cycle.counters.get(name, 0) for cycle in found for name in RAYS)
     segments = rays / sum(cycle.counters["primary_rays"] for cycle in found)
     drawn = {"framelet_pixels": sum(cycle.counters.get("framelet_pixels", 0) for cycle in found) / len(found)}
@@ -113,7 +113,7 @@ class PyWaveletsStream:
     """The streaming transform of a batch by PyWavelets: rows and columns of the new tiles, then each coefficient of
     octave o with that of 2^o updates before. Changes in place.
 
-    Whole batches go through each call; ``zero`` is its fastest way to end a signal, and with two values all are alike.
+    Each call transforms a whole batch. ``zero`` is the fastest boundary mode, and for two values all modes agree.
     """
 
     def __init__(self, tiles: int, side: int) -> None:
@@ -150,8 +150,8 @@ class PyWaveletsStream:
 def transform_row(options: BenchOptions, task: Task) -> Row:
     """The streaming transform of one batch, ours beside PyWavelets, on the same framelets.
 
-    Ours cannot be had alone: from colours on, it is one pass with the norms and errors that are made of it, and with
-    the batch's way into the cache. All of that is timed.
+    Ours cannot be timed alone: it is one pass from colours to norms and errors that also stores the batch in the
+    cache. All of that is timed.
     """
     batch, color, cache = estimated_batch(options)
     config = pipeline_config(options)
@@ -177,7 +177,7 @@ def pipeline_config(options: BenchOptions) -> TsarConfig:
 
 
 def estimated_batch(options: BenchOptions) -> tuple[FrameletBatch, torch.Tensor, FrameletCache]:
-    """A batch, its colours, and a cache that holds an earlier batch of the same tiles, so that all have a past."""
+    """A batch, its colours, and a cache with an earlier batch of the same tiles, so that every tile has a history."""
     config = pipeline_config(options)
     cache = FrameletCache(config)
     batch = morton_batches(options, 0.0)[0]

@@ -1,4 +1,4 @@
-"""Group tsar: what each stage of the policy ``tsar`` takes of a cycle, beside its tracing."""
+"""Group tsar: the time of each stage of the policy ``tsar`` in a cycle, beside its tracing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from renderer.trace import Renderer
 
 CYCLE_S = 0.005
-"""Animation time that a cycle takes, seconds: about what the cost model gives at the defaults."""
+"""Animation time of a cycle, seconds: about that of the cost model at the defaults."""
 MEASURED_CYCLES = 240
 ALL_ELSE_LIMIT = 0.60
 NAMES = {
@@ -42,7 +42,7 @@ TRACING, REST, ALL_ELSE = "tracing", "remaining", "all but tracing"
 
 
 def policy(options: BenchOptions, bars: Bars) -> Iterator[Row]:
-    """Wall time of the stages on the driving scenes, and the share of tracing that all others together take."""
+    """Wall time of the stages on the driving scenes, and the ratio of all other stages together to tracing."""
     scenes = driving_scenes(options)
     task = bars.task("tsar", len(scenes) * MEASURED_CYCLES)
     for name, scene in scenes.items():
@@ -69,7 +69,7 @@ def measured_cycles(config: TsarConfig, renderer: Renderer, task: Task) -> list[
 
 
 def timed(stages: Stages, seconds: dict[str, float]) -> Stages:
-    """The same stages; those of the filter note in ``seconds``, by name, what they took."""
+    """The same stages; those of the filter add their time to ``seconds``, by name."""
 
     def noting(name: str, stage: Callable[..., Any]) -> Callable[..., Any]:
         def noted(*arguments: Any) -> Any:
@@ -87,14 +87,14 @@ def timed(stages: Stages, seconds: dict[str, float]) -> Stages:
 
 
 def divided(whole: Mapping[str, float], stages: Mapping[str, float]) -> dict[str, float]:
-    """Seconds of a cycle by the names of the rows: tracing, the filter's stages, what remains, and all but tracing."""
+    """Seconds of a cycle by the names of the rows: tracing, the filter's stages, the rest, and all but tracing."""
     rest = sum(whole.values()) - whole["tracing"]
     named = {label: stages.get(name, 0.0) for name, label in NAMES.items()}
     return {TRACING: whole["tracing"], **named, REST: rest - sum(stages.values()), ALL_ELSE: rest}
 
 
 def policy_rows(name: str, found: Sequence[Mapping[str, float]]) -> Iterator[Row]:
-    """Milliseconds of each stage on one scene, and what all but tracing takes against what it may."""
+    """Milliseconds of each stage on one scene, and all but tracing against its limit."""
     taken_ms = {label: 1e3 * median(cycle[label] for cycle in found) for label in found[0]}
     for label, value in taken_ms.items():
         yield Row("tsar", f"{name}, {label}", "ms", value, repetitions=len(found), less_is_better=True)

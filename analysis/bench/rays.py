@@ -27,7 +27,7 @@ CLOSEST_TARGETS = {5: 3.0, 8: 2.0}
 
 SHADOW_TARGET, INCOHERENT_TARGET = 2.0, 0.8
 
-_OFFSET = 1.0e-4  # of the mesh's size, from the surface to the start of a secondary ray
+_OFFSET = 1.0e-4  # in units of the mesh's size, from the surface to the origin of a secondary ray
 _JITTER = 0.15  # of a glossy mirror: about the width of a Phong lobe of exponent 100
 _REACH = 0.9999  # a shadow ray ends short of its light
 _SAME_DISTANCE = 1.0e-4
@@ -37,7 +37,7 @@ Points = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays ``(n, 3)`` of one call; with ``t_max`` ``(n,)`` any hit nearer than it counts, else the closest."""
+    """Rays ``(n, 3)`` of one call: any hit nearer than ``t_max`` ``(n,)`` where it is given, else the closest hit."""
 
     origin: Points
     direction: Points
@@ -50,7 +50,7 @@ class Rays:
 
 @dataclass(frozen=True)
 class Question:
-    """Calls whose time is compared, a row of the table."""
+    """Calls whose time is compared; one row of the table."""
 
     name: str
     calls: list[Rays]
@@ -58,12 +58,12 @@ class Question:
 
 
 def coherent(options: BenchOptions, bars: Bars) -> Iterator[Row]:
-    """Closest hits of framelet batches, and shadow rays from what they see towards one light."""
+    """Closest hits of framelet batches, and shadow rays from these hits towards one light."""
     yield from _rows("coherent", _coherent_questions, options, bars)
 
 
 def incoherent(options: BenchOptions, bars: Bars) -> Iterator[Row]:
-    """Glossy bounces off what the camera sees, and random directions from within the mesh's box."""
+    """Glossy bounces off the camera's hits, and random directions from within the mesh's bounding box."""
     yield from _rows("incoherent", _incoherent_questions, options, bars)
 
 
@@ -91,7 +91,7 @@ def compare(
     repetitions: int,
     task: Task,
 ) -> Row:
-    """Fills a row: both sides take turns with all calls of a question."""
+    """Fills a row: both sides answer all calls of a question in turns."""
     cases: dict[str, Callable[[], object]] = {"ours": lambda: [_ask(ours, rays) for rays in question.calls]}
     note = NOT_INSTALLED
     if peer is not None:
@@ -113,7 +113,7 @@ def _ask(side: Any, rays: Rays) -> object:
 def disagreements(ours: RayQueries, peer: EmbreeMesh, rays: Rays) -> int:
     """Rays of which one side alone hits something, or the two hit at different distances.
 
-    The face is not asked for: on an edge that two share, either is right.
+    Faces are not compared: on an edge shared by two faces, either is right.
     """
     if rays.t_max is not None:
         theirs = peer.blocked(rays.origin, rays.direction, rays.t_max) >= 0
@@ -131,7 +131,7 @@ def framelet_calls(options: BenchOptions) -> list[Rays]:
 
 
 def seen(mesh: Mesh, ours: RayQueries, rays: Rays) -> tuple[Points, Points, NDArray[np.bool_]]:
-    """Points ``(m, 3)`` just above the surface that rays see, unit normals there, and which of the rays hit."""
+    """Points ``(m, 3)`` just above the surfaces that rays hit, unit normals there, and which of the rays hit."""
     found = ours.closest(rays.origin, rays.direction)
     hit = np.asarray(found.face) >= 0
     corners = mesh.vertices[mesh.faces[found.face[hit]]]
@@ -143,7 +143,7 @@ def seen(mesh: Mesh, ours: RayQueries, rays: Rays) -> tuple[Points, Points, NDAr
 
 
 def shadow_rays(mesh: Mesh, ours: RayQueries, rays: Rays) -> Rays:
-    """Rays from what is seen towards the light, where the surface faces it; their direction ends at the light."""
+    """Rays from hits to the light, where the surface faces it; their direction vector ends at the light."""
     point, normal, _ = seen(mesh, ours, rays)
     direction = np.asarray(LIGHT, np.float32) - point
     lit = np.einsum("ij,ij->i", direction, normal) > 0.0

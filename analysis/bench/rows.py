@@ -18,17 +18,17 @@ NOT_INSTALLED = "peer not installed"
 
 @dataclass(frozen=True)
 class Row:
-    """One measured figure beside a peer's, or beside the limit that it is to keep.
+    """One measured figure beside a peer's, or beside its limit.
 
     Attributes:
-        ours, peer: medians in ``unit``; ``peer`` is None where there is none to compare with.
-        peer_name: who, or what limit.
+        ours, peer: medians in ``unit``; ``peer`` is None where there is no peer.
+        peer_name: name of the peer, or of the limit.
         ratio: above 1 ours is faster than the peer, or within the limit.
         spread: quartiles of the ratio over the repetitions.
-        target: least ratio that is asked for; None where none is.
-        repetitions: rounds, or cycles, that the medians are over.
+        target: least ratio to reach; None where there is none.
+        repetitions: number of rounds, or cycles, behind the medians.
         less_is_better: whether ``ours`` is a time or a share rather than a rate.
-        note: what else must be known to judge the figure.
+        note: further information needed to judge the figure.
     """
 
     group: str
@@ -46,7 +46,7 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the target is reached; None where there is no target, or nobody to compare with."""
+        """Whether the target is reached; None where there is no target or no peer."""
         return None if self.target is None or self.ratio is None else self.ratio >= self.target
 
     def record(self) -> dict[str, Any]:
@@ -55,7 +55,7 @@ class Row:
 
 
 Group = Callable[["BenchOptions", "Bars"], Iterator[Row]]
-"""Measures the rows of one group and shows how far it is."""
+"""Measures the rows of one group and shows its progress."""
 
 
 def spread_of(ratios: Sequence[float]) -> tuple[float, float] | None:
@@ -73,8 +73,8 @@ def rate_row(
 
     Args:
         row: group, name, unit, name of the peer, and note.
-        work: what is done in one round, in the numerator of ``unit``.
-        ours_s, peer_s: seconds of each round; None for the peer where it cannot be had.
+        work: amount of work in one round, in the numerator of ``unit``.
+        ours_s, peer_s: seconds of each round; None for a peer that is not available.
         target: least ratio.
     """
     filled = dataclasses.replace(row, ours=work / median(ours_s), target=target, repetitions=len(ours_s))
@@ -85,7 +85,7 @@ def rate_row(
 
 
 def limit_row(row: Row, values: Sequence[float], limit: float) -> Row:
-    """Fills a row with positive values that are to stay within a limit: the ratio is the limit over the value, and the
+    """Fills a row with positive values that must stay within a limit: the ratio is the limit over the value, and the
     target 1."""
     return limited_row(row, values, limit, [limit / value for value in values])
 

@@ -1,4 +1,4 @@
-"""Runs the groups of the benchmark that are asked for and writes what they measured."""
+"""Runs the requested groups of the benchmark and writes their measurements."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
     """Measures and writes ``bench.json`` after each group, ``summary.json`` at the end.
 
     Returns:
-        What ``bench.json`` holds: ``rows``, and the machine and versions that they belong to.
+        The content of ``bench.json``: ``rows``, and the machine and versions on which they were measured.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         own_results(options.out, (f"bench{options.file_ending}.json", f"summary{options.file_ending}.json"))

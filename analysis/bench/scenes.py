@@ -1,4 +1,4 @@
-"""What the benchmark renders: the bumpy sphere, the driving scenes, and batches of framelets over their pictures."""
+"""The scenes of the benchmark: the bumpy sphere, the room, the driving scenes, and batches of framelets over them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LIGHT = (1.5, 2.5, 4.5)
 _INTENSITY = (60.0, 57.0, 51.0)
 _ALBEDO = (0.62, 0.5, 0.4)
 SHADED_SUBDIVISIONS = 5
-"""Of the mesh that is shaded: 20,480 triangles."""
+"""Subdivisions of the mesh that is shaded: 20,480 triangles."""
 
 
 @lru_cache(maxsize=8)
@@ -100,7 +100,7 @@ def room_scene() -> Scene:
 
 
 def _placed(about_x: float, about_y: float, at: tuple[float, float, float] | None = None, size: float = 1.0) -> Matrix:
-    """Where the unit square lies: turned, and then one unit back along its normal unless it says where."""
+    """Transform of the unit square: rotated, then moved to ``at``, by default one unit back along its normal."""
     turn = Rotation.from_euler("xy", (about_x, about_y)).as_matrix()
     matrix = identity()
     matrix[:3, :3] = turn * size
@@ -112,7 +112,7 @@ def driving_scenes(options: BenchOptions) -> dict[str, Scene]:
     """The scenes asked for, by name.
 
     Raises:
-        SceneError: there is none of that name.
+        SceneError: no driving scene has that name.
     """
     from scenes import catalog
 
@@ -127,7 +127,7 @@ def renderer_of(scene: Scene, options: BenchOptions, threads: int | None = None)
 
 
 def morton_batches(options: BenchOptions, duration_s: float) -> list[FrameletBatch]:
-    """Batches that cover the picture once between them, each spread over all of it as the pipeline's are.
+    """Batches that together cover the picture once, each spread over all of it like those of the pipeline.
 
     Args:
         options: size of the picture and of a batch.
@@ -148,7 +148,7 @@ def morton_batches(options: BenchOptions, duration_s: float) -> list[FrameletBat
 
 
 def in_rows(batch: FrameletBatch) -> FrameletBatch:
-    """The same samples, of one time, in the order of reading: row by row across all tiles of the batch."""
+    """The same samples, all of one time, row by row across all tiles of the batch."""
     flat = batch.position.reshape(-1, 2)
     order = torch.argsort(flat[:, 0], stable=True)
     order = order[torch.argsort(flat[order, 1], stable=True)]
@@ -156,7 +156,7 @@ def in_rows(batch: FrameletBatch) -> FrameletBatch:
 
 
 def camera_rays(batch: FrameletBatch) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Origins and directions ``(n, 3)`` of a batch's rays at the bumpy sphere, a framelet after the other."""
+    """Origins and directions ``(n, 3)`` of a batch's rays at the bumpy sphere, framelet by framelet."""
     position = batch.position.reshape(-1, 2).numpy()
     tangent = np.float32(np.tan(np.radians(FOV_DEG / 2.0)))
     x, y = (2.0 * position[:, 0] - 1.0) * tangent, (1.0 - 2.0 * position[:, 1]) * tangent

@@ -1,9 +1,9 @@
 """Group shaded: whole pictures beside Mitsuba 3, both on all cores.
 
-The bumpy sphere is the same work on either side: one camera ray and one shadow ray a sample; so is the room, along
-paths of as many bounces at most. Of the driving scenes,
-Mitsuba's paths also go on from diffuse surfaces, which ours do not; a second row beside its direct light alone, which
-follows no mirrors, which ours does, bounds the comparison from the other side.
+The bumpy sphere is the same work on both sides: one camera ray and one shadow ray a sample. So is the room, along
+paths with the same greatest number of bounces. In the driving scenes Mitsuba's paths also continue at diffuse surfaces,
+which ours do not. A second row compares with Mitsuba's direct light alone, which follows no mirrors as ours does, and
+bounds the comparison from the other side.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from renderer.trace import Renderer
 
 DRIVING_S = 0.8
-"""Animation time at which the driving scenes are rendered: the car is in all pictures."""
+"""Animation time, seconds, at which the driving scenes are rendered: the car is in all pictures."""
 
 _NO_TARGETS: Mapping[str, float | None] = dict.fromkeys(peer.VARIANTS)
 
-_REST_S = 0.03  # Mitsuba's threads spin on after a rendering
+_REST_S = 0.03  # Mitsuba's threads keep spinning after a rendering
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Still:
 
     Attributes:
         name: of the row.
-        integrator: Mitsuba's.
-        samples_per_axis: samples along a pixel's side; Mitsuba takes as many in all.
+        integrator: that of Mitsuba.
+        samples_per_axis: samples along a pixel's side; Mitsuba takes the same number in all.
         targets: least ratio by variant.
     """
 
@@ -66,7 +66,7 @@ def stills(options: BenchOptions) -> Iterator[Still]:
 
 
 def shaded(options: BenchOptions, bars: Bars) -> Iterator[Row]:
-    """Pictures per second as samples per second, beside each variant that runs here."""
+    """Samples per second of whole pictures, beside each variant that runs here."""
     found = list(stills(options))
     task = bars.task("shaded", len(found) * options.repetitions)
     renderers: dict[int, Renderer] = {}

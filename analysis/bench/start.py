@@ -34,14 +34,14 @@ _SHORT_RUN = (
 
 @dataclass(frozen=True)
 class Started:
-    """A process that has ended: its wall seconds and what it printed on either stream."""
+    """A process that has ended: its wall seconds and its output on both streams."""
 
     seconds: float
     text: str
 
     @property
     def first_cycle_s(self) -> float | None:
-        """Seconds to the first cycle as the process tells them itself, or None."""
+        """Seconds to the first cycle as the process prints them, or None."""
         found = _FIRST_CYCLE.search(self.text)
         return float(found.group(1)) if found else None
 
@@ -50,7 +50,7 @@ def start(environment: Mapping[str, str], *arguments: str) -> Started:
     """Runs a script of the project to its end.
 
     Args:
-        environment: added to that of this process.
+        environment: variables added to those of this process.
         arguments: name of the script and its arguments.
 
     Raises:
@@ -66,7 +66,7 @@ def start(environment: Mapping[str, str], *arguments: str) -> Started:
 
 
 def first_cycle(found: Started) -> tuple[float, str]:
-    """Seconds to the first cycle, and a note on where they come from."""
+    """Seconds to the first cycle, and a note on their source."""
     if found.first_cycle_s is None:
         return found.seconds, "wall time of a whole short run"
     return found.first_cycle_s, f"whole short run {found.seconds:.1f} s"
@@ -78,7 +78,7 @@ def start_rows(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     helped, warm = [], []
     with tempfile.TemporaryDirectory() as folder:
         short = ("run.py", "fly-by", *_SHORT_RUN, "--out", f"{folder}/run", "--cache", f"{folder}/references")
-        start({}, *short)  # fills the cache of kernels and that of references
+        start({}, *short)  # fills the caches of kernels and references
         task.advance()
         for _ in range(options.repetitions):
             helped.append(start({}, "run.py", "--help").seconds)
@@ -96,7 +96,7 @@ def start_rows(options: BenchOptions, bars: Bars) -> Iterator[Row]:
 
 
 def cold_row(cold: list[Started]) -> Row:
-    """First cycle with an empty cache of kernels, and whether every run said that it compiles."""
+    """First cycle with an empty kernel cache, and whether every run said that it compiles."""
     seconds = sorted(first_cycle(found)[0] for found in cold)
     said = all("compiling" in found.text for found in cold)
     return Row(

@@ -11,7 +11,7 @@ from analysis.command.console import Table
 from analysis.storage.store import read_json
 
 _ROW = {"group": str, "name": str, "unit": str, "ours": float | None, "less_is_better": bool}
-"""What a row of a stored benchmark must hold to be compared."""
+"""Fields that a row of a stored benchmark must have to be compared."""
 _MET = {True: "yes", False: "NO", None: ""}
 
 
@@ -23,10 +23,10 @@ def figure(value: float | None) -> str:
 
 
 def rows_table(found: Mapping[str, Any]) -> Table:
-    """All rows of a ``bench.json``; notes are told apart by number.
+    """All rows of a ``bench.json``, with numbered notes.
 
     Args:
-        found: its content.
+        found: content of the file.
     """
     header = ("group", "name", "unit", "ours", "peer", "ratio", "spread", "target", "met")
     rows = [
@@ -63,7 +63,7 @@ def read_rows(path: Path) -> dict[tuple[str, str], Mapping[str, Any]]:
     """Rows of a ``bench.json`` by group and name.
 
     Raises:
-        ValueError: it cannot be read, or holds none.
+        ValueError: the file cannot be read, or holds no rows.
     """
     try:
         rows = read_json(path, {"rows": [_ROW]})["rows"]
@@ -75,13 +75,13 @@ def read_rows(path: Path) -> dict[tuple[str, str], Mapping[str, Any]]:
 
 
 def comparison_table(first: Path, second: Path) -> Table:
-    """Our figures of two benchmarks, row by row.
+    """Figures of our side in two benchmarks, row by row.
 
     Args:
         first, second: files; a ratio above 1 means that the second is better.
 
     Raises:
-        ValueError: a file cannot be read, or the two share no row.
+        ValueError: a file cannot be read, or the files share no row.
     """
     before, after = read_rows(first), read_rows(second)
     shared = [key for key in before if key in after]
@@ -95,7 +95,7 @@ def comparison_table(first: Path, second: Path) -> Table:
 
 
 def better_by(before: Mapping[str, Any], after: Mapping[str, Any]) -> float | None:
-    """How many times better our figure became; None where one of the two is not positive."""
+    """Factor by which our figure improved; None where one of the two is not positive."""
     a, b = before["ours"], after["ours"]
     if not (a and b and a > 0.0 and b > 0.0):
         return None

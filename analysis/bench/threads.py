@@ -1,4 +1,4 @@
-"""Groups cores, order and hits: framelet batches on two threads against one, in Morton order against reading order, and
+"""Groups cores, order and hits: framelet batches on two threads against one, in Morton order against row order, and
 with first hits against without."""
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _samples(batches: list[FrameletBatch]) -> float:
 
 
 def cores(options: BenchOptions, bars: Bars) -> Iterator[Row]:
-    """Batches on two threads against one; nothing where this process may use one core only."""
+    """Batches on two threads against one; no row where this process may use one core only."""
     from renderer.compute.device import core_count
 
     if core_count() < 2:

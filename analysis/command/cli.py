@@ -1,4 +1,4 @@
-"""What all command lines share: one clear line for bad input, a clean end on Ctrl-C."""
+"""Shared by all command lines: one clear line for bad input, and a clean end on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ EXIT_BROKEN = 3
 EXIT_INTERRUPTED = 130
 
 _SPINNING = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
-_SPINS = "1000"  # 300 to 3000 cycles were measured to be equally fast
+_SPINS = "1000"  # no difference was measured from 300 to 3000 cycles
 _NO_MEMORY = re.compile(
     r"can't allocate memory|[Cc]annot allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread"
     r"|out of memory|failed to map segment"
@@ -69,7 +69,7 @@ def bad_input() -> Iterator[None]:
 
 
 def _lack_of_memory(error: BaseException) -> InputError | None:
-    """The error to report where memory ran out; None for any other error."""
+    """The error to report if memory ran out; None for any other error."""
     text = " ".join(str(error).split())
     if not any(map(_tells_of_memory, _with_causes(error))):
         return None
@@ -78,7 +78,7 @@ def _lack_of_memory(error: BaseException) -> InputError | None:
 
 
 def _with_causes(error: BaseException | None) -> Iterator[BaseException]:
-    """An error, what it was raised from, and so on."""
+    """An error, and the chain of its causes."""
     while error is not None:
         yield error
         error = error.__cause__
@@ -107,7 +107,7 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     """Options from the command line; help goes to standard output.
 
     Raises:
-        InputError: something cannot be parsed or is out of range.
+        InputError: an option cannot be parsed or is out of range.
     """
     import tyro
 
@@ -122,21 +122,21 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
 
 
 def _as_called(description: str) -> str:
-    """A description whose examples call the command as it was called: as a script, or by ``tsar``."""
+    """A description whose examples call the command in the way it was called: as a script, or by ``tsar``."""
     if not sys.argv[0].startswith("tsar "):
         return description
     return re.sub(r"python scripts/(\w+)\.py", sys.argv[0], description)
 
 
 def require_memory(need_bytes: float, what: str) -> None:
-    """Raises InputError where less memory is free than ``what`` needs."""
+    """Raises InputError if less memory is free than ``what`` needs."""
     have = free_memory_bytes()
     if need_bytes > have:
         raise InputError(f"{what} needs about {need_bytes / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free")
 
 
 def _one_line(box: str) -> str:
-    """The message inside the frame that the parser draws, without its title and its advice."""
+    """The message inside the box that the parser draws, without its title and advice."""
     inside = (re.sub(r"Error parsing \w+: ", "", line) for line in box.splitlines() if line[:1] != "╭")
     lines = [re.sub(r"\s+", " ", _FRAME.sub(" ", line)).strip() for line in inside]
     text = " ".join(line for line in lines if line)
@@ -173,17 +173,17 @@ def run_cli(main: Callable[[], None]) -> None:
             raise
         _end(lack, EXIT_BAD_INPUT)
     except KeyboardInterrupt:
-        print("interrupted; unfinished files were removed, a reference goes on where it stopped", file=sys.stderr)
+        print("interrupted; unfinished files were removed, a reference continues where it stopped", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
     finally:
         release_folders()
 
 
 def run_process(main: Callable[[], None]) -> None:
-    """Runs :func:`run_cli` as the last that this process does.
+    """Runs :func:`run_cli` as the last action of this process.
 
-    The process ends as soon as its exit functions have run: the interpreter's last collection of garbage took up to a
-    minute in a study, and libraries list there what is still alive.
+    The process ends as soon as its exit functions have run: the interpreter's last garbage collection took up to a
+    minute in a study, and libraries print lists of live objects in it.
     """
     code: int | str | None = 0
     try:
@@ -201,7 +201,7 @@ def run_process(main: Callable[[], None]) -> None:
 
 
 def _base_of(error: ModuleNotFoundError) -> InputError | None:
-    """The error to report where packages that every command needs are not installed for this Python; else None."""
+    """The error to report if packages that every command needs are not installed for this Python; else None."""
     if importlib.util.find_spec("tyro") and importlib.util.find_spec("torch"):
         return None
     return InputError(
@@ -217,7 +217,7 @@ def _end(error: Exception, status: int) -> NoReturn:
 
 
 def _one_warning(message: Warning | str, *_: object) -> None:
-    """Prints a warning in one line, without its place in the code."""
+    """Prints a warning in one line, without its location in the code."""
     text = re.sub(r"\s+", " ", str(message)).strip()
     print(f"warning: {text}", file=sys.stderr)
 
@@ -225,7 +225,7 @@ def _one_warning(message: Warning | str, *_: object) -> None:
 def _spin_briefly() -> None:
     """Makes torch's idle threads sleep soon, unless the user has set that.
 
-    By default they spin for milliseconds after every operation, on cores that then trace rays. Where another process is
+    By default they spin for milliseconds after every operation, on cores that then trace rays. If another process is
     busy too, operations wait for threads that wait for a core. This has an effect only before torch is imported.
     """
     if not any(name in os.environ for name in _SPINNING):

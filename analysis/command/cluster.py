@@ -1,4 +1,4 @@
-"""Processes and machines that share work: a Dask cluster on this machine by default, or any other by its address.
+"""Processes and machines that share work: a Dask cluster, by default on this machine, or any other by its address.
 
 Workers of another cluster must see the same folders and run the same source code.
 """
@@ -25,18 +25,17 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 WAIT_S = 30
-"""How long the answer of a scheduler that may be at work, or a worker, is waited for, seconds."""
+"""Seconds to wait for an answer of a busy scheduler, or of a worker."""
 CONNECT_S = 3
-"""How long a connection to a scheduler's port may take, seconds: the system makes it, whatever the scheduler does."""
+"""Seconds that a connection to a scheduler's port may take: the system accepts it even if the scheduler is busy."""
 LOOPBACK = "127.0.0.1"
 _QUIET = "ignore:resource_tracker:UserWarning"
-"""An option of Python by which the process that tracks semaphores does not report those of workers that were killed: it
-removes them."""
+"""An option of Python that silences the semaphore tracker about semaphores of killed workers, which it removes."""
 
 
 @dataclass(frozen=True)
 class ClusterOptions:
-    """Where cases are run."""
+    """Where cases run."""
 
     workers: int = 0
     """Processes of the local cluster; 0 takes one per core."""
@@ -55,13 +54,13 @@ class ClusterOptions:
 
     @property
     def threads(self) -> int:
-        """Threads that each of them traces with."""
+        """Threads for tracing in each of these processes."""
         return max(1, core_count() // self.processes)
 
 
 @contextlib.contextmanager
 def connected(options: ClusterOptions) -> Iterator[Client]:
-    """A client of the cluster; a local one ends with the block.
+    """A client of the cluster; a local cluster ends with the block.
 
     Raises:
         InputError: nothing answers at the address.
@@ -70,7 +69,7 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
     dask.config.set({"distributed.worker.profile.enabled": False})
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # failures are reported in one line each
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # each failure is reported in one line
     if options.scheduler:
         try:
             _require_port(options.scheduler)
@@ -101,7 +100,7 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
 
 
 def _require_port(address: str) -> None:
-    """Raises OSError where nothing listens at an address: a client would go on trying for as long as it may wait."""
+    """Raises OSError if nothing listens at an address: a client would retry until its timeout."""
     from distributed.comm.addressing import parse_address, parse_host_port
 
     transport, place = parse_address(address)
@@ -112,15 +111,15 @@ def _require_port(address: str) -> None:
 
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Threads and processes that are started within ignore Ctrl-C, which a terminal sends to all of them; this
+    """Threads and processes that are started in the block ignore Ctrl-C, which a terminal sends to all of them; this
     thread receives it after the block.
 
-    A thread that was there before can still take the signal, and Python would then raise KeyboardInterrupt here, within
-    libraries that may lose it; so it is noted meanwhile.
+    An earlier thread can still take the signal. Python would then raise KeyboardInterrupt here, inside libraries that
+    may lose it, so the signal is recorded instead.
     """
     if _QUIET not in sys.warnoptions:
         sys.warnoptions.append(_QUIET)
-    resource_tracker.ensure_running()  # it unblocks interrupts where it is started, so it must not be started within
+    resource_tracker.ensure_running()  # its start unblocks interrupts, so it must start before the block
     heard = list[int]()
     handlers = {number: signal.signal(number, lambda number, frame: heard.append(number)) for number in SIGNALS}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 _FILE_WIDTH = 150
-"""Characters a line where the output is not a terminal."""
+"""Characters a line if the output is not a terminal."""
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class Table:
     """Rows of text under a header.
 
     Attributes:
-        title, note: above and below it.
-        header: names of the columns; a table without names has none.
-        rows: a text for every column.
+        title, note: text above and below the table.
+        header: names of the columns; empty for a table without a header.
+        rows: one text for every column.
         words: how many columns, from the left, hold words; the others hold numbers and are aligned to the right.
         grouped: whether a line separates rows that differ in the first column.
     """
@@ -36,7 +36,7 @@ class Table:
 
 
 def console(width: int | None = None) -> Console:
-    """Standard output. Text appears as it is: a path may hold brackets or colons, which rich would take for markup.
+    """Standard output. Text appears unchanged: a path may contain brackets or colons, which rich would read as markup.
 
     Args:
         width: characters a line; by default those of the terminal, or 150 where the output is a file.
@@ -50,7 +50,7 @@ def console(width: int | None = None) -> Console:
 
 
 def show(*parts: Table | str) -> None:
-    """Prints tables and lines of text, one below the other."""
+    """Prints tables and lines of text in order."""
     shown = console()
     for part in parts:
         if isinstance(part, str):
@@ -60,7 +60,7 @@ def show(*parts: Table | str) -> None:
 
 
 def laid_out(table: Table) -> RichTable:
-    """A table as rich draws it."""
+    """A table for rich."""
     from rich.table import Table as RichTable
 
     found = RichTable(
@@ -92,9 +92,9 @@ def frame_table(rows: pd.DataFrame, title: str = "", digits: str = ".4g") -> Tab
     """A data frame as a table; NaN becomes a dash.
 
     Args:
-        rows: a row each.
-        title: above it.
-        digits: format of numbers that are not whole.
+        rows: the data frame, one row of the table for each of its rows.
+        title: text above the table.
+        digits: format of numbers that are not integers.
     """
     kinds = [str(kind) for kind in rows.dtypes]
     words = next((number for number, kind in enumerate(kinds) if kind[:3] in ("int", "flo")), len(kinds))

@@ -21,7 +21,7 @@ EXTRAS: dict[str, dict[str, str]] = {
 
 
 def require_extra(*extras: str) -> None:
-    """Checks that everything of the extras can be imported, and imports nothing.
+    """Checks that every module of the extras can be imported, without importing them.
 
     Args:
         extras: names in :data:`EXTRAS`.
@@ -36,7 +36,7 @@ def require_extra(*extras: str) -> None:
 
 
 def extra_of(error: ModuleNotFoundError) -> InputError | None:
-    """The error to report for an import that failed; None where the module belongs to no extra."""
+    """The error to report for an import that failed; None if the module belongs to no extra."""
     root = (error.name or "").partition(".")[0]
     for extra, modules in EXTRAS.items():
         for module, distribution in modules.items():

@@ -1,4 +1,4 @@
-"""Ctrl-C that is not lost: libraries drop a KeyboardInterrupt that reaches them in a callback or while they load."""
+"""Reliable Ctrl-C: libraries drop a KeyboardInterrupt that reaches them in a callback or while they load."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from types import FrameType
 _AGAIN_S = 0.5
 
 SIGNALS = (signal.SIGINT, signal.SIGALRM)
-"""What interrupts: Ctrl-C, and the clock that repeats it."""
+"""Signals that interrupt: Ctrl-C, and the timer that repeats it."""
 
 
 @contextmanager
 def heeded() -> Iterator[None]:
-    """Has Ctrl-C raise KeyboardInterrupt in the block, again every half second unless that is being handled.
+    """Makes Ctrl-C raise KeyboardInterrupt in the block, and raise it again every half second until it is handled.
 
-    What is cleaned up meanwhile is not disturbed. An error that follows a lost one, such as that of a module that could
-    not be loaded, counts as the KeyboardInterrupt. Outside the main thread, or where Ctrl-C does something else
+    Cleaning up is not disturbed. An error that follows a lost KeyboardInterrupt, such as that of a module that could
+    not be loaded, counts as the KeyboardInterrupt. Outside the main thread, or if Ctrl-C has another handler
     already, nothing changes.
     """
     ours = threading.current_thread() is threading.main_thread()
@@ -41,7 +41,7 @@ def heeded() -> Iterator[None]:
 
 
 def settled() -> None:
-    """Says that a Ctrl-C has been heeded: it is not raised again."""
+    """Marks a Ctrl-C as handled: it is not raised again."""
     signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 def command(module: str) -> Callable[[], None]:
-    """The function ``main`` of a module that is imported when it is called: Ctrl-C ends that, too, with one line."""
+    """The function ``main`` of a module that is imported at the call: Ctrl-C during the import ends in one line."""
 
     def main() -> None:
         importlib.import_module(module).main()

@@ -21,19 +21,19 @@ REPETITIONS = (1, 1000)
 CYCLES_MOST = 1_000_000
 """Cycles, framed images or reference images of one run."""
 _STEPS_PER_CYCLE = 1000
-"""Steps that float64 must resolve within a cycle."""
+"""Number of float64 steps of time that a cycle must have at least."""
 
 
 def within(options: object, **bounds: tuple[float, float]) -> None:
-    """Checks that each of the named fields, a number or several, lies in its bounds, both included.
+    """Checks that each of the named fields, one number or several, lies within its bounds, both inclusive.
 
     Args:
         options: a record.
         bounds: least and greatest value of each field, finite, so that NaN and infinity are refused. A field that is
-            None has no number to check.
+            None is not checked.
 
     Raises:
-        ConfigError: one does not.
+        ConfigError: a field is out of its bounds.
     """
     for name, (low, high) in bounds.items():
         value = getattr(options, name)
@@ -49,12 +49,13 @@ def require_count(name: str, value: object, count: float, what: str, most: int =
     """Refuses a run of more than ``most`` steps.
 
     Args:
-        name, value: the option that is at fault, and its value.
-        count: how many steps the options ask for.
-        what: what they are.
+        name, value: the option to blame, and its value.
+        count: number of steps that the options ask for.
+        what: name of these steps in the message.
+        most: greatest number allowed.
 
     Raises:
-        ConfigError: there are too many.
+        ConfigError: there are too many steps.
     """
     require(count <= most, name, f"at most {most:,} {what}; these options ask for {count:,.6g}", value)
 
@@ -63,13 +64,13 @@ def require_pace(name: str, value: object, cycle_s: float, start_s: float, secon
     """Refuses a simulated machine on which cycles are too long, too many, or too short for their times to differ.
 
     Args:
-        name, value: the option that sets its speed, and its value.
-        cycle_s: what a cycle takes on it, seconds.
-        start_s, seconds: start and length of what is measured.
-        warmup_cycles: cycles before it.
+        name, value: the option that sets the speed of the machine, and its value.
+        cycle_s: duration of a cycle on the machine, seconds.
+        start_s, seconds: start and length of the measurement, seconds of animation time.
+        warmup_cycles: cycles before the measurement.
 
     Raises:
-        ConfigError: it is too slow or too fast.
+        ConfigError: the machine is too slow or too fast.
     """
     fits = f"cycles no longer than the {seconds:g} s that are measured; they take {cycle_s:.3g} s at this speed"
     require(cycle_s <= seconds, name, fits, value)

@@ -9,7 +9,7 @@ import tyro
 
 Record = TypeVar("Record")
 
-Seed = Annotated[int, tyro.conf.arg(help="Seed of everything random.")]
+Seed = Annotated[int, tyro.conf.arg(help="Seed of all random numbers.")]
 """In :data:`analysis.command.limits.SEEDS`."""
 
 Threads = Annotated[int, tyro.conf.arg(help="Threads for tracing; 0 takes one per core.")]
@@ -19,7 +19,7 @@ Device = Annotated[Literal["cpu", "cuda:0"], tyro.conf.arg(help="Where rays are 
 
 References = Annotated[Path, tyro.conf.arg(help="Folder for references, shared by all runs.")]
 REFERENCES = Path(".cache/reference")
-"""The folder that commands share unless they are told otherwise."""
+"""The folder that commands share by default."""
 
 Unprefixed = Annotated[Record, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes]
-"""A record whose fields are options of the command itself, without its name before theirs."""
+"""A record whose fields are options of the command itself, without the record's name as a prefix."""

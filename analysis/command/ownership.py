@@ -16,13 +16,13 @@ from filelock import lock_descriptor
 
 @contextmanager
 def owned(path: Path, what: str) -> Iterator[None]:
-    """Holds a lock file for this process alone, and writes this process into it.
+    """Holds a lock file for this process alone, and writes the name of this process into it.
 
-    The system releases the lock even if this process is killed. The file stays, for two processes could each hold a
-    file that had been removed in between.
+    The system releases the lock even if this process is killed. The file stays, because removing it would let two
+    processes each lock a file of that name.
 
     Raises:
-        ValueError: another process holds it; the message names ``what``, the folder and who.
+        ValueError: another process holds it; the message names ``what``, the folder and the process.
     """
     with _taken(path, what):
         yield
@@ -39,7 +39,7 @@ def _taken(path: Path, what: str) -> TextIO:
             raise ValueError(f"{what}: {path.parent} is in use by {owner}") from None
         if _is(path, file):
             break
-        file.close()  # its last owner removed it meanwhile
+        file.close()  # its last owner removed it in the meantime
     now, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)[:160]
     file.truncate(0)
     file.write(f"process {os.getpid()} on {socket.gethostname()} since {now}: {command}\n")
@@ -62,7 +62,7 @@ def own_folder(path: Path, what: str) -> Path:
     """Creates a folder that this process alone writes results to, until :func:`release_folders` or its end.
 
     Raises:
-        ValueError: it cannot be created or written, or another process writes there; the message says which.
+        ValueError: the folder cannot be created or written, or another process writes there; the message says which.
     """
     folder = writable_folder(path, what).resolve()
     if folder not in _owned_folders:
@@ -71,13 +71,13 @@ def own_folder(path: Path, what: str) -> Path:
 
 
 def release_folders() -> None:
-    """Gives back all folders that this process owns."""
+    """Releases all folders that this process owns."""
     for folder in list(_owned_folders):
         release_folder(folder)
 
 
 def release_folder(path: Path) -> None:
-    """Gives back a folder, if this process owns it."""
+    """Releases a folder, if this process owns it."""
     folder = path.resolve()
     if folder in _owned_folders:
         with _owned_folders.pop(folder), suppress(OSError):
@@ -88,7 +88,7 @@ def writable_folder(path: Path, what: str) -> Path:
     """Creates a folder and checks that files can be written there.
 
     Raises:
-        ValueError: it is a file, or cannot be created or written; the message names ``what`` and the path.
+        ValueError: the path is a file, or cannot be created or written; the message names ``what`` and the path.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -12,28 +12,28 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 @dataclass
 class Task:
-    """How far a piece of work is. Without a bar it only counts. Changes in place.
+    """Progress of a piece of work. Without a bar it only counts. Changes in place.
 
     Attributes:
-        done: steps that are done.
-        show: told of that number whenever it changes.
+        done: number of finished steps.
+        show: called with that number whenever it changes.
     """
 
     done: int = 0
     show: Callable[[int], object] = lambda done: None
 
     def advance(self, steps: int = 1) -> None:
-        """Some more steps are done."""
+        """Adds finished steps."""
         self.reach(self.done + steps)
 
     def reach(self, done: int) -> None:
-        """So many steps are done in all."""
+        """Sets the total number of finished steps."""
         self.done = done
         self.show(done)
 
 
 class Bars:
-    """Bars, one a task; without a display they show nothing."""
+    """Progress bars, one a task; without a display they show nothing."""
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
@@ -55,7 +55,7 @@ class Bars:
 
 @contextmanager
 def bars() -> Iterator[Bars]:
-    """Shows bars while the block runs, from the first one on: without any, nothing is printed."""
+    """Shows bars while the block runs. Nothing is printed before the first task."""
     columns = (
         TextColumn("{task.description:<12}", markup=False),
         BarColumn(),

@@ -16,15 +16,15 @@ from typing import TypeVar
 Item = TypeVar("Item")
 
 _STAT = Path("/proc/self/stat")
-_START_FIELD = 22 - 3  # of those after the name: clock ticks from boot to the start of the process
+_START_FIELD = 22 - 3  # index among the fields after the name: clock ticks from boot to the start of the process
 
 
 def process_began_s() -> float:
-    """When this process began, on the clock of :func:`time.monotonic`, seconds, to within 10 ms."""
+    """Start of this process on the clock of :func:`time.monotonic`, seconds, to within 10 ms."""
     try:
         ticks = int(_STAT.read_text().rpartition(")")[2].split()[_START_FIELD])
         age_s = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
-    except (OSError, AttributeError):  # not Linux; elsewhere psutil is as exact, here it knows whole seconds only
+    except (OSError, AttributeError):  # not Linux: there psutil is as exact; on Linux it knows whole seconds only
         import psutil
 
         age_s = time.time() - psutil.Process().create_time()
@@ -35,9 +35,9 @@ def process_began_s() -> float:
 def first_imports() -> Iterator[None]:
     """Marks a block that imports large packages.
 
-    The objects that an import makes are kept until the process ends. The garbage collector is switched off meanwhile,
-    and leaves those objects out afterwards. At the end it takes them in again: of what is left then, libraries print
-    lists.
+    The objects that an import makes live until the process ends. The garbage collector is switched off during the
+    block, and ignores those objects afterwards. At exit it includes them again, because libraries print lists of the
+    objects that are left then.
     """
     before, collecting = len(sys.modules), gc.isenabled()
     gc.disable()
@@ -52,12 +52,12 @@ def first_imports() -> Iterator[None]:
 
 
 def first_made(items: Iterator[Item], began_s: float, say: Callable[[str], None]) -> tuple[Iterator[Item], float]:
-    """Makes the first item of a run now, and says how long that took from the beginning.
+    """Makes the first item of a run now, and reports the time that this took since the start.
 
     Args:
         items: cycles of the adaptive run.
-        began_s: the beginning, on the clock of :func:`time.monotonic`.
-        say: takes one line of text.
+        began_s: the start, on the clock of :func:`time.monotonic`, seconds.
+        say: prints one line of text.
 
     Returns:
         The same items, and the seconds.

@@ -1,4 +1,4 @@
-"""Seconds of cases that take turns, so that changes of the machine's speed affect all cases alike."""
+"""Times cases in turns, so that changes in the machine's speed affect all cases alike."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def take_turns(
     Cases take turns, forwards and backwards, so that neither drift nor their order favours one of them.
 
     Args:
-        cases: what is measured, by name.
+        cases: functions to time, by name.
         repetitions: turns of each.
-        task: of which a step is a round.
-        rest_s: pause before each turn. Threads of the previous case may go on spinning for milliseconds.
+        task: progress that advances by one step a round.
+        rest_s: pause before each turn, seconds. Threads of the previous case may keep spinning for milliseconds.
         lead_in: each turn runs twice and the second run counts. A core that another case left idle is slow at first,
             and a renderer in use does not leave cores idle.
-        clock: seconds so far; by default those on the wall.
+        clock: function that returns seconds; by default wall time.
     """
     for run in cases.values():
         run()

@@ -1,4 +1,4 @@
-"""A place on the measured front in place of settings: what is chosen, what it is said to take, and what came of it."""
+"""A point on the measured front in place of settings: the choice, its predictions, and the measured values."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from analysis.comparison.summary import Measured
 from tsar.config import ConfigError
 
 _SIDE_PX = 512
-"""Side of the display that batches on the front are of."""
+"""Side of the display for which batches on the front are given, pixels."""
 CLOSE = 0.15
-"""Share by which what came may differ from what was said before it is called a miss."""
+"""Relative difference between a prediction and its measurement above which the prediction counts as missed."""
 _WORDS = {"flops": "FLOPs in all", "wall_s": "wall seconds of its cycles", "mse": "mean squared error"}
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A place on the front, for a run.
+    """A point on the front, for a run.
 
     Attributes:
         asked: the option that chose it, and its value.
-        place: on the front.
+        place: the point.
         predicted: ``flops``, ``wall_s`` and ``mse`` of the run.
-        limit: the name of what was asked for, and its value; None for a preset.
+        limit: the name and value of the limit that was asked for; None for a preset.
     """
 
     asked: str
@@ -40,12 +40,12 @@ class Chosen:
 
 
 def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions, Chosen | None]:
-    """The options with what they choose from the front put in; as they are where they choose nothing.
+    """The options with the settings that they choose from the front; unchanged if they choose none.
 
-    The machine becomes as fast as the place needs it to be, so that rivals are given as much.
+    The simulated machine becomes as fast as the point needs, and rivals get the same machine.
 
     Raises:
-        ConfigError: the place does not fit the resolution.
+        ConfigError: the point does not fit the resolution.
     """
     asked = next((name for name in CHOICES if getattr(options, name) not in ("", None)), None)
     if asked is None:
@@ -84,7 +84,7 @@ def _place(options: RunOptions, asked: str, front: Front) -> Place:
 
 
 def what_came(chosen: Chosen, measured: Measured, capacity: float, seconds: float) -> dict[str, Any]:
-    """What was asked, the setting, what was said and what came of it, and by how much of what was said they differ."""
+    """The request, the setting, the predicted and the measured values, and their relative differences."""
     totals = measured.totals
     came = {
         "flops": capacity * seconds,
@@ -106,7 +106,7 @@ def what_came(chosen: Chosen, measured: Measured, capacity: float, seconds: floa
 
 
 def choice_table(found: Mapping[str, Any]) -> Table:
-    """The choice for people."""
+    """The choice as a table."""
     rows = [
         [
             *(_WORDS[name], f"{found['predicted'][name]:.3g}", f"{found['came'][name]:.3g}"),

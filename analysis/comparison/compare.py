@@ -1,4 +1,4 @@
-"""A comparison from Python: what ``tsar run`` does, with policies, metrics and scenes as objects or by name."""
+"""A comparison from Python: the same as ``tsar run``, with policies, metrics and scenes as objects or by name."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ class Result:
     """A finished comparison.
 
     Attributes:
-        folder: where its files are; removed with this object unless ``out`` was given.
-        summary: what is in ``summary.json``.
+        folder: folder of its files; removed with this object unless ``out`` was given.
+        summary: the content of ``summary.json``.
         errors: ``mse``, ``log_mse`` and image metrics over ``run`` and ``time_s``; NaN where a metric was not taken.
-        images: linear RGB over ``run``, ``time_s``, ``row``, ``column`` and ``channel``: what each display shows, and
-            the reference.
+        images: linear RGB over ``run``, ``time_s``, ``row``, ``column`` and ``channel``: the image on each display,
+            and the reference.
     """
 
     folder: Path
@@ -55,7 +55,7 @@ class Result:
     _temporary: Any = field(repr=False)
 
     def table(self) -> pd.DataFrame:
-        """A row a run: median errors, the ratio of the first policy's error to this one's (its median, its quartiles
+        """One row a run: median errors, the ratio of the first policy's error to this one's (its median, its quartiles
         and the share of the times at which it is at most 1), images shown, and the mean of each metric."""
         shown = self.summary
         rows = self.errors[["mse", "log_mse"]].median("time_s").to_dataframe()
@@ -73,7 +73,7 @@ class Result:
         return rows
 
     def report(self, path: str | PathLike[str]) -> Path:
-        """Writes the report, one HTML file that needs no network, and returns where it is."""
+        """Writes the report, one HTML file that needs no network, and returns its path."""
         target = Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(self.folder / "report.html", target)
@@ -95,19 +95,20 @@ def compare(
 
     Args:
         scene: a scene, the name of a built-in one or of one that was added, or a scene file.
-        policies: names, or classes of policies, which go by their own name; ratios are of the first to each other.
+        policies: names, or classes of policies, which go by their own name; ratios are of the first to each of the
+            others.
         metrics: names, or functions of two display-encoded images ``(h, w, 3)`` in [0, 1], shown and reference, which
-            go by their own name and are better the lower they are.
-        seconds: animation time to measure.
-        image_times_s: times of which images are kept, each at the last reference time that is not later; by default
+            go by their own name; lower is better.
+        seconds: animation time to measure, seconds.
+        image_times_s: times at which images are kept, each at the last reference time that is not later; by default
             five, evenly spaced.
-        out: folder for all that ``tsar run`` writes; by default one that is removed with the result.
+        out: folder for all files of ``tsar run``; by default one that is removed with the result.
         cache: folder for references, which several comparisons may share; by default ``cache`` within ``out``.
         more: further options of a run (:class:`analysis.comparison.options.RunOptions`), and fields of
             :class:`tsar.config.TsarConfig`, such as ``resolution_px``, ``batch_size`` or ``response``.
 
     Returns:
-        The result. The same arguments give the same.
+        The result. The same arguments give the same result.
 
     Raises:
         ValueError: an option is unknown or out of range; the message names it.
@@ -134,7 +135,7 @@ def compare(
 
 
 def _named(given: Sequence[Any], made: Callable[[Any], Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Names of what was given, and entries for what has none in a table yet."""
+    """The names of all that was given, and new table entries for objects that are in no table yet."""
     entries = {one.__name__: made(one) for one in given if not isinstance(one, str)}
     return tuple(one if isinstance(one, str) else one.__name__ for one in given), entries
 
@@ -152,7 +153,7 @@ def _options(known: Mapping[str, Any], more: Mapping[str, Any]) -> RunOptions:
 
 
 def _numbers(options: RunOptions, wanted_s: Sequence[float] | None) -> list[int]:
-    """Numbers of the reference times whose images are kept."""
+    """Indices of the reference times whose images are kept."""
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
     if wanted_s is None:
         return sorted({round(number) for number in np.linspace(0, len(times_s) - 1, _IMAGES)})
@@ -163,7 +164,7 @@ def _numbers(options: RunOptions, wanted_s: Sequence[float] | None) -> list[int]
 
 
 class _Kept:
-    """Keeps what all displays show at some reference times. Changes in place."""
+    """Keeps the images on all displays at some reference times. Changes in place."""
 
     def __init__(self, numbers: Sequence[int]) -> None:
         self._numbers = set(numbers)
@@ -177,7 +178,7 @@ class _Kept:
             self._images.append([image.numpy().copy() for image in (*shown, view.reference)])
 
     def images(self, runs: list[str]) -> xr.DataArray:
-        """All of them, labelled."""
+        """All kept images, labelled."""
         values = np.stack([np.stack(images) for images in self._images], axis=1)
         names = {"run": [*runs, REFERENCE], "time_s": self._times_s, "channel": ["red", "green", "blue"]}
         return xr.DataArray(values, names, ("run", "time_s", "row", "column", "channel"), "radiance")

@@ -1,4 +1,4 @@
-"""Finished runs, also of different days and versions, on one page: what differs between them, and their pictures.
+"""Finished runs, also of different days and versions, on one page: their differences, and their pictures.
 
 Pictures and curves are read back from the pages that the runs wrote.
 """
@@ -21,20 +21,20 @@ from analysis.page.curves import Curve, Plot
 from analysis.page.figures import INKS
 from analysis.page.report import Report, flat
 
-_SAME_S = 1e-6  # times that are closer are one
+_SAME_S = 1e-6  # closer times count as one
 _UNTOLD = ("out", "cache", "content", "config_hash")
 
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """What a run left.
+    """A finished run as read from its folder.
 
     Attributes:
-        name: what it is called on the page, unlike all others.
-        summary: what is in ``summary.json``.
-        comparer: what its page holds; None where that cannot be read.
-        lack: why it cannot be read; empty where it can.
-        made: day and hour at which its summary was written.
+        name: its unique name on the page.
+        summary: the content of ``summary.json``.
+        comparer: the content of its page; None if that cannot be read.
+        lack: why the page cannot be read; empty if it can.
+        made: date and time at which its summary was written.
     """
 
     name: str
@@ -45,7 +45,7 @@ class FinishedRun:
 
     @property
     def own(self) -> str:
-        """Name of its policy."""
+        """Name of the run's policy."""
         return self.summary["policy"]
 
     def median(self, run: str) -> float:
@@ -54,10 +54,10 @@ class FinishedRun:
 
 
 def finished_runs(folders: Sequence[Path]) -> list[FinishedRun]:
-    """Reads what runs left, by the shortest ends of their paths that differ.
+    """Reads finished runs, named by the shortest ends of their paths that differ.
 
     Raises:
-        ValueError: a folder is given twice, or is not one of a finished run.
+        ValueError: a folder is given twice, or is not that of a finished run.
     """
     return [_read(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
 
@@ -92,7 +92,7 @@ def page_of(runs: Sequence[FinishedRun]) -> Report:
     """The page of several runs.
 
     Raises:
-        ValueError: none has pictures.
+        ValueError: no run has pictures.
     """
     names = ", ".join(run.name for run in runs)
     shown = [run for run in runs if run.comparer]
@@ -112,7 +112,7 @@ def page_of(runs: Sequence[FinishedRun]) -> Report:
 
 
 def outcome_table(runs: Sequence[FinishedRun]) -> Table:
-    """What came out of each."""
+    """The errors and ratios of each run."""
     rows = []
     for run in runs:
         ratios = run.summary.get("ratio_statistics", {})
@@ -134,7 +134,7 @@ def outcome_table(runs: Sequence[FinishedRun]) -> Table:
 
 
 def _difference(runs: Sequence[FinishedRun], part: str, title: str) -> Table:
-    """Entries that are not the same in all runs."""
+    """Entries that differ between runs."""
     found = [dict(flat(run.summary[part])) for run in runs]
     names = [name for name in dict.fromkeys(name for one in found for name in one) if name not in _UNTOLD]
     rows = [
@@ -147,7 +147,7 @@ def _difference(runs: Sequence[FinishedRun], part: str, title: str) -> Table:
 
 
 def _joined(shown: Sequence[FinishedRun], runs: Sequence[FinishedRun]) -> Comparer:
-    """Pictures of all runs by time; a reference that is the same in several is there once."""
+    """Pictures of all runs by time; a reference that several runs share appears once."""
     labels = _labels(shown)
     times = sorted(step.time_s for run in shown if run.comparer for step in run.comparer.steps)
     times = [t for number, t in enumerate(times) if number == 0 or t - times[number - 1] > _SAME_S]
@@ -171,7 +171,7 @@ def _joined(shown: Sequence[FinishedRun], runs: Sequence[FinishedRun]) -> Compar
 
 
 def _at(steps: Sequence[Step], times: Sequence[float]) -> Iterable[Step | None]:
-    """The step of each time; none where the run has none within half its period."""
+    """The step of each time; None if the run has no step within half its period."""
     at = np.array([step.time_s for step in steps])
     near = 0.5 * float(np.median(np.diff(at))) if len(at) > 1 else _SAME_S
     for time_s in times:
@@ -203,7 +203,7 @@ def _agree(one: Mapping[float, bytes | None], other: Mapping[float, bytes | None
 
 
 def _plots(runs: Sequence[FinishedRun]) -> Iterable[Plot]:
-    """Errors of all runs, equal ones once, and of each policy over that of the first folder."""
+    """Errors of all runs, identical ones once, and the error of each policy over that of the first folder."""
     errors: list[Curve] = []
     seen: set[tuple[float, ...]] = set()
     for run in runs:

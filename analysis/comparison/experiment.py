@@ -1,7 +1,6 @@
-"""Wiring of one run: scene, renderer, adaptive pipeline, framed renderer, clocks, reference, records.
+"""Wiring of one run: scene, renderer, policies, clocks, reference, records.
 
-The only module of this package that knows the others; heavy imports wait until a run begins, so that the command line
-answers at once.
+Heavy imports wait until a run begins, so that the command line answers at once.
 """
 
 from __future__ import annotations
@@ -32,17 +31,17 @@ if TYPE_CHECKING:
     from renderer.trace import Renderer
     from scenes.canonical import Scene
 
-_BYTES_PER_PIXEL = 260  # images, age fields and samples of a run in flight
-_BYTES_PER_CACHED_SAMPLE = 20  # colours and wavelet coefficients
+_BYTES_PER_PIXEL = 260  # bytes a pixel: images, age fields and samples of a run
+_BYTES_PER_CACHED_SAMPLE = 20  # bytes a sample of the cache: colours and wavelet coefficients
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What a run needs before it starts."""
+    """Inputs of a run before it starts."""
 
     scene: Scene
     renderer_of: Callable[[float], Renderer]
-    """A renderer that filters textures for so many samples along a pixel's side."""
+    """Makes a renderer that filters textures for a given number of samples along a pixel's side."""
     losses: tuple[str, ...] = ()
 
 
@@ -50,7 +49,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
     """Checks the machine, loads the scene unless one is given, and builds the renderer of the adaptive run.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         require_memory(options.pixels_held * _BYTES_PER_PIXEL, options.size)
@@ -62,7 +61,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
     with bad_input():
         scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
-        renderer_of(1)  # what it refuses is bad input
+        renderer_of(1)  # an error of the scene's loader is bad input
         own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
         writable_folder(options.cache, "cache")
     for loss in losses:
@@ -84,13 +83,13 @@ def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[st
 
     Args:
         options: what to run.
-        began_s: since when the first cycle is waited for, on the clock of :func:`time.monotonic`; by default now.
+        began_s: start of the wait for the first cycle, on the clock of :func:`time.monotonic`, seconds; by default now.
 
     Returns:
-        The summary that is also in ``summary.json``.
+        The content of ``summary.json``.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     return measure(options, began_s)[0]
 
@@ -101,13 +100,13 @@ def measure(
     scene: Scene | None = None,
     viewers: Sequence[Callable[[View], None]] = (),
 ) -> tuple[dict[str, Any], Measured]:
-    """As :func:`run_experiment`, and everything that was measured.
+    """As :func:`run_experiment`; also returns everything that was measured.
 
     Args:
         options: what to run.
-        began_s: since when the first cycle is waited for.
+        began_s: start of the wait for the first cycle, seconds.
         scene: by default that of the options' input.
-        viewers: each is told what all displays show at every reference time.
+        viewers: each is called at every reference time with the images on all displays.
     """
     began_s = time.monotonic() if began_s is None else began_s
     with first_imports(), bad_input():
@@ -122,7 +121,7 @@ def measure(
         from renderer.film.files import FilmError
 
     for name in (SUMMARY, *FILES):
-        (options.out / name).unlink(missing_ok=True)  # of an earlier run
+        (options.out / name).unlink(missing_ok=True)  # left by an earlier run
     times_s = reference_times(options.start_s, options.start_s + options.seconds, options.reference_rate_hz)
     with progress.bars() as bars, full_disk(options.out, FilmError):
         with StepWriter(options.out / "steps.parquet", _limits(options)) as writer:
@@ -170,7 +169,7 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
 
 
 def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, PolicyRun]:
-    """All runs, not started yet."""
+    """All runs, not yet started."""
     with first_imports():
         from analysis.study.runs import Machine, begin
 

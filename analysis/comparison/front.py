@@ -25,10 +25,10 @@ class Place:
 
     Attributes:
         batch: framelets of 16 x 16 samples, 50 times a second, for 512 x 512 pixels.
-        parts: other options of the policy that differ from its own, by name in alphabetical order.
-        flops: by ledger, a pixel and simulated second.
-        wall_s: wall seconds of its cycles, a pixel and simulated second, on the machine that measured it.
-        mse: mean squared error, the geometric mean of the inputs that it was measured on.
+        parts: other options of the policy that differ from its defaults, by name in alphabetical order.
+        flops: operations per pixel and simulated second, by ledger.
+        wall_s: wall seconds of its cycles per pixel and simulated second, on the machine that measured it.
+        mse: mean squared error, the geometric mean over the inputs that it was measured on.
         cost, error: over those of the default.
         knee: whether it is the knee.
     """
@@ -44,13 +44,13 @@ class Place:
 
     @property
     def words(self) -> str:
-        """For people."""
+        """The setting in words."""
         return ", ".join([f"batch {self.batch}", *(f"{name} {value:g}" for name, value in self.parts)])
 
 
 @dataclass(frozen=True)
 class Front:
-    """Places by rising cost and falling error, and where they were measured.
+    """Points in order of rising cost and falling error, and the conditions of their measurement.
 
     Attributes:
         places: at least one.
@@ -62,25 +62,25 @@ class Front:
 
     @property
     def knee(self) -> Place:
-        """From which less cost or less error is dearest."""
+        """The knee of the front."""
         return next(one for one in self.places if one.knee)
 
     def preset(self, name: PresetName) -> Place:
-        """The knee (``balanced``), or an end of the front: the cheapest place (``draft``), or the most accurate."""
+        """The knee (``balanced``), or an end of the front: the cheapest point (``draft``), or the most accurate one."""
         return {"draft": self.places[0], "balanced": self.knee, "accurate": self.places[-1]}[name]
 
     def within_flops(self, flops: float, ledger: str) -> Place:
-        """The most accurate place of at most so many operations a pixel and second; the cheapest where there is
+        """The most accurate point of at most ``flops`` operations per pixel and second; the cheapest if there is
         none."""
         return self._most_accurate(flops, lambda place: place.flops[ledger])
 
     def within_seconds(self, wall_s: float) -> Place:
-        """The most accurate place of at most so many wall seconds a pixel and second; the fastest where there is
+        """The most accurate point of at most ``wall_s`` wall seconds per pixel and second; the fastest if there is
         none."""
         return self._most_accurate(wall_s, lambda place: place.wall_s)
 
     def at_error(self, mse: float) -> Place:
-        """The cheapest place of at most this error; the most accurate where there is none."""
+        """The cheapest point of at most this error; the most accurate if there is none."""
         good = [place for place in self.places if place.mse <= mse]
         return min(good, key=lambda place: place.cost) if good else min(self.places, key=lambda place: place.mse)
 
@@ -99,7 +99,7 @@ def read_front(path: Path) -> Front:
     """A front from its file.
 
     Raises:
-        ValueError: the file is none of a front.
+        ValueError: the file does not hold a front.
     """
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Compare a policy, by default the best of the project's own, on several inputs, repeated over seeds or phases.
+"""Compare a policy, by default tsar, on several inputs, repeated over seeds or phases.
 
 Examples: python scripts/inputs.py --out out/inputs
           python scripts/inputs.py fly-by --policy thesis --vary phase --out out/phases

@@ -19,21 +19,21 @@ _SCALARS = ("cost_s", "surplus", "conservation_residual", "nonfinite", "nonfinit
 
 
 def load(folder: str | PathLike[str]) -> xr.Dataset:
-    """What ``tsar run`` or :func:`analysis.compare` left in a folder.
+    """A run that ``tsar run`` or :func:`analysis.compare` wrote to a folder.
 
     Args:
         folder: of a finished run.
 
     Returns:
-        ``mse`` and ``log_mse`` over ``run`` and ``time_s``, the reference times in seconds. Of the policy whose
-        cycles are on disk, the run's own or else the first rival that records them, over ``cycle``: its animation time
-        ``cycle_time_s`` and its numbers; and over ``cycle``, ``row`` and ``column``, rows from the top of the image,
-        the densities and errors as float32 (16 bytes an element and cycle). Attributes are the input, the policy, the
-        ledger, the policy whose cycles these are (``recorded``; empty where there is none), and configuration and
-        provenance as JSON.
+        ``mse`` and ``log_mse`` over ``run`` and ``time_s``, the reference times in seconds. The remaining variables
+        belong to the policy whose cycles are on disk: the run's own, or else the first rival that records them. Over
+        ``cycle`` these are its animation time ``cycle_time_s`` and its numbers; over ``cycle``, ``row`` and
+        ``column``, rows from the top of the image, the densities and errors as float32 (16 bytes an element and
+        cycle). Attributes are the input, the policy, the ledger, the policy whose cycles these are (``recorded``;
+        empty if there is none), and configuration and provenance as JSON.
 
     Raises:
-        FileNotFoundError: no finished run lies there.
+        FileNotFoundError: the folder has no finished run.
         ValueError: its files are damaged.
     """
     place = Path(fspath(folder))
@@ -52,7 +52,7 @@ def load(folder: str | PathLike[str]) -> xr.Dataset:
 
 
 def _cycles(path: Path) -> xr.Dataset:
-    """Every recorded cycle; fields are put from Morton order into rows and columns."""
+    """Every recorded cycle; fields are converted from Morton order to rows and columns."""
     file = pq.ParquetFile(path)
     names = file.schema_arrow.names
     scalars = [name for name in names if name in _SCALARS or name.startswith(("stage_", "count_"))]

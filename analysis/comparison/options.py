@@ -25,17 +25,17 @@ from tsar.config import RESOLUTION_DEFAULT, StagesName, TsarConfig, closed_choic
 from tsar.policies import POLICIES
 
 DEFAULT_POLICY = "tsar"
-"""The best of the project's own (docs/results/rivals.md)."""
+"""The most accurate policy (docs/results/rivals.md)."""
 DEFAULT_RIVALS = ("framed", "thesis", "framed-super", "framed-quarter", "framed-taa-late")
-"""The plain framed renderer, the policy of the dissertation, and framed renderers that are the best of their kind
-somewhere and take little time."""
+"""The plain framed renderer, the policy of the dissertation, and fast framed renderers that are the best of their kind
+on some input."""
 
 OF_PICTURE = ("framed", "frameless")
-"""Beginnings of the names of policies that hold the pixels of the picture alone."""
+"""Prefixes of the names of policies that store only the pixels of the picture."""
 
 
 CHOICES = ("preset", "budget_flops", "budget_seconds", "error_target")
-"""Options that choose a place on the measured front."""
+"""Options that choose a point on the measured front."""
 
 
 @dataclass(frozen=True)
@@ -44,62 +44,60 @@ class RunOptions:
     """One comparison of a policy with its rivals at equal cost."""
 
     input: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="INPUT")]
-    """Built-in input (by name or number), or a scene file of PBRT v3, LuxRender 1.x or Mitsuba 0.5."""
+    """Built-in input (by name or number), a scene that was added, a scene file or a model."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """Size, batch and seed of all policies, and the pipeline of the policy thesis."""
     seconds: float = 2.0
-    """Simulated time to measure, seconds."""
+    """Animation time to measure, seconds."""
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
     phase: float = 0.0
-    """Phase of the animation, for repetitions."""
+    """Phase of the animation, in [0, 1), for repetitions."""
     camera_path: Literal["", "turntable", "fly-through"] = ""
-    """Motion of the camera of a scene file that has none."""
+    """Camera motion for a scene file without one."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Simulated time by the cost model, or measured time (the same as the ledger wall)."""
     ledger: Ledger = "thesis"
     """How cost is counted."""
     capacity: float = CAPACITY_DEFAULT
-    """Speed of the simulated machine, FLOP/s. The default shows 8 framed images a second at 512²."""
+    """Speed of the simulated machine, FLOP/s. The default gives 8 framed images a second at 512²."""
     trace_segments: float = 4.0
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
     policy: str = DEFAULT_POLICY
-    """Who decides what is sampled: a policy by name."""
+    """Policy that decides what is sampled, by name."""
     rivals: tuple[str, ...] = DEFAULT_RIVALS
-    """Policies that it is compared with at equal cost; ratios are to the first. The policy itself is left out of the
-    default."""
+    """Policies to compare with at equal cost; ratios are to the first. The default leaves out the policy itself."""
     metrics: tuple[str, ...] = ()
-    """Metrics beside the squared errors, such as flip, ssim or jod."""
+    """Further metrics beside the squared errors, such as flip, ssim or jod."""
     display: DisplayModel = field(default_factory=DisplayModel)
-    """The display that perceptual metrics of sequences hold for."""
+    """The display that perceptual metrics of sequences assume."""
     metric_stride: int = 6
-    """Reference images from one to the next at which they are taken."""
+    """Interval, in reference images, at which these metrics are taken."""
     reference_rate_hz: float = 60.0
     """Reference images per simulated second."""
     reference_samples_per_axis: int = 3
-    """Samples along a pixel's side of the reference."""
+    """Samples along a pixel's side in the reference."""
     preset: Literal["", "draft", "balanced", "accurate"] = ""
-    """A place on the measured front of cost and error: sets batch, speed of the machine and options of the policy
+    """A point on the measured front of cost and error, which sets batch, speed of the machine and options of the policy
     tsar. draft is its cheapest end, balanced its knee, accurate the other end."""
     budget_flops: float | None = None
-    """Operations that the run may take in all by the ledger: the most accurate setting of the front within them."""
+    """Most operations of the whole run by the ledger: chooses the most accurate setting of the front within them."""
     budget_seconds: float | None = None
-    """Wall seconds that the cycles of the policy may take in all: the most accurate setting of the front within
-    them."""
+    """Most wall seconds of all cycles of the policy: chooses the most accurate setting of the front within them."""
     error_target: float | None = None
-    """Mean squared error that is good enough: the cheapest setting of the front that has it."""
+    """Mean squared error to reach: chooses the cheapest setting of the front that reaches it."""
     parts: Annotated[tuple[tuple[str, bool | int | float], ...], tyro.conf.Suppress] = ()
-    """Options of the policy tsar that differ from its own; a preset or a budget sets them."""
+    """Options of the policy tsar that differ from its defaults; a preset or a budget sets them."""
     device: Device = "cpu"
     threads: Threads = 0
     stages: StagesName = "compiled"
-    """What runs the stages around tracing: kernels, or the tensor operations that they are checked against."""
+    """Implementation of the stages around tracing: compiled kernels, or the tensor operations of the reference."""
     frames: bool = False
-    """Also write what the display of the policy shows at every reference time to frames/, as EXR."""
+    """Also write the image on the policy's display at every reference time to frames/, as EXR."""
     film: bool = True
     """Write comparison.mp4."""
     page: Literal["near", "lossless"] = "near"
-    """How report.html holds pictures: codes off by about 1 of 255, or exact and three times as large."""
+    """Pictures in report.html: near has codes off by about 1 of 255, lossless is exact and three times as large."""
     out: Path = Path("out/run")
     """Folder for the results."""
     cache: References = REFERENCES
@@ -139,7 +137,7 @@ class RunOptions:
             limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
 
     def _check_choice(self) -> None:
-        """One of the four ways to choose a place on the front, beside nothing that it sets."""
+        """Checks that at most one option chooses a point, and that no other option sets the same values."""
         asked = [name for name in CHOICES if getattr(self, name) not in ("", None)]
         for name in asked[:1]:
             require(len(asked) == 1, name, f"only one of {', '.join(CHOICES)}", getattr(self, name))
@@ -155,7 +153,7 @@ class RunOptions:
 
     @property
     def size(self) -> str:
-        """What the user said of the picture's size."""
+        """The picture's size in the options that the user set."""
         c = self.tsar
         return (
             f"width_px x height_px: {c.width_px} x {c.height_px}" if c.width_px else f"resolution_px: {c.resolution_px}"
@@ -163,7 +161,7 @@ class RunOptions:
 
     @property
     def pace(self) -> str:
-        """What a size other than the default's changes in the experiment, in words; empty where it changes nothing."""
+        """What a size other than the default changes in the experiment, in words; empty if it changes nothing."""
         default = CAPACITY_DEFAULT * self.tsar.pixels / RESOLUTION_DEFAULT**2
         if self.capacity != CAPACITY_DEFAULT or self.tsar.pixels == RESOLUTION_DEFAULT**2 or self.counted == "wall":
             return ""
@@ -177,7 +175,7 @@ class RunOptions:
 
     @property
     def pixels_held(self) -> int:
-        """Pixels that all runs hold: of the picture, or, for most, of the square around it."""
+        """Pixels that all runs store: those of the picture or, for most policies, of the square around it."""
         squares = sum(name.partition("-")[0] not in OF_PICTURE for name in (self.policy, *self.rivals))
         return squares * self.tsar.resolution_px**2 + (1 + len(self.rivals) - squares) * self.tsar.pixels
 
@@ -194,7 +192,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """Which finished runs a page compares."""
+    """The finished runs that a page compares."""
 
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
     """Folders of finished runs."""

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator
 
 from analysis.page.figures import ADAPTIVE, FRAMED, Floats, label_ends, line_style, new_figure, styles
 
-_TITLE_CHARACTERS = 105  # of a line above the figure
+_TITLE_CHARACTERS = 105  # characters in a line above the figure
 
 
 def error_figure(
@@ -26,12 +26,12 @@ def error_figure(
     """Errors over time above the ratio of two of them (figs 7.14 and 7.15).
 
     Args:
-        times_s: reference times.
-        errors: MSE of every run by name; the ratio is taken to the first that is not ``own``.
+        times_s: reference times, seconds.
+        errors: MSE of every run by name; the rival is the first that is not ``own``.
         own: the run whose ratio is shown.
         ratio: its error over that of the rival; infinite values are marked along the upper edge.
         refresh_s: times at which the rival's display changes.
-        title: above the figure.
+        title: text above the figure.
     """
     rivals = [name for name in errors if name != own]
     rows = {"rows": 2, "height_ratios": (3, 2)} if rivals else {"rows": 1}
@@ -69,7 +69,7 @@ def _draw_ratio(axis: Axes, times_s: Floats, ratio: Floats, label: str) -> None:
 
 
 def _widen(axis, values: Floats) -> None:
-    """Shows at least the factor 3 about one on a ratio axis."""
+    """Widens a ratio axis to at least a factor of 3 around 1."""
     finite = values[np.isfinite(values)]
     low, high = (finite.min(), finite.max()) if finite.size else (1.0, 1.0)
     axis.set_ylim(min(low * 0.8, 1 / 3), max(high * 1.25, 3.0))
@@ -79,7 +79,7 @@ def _widen(axis, values: Floats) -> None:
 
 
 def stage_figure(modelled: Mapping[str, float], measured: Mapping[str, float]) -> Figure:
-    """Share of a cycle each stage takes by the cost model beside what was measured."""
+    """Share of a cycle of each stage, by the cost model and as measured."""
     names = list(dict.fromkeys((*modelled, *measured)))
     figure, (axis,) = new_figure(9.0, 2.8)
     place = np.arange(len(names))

@@ -22,7 +22,7 @@ from tsar.config import TsarConfig, closed_choices, require
 @dataclass(frozen=True)
 @closed_choices()
 class InputsOptions:
-    """Which inputs, and how often. Runs that are complete in the folder are not repeated."""
+    """The inputs, and the number of repetitions. Runs that are complete in the folder are not repeated."""
 
     inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
     """Built-in inputs."""
@@ -31,22 +31,22 @@ class InputsOptions:
     repetitions: int = 3
     """Runs of each input."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
-    """Size, batch and seed of all policies, and the pipeline of the policy thesis; the seed is set here where seeds
+    """Size, batch and seed of all policies, and the pipeline of the policy thesis; repetitions set the seed if seeds
     vary."""
     policy: str = DEFAULT_POLICY
-    """Who decides what is sampled: a policy by name."""
+    """Policy that decides what is sampled, by name."""
     rivals: tuple[str, ...] = ("framed", "framed-1", "framed-super")
-    """Policies that it is compared with at equal cost; ratios are to the first."""
+    """Policies to compare with at equal cost; ratios are to the first."""
     seconds: float = 2.0
-    """Simulated time to measure, seconds."""
+    """Animation time to measure, seconds."""
     ledger: Ledger = "thesis"
     """How cost is counted."""
     capacity: float = CAPACITY_DEFAULT
     """Speed of the simulated machine, FLOP/s."""
     reference_rate_hz: float = 30.0
-    """Reference images per simulated second; half of run.py's, for the references take most of the time."""
+    """Reference images per simulated second; half as many as run.py has, because references take most of the time."""
     out: Path = Path("out/inputs")
-    """Folder for the results, one folder a run within."""
+    """Folder for the results, with one folder a run."""
 
     def __post_init__(self) -> None:
         limits.within(self, repetitions=limits.REPETITIONS)
@@ -57,7 +57,7 @@ class InputsOptions:
         self.runs()
 
     def runs(self) -> list[RunOptions]:
-        """Every run, resolved."""
+        """The resolved options of every run."""
         found = []
         for name in self.inputs:
             for number in range(self.repetitions):
@@ -82,11 +82,11 @@ class InputsOptions:
 
 
 def row(run: RunOptions, summary: Mapping[str, Any]) -> dict[str, Any]:
-    """What a table over runs shows of one of them."""
+    """The row of one run in a table over runs."""
     names = ("ratio_median", "ratio_quartiles", "share_suitable", "suitable_percentile", "cycles", "age_spread_s")
     beside = dict(summary["ratio_statistics"])
     if "best_rival" in summary:
-        from analysis.metrics.rivals import BEST  # here, for it brings torch, which options do without
+        from analysis.metrics.rivals import BEST  # here, because it imports torch
 
         beside[BEST] = summary["best_rival"]["ratio_statistics"]
     return {

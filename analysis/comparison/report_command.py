@@ -10,7 +10,7 @@ from analysis.comparison.options import ReportOptions
 
 
 def main() -> None:
-    """Reads the runs, writes the page, prints what came out."""
+    """Reads the runs, writes the page, prints the outcome."""
     options = parse(ReportOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.comparison.days import finished_runs, outcome_table, page_of

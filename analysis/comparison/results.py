@@ -1,4 +1,4 @@
-"""Figures and page of a finished run."""
+"""The figures and the page of a finished run."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _comparer(summary: Mapping[str, Any], measured: Measured, steps: Path | None
         left=panels.best_framed or rival or REFERENCE,
         right=measured.own,
         plots=[*_error_plots(measured), *(_cycle_plots(measured.recorded or "", steps) if steps else [])],
-        note=f"Pictures show what stands on each display, latency included, pixel for pixel, {how}. Curves are of the "
+        note=f"Pictures show the image on each display, latency included, pixel for pixel, {how}. Curves show the "
         "exact values.",
     )
 

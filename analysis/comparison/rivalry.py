@@ -19,19 +19,19 @@ Picture = TypeVar("Picture")
 
 
 FRAMED = "framed"
-"""Names of framed renderers are this, or begin with it and a hyphen."""
+"""Name of the framed renderer; the names of its variants begin with it and a hyphen."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Panels:
-    """Which runs are seen beside the reference: of the framed rivals the one of the lowest median error, all other
-    rivals, and the run's own.
+    """The runs that are shown beside the reference: the framed rival of the lowest median error, all other rivals, and
+    the run's own policy.
 
     Attributes:
-        own: name of the run that the others are rivals of.
-        best_framed: the framed rival that is seen; None where there is none.
-        hidden: the framed rivals that are not.
-        runs: that are seen, in order.
+        own: name of the policy whose rivals the others are.
+        best_framed: the framed rival that is shown; None if there is none.
+        hidden: the framed rivals that are not shown.
+        runs: the runs that are shown, in order.
     """
 
     own: str
@@ -49,8 +49,8 @@ class Panels:
         return cls(own, best, hidden, (*([best] if best else []), *others, own))
 
     def arranged(self, pictures: Mapping[str, Picture]) -> dict[str, Picture]:
-        """Pictures by label: the reference, the runs that are seen, and all that are of no run. The label of a framed
-        rival that was chosen out of several says so."""
+        """Pictures by label: the reference, the runs that are shown, and all pictures that belong to no run. The label
+        of a framed rival that was chosen out of several says so."""
         shown = {name: pictures[name] for name in (REFERENCE, *self.runs) if name in pictures}
         rest = {label: one for label, one in pictures.items() if label not in (*shown, *self.hidden)}
         return {self._label(name): one for name, one in shown.items()} | rest
@@ -60,7 +60,7 @@ class Panels:
 
 
 def best_rival(measured: Measured) -> dict[str, Any]:
-    """What ``summary.json`` says of the best rival; empty where there are fewer than two."""
+    """The entries of ``summary.json`` on the best rival; empty if there are fewer than two rivals."""
     if len(measured.rivals) < 2:
         return {}
     errors = {name: measured.mse[name] for name in measured.rivals}
@@ -76,7 +76,7 @@ def best_rival(measured: Measured) -> dict[str, Any]:
 
 
 def best_rival_table(measured: Measured) -> Table | None:
-    """The run beside the best rival by every metric; None where there are fewer than two rivals."""
+    """The run beside the best rival by every metric; None if there are fewer than two rivals."""
     if len(measured.rivals) < 2:
         return None
     rows = [
@@ -91,7 +91,7 @@ def best_rival_table(measured: Measured) -> Table | None:
 
 
 def _standings(measured: Measured) -> Iterator[tuple[str, Floats, Floats, Standing]]:
-    """Metric, values of the run and of the best rival where they were measured, and the standing."""
+    """Metric, values of the run and of the best rival at the measured times, and the standing."""
     for metric in ("mse", "log_mse", *(name for name in metrics_of(measured) if name in METRICS)):
         sign = 1 if metric in METRICS and METRICS[metric].better == "higher" else -1
         if metric in measured.sequences:

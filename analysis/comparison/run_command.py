@@ -1,4 +1,4 @@
-"""Compare a policy, by default the best of the project's own, with its rivals at equal cost.
+"""Compare a policy, by default tsar, with its rivals at equal cost.
 
 Examples: python scripts/run.py fly-by --seconds 2 --out out/fly-by
           python scripts/run.py chase --preset draft --resolution-px 256 --out out/draft
@@ -14,12 +14,12 @@ from analysis.comparison.options import RunOptions
 
 
 def main() -> None:
-    """Parses, runs, prints what came out and where it is."""
+    """Parses, runs, prints the outcome and the place of the files."""
     options = parse(RunOptions, __doc__ or "")
     with first_imports(), bad_input():
         from scenes import catalog
 
-        catalog.require_known(options.input)  # before anything that takes long to load
+        catalog.require_known(options.input)  # before slow imports
     summary = run_experiment(options, process_began_s())
 
     from analysis.command.console import Table, show

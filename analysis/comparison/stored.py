@@ -1,4 +1,4 @@
-"""What a comparison leaves on disk: which files, whether they are whole, and what decides them."""
+"""The files of a comparison on disk: their names, checks that they are whole, and the hash of their inputs."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ FILES = ("steps.parquet", "error.png", "error.svg", "report.html", "comparison.m
 
 @dataclass
 class Recording:
-    """Writes the cycles of the first run that records any: the run's own, which is the first to begin, or else the
+    """Writes the cycles of the first run that records any: the run's own policy, which begins first, or else the
     first of its rivals. Changes in place.
 
     Attributes:
-        writer: where they go.
-        name: of that run; None where none records.
+        writer: destination of the records.
+        name: name of that run; None if no run records cycles.
     """
 
     writer: StepWriter
     name: str | None = None
 
     def of(self, run: str) -> Callable[[StepRecord], None]:
-        """What a run tells of its cycles."""
+        """The callback that takes the records of a run's cycles."""
 
         def add(record: StepRecord) -> None:
             self.name = self.name or run
@@ -48,9 +48,9 @@ class Recording:
 
 
 def finished(options: RunOptions) -> dict[str, Any] | None:
-    """The summary of a run of these options, by this code and of this scene as they are now; or None.
+    """The summary of a finished run with these options, the current code and the current scene; or None.
 
-    It is complete where all of its files are as they were written; those that are damaged are named.
+    A run is finished if all of its files are unchanged; damaged files are named.
 
     Raises:
         InputError: the scene cannot be read.
@@ -67,7 +67,7 @@ def finished(options: RunOptions) -> dict[str, Any] | None:
 
 
 def content_of(options: RunOptions, scene: Scene) -> str:
-    """Hash of all that decides what a run gives: options, the scene's content, and the code."""
+    """Hash of everything that decides the results of a run: options, the scene's content, and the code."""
     from analysis.comparison.experiment import run_experiment
     from analysis.storage.files import plain
     from analysis.storage.reference import content_hash
@@ -81,7 +81,7 @@ def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any
     """Lists the files of a run that has ended, and writes its summary last: from then on the run is complete.
 
     Returns:
-        What is in the summary: what was given, and the files.
+        The content of the summary: the given one with the files.
     """
     from analysis.storage.store import Store
 
@@ -95,7 +95,7 @@ def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any
 
 
 def added_by(options: RunOptions) -> list[Brought]:
-    """What a run uses that is not the project's own."""
+    """The additions of other packages that a run uses."""
     from analysis.storage.source import brought
 
     policies = ((POLICIES, name) for name in (options.policy, *options.rivals))

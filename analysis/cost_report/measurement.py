@@ -61,7 +61,7 @@ def prepare(options: MeasurementOptions) -> tuple[Scene, dict[int, Renderer]]:
     """Checks the memory, loads the scene and builds a renderer for each output side.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         require_memory(_needed_bytes(options), f"measured_resolutions: {options.measured_resolutions}")

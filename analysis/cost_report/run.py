@@ -208,7 +208,7 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
         What is in ``summary.json``.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         own_results(options.out, _FILES)

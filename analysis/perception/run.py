@@ -53,7 +53,7 @@ def run(options: Options) -> str:
     """Runs one step of the study and writes its summary; returns a few lines of text about it.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     from renderer.film.files import FilmError
 

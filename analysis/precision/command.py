@@ -38,7 +38,7 @@ def study(options: PrecisionOptions) -> dict[str, Any]:
     holds.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     from analysis.precision.runs import OWN, runs
     from analysis.precision.tables import Result, format_table, least_safe, run_table, shown_tables

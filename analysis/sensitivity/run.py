@@ -25,7 +25,7 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
         What is in ``summary.json``, and names of the results whose cycles broke an invariant.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         planned = runs(options)

@@ -43,7 +43,7 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
         What is in ``summary.json``, and the tables.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         planned = runs(options)

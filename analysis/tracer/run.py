@@ -64,7 +64,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
     """Renders what is missing of a sequence, and its film if one is asked for; returns what ``summary.json`` holds.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     from analysis.storage.reference import content_hash
     from analysis.storage.source import brought, code_hash
@@ -127,7 +127,7 @@ def tiles(options: TileOptions) -> dict[str, Any]:
     """Renders a picture, or measures how much faster more workers are; returns what ``summary.json`` holds.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     from analysis.tracer.tile_speedup import study
     from analysis.tracer.tiles import chunks_of, picture_of, render_resumed
@@ -153,7 +153,7 @@ def gallery(options: GalleryOptions) -> dict[str, Any]:
     """Renders all effects that are asked for, and the sheet; returns what ``summary.json`` holds.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     from analysis.tracer.gallery import names, render_effect, sample_plan, write_sheet
     from renderer.film.files import FilmError

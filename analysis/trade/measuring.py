@@ -52,7 +52,7 @@ def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
     """Runs what is missing, single knobs first, with a bar for each part.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         planned, dropped = runs(options, points_of(knobs))

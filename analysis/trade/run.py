@@ -32,7 +32,7 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
         What is in ``summary.json``, and the tables.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
         knobs = chosen_knobs(options.knobs)

@@ -37,7 +37,7 @@ def study(options: WorkloadOptions) -> dict[str, Any]:
     holds.
 
     Raises:
-        InputError: something asked for cannot be had.
+        InputError: the machine or the input cannot provide what the options ask for.
     """
     from analysis.page.figures import save
     from analysis.study.evaluation import broken
