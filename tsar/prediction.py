@@ -50,15 +50,29 @@ def predicted(known: Sequence[Viewpoint], time_s: float) -> Viewpoint:
     )
 
 
+def mid_display_s(now_s: float, cycle_s: float, latency_cycles: int = 1) -> float:
+    """The middle of the time for which a picture is displayed, seconds.
+
+    A picture made in a cycle is displayed from ``latency_cycles`` after the cycle's start for one cycle. Poses of the
+    middle are off by at most half a cycle's motion, those of either end by a whole one.
+
+    Args:
+        now_s: start of the cycle, seconds.
+        cycle_s: its length, seconds.
+        latency_cycles: from the start of a cycle to the display of its picture.
+    """
+    return now_s + (latency_cycles + 0.5) * cycle_s
+
+
 def foretold(view: Callable[[float], Viewpoint], now_s: float, cycle_s: float) -> Viewpoint:
-    """The poses a cycle later, :func:`predicted` from those of now and of one and two cycles before.
+    """The poses of the middle of the next cycle, :func:`predicted` from those of this one and of the two before.
 
     Args:
         view: gives the poses of a time.
         now_s: start of the cycle, seconds.
         cycle_s: its length, seconds.
     """
-    return predicted([view(now_s - back * cycle_s) for back in (2, 1, 0)], now_s + cycle_s)
+    return predicted([view(now_s - back * cycle_s) for back in (2, 1, 0)], mid_display_s(now_s, cycle_s))
 
 
 def _continued(values: list[Float64[Tensor, "n entries"]], ahead: float) -> Float64[Tensor, "n entries"]:

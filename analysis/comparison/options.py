@@ -21,6 +21,7 @@ from analysis.metrics.cost_model import (
     parameters_of,
 )
 from analysis.metrics.display_model import DisplayModel
+from analysis.study.cases import ADAPTIVE_STAGES
 from tsar.config import RESOLUTION_DEFAULT, StagesName, TsarConfig, closed_choices, require
 from tsar.policies import POLICIES
 
@@ -131,8 +132,9 @@ class RunOptions:
         limits.require_count("seconds", self.seconds, images, "reference images")
         if self.counted != "wall":
             priced = expected_ledger(self.counted)
-            cycle_s = float(adaptive_flops(self.cost, priced)) / self.capacity
-            limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
+            if not set(ADAPTIVE_STAGES).isdisjoint(runs):
+                cycle_s = float(adaptive_flops(self.cost, priced)) / self.capacity
+                limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
             frame_s = float(nonadaptive_flops(self.cost, priced)) / self.capacity
             limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
 

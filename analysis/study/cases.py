@@ -106,6 +106,9 @@ def framed_config(side_px: int) -> TsarConfig:
     return TsarConfig(batch_size=16, resolution_px=side_px, tiling=TilingConfig(tile_count_max=16))
 
 
+ADAPTIVE_STAGES = ("thesis", "oracle")
+"""Policies whose stages are priced as table 7.1 prices them: whether their cycles fit is known before they are made."""
+
 SCALES: dict[str, Scale] = {
     "thesis": Scale(1, seconds=2.0, reference_rate_hz=60.0, reference_samples_per_axis=2, stride=6),
     "half": Scale(2, seconds=2.0, reference_rate_hz=60.0, reference_samples_per_axis=3, stride=6),
@@ -199,7 +202,7 @@ class Case:
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
         pace = self.samples_per_s
         require(pace is None or 0.0 < pace < 1e15, "samples_per_s", "a positive number", pace)
-        if pace is None and not is_framed(self.policy):
+        if pace is None and self.policy in ADAPTIVE_STAGES:
             cycle_s = float(adaptive_flops(self.cost, expected_ledger(self.ledger))) / self.capacity
             pace = cycle_s, self.start_s, self.scale.seconds, self.tsar.warmup_cycles
             limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)

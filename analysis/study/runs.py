@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds, measured_parameters
+from analysis.command import limits
+from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds, expected_ledger, measured_parameters
 from analysis.metrics.quality import Shown
 from analysis.storage.invariants import InvariantCheck
 from analysis.storage.records import RecordLimits
+from analysis.study.cases import is_framed
 from tsar.config import StagesName, TsarConfig, closed_choices
 from tsar.error import count_nonfinite
 from tsar.policies import POLICIES
@@ -197,7 +199,7 @@ def begin(
         formats: of numbers that the policy keeps, where they are not its own; with any, what it asks for is noted.
 
     Raises:
-        ConfigError: no policy has that name, or it keeps no such numbers.
+        ConfigError: no policy has that name, its cycles do not fit into the span, or it keeps no such numbers.
     """
     from renderer.stages.control import stages as stages_of
 
@@ -215,8 +217,29 @@ def begin(
     renderer = renderer_of(policy.footprint)
     meter, totals = Meter(lambda batch: renderer.trace(batch, aspect), [] if formats else None), Totals(config)
     clock = machine.clock(policy.price)
+    require_pace(name, policy.price, machine, span_s, config.warmup_cycles)
     images = _noted(policy, meter, clock, span_s, totals, on_record)
     return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)
+
+
+def require_pace(name: str, price: Price, machine: Machine, span_s: tuple[float, float], warmup_cycles: int) -> None:
+    """Refuses a policy whose cycles are too long, too many or too short for a run, at its own price.
+
+    Framed renderers are never refused: a run of less than a frame shows what they made before it.
+
+    Args:
+        name, price: of the policy.
+        machine: what it runs on; one that measures its speed, or keeps up with every policy, refuses none.
+        span_s: from and to, seconds.
+        warmup_cycles: cycles before it.
+
+    Raises:
+        ConfigError: they do not fit.
+    """
+    if machine.ledger == "wall" or machine.samples_per_s is not None or is_framed(name):
+        return
+    cycle_s = dataclasses.replace(machine, ledger=expected_ledger(machine.ledger)).clock(price)({}, 0.0)
+    limits.require_pace("policy", name, cycle_s, span_s[0], span_s[1] - span_s[0], warmup_cycles)
 
 
 def _changed(setting: Setting, parts: Mapping[str, Any]) -> Policy[Any]:

@@ -52,7 +52,7 @@ _SWITCHES = {
     "accumulation": "samples averaged over time",
     "smoothing": "uncertain pixels blended when they are shown",
     "reprojection": "estimates that move with their surfaces",
-    "prediction": "poses foretold to when the picture is shown",
+    "prediction": "poses predicted for the middle of the display",
     "jitter": "samples that move within their pixels",
     "by_gain": "tiles chosen by what they gain",
     "shadows": "change expected where shadows move",

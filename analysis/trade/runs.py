@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from analysis.study.cases import INPUTS, SCALES, Case, Scale
+from analysis.study.fitting import fitting
 from analysis.trade.knobs import OWN, ROW, Knob, Setting, Value, Where, alone, case_of
 from analysis.trade.options import TradeOptions
 from tsar.config import ConfigError, TsarConfig
@@ -91,7 +92,7 @@ def runs(options: TradeOptions, points: Iterable[Point]) -> tuple[list[Run], dic
     )
     for point, where in itertools.product(points, places(options)):
         try:
-            found.append(Run(point, where, case_of(point.setting, where, scale, base)))
+            found.append(Run(point, where, fitting(case_of(point.setting, where, scale, base))))
         except ConfigError as error:
             if point.setting == Setting():
                 raise

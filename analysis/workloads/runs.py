@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from analysis.metrics.cost_model import CostParameters, per_segment
 from analysis.study.cases import ROWS, SCALES, Case, framed_config, is_framed
+from analysis.study.fitting import fitting
 from analysis.workloads.options import WorkloadOptions
 from tsar.config import ConfigError
 
@@ -68,7 +69,7 @@ def _runs_at(
     segments = workload.sample_flops / float(per_segment(CostParameters()))
     for policy in policies:
         try:
-            case = Case(
+            case = fitting(Case(
                 input=name,
                 policy=policy,
                 tsar=framed_config(config.resolution_px) if is_framed(policy) else config,
@@ -76,7 +77,7 @@ def _runs_at(
                 phase=repetition / options.repetitions,
                 framed_rate_hz=workload.image_hz,
                 trace_segments=_SEGMENTS if policy in UNPRICED else segments,
-            )
+            ))  # fmt: skip
         except ConfigError:
             case = None
         yield Run(policy, workload, repetition, name, case)

@@ -6,7 +6,7 @@ from math import cos, sin
 
 import torch
 
-from tsar.prediction import predicted
+from tsar.prediction import foretold, predicted
 from tsar.types import Viewpoint
 
 STEP_S = 0.01
@@ -48,3 +48,12 @@ def test_what_starts_stops_or_jumps_stays_where_it_was_last_known() -> None:
 def test_two_views_are_too_few() -> None:
     known = [view(STEP_S * k, place=0.3 * k) for k in range(2)]
     assert predicted(known, 1.0) is known[-1]
+
+
+def test_what_is_displayed_for_a_cycle_has_the_poses_of_its_middle() -> None:
+    def motion(time_s: float) -> Viewpoint:
+        assert time_s <= 1.0  # no pose later than the start of the cycle is looked at
+        return view(time_s, place=4.0 * time_s, camera=-7.0 * time_s)
+
+    found = foretold(motion, 1.0, STEP_S)
+    assert close(found, view(0.0, place=4.0 * (1.0 + 1.5 * STEP_S), camera=-7.0 * (1.0 + 1.5 * STEP_S)))

@@ -12,7 +12,7 @@ from tests.oracles.planes import Planes, fine
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import ConfigError, TsarConfig
 from tsar.policies import POLICIES
-from tsar.policies.reprojected import Reprojected
+from tsar.policies.reprojected import PARTS, Reprojected
 from tsar.policy import Moment, Setting, run
 from tsar.types import ShownImage
 
@@ -102,10 +102,11 @@ def test_a_still_scene_converges_or_stays_as_it_is(name: str) -> None:
 @pytest.mark.parametrize("pan", [0.3, -0.3])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_pan_is_followed(name: str, pan: float) -> None:
-    """A warp shows the poses of its display; a frame shows those of its own time."""
+    """A warp shows the poses of the middle of its display; a frame shows those of its own time."""
     scene = Planes(pan=pan)
     for shown in play(name, scene)[-6:]:
-        right = scene.image(64, shown.display_time_s if "late" in name else shown.sample_time_s, 4)
+        middle_s = shown.display_time_s + 0.5 * FRAME_S / PARTS
+        right = scene.image(64, middle_s if "late" in name else shown.sample_time_s, 4)
         late = scene.image(64, shown.sample_time_s - FRAME_S, 4)
         # what comes into view within two frames is not known
         found, wrong = (error(shown.image, truth, border=8) for truth in (right, late))
@@ -124,7 +125,7 @@ def test_a_square_is_shown_where_it_is_and_leaves_the_background() -> None:
     """It moves three quarters of its width in a frame; what it hid is filled from around."""
     scene = Planes(lambda x, y: torch.full_like(x, 0.25), square=0.1875 / FRAME_S)
     for shown in play("framed-late", scene, seconds=0.2)[-8:]:
-        truth = scene.image(64, shown.display_time_s)
+        truth = scene.image(64, shown.display_time_s + 0.5 * FRAME_S / PARTS)
         off = (shown.image - truth).abs().amax(-1) > 0.05
         planes = truth.permute(2, 0, 1)[None, :1]
         edge = F.max_pool2d(planes, 3, 1, 1) + F.max_pool2d(-planes, 3, 1, 1) > 0

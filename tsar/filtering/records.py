@@ -30,7 +30,7 @@ class FilterOptions:
 
     Attributes:
         reprojection: whether estimates move with the surfaces that they belong to.
-        prediction: whether steady motion is continued to the time at which the picture is first shown.
+        prediction: whether steady motion is continued to the middle of the time for which the picture is displayed.
         smoothing: whether uncertain pixels are blended with their surroundings when they are shown.
         accumulation: whether samples are averaged over time; otherwise the newest replaces the estimate.
         jitter: whether samples move within their pixels from cycle to cycle.

@@ -3,7 +3,7 @@ filter over space and time whose extents follow the gradients in each tile.
 
 A cycle samples *crosshairs*: a random position in a tile and the four positions one pixel beside it. Their differences
 give the tile's spatial gradient. A deep buffer keeps all recent samples with their first hits and reprojects them to
-the poses at which the picture is first shown, as predicted from the newest ones. The difference between a new sample
+the poses of the middle of the picture's display, as predicted from the newest ones. The difference between a new sample
 and the reprojected one in its pixel gives the temporal gradient, so that it covers only changes that reprojection does
 not explain. The tiles are split and merged by :mod:`tsar.policies.tiles`.
 

@@ -1,8 +1,8 @@
 """The project's own policies: estimates of every pixel, filtered over time and space, moving with their surfaces.
 
 Every pixel has an estimate of its colour and of the variance of its error. A cycle moves the estimates with their
-surfaces to the positions predicted, from the poses known at its start, for the time of display. It chooses the tiles
-whose samples remove the most error for the longest time and averages the new samples into the estimates. From the
+surfaces to the positions that the poses known at its start predict for the middle of the display. It chooses the
+tiles whose samples remove the most error for the longest time and averages the new samples into the estimates. From the
 residuals it learns how fast the picture changes, and from the shadows of moving objects where it will change soon. It
 shows the estimates, blended with their surroundings where they are uncertain. ``filter`` omits the reprojection.
 
@@ -36,7 +36,7 @@ from tsar.filtering.records import (
 )
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
-from tsar.prediction import predicted
+from tsar.prediction import mid_display_s, predicted
 from tsar.roots import square_root
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 from tsar.window import GRID
@@ -66,8 +66,8 @@ class State:
         rate: variance per second that estimates gain: the greater of the observed rate and that expected from shadows.
         now_s: start of the newest cycle; None before the first.
         known: poses at the start of the newest cycles, three at most; empty without reprojection.
-        view: poses to which estimates are moved, predicted from the known ones for the time at which the picture is
-            first shown; None without reprojection.
+        view: poses to which estimates are moved, predicted from the known ones for the middle of the picture's display;
+            None without reprojection.
         earlier: the ``view`` of the cycle before; None where there was none.
         spacing: distance between samples of each requested tile, pixels.
         visits: number of cycles that sampled each element.
@@ -198,7 +198,7 @@ class Filter(Policy[State]):
             view = None
         if view is not None:
             known = (*known[-2:], view)
-            shown_s = now_s + self.latency_cycles * moment.cycle_s
+            shown_s = mid_display_s(now_s, moment.cycle_s, self.latency_cycles)
             view = predicted(known, shown_s) if self._options.prediction else view
             estimates, surfels = self._stages.advanced(estimates, surfels, state.rate, seconds, view)
         else:

@@ -150,7 +150,7 @@ class Reprojected(Policy[Progress]):
             return Progress(state.number + 1, finished=self._finish(state, parts))
 
     def image(self, state: Progress, moment: Moment) -> Picture:
-        """The last finished frame, warped to the poses at which it is first shown, as predicted from those at the
+        """The last finished frame, warped to the poses of the middle of its display, as predicted from those at the
         cycle's start and before; black before the first frame."""
         last = state.finished
         if last is None:

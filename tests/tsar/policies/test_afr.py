@@ -29,10 +29,10 @@ def moving(speed: float) -> Screen:
 
 
 def error(screen: Screen, poses: bool) -> float:
-    """Mean squared error of the last picture at the time at which it is shown."""
+    """Mean squared error of the last picture in the middle of its display."""
     policy = POLICIES["afr"](Setting(CONFIG, view=screen.view if poses else None))
     *_, (_, last) = run(policy, screen.trace, fixed_clock(CYCLE_S), 0.0, 2 * CYCLE_S)
-    return float((last.image - screen.picture(last.display_time_s, 64)).square().mean())
+    return float((last.image - screen.picture(last.display_time_s + 0.5 * CYCLE_S, 64)).square().mean())
 
 
 def test_crosshairs_are_a_place_in_their_tile_and_four_beside_it() -> None:
