@@ -1,4 +1,4 @@
-"""The command ``tsar``: every script of the project as a subcommand, and what has a name.
+"""The command ``tsar``: every script of the project as a subcommand, and lists of all names.
 
 Usage: tsar COMMAND [OPTIONS]; tsar COMMAND --help; tsar list [TABLE]; tsar --version
 """
@@ -50,7 +50,7 @@ TABLES = {
     "norms": "tsar.choices:NORMS",
     "reconstructions": "tsar.choices:RECONSTRUCTIONS",
 }
-"""What has a name, and where its table is."""
+"""Tables of names, by kind, with the place of each in the code."""
 
 
 def main() -> None:
@@ -74,7 +74,7 @@ def _dispatch() -> None:
 
 
 def _print_table(name: str) -> None:
-    """What has a name, and where each comes from."""
+    """Prints the names in a table, and the module of each."""
     module, _, attribute = _known(name, TABLES, "list").partition(":")
     table = getattr(importlib.import_module(module), attribute)
     print(f"{name} (entry points: {table.group})")

@@ -1,4 +1,4 @@
-"""From what a comparison measured to the tables of its summary and report."""
+"""The measurements of a comparison, and the numbers of its summary and report that follow from them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from analysis.study.runs import PolicyRun, Totals
 from analysis.study.spending import cycle_flops
 
 AROUND = "all others"
-"""Name of the stages around tracing where they have one price."""
+"""Name of the stages around tracing if they have one price."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,16 @@ class Measured:
     """Everything a comparison measured.
 
     Attributes:
-        own: name of the run that the others are rivals of.
-        times_s: reference times.
-        seen: what every display showed, by name; the first rival is the one compared to.
-        runs: the runs that showed it.
-        steps: pictures of evenly spaced times, for the page.
-        panels: what they are of.
-        reference_nonfinite: non-finite values in the reference.
+        own: name of the policy whose rivals the others are.
+        times_s: reference times, seconds.
+        seen: errors of the images on every display, by name; ratios are to the first rival.
+        runs: the runs, by name.
+        steps: pictures at evenly spaced times, for the page.
+        panels: the runs and maps that the pictures show.
+        reference_nonfinite: number of non-finite values in the reference.
         cost: parameters of the cost model, scalars.
         sequences: values of metrics of sequences, by metric and run.
-        recorded: the run whose cycles are on disk; None where none records them.
+        recorded: the run whose cycles are on disk; None if no run records them.
     """
 
     own: str
@@ -61,23 +61,23 @@ class Measured:
 
     @property
     def rival(self) -> str | None:
-        """The one compared to; None where the run is alone."""
+        """The first rival, to which ratios are; None if there is none."""
         return self.rivals[0] if self.rivals else None
 
     @property
     def totals(self) -> Totals:
-        """Sums over the cycles of the run's own."""
+        """Sums over the cycles of the policy ``own``."""
         return self.runs[self.own].totals
 
     @property
     def own_cost(self) -> CostParameters:
-        """Parameters of the cost model with what the mean cycle of the run's own drew."""
+        """Parameters of the cost model with the overdraw of the mean cycle of ``own``."""
         return self.totals.of_a_cycle(self.cost)
 
     @cached_property
     def invariants(self) -> dict[str, Any] | None:
-        """What was checked in every recorded cycle of the run whose cycles are on disk, whether all hold in every run
-        that records, and which those are (``runs``); None where none does."""
+        """Invariants checked in every recorded cycle of the run whose cycles are on disk, whether all hold in every run
+        that records, and the names of these runs (``runs``); None if no run records."""
         found = {name: run.totals.invariants for name, run in self.runs.items() if run.totals.recorded}
         if self.recorded is None or not found:
             return None
@@ -85,11 +85,11 @@ class Measured:
 
     @cached_property
     def mse(self) -> dict[str, Floats]:
-        """Mean squared errors at the reference times, by name."""
+        """Mean squared errors at the reference times, by name of the run."""
         return {name: seen.column("mse") for name, seen in self.seen.items()}
 
     def ratio(self) -> Floats:
-        """The run's error over the rival's at the reference times; empty where it is alone."""
+        """The error of ``own`` over the first rival's at the reference times; empty if there is no rival."""
         return ratio(self.mse[self.own], self.mse[self.rival]) if self.rival else np.empty(0)
 
     def statistics(self, rival: str, column: str = "mse") -> RatioStatistics:
@@ -97,7 +97,7 @@ class Measured:
         return ratio_statistics(self.seen[self.own].column(column), self.seen[rival].column(column))
 
     def period_s(self, name: str) -> float:
-        """Mean time between images of a display, seconds; NaN where it showed one."""
+        """Mean time between images of a display, seconds; NaN if it showed a single one."""
         refresh = self.seen[name].refresh_s
         return (refresh[-1] - refresh[0]) / (len(refresh) - 1) if len(refresh) > 1 else float("nan")
 
@@ -107,7 +107,7 @@ def ledger_costs(measured: Measured) -> dict[str, dict[str, float]]:
     costs: dict[str, dict[str, float]] = {ledger: {} for ledger in LEDGERS}
     for name, run in measured.runs.items():
         totals, meter = run.totals, run.meter
-        # the cycles of the span, or all where it has none
+        # the cycles of the measured span, or all if it has none
         counters, cycles = (totals.counters, totals.cycles) if totals.cycles else (meter.counters, max(meter.calls, 1))
         mean = {counter: count / cycles for counter, count in counters.items()}
         for ledger, flops in cycle_flops(totals.of_a_cycle(measured.cost), run.price, mean).items():
@@ -117,7 +117,7 @@ def ledger_costs(measured: Measured) -> dict[str, dict[str, float]]:
 
 
 def cycles_per_image(measured: Measured) -> dict[str, float]:
-    """How many cycles of the run cost as much as one of the rival's, under every ledger."""
+    """Number of cycles of the run that cost as much as one cycle of the rival, under every ledger."""
     own, rival = measured.own, measured.rival
     return {
         ledger: found[rival] / found[own] if found[own] > 0 else float("inf")
@@ -127,7 +127,7 @@ def cycles_per_image(measured: Measured) -> dict[str, float]:
 
 
 def segments(counters: Mapping[str, float]) -> float:
-    """Ray segments per sample that were counted."""
+    """Counted ray segments per sample."""
     primary = counters.get("primary_rays", 0)
     return sum(value for name, value in counters.items() if name.endswith("_rays")) / primary if primary else 0.0
 
@@ -173,7 +173,7 @@ def summarise(measured: Measured) -> dict[str, Any]:
 
 
 def metrics_of(measured: Measured) -> dict[str, dict[str, float]]:
-    """Mean over the times of what was measured beside the squared errors, by metric and run."""
+    """Mean over time of all metrics beside the squared errors, by metric and run."""
     known = ("time_s", "mse", "log_mse", "refresh")
     names = dict.fromkeys(name for seen in measured.seen.values() for row in seen.rows for name in row)
     means = {
@@ -201,14 +201,14 @@ def _ratios(measured: Measured) -> dict[str, Any]:
 
 
 def overdraw(measured: Measured, name: str) -> float:
-    """Framelets that the mean cycle of a run accumulated at each pixel; NaN where it has none."""
+    """Framelets that the mean cycle of a run accumulated at each pixel; NaN if it accumulates none."""
     totals = measured.runs[name].totals
     drawn = totals.counters.get("framelet_pixels", 0)
     return float(totals.of_a_cycle(measured.cost).overdraw) if drawn else float("nan")
 
 
 def modelled_stages(measured: Measured) -> dict[str, float]:
-    """FLOPs of a cycle of the run's own by stage; those around tracing together where they are priced together."""
+    """FLOPs of a cycle of ``own`` by stage; the stages around tracing are one entry if they have one price."""
     cost, price = measured.own_cost, measured.runs[measured.own].price
     if price.adaptive_stages:
         return {name: float(flops) for name, flops in stage_flops(cost).items()}
@@ -217,7 +217,7 @@ def modelled_stages(measured: Measured) -> dict[str, float]:
 
 
 def measured_stages(measured: Measured) -> dict[str, float]:
-    """Wall seconds of the run's own by the stages of :func:`modelled_stages`."""
+    """Wall seconds of ``own`` by the stages of :func:`modelled_stages`."""
     seconds: dict[str, float] = dict(measured.totals.stage_s)
     if measured.runs[measured.own].price.adaptive_stages or not seconds:
         return seconds

@@ -1,4 +1,4 @@
-"""Tables of what a comparison measured, for the terminal and the report."""
+"""Tables of a comparison, for the terminal and the report."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def key_table(measured: Measured) -> Table:
 
 
 def _recorded_rows(measured: Measured, holds: str) -> list[tuple[str, str]]:
-    """Of the run whose cycles are on disk."""
+    """Rows on the run whose cycles are on disk."""
     if measured.recorded is None:
         return []
     name = measured.recorded
@@ -71,21 +71,21 @@ def _recorded_rows(measured: Measured, holds: str) -> list[tuple[str, str]]:
 
 
 def said_of(invariants: Mapping[str, Any] | None, hold: str) -> str:
-    """In words, whether invariants were checked and hold."""
+    """Words that say whether invariants were checked and hold."""
     if invariants is None:
         return "not recorded by these policies"
     return hold if invariants["ok"] else f"BROKEN: {dict(invariants)}"
 
 
 def metric_table(measured: Measured) -> Table | None:
-    """Metrics of every run; None where none was asked for."""
+    """Metrics of every run; None if none was asked for."""
     found = metrics_of(measured)
     rows = [(name, *(f"{found[metric][name]:.4f}" for metric in found)) for name in measured.seen]
     return Table("Metrics, mean over the times", ("run", *found), rows) if found else None
 
 
 def stage_table(measured: Measured) -> Table:
-    """Per stage: share by the model beside what was measured."""
+    """Modelled and measured cost of each stage."""
     flops, wall, cycles = modelled_stages(measured), measured_stages(measured), max(measured.totals.cycles, 1)
     total, total_s = sum(flops.values()), sum(wall.values()) or 1.0
     rows = []

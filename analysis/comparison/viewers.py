@@ -1,7 +1,7 @@
-"""What is made of a comparison as it goes by: the film, and the pictures that the page shows.
+"""The film of a comparison, and the pictures of its page, made while it runs.
 
-Which framed rival has a panel is known when all errors are: that of the lowest median error. So the pictures of a film
-are kept until then, on disk.
+The framed rival of the lowest median error has a panel. It is known only when all errors are known, so the pictures of
+a film are kept on disk until then.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ from analysis.page.video import (
 )
 
 STEPS_MAX = 60
-"""Positions of the slider in the report at most."""
+"""Most positions of the slider in the report."""
 EXACT = "lossless"
-"""The report holds pictures and maps exactly."""
+"""The report keeps pictures and maps exactly."""
 MAP_PX = 256
-"""Otherwise larger maps, which are noisy, are held at every so many pixels that this many are left."""
+"""Otherwise larger maps, which are noisy, are thinned to this many pixels along a side."""
 
 
 @dataclass
 class Steps:
-    """Keeps pictures of evenly spaced times for the page, each pixel of them: every k-th, with the least k that keeps
-    to ``most``. What stands on a display unchanged is kept once.
+    """Keeps pictures for the page at every k-th reference time, at full resolution, with the least k that keeps to
+    ``most``. An image that stays on a display is kept once.
 
     Changes in place.
 
     Attributes:
         own: the run whose decisions are shown first.
         scales: bounds of the colour scales.
-        count: how many reference times there will be.
-        exact: whether pictures are kept without loss, and maps of any size.
-        made: the pictures, of all runs.
-        map_scales: of maps, by label.
+        count: number of reference times.
+        exact: whether pictures are kept without loss, and maps at full size.
+        made: the pictures of all runs.
+        map_scales: colour scales of the maps, by label.
     """
 
     own: str
@@ -86,7 +86,7 @@ class Steps:
         return before[1]
 
     def panels(self, runs: Sequence[str]) -> list[Panel]:
-        """The reference, runs and maps, the scale of ages fitted to the data."""
+        """The reference, runs and maps; the scale of ages is fitted to the data."""
         found = [Panel(REFERENCE), *(Panel(name, truth=REFERENCE) for name in runs)]
         for label, scale in self.map_scales.items():
             found.append(Panel(label, scale=scale.fitted(self._ages) if label == AGES else scale))
@@ -94,21 +94,21 @@ class Steps:
 
 
 class Reel:
-    """Pictures kept aside on disk, without loss, in a file that nothing else sees. Changes in place."""
+    """Pictures on disk, without loss, in an anonymous temporary file. Changes in place."""
 
     def __init__(self, folder: Path) -> None:
         self._file = tempfile.TemporaryFile(dir=folder)
         self._codec = pa.Codec("zstd", compression_level=1)
 
     def keep(self, pixels: Pixels) -> tuple[int, int, tuple[int, ...]]:
-        """Where a picture lies."""
+        """Stores a picture; returns its offset, length and shape."""
         packed = self._codec.compress(np.ascontiguousarray(pixels), asbytes=True)
         place = self._file.seek(0, 2)
         self._file.write(packed)
         return place, len(packed), pixels.shape
 
     def picture(self, kept: tuple[int, int, tuple[int, ...]]) -> Pixels:
-        """A picture that lies there."""
+        """The stored picture."""
         place, size, shape = kept
         self._file.seek(place)
         whole = self._codec.decompress(self._file.read(size), int(np.prod(shape)), asbytes=True)
@@ -116,8 +116,7 @@ class Reel:
 
 
 class Filming:
-    """Keeps the pictures of every so many reference times, and makes the film of them when all is over. Changes in
-    place.
+    """Keeps the pictures at every ``stride``-th reference time, and makes a film of them at the end. Changes in place.
 
     Attributes:
         own: the run whose decisions are shown first.
@@ -149,7 +148,7 @@ class Filming:
             self._frames.append((view.time_s, kept))
 
     def film(self, panels: Panels, span_s: tuple[float, float]) -> ComparisonFilm:
-        """What composes its frames."""
+        """The object that composes its frames."""
         first = panels.arranged(self._frames[0][1])
         height_px = next(iter(first.values()))[2][0]
         runs, row = list(self._errors), len(panels.runs) + 1
@@ -157,7 +156,7 @@ class Filming:
 
     @property
     def map_scales(self) -> dict[str, Scale]:
-        """Scales of the maps so far, that of ages fitted to the data."""
+        """Scales of the maps so far; that of ages is fitted to the data."""
         return {label: one.fitted(self._ages) if label == AGES else one for label, one in self._scales.items()}
 
     def write(
@@ -176,7 +175,7 @@ class Filming:
 
     @property
     def frames(self) -> int:
-        """How many the film will have."""
+        """Number of frames of the film."""
         return len(self._frames)
 
 

@@ -1,4 +1,4 @@
-"""Converted scenes rendered by the renderers that they were converted for, side by side."""
+"""Converted scenes, rendered by their target renderers and compared."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def flip(first: Picture, second: Picture) -> float:
-    """Mean FLIP of two pictures, as shown on a display."""
+    """Mean FLIP of two pictures, encoded for a display."""
     import flip_evaluator
 
     shown = [one.astype(np.float32) / 255.0 for one in (shown_as(first), shown_as(second))]
@@ -25,7 +25,7 @@ def flip(first: Picture, second: Picture) -> float:
 
 
 def shown_as(picture: Picture) -> np.ndarray:
-    """A picture as a display shows it, 8 bits."""
+    """A picture encoded for a display, 8 bits."""
     import torch
 
     from renderer.film.files import encode_srgb
@@ -34,7 +34,7 @@ def shown_as(picture: Picture) -> np.ndarray:
 
 
 def checked(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
-    """A row for each pair of pictures of each scene, the source's own rendering first where there is one."""
+    """A row for each pair of pictures of each scene, with the rendering of the source file first if there is one."""
     rows: list[dict[str, Any]] = []
     shown: list[tuple[str, Picture]] = []
     for number, source in enumerate(options.scenes):
@@ -56,7 +56,7 @@ def checked(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
 def _pictures(
     options: CheckOptions, source: Path, folder: Path
 ) -> tuple[Scene, dict[str, Picture | str], Picture | str, dict[str, list[str]]]:
-    """A scene, its pictures by what rendered them, the first once more with other noise, and what was lost for each."""
+    """A scene, its pictures by renderer, the first picture again with other noise, and the losses for each."""
     from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
     from scenes.formats.losses import LossReport
 
@@ -85,7 +85,7 @@ def _size(options: CheckOptions, scene: Scene) -> tuple[int, int]:
 
 
 def plain(scene: Scene) -> Scene:
-    """The scene with every surface matte, of the colour that it has most of."""
+    """The scene with every surface matte, in its dominant colour."""
     from scenes.canonical import ConstantTexture, Matte
     from scenes.formats.appearance.folding import mean_of
 

@@ -1,4 +1,4 @@
-"""Renders converted scenes with Mitsuba 3 and LuxCore and compares their pictures.
+"""Render converted scenes with Mitsuba 3 and LuxCore and compare their pictures.
 
 Examples: python scripts/conversion_check.py scene.xml other.lxs --out out/conversion-check
           python scripts/conversion_check.py --markers

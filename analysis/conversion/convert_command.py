@@ -1,4 +1,4 @@
-"""Converts a scene file of one renderer to that of another, and reports what could not be carried over.
+"""Convert a scene file of one renderer to that of another, and report what could not be carried over.
 
 Examples: python scripts/convert.py scene.pbrt out/scene.lxs
           python scripts/convert.py scene.lxs out/scene.pbrt --strict --report losses.json
@@ -11,7 +11,7 @@ from analysis.conversion.options import ConvertOptions
 
 
 def main() -> None:
-    """Parses, converts, and prints what was lost."""
+    """Parses, converts, and prints the losses."""
     options = parse(ConvertOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.conversion.run import convert

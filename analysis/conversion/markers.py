@@ -1,4 +1,4 @@
-"""Where lamps at known places appear, in scenes written by hand in each format and converted to every other.
+"""Places of known lamps in the pictures of scenes that are written by hand in each format and converted to every other.
 
 Source: the projection of a pinhole camera; conventions of the formats as in :mod:`scenes.formats`.
 """
@@ -17,7 +17,7 @@ from analysis.conversion.peers import Picture, rendered
 
 EYE, TARGET, UP = np.array([3.0, 2.0, 4.0]), np.array([0.2, 0.1, -0.3]), np.array([0.0, 1.0, 0.0])
 FOV_DEG = 40.0
-"""Field of view of the shorter side."""
+"""Field of view of the shorter side, degrees."""
 
 SIZES = {"landscape": (120, 80), "portrait": (80, 120)}
 
@@ -34,13 +34,13 @@ SIDE = 0.16
 SEARCH_PX = 12
 SAMPLES = 64
 SOURCES = ("pbrt", "pbrt, turned", "luxrender", "mitsuba")
-"""Formats that the scene is written in by hand; PBRT's ``LookAt`` alone gives a mirrored picture."""
+"""Formats in which the scene is written by hand; PBRT's ``LookAt`` alone gives a mirrored picture."""
 
 Vector = NDArray[np.float64]
 
 
 def axes() -> tuple[Vector, Vector, Vector]:
-    """To the right, upwards and ahead, seen by the camera; unit."""
+    """Unit vectors to the right, upwards and ahead, as the camera sees them."""
     ahead = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(ahead, UP)
     right /= np.linalg.norm(right)
@@ -48,7 +48,7 @@ def axes() -> tuple[Vector, Vector, Vector]:
 
 
 def expected_px(center: tuple[float, ...], size: tuple[int, int], mirrored: bool) -> Vector:
-    """Where a point appears: pixels from the left and the top."""
+    """Place of a point in the picture, pixels from the left and the top."""
     right, above, ahead = axes()
     away = np.array(center) - EYE
     half = 0.5 * min(size) / math.tan(math.radians(FOV_DEG) / 2.0)
@@ -57,7 +57,7 @@ def expected_px(center: tuple[float, ...], size: tuple[int, int], mirrored: bool
 
 
 def _corners(center: tuple[float, ...]) -> Vector:
-    """Of the square about a point that faces the camera, counter-clockwise seen from it."""
+    """Corners of the square about a point that faces the camera, counter-clockwise as seen from the camera."""
     right, above, _ = axes()
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     return np.array([np.array(center) + 0.5 * SIDE * (x * right + y * above) for x, y in signs])
@@ -113,7 +113,7 @@ def _mitsuba(size: tuple[int, int]) -> str:
 
 
 def native(source: str, size: tuple[int, int]) -> tuple[str, str]:
-    """The scene in a format, written without the exporters, and how its file's name ends."""
+    """The scene in a format, written without the exporters, and the ending of its file name."""
     if source == "mitsuba":
         return _mitsuba(size), ".xml"
     if source == "luxrender":
@@ -122,7 +122,7 @@ def native(source: str, size: tuple[int, int]) -> tuple[str, str]:
 
 
 def farthest_px(picture: Picture, size: tuple[int, int], mirrored: bool) -> float:
-    """Greatest distance of a marker from where it must be; infinite where one of its colour is not near there."""
+    """Greatest distance of a marker from its expected place, pixels; infinite if no marker of its colour is near."""
     worst = 0.0
     rows, columns = np.mgrid[: size[1], : size[0]] + 0.5
     for center, radiance in MARKERS:
@@ -164,12 +164,12 @@ def _pictures(scene: Any, folder: Path, size: tuple[int, int], limit_s: float) -
 def marker_offsets(
     folder: Path, limit_s: float, sources: tuple[str, ...] = SOURCES, sizes: tuple[str, ...] = tuple(SIZES)
 ) -> list[dict[str, Any]]:
-    """A row for each pair of formats, shape of the film and renderer: how far off a marker is at most, pixels.
+    """A row for each pair of formats, shape of the film and renderer: greatest offset of a marker, pixels.
 
     Args:
-        folder: receives the scenes.
-        limit_s: seconds for each picture at most.
-        sources: formats to start from.
+        folder: folder for the scenes.
+        limit_s: most seconds for each picture.
+        sources: source formats.
         sizes: shapes of the film.
     """
     from scenes.formats.conversion import load_scene_file

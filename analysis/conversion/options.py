@@ -15,16 +15,17 @@ from tsar.config import require
 
 @dataclass(frozen=True)
 class ConvertOptions:
-    """A scene file of one renderer as that of another, with its meshes and pictures, and a report of what was lost."""
+    """Converts a scene file of one renderer to that of another, with its meshes and pictures, and reports the
+    losses."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """Scene file: PBRT v3 (.pbrt), LuxRender 1.x (.lxs) or Mitsuba 0.5 (.xml)."""
+    """Scene file: PBRT v3 or v4 (.pbrt), LuxRender 1.x (.lxs), Mitsuba 0.5 to 3 (.xml, .json), or a model."""
     target: Annotated[Path, tyro.conf.Positional]
     """File to write; meshes and pictures go to the folders models and textures beside it."""
     to: str = ""
-    """Its format: pbrt, luxrender, mitsuba, mitsuba3 or another that is installed; by default that of its ending."""
+    """Its format: pbrt, pbrt4, luxrender, mitsuba, mitsuba3 or an installed one; by default that of its ending."""
     strict: bool = False
-    """A loss is an error, and nothing is written."""
+    """A loss that changes the picture is an error, and nothing is written."""
     report: Path | None = None
     """JSON file for the losses; by default the target's name with .losses.json."""
     root: Path | None = None
@@ -39,7 +40,7 @@ class ConvertOptions:
 
     @property
     def report_file(self) -> Path:
-        """Where the losses go."""
+        """File for the losses."""
         return self.report or self.target.with_name(f"{self.target.name}.losses.json")
 
 
@@ -50,17 +51,17 @@ class CheckOptions:
     scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
     markers: bool = False
-    """Where lamps at known places appear in the picture, from every format to every other."""
+    """Check the places of known lamps in the pictures, from every format to every other."""
     plain: bool = False
-    """Compare both renderers on each scene with every surface matte, too: what differs then is not materials."""
+    """Also compare both renderers on each scene with every surface matte: a difference is then not due to materials."""
     width_px: int = 160
-    """Width, pixels; the height follows the film."""
+    """Width, pixels; the height follows from the aspect of the film."""
     samples: int = 256
     """Samples per pixel."""
     root: Path | None = None
     """Folder that scenes may read from; by default their own."""
     limit_s: float = 240.0
-    """Seconds for each picture at most."""
+    """Most seconds for each picture."""
     out: Path = Path("out/conversion-check")
     """Folder for the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
 

@@ -1,7 +1,7 @@
 """Mitsuba 3 and LuxCore as renderers of scene files, each in a process of its own.
 
-Both bring libraries that do not go together, and a scene that one cannot load may end it. Both are told to average a
-pixel over its own square, whatever filter a file asks for, so that pictures differ by what the scene is.
+Their libraries cannot be loaded together, and a scene that one cannot load may crash it. Both use a box filter of one
+pixel, whatever filter a file asks for, so that pictures differ by the scene alone.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-# A file of Mitsuba 0.5 is brought to what Mitsuba 3 knows by its tree alone, without this project's importer: that
-# makes its picture a witness of its own. Version 3 renames most properties itself.
+# A file of Mitsuba 0.5 is upgraded to Mitsuba 3 by editing its tree, without this project's importer, so that its
+# picture is an independent reference. Version 3 renames most properties itself.
 _MITSUBA = """
 import os, sys, numpy as np, mitsuba as mi, xml.etree.ElementTree as E
 file, out, width, height, samples, seed = sys.argv[1], sys.argv[2], *map(int, sys.argv[3:])
@@ -69,8 +69,8 @@ parameters.update()
 np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
 """
 
-# Its pictures come bottom row first, and one row too low: it takes the ray of row y from height - y - 1, not from
-# height - y. The row that is missing at the bottom is that above it once more.
+# LuxCore's pictures begin with the bottom row, and are one row too low: it takes the ray of row y from
+# height - y - 1, not from height - y. The missing row at the bottom repeats the row above it.
 _LUXCORE = """
 import os, sys, time, numpy as np
 import pyluxcore as lux  # after NumPy: its allocator stops a later import
@@ -111,19 +111,19 @@ Picture = NDArray[np.float32]
 def rendered(
     program: str, file: Path, out: Path, size: tuple[int, int], samples: int, limit_s: float, seed: int = 0
 ) -> Picture | str:
-    """The picture of a renderer, or a line that says why there is none.
+    """The picture of a renderer, or a line that says why it made none.
 
     Args:
         program: ``mitsuba`` (scenes of version 3, and of 0.5 as far as 3 has their plugins) or ``luxcore``.
         file: the scene.
-        out: file that the picture is stored in, ``.npy``.
+        out: file for the picture, ``.npy``.
         size: width and height, pixels.
-        samples: per pixel.
-        limit_s: seconds at most.
-        seed: of the noise.
+        samples: samples per pixel.
+        limit_s: most seconds.
+        seed: seed of the noise.
 
     Returns:
-        ``(height, width, 3)`` linear radiance, or the last line that the renderer said.
+        ``(height, width, 3)`` linear radiance, or the last line that the renderer printed.
     """
     numbers = map(str, (*size, samples, seed))
     out.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Runs the commands about scene files, each from its options to files and a summary."""
+"""Runs the commands on scene files, from their options to files and a summary."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from analysis.storage.summary import with_source, write_summary
 
 
 def convert(options: ConvertOptions) -> dict[str, Any]:
-    """Converts a scene file; returns what the report of losses holds.
+    """Converts a scene file; returns the content of the report of losses.
 
     Raises:
-        InputError: the scene cannot be read or written, or something is lost where that is an error.
+        InputError: the scene cannot be read or written, or ``strict`` is set and a loss changes the picture.
     """
     from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
     from scenes.formats.losses import LossReport
@@ -38,7 +38,7 @@ def convert(options: ConvertOptions) -> dict[str, Any]:
 
 
 def check(options: CheckOptions) -> list[Table]:
-    """Renders converted scenes and compares their pictures; returns what was found as tables.
+    """Renders converted scenes and compares their pictures; returns the results as tables.
 
     Raises:
         InputError: a scene cannot be read or written.

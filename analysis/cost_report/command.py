@@ -1,4 +1,4 @@
-"""Report what an adaptive cycle and a framed image cost: the model of table 7.1 under every ledger, and this machine.
+"""Report the cost of an adaptive cycle and of a framed image: by the model of table 7.1, and on this machine.
 
 Examples: python scripts/cost_report.py --out out/cost
           python scripts/cost_report.py --no-measure --ledger summed --batch-size 256 --out out/summed
@@ -11,7 +11,7 @@ from analysis.cost_report.options import CostReportOptions
 
 
 def main() -> None:
-    """Parses, evaluates, measures, prints tables and where the files are."""
+    """Parses, evaluates, measures, prints tables and the place of the files."""
     options = parse(CostReportOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.cost_report.run import write_report

@@ -1,6 +1,6 @@
 """Measured cost of the pipeline over a grid of settings.
 
-Settings take turns, so that changes of the machine's speed affect all settings alike. The renderer and the pipeline are
+Settings take turns, so that changes in the machine's speed affect all settings alike. The renderer and the pipeline are
 imported when a measurement begins.
 """
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from scenes.canonical import Scene
     from tsar.policy import Policy
 
-_BYTES_PER_PIXEL = 320  # images and age fields in flight, and the framed image
+_BYTES_PER_PIXEL = 320  # bytes: images and age fields in use, and the framed image
 
 
 def _segments(counters: Sequence[Mapping[str, int]]) -> float:
@@ -36,13 +36,13 @@ def _segments(counters: Sequence[Mapping[str, int]]) -> float:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured, and on what.
+    """The measurement, and the machine that made it.
 
     Attributes:
-        cells: one a setting.
-        memory: None where it was left out.
-        device, threads, torch_threads: where rays are traced, threads that trace, threads of the other stages.
-        load_average: of the machine over the minute before; what other programs take disturbs all seconds.
+        cells: one for each setting.
+        memory: None if it was left out.
+        device, threads, torch_threads: device of tracing, threads that trace, threads of the other stages.
+        load_average: load of the machine over the minute before; other programs disturb all times.
     """
 
     cells: Sequence[Cell]
@@ -71,12 +71,12 @@ def prepare(options: MeasurementOptions) -> tuple[Scene, dict[int, Renderer]]:
     with bad_input():
         scene = catalog.load(options.input)
         sides, threads = sorted({side for _, side in options.settings}), options.threads or None
-        # how finely textures are filtered goes with the output side
+        # the texture filter depends on the output side
         return scene, {side: Renderer(scene, options.device, threads, side) for side in sides}
 
 
 def measure(options: MeasurementOptions, ready: tuple[Scene, Mapping[int, Renderer]], bars: Bars) -> Measurement:
-    """Watches memory, then measures every setting; memory first, before other settings fill it."""
+    """Watches memory first, before other settings fill it, and then measures every setting."""
     import torch
 
     scene, found = ready
@@ -100,7 +100,7 @@ def _policy(config: TsarConfig, renderer: Renderer) -> Policy:
 
 @dataclass
 class _Adaptive:
-    """A pipeline that goes on a few cycles at each call. Changes in place."""
+    """A pipeline that runs a few more cycles at each call. Changes in place."""
 
     config: TsarConfig
     renderer: Renderer
@@ -155,7 +155,7 @@ class _Framed:
 
 
 def _needed_bytes(options: MeasurementOptions) -> float:
-    """Memory that all settings take side by side, about."""
+    """Approximate memory of all settings together, bytes."""
     configs = [options.pipeline(*setting) for setting in options.settings]
     cached = sum(config.cache_slots * config.samples * 24 for config in configs)
     return cached + sum(config.resolution_px**2 * _BYTES_PER_PIXEL for config in configs)
@@ -167,7 +167,7 @@ def measure_cells(options: MeasurementOptions, found: Mapping[int, Renderer], ta
     Args:
         options: the settings.
         found: a renderer for each output side.
-        task: of ``repetitions + 1`` rounds, the first of which is the warm-up.
+        task: progress over ``repetitions + 1`` rounds, the first of which is the warm-up.
     """
     from analysis.command.timing import take_turns
 
@@ -203,7 +203,7 @@ def _cell(setting: tuple[int, int], adaptive: _Adaptive, framed: _Framed) -> Cel
 
 
 def watch_memory(options: MeasurementOptions, renderer: Renderer, span_s: float, task: Task) -> MemoryTrace:
-    """Resident memory over a run of the centre setting that takes ``span_s`` of animation time at most."""
+    """Resident memory over a run of the centre setting that takes at most ``span_s`` seconds of animation time."""
     import psutil
 
     from analysis.storage.invariants import unbroken

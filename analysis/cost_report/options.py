@@ -1,4 +1,4 @@
-"""Options of the cost report: the parameters of table 7.1, what may be admitted, what is measured."""
+"""Options of the cost report: the parameters of table 7.1, the candidates to admit, the measurement."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FEWEST_BATCHES, _FEWEST_RESOLUTIONS = 3, 3
 @dataclass(frozen=True)
 @closed_choices()
 class MeasurementOptions:
-    """What is run to hold against the model."""
+    """The runs that are compared with the model."""
 
     input: str = "fly-by"
     """Built-in input, by name or number."""
@@ -33,15 +33,15 @@ class MeasurementOptions:
     repetitions: int = 10
     """Turns of each setting."""
     cycles_per_turn: int = 4
-    """Pipeline cycles a setting runs in its turn."""
+    """Pipeline cycles that a setting runs in each turn."""
     cycle_s: float = 0.02
-    """Animation time a cycle takes, seconds; the ledger thesis gives about this at the defaults."""
+    """Animation time of a cycle, seconds: about that of the ledger thesis at the defaults."""
     measured_warmup: int = 0
-    """Cycles of every setting before it is measured; 0 runs until the cache is full, 48 at least."""
+    """Cycles of every setting before it is measured; 0 runs until the cache is full, and at least 48."""
     memory_cycles: int = 600
     """Cycles over which resident memory is watched; 0 leaves it out."""
     memory_every: int = 10
-    """Cycles between two looks at resident memory."""
+    """Cycles between two readings of resident memory."""
     device: Device = "cpu"
     threads: Threads = 0
 
@@ -98,15 +98,15 @@ class CostReportOptions:
     parameters: Unprefixed[CostParameters] = field(default_factory=CostParameters)
     """The model's parameters, table 7.1."""
     measurement: Unprefixed[MeasurementOptions] = field(default_factory=MeasurementOptions)
-    """What is measured."""
+    """The measurement on this machine."""
     ledger: Literal["thesis", "printed", "summed"] = "thesis"
-    """How the model counts; figures are drawn under it, tables show all."""
+    """How the model counts cost; figures show this ledger, tables all of them."""
     batches: tuple[int, ...] = (32, 64, 128, 256, 512, 768, 1024)
     """Batch sizes that may be admitted."""
     resolutions: tuple[int, ...] = (256, 512, 1024)
     """Output sides that may be admitted, pixels."""
     admitted_segments: float = 4
-    """Ray segments per sample at which they are; about what the thesis' inputs have."""
+    """Ray segments per sample at which they may be admitted; the thesis' inputs have about as many."""
     measure: bool = True
     """Run the pipeline on this machine and refit the model to it."""
     out: Path = Path("out/cost")
@@ -121,7 +121,7 @@ class CostReportOptions:
         limits.within(self.parameters, **{**bounds, "trace_segments": segments})
         for name in ("tree_size", "tiling_size"):
             value = getattr(self.parameters, name)
-            require(value > 1, name, "more than 1, for its logarithm counts", value)
+            require(value > 1, name, "more than 1, because the model takes its logarithm", value)
         limits.within(self, batches=(1, 1 << 20), resolutions=limits.SIDES_PX, admitted_segments=segments)
         _ = self.admitting
 

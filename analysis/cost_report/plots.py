@@ -39,7 +39,7 @@ _AXES = {
 }
 _SIDES = (64, 128, 256, 512, 1024, 2048)
 _MIB = 2.0**20
-_BOX = 0.016  # edge of a box, as a share of an axis: less than the distance of batch sizes 32 and 64
+_BOX = 0.016  # edge of a box as a share of an axis: less than the distance between batch sizes 32 and 64
 
 
 def _axes(width: float, height: float, columns: int = 1, rows: int = 1) -> tuple[Figure, list[Axes]]:
@@ -61,12 +61,12 @@ def _resolution_axis(axis: Axes) -> None:
 
 
 def cost_figure(found: Sweep, title: str, crossing: float | None = None) -> Figure:
-    """Cost per output pixel along one parameter: stages thin, sums thick (figs 7.3 to 7.5).
+    """Cost per output pixel along one parameter, with thin lines for stages and thick lines for sums (figs 7.3 to 7.5).
 
     Args:
         found: the costs.
-        title: above the figure.
-        crossing: where both renderers cost the same, if that is to be marked.
+        title: text above the figure.
+        crossing: parameter at which both renderers cost the same, if it is to be marked.
     """
     figure, (axis,) = _axes(9.0, 5.0)
     x = found.values.numpy()
@@ -95,7 +95,7 @@ def cost_figure(found: Sweep, title: str, crossing: float | None = None) -> Figu
 def advantage_figure(
     batch: Tensor, advantages: Mapping[str, Tensor], measured: Sequence[Mapping[str, float]] = ()
 ) -> Figure:
-    """Cycles per framed image over the batch size under every ledger, with what was measured at the same output."""
+    """Cycles per framed image over the batch size under every ledger, with measurements at the same output side."""
     figure, (axis,) = _axes(9.0, 4.4)
     for style, (name, values) in enumerate(advantages.items()):
         axis.plot(batch.numpy(), values.numpy(), **line_style(style), label=f"ledger {name}")
@@ -209,7 +209,7 @@ def surface_picture(
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # without a display VTK says so on standard error, and then draws all the same
+    # without a display VTK reports that on standard error, but draws nevertheless
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     top = np.array(limits)
     theme = pyvista.themes.DocumentTheme()

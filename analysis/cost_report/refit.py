@@ -11,23 +11,23 @@ import numpy as np
 from analysis.metrics.cost_model import CostParameters, per_segment, stage_flops
 
 MEGAPIXEL = 1e6
-_ALIKE = 1e-6  # abscissas closer than this, relative, are one point: no slope can be told from them
+_ALIKE = 1e-6  # abscissas closer than this relative distance are one point, which determines no slope
 _EXPONENTS = (0.1, 3.0)
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What one setting took, medians over cycles.
+    """Measurements of one setting, medians over cycles.
 
     Attributes:
         batch_size, resolution_px: the setting.
         stage_s: seconds per cycle of each stage.
         cycle_s: seconds per cycle.
-        segments: rays counted per sample.
-        parameters: of the cost model, with the segments counted.
+        segments: counted rays per sample.
+        parameters: parameters of the cost model, with the counted segments.
         image_s, image_trace_s: seconds of a framed image of the same size, and of tracing it.
-        image_segments: rays counted per sample of the framed image.
-        cycles, images: how many were measured.
+        image_segments: counted rays per sample of the framed image.
+        cycles, images: numbers of measured cycles and images.
     """
 
     batch_size: int
@@ -46,8 +46,8 @@ class Cell:
     def flops(self) -> dict[str, float]:
         """Modelled operations per cycle of every stage that was measured.
 
-        Deviation: the thesis counts nothing for storing framelets; here ``cache`` counts one operation per sample
-        stored, so that its price can be fitted.
+        Deviation: the thesis counts nothing for storing framelets; here ``cache`` counts one operation per stored
+        sample, so that its price can be fitted.
         """
         p = self.parameters
         flops = {name: float(value) for name, value in stage_flops(p).items()}
@@ -55,7 +55,7 @@ class Cell:
 
     @property
     def image_flops(self) -> float:
-        """Modelled operations of the framed image, with the segments counted in it."""
+        """Modelled operations of the framed image, with the segments that were counted in it."""
         return float(self.parameters.recon_res * per_segment(self.parameters) * self.image_segments)
 
 
@@ -64,10 +64,10 @@ class MemoryTrace:
     """Resident memory of the process over a run.
 
     Attributes:
-        batch_size, resolution_px: of the run.
-        before_bytes: with the scene loaded, before the pipeline starts.
-        cycle: number of each look, the first at the end of the warm-up.
-        resident_bytes: at each look.
+        batch_size, resolution_px: setting of the run.
+        before_bytes: memory with the scene loaded, before the pipeline starts.
+        cycle: number of the cycle at each reading, the first at the end of the warm-up.
+        resident_bytes: memory at each reading.
     """
 
     batch_size: int
@@ -79,13 +79,13 @@ class MemoryTrace:
 
 @dataclass(frozen=True)
 class Line:
-    """Least squares line.
+    """Least-squares line.
 
     Attributes:
         per_unit: slope.
         offset: value at zero; 0 for a line through the origin.
-        r2: coefficient of determination, about the mean in either case: below 0 the mean would do better. None where
-            all values are alike.
+        r2: coefficient of determination, always relative to the mean: below 0 the mean fits better. None if all
+            values are equal.
         worst: greatest distance of a value from the line, as a share of the value.
     """
 
@@ -105,10 +105,10 @@ class PowerLaw:
     Attributes:
         exponent: its slope.
         factor: value at one.
-        spread: standard deviation of the values about the line, as a share.
+        spread: relative standard deviation of the values about the line.
         low, high: range of the abscissa.
-        above_fixed: exponent of what remains above a fixed value, which is fitted too; None below four values.
-        linear: a straight line with an offset through the same values, for what grows linearly from a fixed cost.
+        above_fixed: exponent ``k`` of ``a + b x^k``, with the fixed value ``a`` fitted too; None below four values.
+        linear: a straight line with an offset through the same values, for linear growth from a fixed cost.
     """
 
     exponent: float
@@ -127,8 +127,8 @@ class StageFit:
     Attributes:
         flops, seconds: one value a setting.
         origin: line through the origin: seconds per operation.
-        affine: line with a fixed cost per cycle; None where the operations hardly vary.
-        relative_to_tracing: what an operation costs, in units of a tracing operation (lines through the origin).
+        affine: line with a fixed cost per cycle; None if the operations hardly vary.
+        relative_to_tracing: cost of an operation in units of a tracing operation (lines through the origin).
     """
 
     flops: Sequence[float]
@@ -139,7 +139,7 @@ class StageFit:
 
     @property
     def best(self) -> Line:
-        """With a fixed cost where one can be fitted."""
+        """The line with a fixed cost if it can be fitted, else the line through the origin."""
         return self.affine or self.origin
 
 
@@ -157,7 +157,7 @@ def origin_line(x: Sequence[float], y: Sequence[float]) -> Line:
 
 
 def affine_line(x: Sequence[float], y: Sequence[float]) -> Line | None:
-    """Least squares with an offset; None where the abscissas are alike."""
+    """Least squares with an offset; None if the abscissas are equal."""
     a, b = np.asarray(x, float), np.asarray(y, float)
     if np.ptp(a) <= _ALIKE * np.abs(a).max():
         return None
@@ -191,7 +191,7 @@ def power_law(x: Sequence[float], y: Sequence[float]) -> PowerLaw:
 
 
 def _above_fixed(x: np.ndarray, y: np.ndarray) -> float | None:
-    """Exponent ``k`` of ``y = a + b x^k`` with ``a, b >= 0``, by least squares of the relative distances."""
+    """Exponent ``k`` of ``y = a + b x^k`` with ``a, b >= 0``, by least squares of the relative residuals."""
     from scipy.optimize import fminbound, nnls
 
     if len(x) < 4:
@@ -237,8 +237,8 @@ def exponents(cells: Sequence[Cell], centre: tuple[int, int]) -> dict[str, Power
 def advantages(cells: Sequence[Cell], fits: Mapping[str, StageFit]) -> list[dict[str, float]]:
     """Cycles per framed image at every setting: by the model, by the refitted model, and measured.
 
-    ``modelled`` takes the segments counted; ``refitted`` prices each stage by its line with a fixed cost where there is
-    one, ``refitted_origin`` without.
+    ``modelled`` takes the counted segments. ``refitted`` prices each stage by its line with a fixed cost if there is
+    one, ``refitted_origin`` by the line through the origin.
     """
     rows = []
     for cell in cells:
@@ -262,7 +262,7 @@ def advantages(cells: Sequence[Cell], fits: Mapping[str, StageFit]) -> list[dict
 def memory_growth(trace: MemoryTrace) -> dict[str, Any]:
     """Slope of resident memory over the cycles, the greatest rise after the warm-up, and both per output megapixel.
 
-    The looks of the first quarter are left out of ``slope_settled``: allocators may still reserve then.
+    ``slope_settled`` leaves out the first quarter of the readings, in which allocators may still reserve memory.
     """
     cycle, resident = np.asarray(trace.cycle, float), np.asarray(trace.resident_bytes, float)
     megapixels = trace.resolution_px**2 / MEGAPIXEL

@@ -1,5 +1,5 @@
 """The cost model as a report: costs per stage under every ledger, the admitted set, the equal-cost surface, and the
-model beside what this machine measures."""
+model beside measurements on this machine."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SURFACE_SIDES_PX = (64.0, 1536.0)
 
 
 def costs(p: CostParameters, ledger: Ledger) -> dict[str, Any]:
-    """Operations per cycle of every stage and in all, and of a framed image."""
+    """Operations per cycle of every stage and in total, and operations of a framed image."""
     stages = {name: float(value) for name, value in stage_flops(p, ledger).items()}
     adaptive = {**stages, "total": float(adaptive_flops(p, ledger))}
     return {"adaptive": adaptive, "nonadaptive": float(nonadaptive_flops(p, ledger))}
@@ -73,10 +73,10 @@ def modelled_ledgers(options: CostReportOptions) -> dict[str, dict[str, Any]]:
 
 
 def measured_ledgers(cell: Cell) -> dict[str, dict[str, Any]]:
-    """The ledgers ``work`` and ``wall`` at a measured setting; ``wall`` has the stage ``cache``, which no model has."""
+    """The ledgers ``work`` and ``wall`` at a measured setting; only ``wall`` has the stage ``cache``."""
     pixels = float(cell.resolution_px**2)
     work = {**costs(cell.parameters, "thesis"), "nonadaptive": cell.image_flops}
-    # the sum of medians is not quite the median of sums: the total is what a cycle takes
+    # the sum of medians is not quite the median of sums: the total is the measured time of a cycle
     wall = {"adaptive": {**cell.stage_s, "total": cell.cycle_s}, "nonadaptive": cell.image_s}
     return {"work": _ledger_entry(work, pixels, "FLOP"), "wall": _ledger_entry(wall, pixels, "s")}
 
@@ -84,12 +84,12 @@ def measured_ledgers(cell: Cell) -> dict[str, dict[str, Any]]:
 def conclusion(
     ledgers: Mapping[str, Mapping[str, Any]], chosen: str, settings: Sequence[Mapping[str, float]] = ()
 ) -> dict[str, Any]:
-    """Where it depends on the ledger whether a cycle is cheaper than an image.
+    """The ledgers and settings by which a cycle is cheaper than an image, and those by which it is not.
 
     Args:
-        ledgers: by name.
-        chosen: the one the others' admitted sets are compared with.
-        settings: advantages that were measured.
+        ledgers: entries by name.
+        chosen: the ledger with which the admitted sets of the others are compared.
+        settings: measured advantages.
     """
     cheaper = [name for name, entry in ledgers.items() if entry["advantage"] >= 1.0]
     dearer = [name for name in ledgers if name not in cheaper]
@@ -121,7 +121,7 @@ def sweeps(options: CostReportOptions) -> dict[str, Sweep]:
 
 
 def advantages_by_batch(options: CostReportOptions) -> tuple[Tensor, dict[str, Tensor]]:
-    """Batch sizes, and cycles per framed image at each under every modelled ledger."""
+    """Batch sizes, and the cycles per framed image at each of them under every modelled ledger."""
     import torch
 
     batch = torch.exp2(torch.linspace(4, 11, 281, dtype=torch.float64))
@@ -132,8 +132,8 @@ def advantages_by_batch(options: CostReportOptions) -> tuple[Tensor, dict[str, T
 def equal_cost_surface(options: CostReportOptions, steps: int = 61) -> PolyData:
     """Points (batch size, segments, output side in pixels) at which a cycle costs as much as an image (fig. 7.6).
 
-    ``ratio`` at each point is nonadaptive over adaptive cost, evaluated there. The surface is found as the zero of
-    their difference, which is linear in two of the axes and so interpolates without error along them.
+    ``ratio`` at each point is the nonadaptive over the adaptive cost there. The surface is the zero set of their
+    difference, which is linear along two of the axes, so interpolation along them is exact.
     """
     import numpy as np
     import pyvista
@@ -163,7 +163,7 @@ def equal_cost_surface(options: CostReportOptions, steps: int = 61) -> PolyData:
 
 
 def refitted(options: MeasurementOptions, measured: Measurement) -> dict[str, Any]:
-    """What the measurement says, with the model's constants refitted to it."""
+    """The measurement, and the model's constants refitted to it."""
     from analysis.cost_report.refit import advantages, exponents, memory_growth, refit
 
     fits = refit(measured.cells)
@@ -202,10 +202,10 @@ _FILES = ("fig_7_*.png", "fig_7_6.vtp", "advantage.png", "refit.png", "scaling.p
 
 
 def write_report(options: CostReportOptions) -> dict[str, Any]:
-    """Measures if asked to, writes figures, the surface and the summary to ``options.out``.
+    """Measures if asked to, and writes figures, the surface and the summary to ``options.out``.
 
     Returns:
-        What is in ``summary.json``.
+        The content of ``summary.json``.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -235,7 +235,7 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
 
 
 def _draw(options: CostReportOptions, summary: Mapping[str, Any]) -> None:
-    """Figures of the model, and of the measurement where there is one."""
+    """Figures of the model, and of the measurement if there is one."""
     from analysis.cost_report import plots
 
     out, measurement, title = options.out, summary["measurement"], f"ledger {options.ledger}"

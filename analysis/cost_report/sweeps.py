@@ -1,4 +1,4 @@
-"""The cost model over grids of parameters: what is admitted, where costs are equal, and curves along one parameter."""
+"""The cost model over grids of parameters: admitted combinations, equal cost, and curves along one parameter."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def crossing_batch(p: CostParameters, ledger: Ledger = "thesis", most: float = 2
     """Batch size at which a cycle costs as much as a framed image, by bisection.
 
     Returns:
-        None where a cycle of one framelet already costs more, or one of ``most`` framelets still less.
+        The batch size; None if a cycle of one framelet costs more than an image, or one of ``most`` framelets less.
     """
     low, high = 1.0, most
     if not admitted(replace(p, batch_size=low), ledger) or admitted(replace(p, batch_size=high), ledger):
@@ -64,7 +64,7 @@ def sweep(p: CostParameters, name: str, values: Tensor, ledger: Ledger = "thesis
     varied = replace(p, **{name: values})
 
     def per_pixel(cost: Value) -> Tensor:
-        # stages that do not depend on what varies come out as one number
+        # stages that do not depend on the parameter give one number
         return cost / varied.recon_res * values.new_ones(values.shape)
 
     stages = {stage: per_pixel(cost) for stage, cost in stage_flops(varied, ledger).items()}

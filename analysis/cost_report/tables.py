@@ -12,7 +12,7 @@ _MIB = 2.0**20
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
-    """Every table, the ones of the measurement where there is one."""
+    """Every table, with those of the measurement if there is one."""
     found = [ledger_table(name, entry) for name, entry in summary["ledgers"].items()]
     found.append(advantage_table(summary))
     measurement = summary["measurement"]
@@ -44,7 +44,7 @@ def ledger_table(name: str, entry: Mapping[str, Any]) -> Table:
 
 
 def advantage_table(summary: Mapping[str, Any]) -> Table:
-    """Cycles per framed image under every ledger, and where the conclusion changes."""
+    """Cycles per framed image under every ledger, and the settings at which the conclusion changes."""
     found, rows = summary["conclusion"], []
     for name, entry in summary["ledgers"].items():
         shown = (name, f"{entry['advantage']:.2f}")
@@ -79,7 +79,7 @@ def _conclusion(summary: Mapping[str, Any]) -> str:
 
 
 def refit_table(measurement: Mapping[str, Any]) -> Table:
-    """What a modelled operation of each stage takes here."""
+    """Seconds of a modelled operation of each stage on this machine."""
 
     def r2(value: float | None) -> str:
         return "" if value is None else f"{value:.3f}"

@@ -1,4 +1,4 @@
-"""Metrics by name: what is measured of a display beside its mean squared errors."""
+"""Metrics by name, which are measured beside the mean squared errors."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ else:
 @dataclass(frozen=True)
 @closed_choices("metric.")
 class Metric:
-    """A measure of how far a display is from the reference.
+    """A measure of the difference between a display and the reference.
 
     Attributes:
         better: whether lower or higher values are better.
-        image: of two display-encoded images in [0, 1], ``(h, w, 3)``: shown and reference; None for a metric of
-            sequences.
-        sequence: of two sequences of display-encoded images ``(count, h, w, 3)`` uint8, their rate and the display.
-        unit: of its values; empty for plain numbers.
+        image: function of two display-encoded images in [0, 1], ``(h, w, 3)``, shown and reference; None for a metric
+            of sequences.
+        sequence: function of two sequences of display-encoded images ``(count, h, w, 3)`` uint8, their rate in Hz and
+            the display; None for a metric of images.
+        unit: unit of its values; empty for plain numbers.
     """
 
     better: Literal["lower", "higher"]

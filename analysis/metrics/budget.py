@@ -1,4 +1,4 @@
-"""Where the squared error of an image lies: shares that add up to it, and the least that its latency leaves.
+"""Division of the squared error of an image into shares that add up to it, and the floor that its latency sets.
 
 With D the image on the display, R the picture now, R' the picture at the time that the image shows, and S(R') what the
 image's own blends of pixels would show of R', all display-encoded,
@@ -7,12 +7,12 @@ image's own blends of pixels would show of R', all display-encoded,
               =  estimates  +      blur    +  latency.
 
 The share of a term is the mean of ``term * e`` over pixels and channels. Shares add up to the mean of ``e²``, and each
-is what putting the term right takes away, averaged over all orders in which the three could be put right (its Shapley
-value). A share is negative where a term offsets the others. The estimates' share is divided by the pixel, so that it is
-exact too: places that came into sight, else places where the light changed, else the rest, where only too few samples
-or samples beside their pixels are left to blame: aliasing.
+is the reduction of the error when the term is removed, averaged over all orders in which the three can be removed (its
+Shapley value). A share is negative if the term offsets the others. The share of the estimates is divided by pixels,
+which is exact too: pixels that came into sight, else pixels where the light changed, else the rest. In the rest only
+too few samples, or samples off the pixel's centre, can be the cause: aliasing.
 
-:mod:`analysis.metrics.causes` asks another question, by the age of each place's samples, and its parts are mean squares
+:mod:`analysis.metrics.causes` divides the error in another way, by the age of each place's samples, into mean squares
 with a remainder.
 """
 
@@ -32,11 +32,11 @@ SHARES = ("latency", "blur", "disocclusion", "shadows", "aliasing")
 
 @dataclass(frozen=True)
 class Places:
-    """Pixels whose past differs; none is both.
+    """Pixels whose recent past differs; no pixel is in both sets.
 
     Attributes:
-        uncovered: what they show was hidden, or outside the picture, shortly before.
-        relit: what they show was seen then, and the first light reached it then or reaches it now, not both.
+        uncovered: pixels whose surface was hidden, or outside the picture, shortly before.
+        relit: pixels whose surface was visible then, and which the first light reaches at one of the two times only.
     """
 
     uncovered: Bool[Tensor, "h w"]
@@ -53,15 +53,15 @@ def budget(
     """Shares of one image's error.
 
     Args:
-        shown: the image on the display, linear; what is not finite counts as 0.
-        carried: what its blends show of ``late``, linear.
-        late: the truth at the time that the image shows, linear.
-        now: the truth, linear.
+        shown: the image on the display, linear; non-finite values count as 0.
+        carried: ``late`` after the image's blends of pixels, S(R'), linear.
+        late: the truth at the time that the image shows, R', linear.
+        now: the truth now, R, linear.
         places: pixels whose past differs, at the time that the image shows.
 
     Returns:
-        Each of :data:`SHARES`, squared display-encoded values; they add up to the mean squared error. ``floor``, the
-        mean squared error of ``late``; ``uncovered`` and ``relit``, shares of the pixels.
+        Each of :data:`SHARES`, squared display-encoded values, which add up to the mean squared error; ``floor``, the
+        mean squared error of ``late``; and ``uncovered`` and ``relit``, shares of the pixels.
     """
     display, kept, old, wanted = (
         encode(image).to(torch.float64) for image in (shown.nan_to_num(0.0, 0.0, 0.0), carried, late, now)

@@ -1,12 +1,12 @@
-"""Why an image differs from the reference: aliasing, blur, lag; and how much of it flickers.
+"""Causes of the difference between an image and the reference: aliasing, blur and lag; and its flicker.
 
 With D the image on the display, R the reference now, R' the reference at the age of the samples shown in each place,
-and B the most that samples as dense as those shown could carry of R', all display-encoded,
+and B the part of R' that samples of the density shown can carry, all display-encoded,
 
     D - R = (D - B) + (B - R') + (R' - R)
           = aliasing + blur + lag.
 
-Older samples that are blended into D count in the first term too. The mean squares of the three terms do not add up to
+Older samples that are blended into D also count in the first term. The mean squares of the three terms do not add up to
 that of the sum: twice the sum of their products remains and is reported as ``mixed``. R' is the nearest reference image
 in time, so lag is known to half the interval of the reference.
 
@@ -44,11 +44,12 @@ class Split:
     """The causes of one image's error.
 
     Attributes:
-        causes: mean over pixels and channels of each of :data:`CAUSES`, all pixels; they sum to ``mse``.
-        regions: the same per region, as sums over its pixels divided by all pixels, so that regions add up.
-        share: of the pixels in each region.
-        mse: of the pixels whose truth at their own age is known.
-        known: share of those; samples older than the first reference image have none.
+        causes: mean of each of :data:`CAUSES` over the known pixels and all channels; they sum to ``mse``.
+        regions: the same for each region, as sums over its pixels divided by all known pixels, so that regions add up.
+        share: share of the known pixels in each region.
+        mse: mean squared error of the known pixels.
+        known: share of the pixels whose truth at their own age is known; it is unknown for samples older than the
+            first reference image.
     """
 
     causes: dict[str, float]
@@ -59,7 +60,7 @@ class Split:
 
 
 class Truths:
-    """Reference images by number; the newest are kept. Changes in place."""
+    """Reference images by number, with the newest kept in memory. Changes in place."""
 
     def __init__(self, images: Images, start_s: float, rate_hz: float, count: int) -> None:
         self._images, self._start_s, self._rate_hz, self.count = images, start_s, rate_hz, count
@@ -74,18 +75,18 @@ class Truths:
         return self._kept[number]
 
     def nearest(self, time_s: Float[Tensor, "*n"]) -> tuple[Int64[Tensor, "*n"], Bool[Tensor, "*n"]]:
-        """Number of the reference image nearest in time, and whether the time lies within the reference."""
+        """Number of the reference image nearest to each time, and whether the time lies within the reference."""
         number = torch.floor((time_s - self._start_s) * self._rate_hz + 0.5)
         known = (number >= 0) & (number < self.count)
         return torch.where(known, number, 0.0).to(torch.int64), known
 
     def at(self, time_s: float) -> Float[Tensor, "h w 3"]:
-        """Nearest reference image, the first or last one beyond them."""
+        """Nearest reference image; before and after all of them, the first and the last."""
         number = round((time_s - self._start_s) * self._rate_hz)
         return self.image(min(max(number, 0), self.count - 1))
 
     def of_age(self, samples: SampleMap, side: int) -> tuple[Float[Tensor, "h w 3"], Bool[Tensor, "h w"]]:
-        """The truth in each place at the time of the newest sample shown there, and where it is known."""
+        """The truth in each place at the time of the newest sample shown there, and the places where it is known."""
         number, known = self.nearest(samples.newest_s)
         number, known = _to_pixels(number, side), _to_pixels(known, side)
         image = torch.zeros(side, side, 3)
@@ -100,9 +101,9 @@ def _to_pixels(field: Tensor, side: int) -> Tensor:
 
 
 def carried(image: Float[Tensor, "h w 3"], level: Int64[Tensor, "side side"], framelet_side: int) -> Tensor:
-    """What samples as dense as a tile's of each level hold of an image: box average, bilinear between.
+    """The part of an image that samples of a tile's density at each level carry: box averages, bilinear in between.
 
-    Where samples are at most a pixel apart that is the image itself.
+    Where samples are at most a pixel apart, that is the image itself.
     """
     side = image.shape[0]
     pixels, result = _to_pixels(level, side), image
@@ -117,10 +118,10 @@ def carried(image: Float[Tensor, "h w 3"], level: Int64[Tensor, "side side"], fr
 
 
 def regions_of(now: Float[Tensor, "h w 3"], before: Float[Tensor, "h w 3"]) -> Int64[Tensor, "h w"]:
-    """Region of each pixel, a number into :data:`REGIONS`, from two encoded reference images.
+    """Region of each pixel, an index into :data:`REGIONS`, from two encoded reference images.
 
-    Moving is a change by more than two of 255 steps in some channel nearby, detailed a difference of more than eight
-    to some pixel nearby; nearby is a square of 9 pixels.
+    A pixel is moving if a channel changes by more than two of 255 steps at some pixel of the 9 x 9 pixels around it. It
+    is detailed if a channel varies by more than eight steps over the 3 x 3 pixels around one of these pixels.
     """
     moving = (now - before).abs().amax(2) > _STILL
     planes = now.permute(2, 0, 1)[None]
@@ -138,10 +139,10 @@ def split(
     Args:
         shown: image on the display.
         samples: age and density of its samples.
-        number: of the reference time.
+        number: number of the reference time.
         truths: reference images.
         framelet_side: samples along a framelet's side.
-        step: reference images back to which motion is judged.
+        step: number of reference images back with which the image is compared to find motion.
     """
     side = shown.shape[0]
     old, known = truths.of_age(samples, side)
@@ -175,7 +176,7 @@ def flicker(
 ) -> float:
     """Half the mean squared change of the error where the reference stands still, over all pixels.
 
-    For an error that is independent from one time to the next this is its variance. All images display-encoded.
+    For an error that is independent from one time to the next this is its variance. All images are display-encoded.
     """
     still = ((reference - reference_before).abs().amax(2) <= _STILL).to(torch.float64)
     change = (error - error_before).square().mean(2, dtype=torch.float64)

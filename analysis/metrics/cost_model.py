@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Value = float | Tensor
 else:
-    # what the command line reads
+    # read by the command line
     Value = float
 
 Ledger = Literal["thesis", "printed", "summed", "work", "wall"]
@@ -109,7 +109,7 @@ def _log2(value: Value) -> Value:
 
 
 def per_traversal(p: CostParameters, ledger: Ledger = "thesis") -> Value:
-    """FLOPs to trace one segment to its end, without shading."""
+    """FLOPs to trace one ray segment, without shading."""
     if ledger == "summed":
         return _log2(p.tree_size) * p.per_bvh_node + p.per_triangle
     return _log2(p.tree_size) * p.per_bvh_node * p.per_triangle
@@ -118,7 +118,7 @@ def per_traversal(p: CostParameters, ledger: Ledger = "thesis") -> Value:
 def per_segment(p: CostParameters, ledger: Ledger = "thesis") -> Value:
     """FLOPs per ray segment: the unit price of a counted ray in the ledger ``work``, whatever the kind of ray.
 
-    The thesis prices all segments alike (sec. 7.1.2.2).
+    The thesis gives all segments the same price (sec. 7.1.2.2).
     """
     return per_traversal(p, ledger) + p.per_shader
 
@@ -146,7 +146,7 @@ def reconstruction_flops(p: CostParameters) -> Value:
 def stage_flops(p: CostParameters, ledger: Ledger = "thesis") -> dict[str, Value]:
     """FLOPs per cycle of each stage in :data:`STAGES` (*per_entry* in the thesis).
 
-    For ``work`` and ``wall``, which measure, this is what ``thesis`` expects.
+    For ``work`` and ``wall``, which are measured, these are the values of ``thesis``.
     """
     return {
         "selection": p.tiling_size * 1 + p.batch_size * 2,
@@ -169,7 +169,7 @@ def nonadaptive_flops(p: CostParameters, ledger: Ledger = "thesis", samples_per_
 
 
 def advantage(p: CostParameters, ledger: Ledger = "thesis") -> Value:
-    """How many cycles the adaptive pipeline completes in the time of one framed image."""
+    """Number of cycles that the adaptive pipeline completes in the time of one framed image."""
     return nonadaptive_flops(p, ledger) / adaptive_flops(p, ledger)
 
 
@@ -182,7 +182,7 @@ def work_flops(p: CostParameters, counters: Mapping[str, int]) -> float:
     """FLOPs of counted rays, each at the price of one segment under ``thesis``.
 
     Raises:
-        ValueError: the counters hold none of :data:`RAYS`.
+        ValueError: the counters have none of :data:`RAYS`.
     """
     rays = [counters[name] for name in RAYS if name in counters]
     if not rays:
@@ -203,11 +203,11 @@ def control_flops(p: CostParameters, price: Price, ledger: Ledger = "thesis") ->
 
 
 def measured_parameters(p: CostParameters, counters: Mapping[str, float]) -> CostParameters:
-    """Parameters with what a cycle drew: the framelets that were accumulated at each pixel, where that was counted.
+    """Parameters with the overdraw of a cycle: the framelets accumulated at each pixel, if they were counted.
 
     Args:
         p: scalars.
-        counters: work of one cycle, by name; ``framelet_pixels`` are those of all framelets that were accumulated.
+        counters: work of one cycle, by name; ``framelet_pixels`` counts the pixels of all accumulated framelets.
     """
     drawn = counters.get("framelet_pixels", 0)
     return replace(p, avg_recon_overdraw=drawn / p.recon_res) if drawn > 0 else p
@@ -220,14 +220,14 @@ def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters, price: Pri
     """Clock of a policy: ``(counters, wall_s) -> seconds`` of one cycle.
 
     Args:
-        ledger: how cost is counted; ``wall`` returns the measured seconds, ``work`` the counted rays and what is
-            modelled beside them. Reconstruction is charged for the framelets that were drawn, where they are counted.
+        ledger: how cost is counted; ``wall`` returns the measured seconds, ``work`` prices the counted rays and the
+            modelled control stages. Reconstruction is charged for the framelets drawn, if they are counted.
         capacity: FLOP/s of the simulated machine.
         p: scalars.
-        price: of a cycle of the policy.
+        price: price of a cycle of the policy.
 
     Raises:
-        ValueError: the ledger is not known, or the capacity is not positive and finite.
+        ValueError: the ledger is unknown, or the capacity is not positive and finite.
     """
     if ledger not in LEDGERS:
         raise ValueError(f"ledger: expected one of {', '.join(LEDGERS)}, got {ledger!r}")
@@ -243,13 +243,13 @@ def cycle_seconds(ledger: Ledger, capacity: float, p: CostParameters, price: Pri
 
 
 def expected_ledger(ledger: Ledger) -> Ledger:
-    """The ledger that predicts this one before a run: rays that will be counted are predicted by ``thesis``."""
+    """The ledger that predicts this one before a run: ``thesis`` predicts the rays that ``work`` will count."""
     return "thesis" if ledger == "work" else ledger
 
 
 def parameters_of(config: TsarConfig, trace_segments: float) -> CostParameters:
-    """Parameters for a configuration of the pipeline. Parameters that it does not set keep the values of table 7.1; how
-    much reconstruction draws is known of a run only: see :func:`measured_parameters`."""
+    """Parameters for a configuration of the pipeline. Parameters that it does not set keep the values of table 7.1. The
+    overdraw of the reconstruction is known only after a run: see :func:`measured_parameters`."""
     return CostParameters(
         batch_size=config.batch_size,
         sdf_size=config.sdf_side**2,

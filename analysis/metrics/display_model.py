@@ -1,4 +1,4 @@
-"""The display that a perceptual score holds for. Imports little, because command lines are made from it."""
+"""The display that a perceptual score assumes. Imports little, because command lines are made from it."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from tsar.config import require
 
 @dataclass(frozen=True)
 class DisplayModel:
-    """The display a score holds for; it stands in every record."""
+    """The display that a score assumes; every record names it."""
 
     name: str = "standard_fhd"
     """A display of ColorVideoVDP: size, distance, luminance."""
     rate_hz: float = 60.0
-    """Declared rate. The same pixels score differently at another one."""
+    """Refresh rate, Hz. The same pixels score differently at another rate."""
 
     def __post_init__(self) -> None:
         require(self.rate_hz in (60.0, 120.0), "display.rate_hz", "60 or 120", self.rate_hz)
 
     def repeats(self, image_rate_hz: float) -> int:
-        """Refreshes for which each of the images stays on the display.
+        """Number of refreshes for which each image stays on the display.
 
         Raises:
-            ConfigError: it is not a whole number.
+            ConfigError: the number is not an integer.
         """
         count = round(self.rate_hz / image_rate_hz)
         fits = count >= 1 and abs(count * image_rate_hz - self.rate_hz) < 1e-6

@@ -1,4 +1,4 @@
-"""What settings cost and how far off they are: the front of those that nothing beats, its knee, and how sure it is."""
+"""The Pareto front of cost and error, its knee, and the uncertainty of both."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ Indices = NDArray[np.intp]
 
 
 def on_front(costs: Floats, errors: Floats) -> Flags:
-    """Which points no other point beats: none costs at most as much, errs at most as much, and is less in one of them.
+    """The points on the Pareto front: no other point has at most the cost and the error, and less of one of them.
 
     Points that are equal in both are on the front together. A point that is not finite is not on it.
 
     Args:
-        costs, errors: one value a point.
+        costs, errors: one value for each point.
 
     Raises:
-        ValueError: there are not as many of the one as of the other.
+        ValueError: the numbers of costs and errors differ.
     """
     costs, errors = np.asarray(costs, np.float64), np.asarray(errors, np.float64)
     if costs.shape != errors.shape or costs.ndim != 1:
@@ -40,21 +40,21 @@ def on_front(costs: Floats, errors: Floats) -> Flags:
 
 
 def knee(costs: Floats, errors: Floats) -> int:
-    """The point of the front from which less cost or less error is dearest.
+    """The knee of the front.
 
-    Both axes are logarithmic and scaled to the front's extent. The knee is the point that lies farthest below the line
-    from the cheapest point of the front to the most accurate one: ``max (1 - x - y)``.
+    Both axes are logarithmic and scaled to the extent of the front, so that ``x`` and ``y`` are in [0, 1]. The knee is
+    the point farthest below the line from the cheapest point to the most accurate one: ``max (1 - x - y)``.
 
     Source: Das 1999, "On characterizing the 'knee' of the Pareto curve based on normal-boundary intersection".
 
     Args:
-        costs, errors: positive, one value a point; at least one is finite.
+        costs, errors: positive, one value for each point; at least one point is finite.
 
     Returns:
-        Number of the point; where no point of the front lies below the line, that of the cheapest.
+        Index of the point; that of the cheapest if no point of the front lies below the line.
 
     Raises:
-        ValueError: there is no front, or a value of it is not positive.
+        ValueError: there is no front, or one of its values is not positive.
     """
     front = _ordered_front(costs, errors)
     if not len(front):
@@ -67,7 +67,7 @@ def knee(costs: Floats, errors: Floats) -> int:
 
 
 def _ordered_front(costs: Floats, errors: Floats) -> Indices:
-    """Numbers of the points on the front by rising cost; of those that are equal, the first."""
+    """Indices of the points on the front by rising cost; of equal points only the first."""
     costs, errors = np.asarray(costs, np.float64), np.asarray(errors, np.float64)
     flat = np.flatnonzero(on_front(costs, errors))
     _, first = np.unique(np.stack((costs[flat], errors[flat])), axis=1, return_index=True)
@@ -81,20 +81,20 @@ def _scaled(values: Floats) -> Floats:
 
 
 def least_error(costs: Floats, errors: Floats, budgets: Floats) -> Floats:
-    """The least error that each budget buys; infinite where it buys nothing."""
+    """The least error within each budget; infinite where no point is within it."""
     affordable = np.asarray(costs)[:, None] <= np.asarray(budgets)[None, :]
     return np.where(affordable, np.asarray(errors, np.float64)[:, None], np.inf).min(axis=0, initial=np.inf)
 
 
 @dataclass(frozen=True)
 class Bands:
-    """How a front varies with the runs that it was measured on.
+    """Variation of a front with the runs on which it was measured.
 
     Attributes:
-        budgets: costs at which it was looked at.
-        low, high: quantiles of the least error at each; infinite where too little was affordable.
-        on_front: of each point, the share of the draws in which it is on the front.
-        at_knee: and in which it is the knee.
+        budgets: costs at which the front is evaluated.
+        low, high: quantiles of the least error at each budget; infinite where too few draws have a point within it.
+        on_front: for each point, the share of the draws in which it is on the front.
+        at_knee: for each point, the share of the draws in which it is the knee.
     """
 
     budgets: Floats
@@ -105,18 +105,19 @@ class Bands:
 
 
 def means(values: Floats) -> Floats:
-    """Geometric means over runs. ``values`` has a row a point and a column a run."""
+    """Geometric means over runs. ``values`` has a row for each point and a column for each run."""
     return np.exp(np.log(values).mean(axis=1))
 
 
 def bootstrap(costs: Floats, errors: Floats, budgets: Floats, draws: int = 1000, seed: int = 0) -> Bands:
-    """Bands of the front of geometric means, from runs drawn with replacement, the same for all points.
+    """Bootstrap of the front of geometric means, over runs drawn with replacement, the same for all points.
 
     Args:
-        costs, errors: a row a point and a column a run (an input at a seed), positive and finite, at least one of each.
-        budgets: costs at which the front is looked at.
-        draws: how often.
-        seed: of the draws.
+        costs, errors: a row for each point and a column for each run (an input at a seed), positive and finite, with
+            at least one of each.
+        budgets: costs at which the front is evaluated.
+        draws: number of bootstrap draws.
+        seed: seed of the draws.
 
     Returns:
         Quantiles of 2.5 and 97.5 %, and shares of the draws.
@@ -130,13 +131,13 @@ def bootstrap(costs: Floats, errors: Floats, budgets: Floats, draws: int = 1000,
         shares[0] += on_front(cost, error)
         shares[1, knee(cost, error)] += 1
         least[number] = least_error(cost, error, budgets)
-    # the nearest of the draws, as an infinite neighbour cannot be interpolated
+    # the nearest draw, because interpolation with an infinite neighbour fails
     low, high = (np.quantile(least, share, axis=0, method="nearest") for share in (0.025, 0.975))
     return Bands(np.asarray(budgets, np.float64), low, high, shares[0] / draws, shares[1] / draws)
 
 
 def interval(values: Floats, draws: int = 1000, seed: int = 0) -> tuple[float, float]:
-    """Quantiles of 2.5 and 97.5 % of the geometric mean of runs that are drawn with replacement."""
+    """Quantiles of 2.5 and 97.5 % of the geometric mean over runs drawn with replacement."""
     found = [float(means(values[None, drawn])[0]) for drawn in _draws(len(values), draws, seed)]
     low, high = np.quantile(found, (0.025, 0.975))
     return float(low), float(high)

@@ -1,6 +1,6 @@
-"""Perceptual metrics of what a display shows, on display-encoded images: JOD, FLIP, SSIM.
+"""Perceptual metrics of display-encoded images: JOD, FLIP, SSIM.
 
-All run on one thread, because the libraries do not promise the same bits for another number of threads.
+All run on one thread, because the libraries do not guarantee the same bits for another number of threads.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Frames = NDArray[np.uint8]
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Torch operations of the block run on one thread."""
+    """Runs the torch operations of the block on one thread."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -54,7 +54,7 @@ def jod(test: Frames, reference: Frames, image_rate_hz: float, display: DisplayM
     logging.getLogger("pycvvdp").setLevel(logging.ERROR)
     import pycvvdp
 
-    # the metric draws a progress bar of its own on standard error
+    # the metric prints a progress bar on standard error
     with one_thread(), torch.no_grad(), contextlib.redirect_stderr(io.StringIO()):
         metric = pycvvdp.cvvdp(display_name=display.name, device=torch.device("cpu"), quiet=True)
         shown = [np.repeat(frames, repeats, axis=0) for frames in (test, reference)]

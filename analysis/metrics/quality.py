@@ -1,8 +1,8 @@
-"""Quality of what a display shows against a reference, as a stream: two images are held at a time.
+"""Errors of the image on a display against a reference, as a stream that holds two images at a time.
 
-The main error is the MSE of display-encoded images (sRGB, clipped to [0, 1]): that is what a viewer is shown, it is
-bounded, and a highlight a hundred times brighter than white cannot outvote the rest of the picture as it would in
-linear radiance. Beside it stands the MSE of log-compressed radiance, which keeps what clipping hides.
+The main error is the MSE of display-encoded images (sRGB, clipped to [0, 1]). It is the error that a viewer sees. It is
+bounded, so a highlight a hundred times brighter than white cannot dominate the rest of the picture as it would in
+linear radiance. The MSE of log-compressed radiance is the second error; it keeps the differences that clipping hides.
 
 Source: Stephens 2011, sec. 7.2.3.
 """
@@ -32,19 +32,19 @@ Payload = TypeVar("Payload")
 
 
 Shown = tuple[StepRecord | None, ShownImage]
-"""A record, where the policy makes any, and its image."""
+"""A record, if the policy makes any, and its image."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What all displays show at one reference time.
+    """The images on all displays at one reference time.
 
     Attributes:
-        number: of the reference time.
-        time_s: simulated time.
+        number: index of the reference time.
+        time_s: simulated time, seconds.
         reference: ``(h, w, 3)`` linear RGB.
-        shown: by name of the run; records and images of the cycles whose images are on the displays.
-        mse: mean squared error of each.
+        shown: records and images of the cycles whose images are on the displays, by name of the run.
+        mse: mean squared error of each run.
     """
 
     number: int
@@ -64,18 +64,18 @@ def reference_times(start_s: float, end_s: float, rate_hz: float) -> Floats:
         raise ValueError(
             f"reference times: expected end_s > start_s and rate_hz > 0, got {start_s}, {end_s}, {rate_hz}"
         )
-    # rounding keeps 0.3 s at 60 Hz at 18 images, not 19
+    # rounding, so that 0.3 s at 60 Hz have 18 images, not 19
     return start_s + np.arange(math.ceil(round((end_s - start_s) * rate_hz, 6))) / rate_hz
 
 
 class Hold(Generic[Payload]):
-    """What a display shows at any time: the last image that was put on it, unchanged until the next.
+    """The image on a display at any time: the last one that was put on it, unchanged until the next.
 
     Consumes a stream of images and holds two of them.
 
     Attributes:
-        refresh_s: display times of the images that have been shown so far.
-        nonfinite: values of those images that are not finite.
+        refresh_s: display times of the images that have been shown so far, seconds.
+        nonfinite: number of non-finite values in these images.
     """
 
     def __init__(self, displays: Iterable[tuple[Payload, ShownImage]]) -> None:
@@ -89,7 +89,7 @@ class Hold(Generic[Payload]):
         """The image on the display at ``time_s``; times must not decrease.
 
         Raises:
-            InputError: nothing has been displayed by then.
+            InputError: no image has been displayed by then.
         """
         while self._next is not None and self._next[1].display_time_s <= time_s:
             self._current = self._next
@@ -103,7 +103,7 @@ class Hold(Generic[Payload]):
 
 
 def encode(image: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
-    """Linear radiance as a display shows it: clipped to [0, 1] and sRGB-encoded."""
+    """Linear radiance encoded for a display: clipped to [0, 1] and sRGB-encoded."""
     return linear_rgb_to_rgb(image.clamp(0.0, 1.0).permute(2, 0, 1)).permute(1, 2, 0)
 
 
@@ -112,9 +112,9 @@ class PixelErrors:
     """Errors of one image.
 
     Attributes:
-        mse: of display-encoded values in [0, 1], mean over pixels and channels.
-        log_mse: of ``log(1 + radiance)``.
-        nonfinite: values of the image that were not finite; they count as 0.
+        mse: MSE of display-encoded values in [0, 1], mean over pixels and channels.
+        log_mse: MSE of ``log(1 + radiance)``.
+        nonfinite: number of non-finite values in the image; they count as 0.
     """
 
     mse: float
@@ -133,12 +133,12 @@ def pixel_errors(
     Deviation: the mean runs over pixels and channels; the printed ``1 / N`` before ``N²`` terms would scale with size.
 
     Args:
-        image: what is shown.
-        reference: the truth.
-        encoded: the truth as :func:`encode` gives it, where that is known already.
+        image: the image on the display.
+        reference: the reference.
+        encoded: ``encode(reference)``, if it is known already.
 
     Returns:
-        The errors, and the image as :func:`encode` gives it.
+        The errors, and ``encode(image)``.
 
     Raises:
         ValueError: the shapes differ.
@@ -155,7 +155,8 @@ def pixel_errors(
 
 
 def ratio(adaptive: Floats, framed: Floats) -> Floats:
-    """``mse_adaptive / mse_framed``; 1 where both are 0, inf where only the framed one is, NaN where either is NaN.
+    """``mse_adaptive / mse_framed``; 1 where both are 0, infinite where only the framed one is 0, NaN where either is
+    NaN.
 
     Source: Stephens 2011, eq. 7.2.
     """
@@ -182,7 +183,7 @@ def suitable_percentile(ratios: Floats) -> float:
     """Greatest ``p`` in [0, 100] such that the ``p``-th percentile of the ratios is at most 1.
 
     With linear interpolation the percentile is continuous and increasing in ``p``, so the greatest one lies where the
-    line between two neighbours crosses 1. It is 100 where all are at most 1 and 0 where none is.
+    line between two neighbours crosses 1. It is 100 if all ratios are at most 1, and 0 if none is.
 
     Source: Stephens 2011, sec. 7.2.5 and table 7.2.
 

@@ -1,4 +1,4 @@
-"""The best rival: at each moment the best of all rivals that ran, and how a policy stands beside it."""
+"""The best rival, which is at each moment the best of all rivals that ran, and the comparison of a policy with it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from analysis.metrics.quality import Floats
 
 BEST = "best-rival"
-"""Its name in tables."""
+"""Name of the best rival in tables."""
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,9 @@ class Standing:
     """A policy beside another one, by one metric.
 
     Attributes:
-        times: moments at which both were measured.
-        share: of these, at how many the policy is at least as good; NaN where there are none.
-        ratio: its median over the other's; NaN where there are none, infinite where only the other's is 0.
+        times: number of moments at which both were measured.
+        share: share of these moments at which the policy is at least as good; NaN if there are none.
+        ratio: median of the policy over that of the other; NaN if there are none, infinite if only the other's is 0.
     """
 
     times: int
@@ -29,11 +29,11 @@ class Standing:
 
 
 def best_of(traces: Iterable[Floats], sign: int = -1) -> Floats:
-    """The best value at each moment, NaN where no trace has one.
+    """The best value at each moment; NaN where no trace has one.
 
     Args:
-        traces: of the same moments, NaN where not measured.
-        sign: 1 where more is better, -1 where less is.
+        traces: values at the same moments, NaN where not measured.
+        sign: 1 if higher is better, -1 if lower is better.
 
     Raises:
         ValueError: there are no traces.
@@ -45,7 +45,7 @@ def best_of(traces: Iterable[Floats], sign: int = -1) -> Floats:
 
 
 def best_shares(traces: Mapping[str, Floats], sign: int = -1) -> dict[str, float]:
-    """Share of the moments at which each trace is the best one; where several are, each counts."""
+    """Share of the moments at which each trace is the best one; equally good traces all count."""
     best = best_of(traces.values(), sign)
     known = ~np.isnan(best)
     count = max(int(known.sum()), 1)
@@ -53,11 +53,11 @@ def best_shares(traces: Mapping[str, Floats], sign: int = -1) -> dict[str, float
 
 
 def standing(own: Floats, other: Floats, sign: int = -1) -> Standing:
-    """How a policy stands beside another one.
+    """Compares a policy with another one.
 
     Args:
-        own, other: values of the same moments, NaN where not measured.
-        sign: 1 where more is better, -1 where less is.
+        own, other: values at the same moments, NaN where not measured.
+        sign: 1 if higher is better, -1 if lower is better.
     """
     own, other = np.asarray(own, np.float64), np.asarray(other, np.float64)
     known = ~np.isnan(own) & ~np.isnan(other)

@@ -1,8 +1,8 @@
-"""Lets ``torchvision`` be imported where its compiled extension does not load.
+"""Makes ``torchvision`` importable where its compiled extension does not load.
 
-The metric ColorVideoVDP imports ``torchvision`` but uses none of its operators. Beside a CPU build of torch the
-compiled extension of ``torchvision`` is not found, and its import fails at a fake implementation of the operator
-``torchvision::nms``, which is not declared then. Declaring the schemas is enough for the import to succeed.
+The metric ColorVideoVDP imports ``torchvision`` but uses none of its operators. With a CPU build of torch the
+compiled extension of ``torchvision`` does not load, and the import fails at a fake implementation of the operator
+``torchvision::nms``, which is then not declared. Declaring the schemas is enough for the import to succeed.
 """
 
 from __future__ import annotations
