@@ -1,6 +1,6 @@
 """A ray tracer for framelet batches and whole frames, on NVIDIA Warp.
 
-Names of its modules that others use are offered here; each is imported when it is first asked for.
+It exports the names of its modules that others use; each is imported at its first access.
 """
 
 from typing import TYPE_CHECKING

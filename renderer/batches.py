@@ -1,4 +1,4 @@
-"""Batches of samples: what is refused, and how packets take them at little cost beside the tracing itself."""
+"""Batches of samples: their validation, and their hand-over to packets with little overhead."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from tsar.types import FrameletBatch, Hits
 
 
 def checked(batch: FrameletBatch) -> FrameletBatch:
-    """A batch that can be traced; its times are one number where all are the same.
+    """The batch after validation. Its times become one number where all are equal.
 
     Raises:
-        ValueError: if the shapes do not fit, times are not float64, or a time or footprint is not what it may be.
+        ValueError: if shapes do not match, times are not float64 or not finite, or a footprint is not finite and above
+            0.
     """
     shape, time_s, footprint = tuple(batch.position.shape), batch.time_s, batch.footprint
     times = tuple(time_s.shape) if isinstance(time_s, Tensor) else shape[:2]
@@ -45,28 +46,29 @@ def checked(batch: FrameletBatch) -> FrameletBatch:
 
 
 def bounds(values: Tensor) -> tuple[float, float]:
-    """Least and greatest value; NaN where there is one."""
-    # by NumPy: a parallel reduction by torch leaves its threads spinning for milliseconds beside ours
+    """Least and greatest value; NaN if any value is NaN."""
+    # by NumPy: after a parallel reduction the threads of torch spin for milliseconds and compete with ours
     given = values.numpy() if values.device.type == "cpu" else values
     return float(given.min()), float(given.max())
 
 
 def empty_hits(groups: int, group_size: int, device: torch.device) -> Hits:
-    """Hits to be filled in."""
+    """Empty records of hits, to be filled in."""
     instance, occluder = (torch.empty(groups, group_size, dtype=torch.int32, device=device) for _ in range(2))
     return Hits(instance, torch.empty(groups, group_size, 3, device=device), occluder)
 
 
 class PacketBatches:
-    """Shades lists of samples for one camera and one footprint, on the CPU. Calls from several threads take turns."""
+    """Shades lists of samples for one camera and one footprint, on the CPU. Calls from several threads are
+    serialised."""
 
     def __init__(self, buffers: SceneBuffers, still: ViewData, moving: ViewData, threads: int) -> None:
-        """Records the launches.
+        """Prepares the launches.
 
         Args:
             buffers: the scene.
-            still, moving: two records of the camera, for samples of one time and of many; ``still`` is changed here.
-            threads: host threads that share a batch, the caller's among them.
+            still, moving: records of the camera for samples of one time and of many times; ``still`` is changed here.
+            threads: number of host threads that share a batch, including the caller's.
         """
         count = len(buffers.tracks.tracks)
         still.pose_translation = wp.empty(count, wp.vec3, "cpu")
@@ -75,16 +77,16 @@ class PacketBatches:
         poses = still.pose_translation, still.pose_rotation
         self._pose = Command(kernels.pose_tracks, buffers.data, moving, *poses, size=count)
         self._still, self._moving = (Command(packets.shade_samples, buffers.data, view) for view in (still, moving))
-        self._keep = buffers, still, moving  # launches know their arrays by address only
+        self._keep = buffers, still, moving  # launches refer to their arrays by address only
         self._threads, self._lock = threads, threading.Lock()
         self._taken, self._rays = np.zeros(1, np.int32), np.zeros(2, np.int64)
         self._counters = address("taken", self._taken, torch.int32, 1), address("rays", self._rays, torch.int64, 2)
 
     def shade(self, batch: FrameletBatch) -> tuple[Tensor, list[int], Hits | None]:
-        """Colours ``(n, s, 3)`` float32, how many shadow rays and reflections they took, and hits if asked for.
+        """Colours ``(n, s, 3)`` float32, the numbers of rays traced, and hits if requested.
 
         Args:
-            batch: from :func:`checked`; all of its tensors on the CPU.
+            batch: from :func:`checked`, with all tensors on the CPU.
         """
         groups, group_size, _ = batch.position.shape
         count = groups * group_size
@@ -117,7 +119,7 @@ class PacketBatches:
 
 
 def _plain(values: Tensor) -> Tensor:
-    """Float32 on the CPU, one value after the other."""
+    """The values as a contiguous float32 tensor on the CPU."""
     if values.dtype is torch.float32 and values.is_cpu and values.is_contiguous():
         return values
     return values.to("cpu", torch.float32).contiguous()

@@ -1,6 +1,7 @@
-"""Frames as batches of framelets: every pixel's samples are one group, and tiles of pixels go through the one kernel.
+"""Frames as batches of framelets: the samples of every pixel are one group, and tiles of pixels are traced by the same
+kernel as framelets.
 
-A tile's pixels come out the same to the bit whichever tiles are rendered together, and on whichever machine.
+The pixels of a tile have the same bits whichever tiles are rendered together, and on any machine.
 """
 
 from __future__ import annotations
@@ -22,17 +23,17 @@ from tsar.morton import deinterleave
 from tsar.types import FrameletBatch
 
 TILE_PX = 16
-"""Side of a tile. Tiles are always traced whole, also where they hang over the picture: which samples share a packet
-must not depend on the picture's size."""
+"""Side of a tile. Tiles are always traced whole, even where they extend beyond the picture: the grouping of samples
+into packets must not depend on the picture's size."""
 
 Crop = tuple[int, int, int, int]
-"""Part of a picture: its left column, its upper row, its width and its height, pixels."""
+"""Part of a picture: left column, upper row, width and height, pixels."""
 
 _SAMPLES_AT_ONCE = 1 << 18
 
 
 def tile_count(width_px: int, height_px: int) -> int:
-    """Tiles that cover a picture; they are numbered row by row."""
+    """Number of tiles that cover a picture; they are numbered row by row."""
     return -(-width_px // TILE_PX) * -(-height_px // TILE_PX)
 
 
@@ -55,7 +56,7 @@ def cut(image: Float[Tensor, "h w 3"], crop: Crop | None) -> Float[Tensor, "h w 
 def tile_pixels(
     tiles: Sequence[int] | NDArray[np.int64], width_px: int
 ) -> tuple[Int[NDArray[np.int64], "tiles 256"], Int[NDArray[np.int64], "tiles 256"]]:
-    """Columns and rows of the pixels of tiles, each tile along the Morton curve."""
+    """Columns and rows of the pixels of tiles, in Morton order within each tile."""
     across = -(-width_px // TILE_PX)
     index = np.asarray(tiles, np.int64)[:, None]
     x, y = (np.asarray(part) for part in deinterleave(torch.arange(TILE_PX**2)))
@@ -71,19 +72,19 @@ def render_tiles(
     shutter_s: tuple[float, float] = (0.0, 0.0),
     frame: int = 0,
 ) -> tuple[Float[Tensor, "tiles 256 3"], dict[str, int]]:
-    """Means of the samples of every pixel of some tiles, and the rays they took.
+    """Means of the samples of every pixel of some tiles, and the counts of rays traced.
 
     Args:
         renderer: the scene.
-        plan: where in the pixel and when in the shutter's time samples lie.
-        tiles: their numbers, see :func:`tile_count`.
+        plan: positions of samples in the pixel, and their times within the shutter's.
+        tiles: numbers of the tiles, see :func:`tile_count`.
         size_px: width and height of the whole picture.
         frame_time_s: time of the frame, seconds.
-        shutter_s: opening and closing time, from the frame's.
+        shutter_s: opening and closing time of the shutter, relative to the frame's, seconds.
         frame: number of the frame in its sequence.
 
     Returns:
-        Linear radiance, pixels along the Morton curve; those outside the picture are traced as well. Counts by kind.
+        Linear radiance, pixels in Morton order, including those outside the picture; and ray counts by kind.
     """
     parts, counters = [], Counter[str]()
     at_once = _tiles_at_once(plan)
@@ -123,13 +124,13 @@ def _traced(
     batch = FrameletBatch(number, number, torch.as_tensor(position), torch.as_tensor(time_s), frame, seed)
     footprint_px = min(size_px) * math.sqrt(position.shape[1])
     answer = renderer.trace(batch, size_px[0] / size_px[1], footprint_px)
-    # in the order of the samples, whatever the number of pixels
+    # in the order of the samples, for any number of pixels
     means = answer.color.cpu().numpy().sum(axis=1, dtype=np.float64) / position.shape[1]
     return torch.as_tensor(means.reshape(tiles, TILE_PX**2, 3).astype(np.float32)), answer.counters
 
 
 def place_tiles(image: Float[Tensor, "h w 3"], tiles: Sequence[int], colors: Float[Tensor, "tiles 256 3"]) -> None:
-    """Puts tiles into a picture; pixels outside of it are dropped."""
+    """Copies tiles into a picture; pixels outside of it are dropped."""
     height, width = image.shape[:2]
     columns, rows = (torch.as_tensor(part) for part in tile_pixels(tiles, width))
     inside = (columns < width) & (rows < height)
@@ -148,8 +149,9 @@ def render_image(
     counters: Counter[str] | None = None,
     crop: Crop | None = None,
 ) -> Float[Tensor, "h w 3"]:
-    """A whole frame, linear radiance; see :func:`render_tiles`. ``done`` is told how many tiles are,
-    and ``counters`` receives the rays they took. With ``crop``, only that part, and only the tiles that it touches.
+    """A whole frame, linear radiance; see :func:`render_tiles`. ``done`` receives the number of finished tiles, and
+    ``counters`` the counts of rays. With ``crop``, only that part is returned, and only the tiles that it touches are
+    traced.
     """
     image = torch.zeros(height_px, width_px, 3)
     wanted = tiles_of(crop or (0, 0, width_px, height_px), width_px)
@@ -158,7 +160,7 @@ def render_image(
     size = width_px, height_px
     chunks = [wanted[first : first + at_once] for first in range(0, count, at_once)]
     finished = 0
-    with ThreadPoolExecutor(1) as ahead:  # places the next samples while these are traced
+    with ThreadPoolExecutor(1) as ahead:  # the next samples are placed while these are traced
         waiting = ahead.submit(_tile_samples, plan, chunks[0], size, frame_time_s, shutter_s, frame)
         for tiles, following in zip(chunks, [*chunks[1:], None], strict=True):
             samples = waiting.result()
@@ -176,13 +178,14 @@ def render_image(
 def pictures(
     renderer: Renderer, sampling: SamplePlan | int, width_px: int, height_px: int, crop: Crop | None = None
 ) -> Callable[[int, float], Float[Tensor, "h w 3"]]:
-    """Makes the frame of a number at a time, over the time that the scene's shutter is open.
+    """A function ``(number, time_s) -> image`` that renders a frame over the time for which the scene's shutter is
+    open.
 
     Args:
         renderer: the scene.
-        sampling: a plan; or a whole number, of the samples along a pixel's side of a regular grid at one time.
-        width_px, height_px: of every frame.
-        crop: part of every frame that is made. A regular grid is traced as a whole, and then cut.
+        sampling: a plan; or an integer, the number of samples along a pixel's side of a regular grid at one time.
+        width_px, height_px: size of every frame.
+        crop: part of every frame that is returned. A regular grid is traced as a whole and then cropped.
     """
     if not isinstance(sampling, SamplePlan):
         return lambda number, time_s: cut(renderer.render_frame(time_s, width_px, height_px, sampling), crop)

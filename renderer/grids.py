@@ -1,4 +1,4 @@
-"""Whole pictures on regular grids of samples, for kernels that take lists of samples alone."""
+"""Whole pictures on regular grids of samples, for kernels that take only lists of samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _AT_ONCE = 1 << 18
 
 
 class Traces(Protocol):
-    """What shades batches of samples."""
+    """A renderer of batches of samples."""
 
     def trace(self, batch: FrameletBatch, aspect: float = 1.0, footprint_px: float | None = None) -> SampleBatch: ...
 
@@ -23,7 +23,7 @@ def grid_frame(renderer: Traces, time_s: float, width_px: int, height_px: int, s
     """A picture ``(height, width, 3)`` float32 as :meth:`renderer.trace.Renderer.render_frame` gives, some rows of
     pixels at a time; each pixel's samples are one group."""
     step = (torch.arange(samples_per_axis) + 0.5) / samples_per_axis
-    columns = (torch.arange(width_px)[:, None] + step) / width_px  # of a row of pixels
+    columns = (torch.arange(width_px)[:, None] + step) / width_px  # of one row of pixels
     rows_at_once = max(1, _AT_ONCE // (width_px * samples_per_axis**2))
     footprint_px = min(width_px, height_px) * samples_per_axis
     image = torch.empty(height_px, width_px, 3)

@@ -1,4 +1,4 @@
-"""Layers beside a picture: depth, normal, albedo and instance of what its pixels show."""
+"""Auxiliary layers of a picture: depth, normal, albedo and instance of the surface in each pixel."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from renderer.kernels.guides import guides
 from renderer.trace import Renderer
 
 GRID = 4
-"""Samples along a pixel's side that depth, normal and albedo are means of."""
+"""Number of samples along a pixel's side over which depth, normal and albedo are averaged."""
 
 _ROWS = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Guides:
-    """Layers of a picture, rows from the top.
+    """Auxiliary layers of a picture, rows from the top.
 
     Attributes:
-        depth: distance from the camera along the ray, scene units, mean over the samples of a pixel that meet
-            something; infinite where none does.
-        normal: shading normal in the world, on the viewer's side, mean over the pixel, not unit at edges.
-        albedo: colour that the surface scatters or mirrors light with, mean over the pixel.
-        instance: number of the instance at the pixel's centre, meshes that were merged counting as one; -1 for none.
-        point: what lies there, as :class:`tsar.types.Hits` has it.
+        depth: distance from the camera along the ray, scene units, mean over the samples of a pixel that hit a surface;
+            infinite where none does.
+        normal: shading normal in the world, on the viewer's side, mean over the pixel, so it is not a unit vector at
+            edges.
+        albedo: colour with which the surface scatters or mirrors light, mean over the pixel.
+        instance: number of the instance at the pixel's centre, where merged meshes count as one; -1 for none.
+        point: hit point there, as in :class:`tsar.types.Hits`.
     """
 
     depth: Float[NDArray[np.float32], "h w"]
@@ -42,11 +43,11 @@ class Guides:
 
 
 def render_guides(renderer: Renderer, width_px: int, height_px: int, time_s: float) -> Guides:
-    """The layers of a picture of one time.
+    """The auxiliary layers of a picture at one time.
 
     Args:
         renderer: the scene.
-        width_px, height_px: of the picture.
+        width_px, height_px: size of the picture.
         time_s: animation time, seconds.
     """
     depth, instance = np.zeros((height_px, width_px), np.float32), np.zeros((height_px, width_px), np.int32)
@@ -66,7 +67,7 @@ def render_guides(renderer: Renderer, width_px: int, height_px: int, time_s: flo
 def _met(
     renderer: Renderer, width_px: int, height_px: int, rows: slice, grid: int, time_s: float
 ) -> dict[str, NDArray]:
-    """What a regular grid of samples of the pixels of some rows meets, ``(rows, width, grid², …)``."""
+    """First hits of a regular grid of samples in the pixels of some rows, ``(rows, width, grid², …)``."""
     step = (torch.arange(grid, dtype=torch.float64) + 0.5) / grid
     y = (torch.arange(rows.start, rows.stop)[:, None] + step) / height_px
     x = (torch.arange(width_px)[:, None] + step) / width_px
@@ -78,7 +79,7 @@ def _met(
 
 
 def _launched(renderer: Renderer, position: Tensor, group_size: int, time_s: float, aspect: float, footprint_px: float):
-    """Runs the kernel over samples of one time."""
+    """Launches the kernel over samples of one time."""
     kernel, device, count = guides(renderer.features), renderer.device, len(position)
     devices.load_kernels(kernel.module, device)
     kinds = {"instance": wp.int32, "point": wp.vec3, "distance": wp.float32, "normal": wp.vec3, "albedo": wp.vec3}

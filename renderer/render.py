@@ -1,4 +1,4 @@
-"""One picture of a scene, from a single call."""
+"""Rendering of one picture of a scene by a single call."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def render(
 
     Args:
         scene: a scene, the name of a built-in one or of one that was added, or a scene file.
-        size: width and height, pixels, or both in one number.
+        size: width and height, pixels, or one number for both.
         time_s: animation time at which the frame begins, seconds; samples spread over the time that the shutter is
             open.
         samples_per_pixel: at least 1; a cube for the point set ``stratified``.
-        point_set: where samples lie; a name in :data:`renderer.sampling.POINT_SETS`.
+        point_set: point set of the samples; a name in :data:`renderer.sampling.POINT_SETS`.
         space_filter: reconstruction filter over the picture.
-        seed: of everything random.
-        threads: for tracing; 0 takes one per core.
+        seed: seed of all random numbers.
+        threads: number of threads for tracing; 0 for one per core.
 
     Returns:
         Linear RGB, not clipped, rows from the top; :func:`renderer.film.files.write_image` writes it to a file.

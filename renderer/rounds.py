@@ -1,4 +1,5 @@
-"""A picture in rounds of samples: after each its error is known, and tiles that are good enough get no more."""
+"""Progressive rendering in rounds of samples: the error is estimated after each, and tiles below the target get no
+more."""
 
 from __future__ import annotations
 
@@ -18,18 +19,17 @@ from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 
 ROUNDS_LEAST = 4
-"""Rounds that every tile gets: fewer tell too little of its error."""
+"""Least number of rounds of a tile: fewer do not suffice to estimate its error."""
 
 
 @dataclass
 class Rounds:
-    """What rounds have found so far, by tiles; changes in place.
+    """Sums over the rounds so far, by tiles. Changes in place.
 
     Attributes:
-        total: sum of the means of rounds, linear radiance.
-        coded, squares: sums of the encoded means, the root of what is clipped to [0, 1] as policies measure errors, and
-            of their squares.
-        count: rounds that each tile has had.
+        total: sum of the means of all rounds, linear radiance.
+        coded, squares: sums of the encoded means, ``sqrt(clip(c, 0, 1))`` as in policies, and of their squares.
+        count: number of rounds of each tile.
     """
 
     total: Float[NDArray[np.float64], "tiles 256 3"]
@@ -39,30 +39,30 @@ class Rounds:
 
     @classmethod
     def empty(cls, tiles: int) -> Rounds:
-        """Before the first round."""
+        """The state before the first round."""
         sums = (np.zeros((tiles, TILE_PX**2, 3)) for _ in range(3))
         return cls(*sums, np.zeros(tiles, np.int64))
 
     def variance(self) -> Float[NDArray[np.float64], "tiles 256 3"]:
-        """Of the mean of each pixel, squared encoded colour: that of its rounds over their number."""
+        """Variance of each pixel's mean, squared encoded colour: the variance of its rounds over their number."""
         count = np.maximum(self.count, 2)[:, None, None].astype(np.float64)
         spread = (self.squares - self.coded**2 / count) / (count - 1.0)
         return np.where(self.count[:, None, None] > 1, np.maximum(spread, 0.0) / count, math.inf)
 
     def errors(self) -> Float[NDArray[np.float64], " tiles"]:
-        """Root mean square error of each tile as its rounds tell, in encoded colour."""
+        """Root mean square error of each tile, estimated from its rounds, in encoded colour."""
         return np.sqrt(self.variance().mean(axis=(1, 2)))
 
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A picture made in rounds.
+    """A picture rendered in rounds.
 
     Attributes:
         image: linear radiance.
-        samples: of each pixel.
-        variance: of each pixel's encoded colour.
-        error: root mean square of that over the picture.
+        samples: number of samples of each pixel.
+        variance: variance of each pixel's encoded colour.
+        error: root mean square error over the picture, from that variance.
     """
 
     image: Float[Tensor, "h w 3"]
@@ -85,21 +85,22 @@ def render_rounds(
     state: Rounds | None = None,
     done: Callable[[int, Rounds], None] = lambda samples, state: None,
 ) -> Made:
-    """A whole frame in rounds; the same bits for any number of threads, and wherever it was interrupted.
+    """Renders a whole frame in rounds; the bits are the same for any number of threads, and wherever it was
+    interrupted.
 
     Args:
         renderer: the scene.
         plan: samples of one round; later rounds take other seeds.
-        rounds: at most, at least 2.
-        width_px, height_px: of the picture.
+        rounds: maximum number of rounds, at least 2.
+        width_px, height_px: size of the picture.
         frame_time_s, shutter_s, frame: see :func:`renderer.frames.render_tiles`.
-        error_target: a tile whose error is at most this gets no further rounds after the first few; 0 for none.
-        crop: part of the picture that is made.
-        state: of an earlier call that was interrupted; changes in place.
-        done: told after each round how many samples it took, and the state.
+        error_target: after the first few rounds, a tile with at most this error gets no further ones; 0 for no target.
+        crop: part of the picture that is rendered.
+        state: state of an earlier call that was interrupted; changes in place.
+        done: receives, after each round, the number of its samples and the state.
 
     Returns:
-        The picture and what is known of its error.
+        The picture and its estimated error.
     """
     tiles = np.array(tiles_of(crop or (0, 0, width_px, height_px), width_px))
     state = state or Rounds.empty(len(tiles))

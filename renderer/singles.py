@@ -1,4 +1,4 @@
-"""Batches of samples for the kernels that trace them one by one."""
+"""Batches for the kernels that trace single samples."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class SingleSamples:
     """A batch as the arguments of :func:`renderer.kernels.entry.specialised`'s ``shade_samples``, and its answer.
 
     Attributes:
-        arguments: those behind the first sample of a launch.
-        color: ``(n, s, 3)`` radiance, filled in by the launches, as ``hits``, which is None unless asked for.
+        arguments: arguments after that for the first sample of a launch.
+        color, hits: ``(n, s, 3)`` radiance and first hits, filled by the launches; hits are None unless requested.
     """
 
     def __init__(self, batch: FrameletBatch, device: torch.device) -> None:
-        """Puts a batch from :func:`renderer.batches.checked` onto the device."""
+        """Copies a batch from :func:`renderer.batches.checked` to the device."""
         groups, group_size, _ = batch.position.shape
         count, time_s, scale = groups * group_size, batch.time_s, batch.footprint
         self.color = torch.empty(groups, group_size, 3, device=device)
@@ -50,7 +50,7 @@ class SingleSamples:
         )
 
     def totals(self) -> list[int]:
-        """Shadow rays, reflections and refractions of all samples."""
-        if self._rays.is_cpu:  # by NumPy, as renderer.batches.bounds
+        """Numbers of shadow, reflected and refracted rays of all samples."""
+        if self._rays.is_cpu:  # by NumPy, as in renderer.batches.bounds
             return self._rays.numpy().sum(axis=0, dtype=np.int64).tolist()
         return self._rays.sum(dim=0, dtype=torch.int64).tolist()

@@ -1,4 +1,4 @@
-"""The host side of the renderer: framelet batches and whole frames through one kernel."""
+"""The host side of the renderer: framelet batches and whole frames, by the same kernel."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ from renderer.viewpoints import viewpoint_of
 from scenes.canonical import Scene
 from tsar.types import FrameletBatch, Hits, SampleBatch, Viewpoint
 
-_RANGE = 1024  # samples or pixels per launch without packets: few enough that threads end together
-_RANGE_CUDA = 1 << 18  # few enough that the rays that wait to be followed fit into memory
+_RANGE = 1024  # samples or pixels per launch without packets: few enough that threads finish together
+_RANGE_CUDA = 1 << 18  # few enough that the stacks of waiting rays fit into memory
 _SECONDARY = "shadow_rays", "reflection_rays", "refraction_rays"
 
 
 class Renderer:
-    """A scene ready to be sampled.
+    """A scene ready for rendering.
 
     Attributes:
         device: where kernels run, ``cpu`` or ``cuda:0``.
-        threads: host threads that launch kernels (``cpu`` only).
-        footprint_resolution_px: pixels along the shorter image axis that :meth:`trace` filters textures for.
-        features: what kernels are compiled for.
-        packets: whether sixteen samples at a time are traced.
-        scene: as it is traced, moved near the origin.
+        threads: number of host threads that launch kernels (``cpu`` only).
+        footprint_resolution_px: number of pixels along the shorter image axis for which :meth:`trace` filters textures.
+        features: features for which kernels are compiled.
+        packets: whether sixteen samples are traced at a time.
+        scene: scene that is traced, moved near the origin.
     """
 
     def __init__(
@@ -66,26 +66,26 @@ class Renderer:
         """Builds acceleration structures and loads kernels.
 
         Args:
-            scene: what to render.
+            scene: scene to render.
             device: ``cpu`` or ``cuda:0``.
-            threads: host threads, by default one per core this process may use.
-            footprint_resolution_px: see the class. It is fixed for all batches, so that a coarse tile is as sharp as a
-                fine one, and a framed renderer as sharp as an adaptive one.
-            throughput_cutoff: a chain of mirrors ends where it would contribute less than this share.
-            packets: trace sixteen samples at a time where they can do all that the scene requires (``cpu`` only);
-                without, one by one as other devices do. Pictures differ by rounding.
-            specialise: compile kernels for what the scene requires; without, for everything there is. Pictures are the
+            threads: number of host threads, by default one per core that this process may use.
+            footprint_resolution_px: see the class. It is the same for all batches, so that coarse and fine tiles, and
+                framed and adaptive renderers, are equally sharp.
+            throughput_cutoff: least throughput of a secondary ray; a chain of mirrors ends below it.
+            packets: trace sixteen samples at a time if packets support all features of the scene (``cpu`` only);
+                otherwise one by one, as on other devices. Pictures differ by rounding.
+            specialise: compile kernels for the features of the scene; otherwise for all features. Pictures are the
                 same.
-            structure: over the triangles of meshes: the tree of boxes, a kd-tree, ``brute`` for none, or ``warp`` for
-                Warp's own tree, which a GPU always has. Only the first is walked by packets. The first three give the
-                same pictures to the bit, ``warp`` up to rounding.
-            count_work: count the nodes visited and triangles tested, as ``node_visits`` and ``triangle_tests``; for
-                single samples, on the CPU, of the first three.
-            seed: of the random numbers behind lens, extended lights and glossy rays, 0 to 2^32 - 1.
+            structure: structure over the triangles of meshes: the tree of boxes (``bvh``), a kd-tree, ``brute`` for
+                none, or ``warp`` for Warp's own tree, which a GPU always uses. Packets support only the first. The
+                first three give the same bits, ``warp`` the same up to rounding.
+            count_work: count visited nodes and tested triangles, as ``node_visits`` and ``triangle_tests``; for single
+                samples on the CPU with the first three structures.
+            seed: seed of the random numbers for lens, extended lights and glossy rays, 0 to 2^32 - 1.
 
         Raises:
-            SceneError: if the scene holds what the renderer does not support.
-            DeviceError: if the device is not there.
+            SceneError: if the scene contains an unsupported part.
+            DeviceError: if the device does not exist.
         """
         if threads is not None and threads < 1:
             raise ValueError(f"threads: expected at least 1, got {threads}")
@@ -118,7 +118,7 @@ class Renderer:
         # before the buffers are built, which takes those of packets too: they are compiled side by side
         devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)
         self._buffers = build_buffers(scene, self.device, own)
-        if not self.packets:  # these are compiled for the scene: it is known now that it can be rendered
+        if not self.packets:  # these are compiled for the scene, now that it is known to be supported
             devices.load_kernels(self._kernels.module, self.device)
         data = self._buffers.data
         data.throughput_cutoff, data.seed = float(throughput_cutoff), wp.uint32(seed)
@@ -130,21 +130,22 @@ class Renderer:
             self._packet_batches(1.0, self.footprint_resolution_px)
 
     def trace(self, batch: FrameletBatch, aspect: float = 1.0, footprint_px: float | None = None) -> SampleBatch:
-        """Shades the samples of a batch; those of one row are a group, over which secondary rays are spread.
+        """Shades the samples of a batch; those of one row are a group, over which secondary rays are stratified.
 
         Args:
             batch: positions ``(n, samples, 2)``, and times ``(n, samples)`` or one for all; whether first hits are
-                asked for, and what the footprints of samples are multiplied by.
+                requested, and factors of the samples' footprints.
             aspect: width over height of the image.
-            footprint_px: pixels along its shorter axis that textures are filtered for, by default
+            footprint_px: number of pixels along its shorter axis for which textures are filtered, by default
                 ``footprint_resolution_px``.
 
         Returns:
-            Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, ray counts, and hits if asked for.
-            Colours are the same bits with and without them.
+            Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, ray counts, and hits if requested.
+                Hits do not change the bits of colours.
 
         Raises:
-            ValueError: if the shapes do not fit, times are not float64, or a time or footprint is not finite.
+            ValueError: if shapes do not match, times are not float64 or not finite, or a footprint is not finite and
+                above 0.
         """
         batch = checked(batch)
         if not 0.0 < aspect < math.inf:
@@ -157,10 +158,10 @@ class Renderer:
         texels.copy_(change(texels))
 
     def viewpoint(self, time_s: float, aspect: float = 1.0) -> Viewpoint:
-        """Where the camera and all instances are, to the bit as samples of that time find them.
+        """Poses of the camera and all instances, with the same bits as for samples of that time.
 
-        A scene that lies far from the origin is moved near it before it is traced. Hits, and the world of this record,
-        are in the space of the scene that was moved.
+        A scene far from the origin is moved near it before it is traced. Hits, and the world of this record, are in the
+        space of the moved scene.
 
         Args:
             time_s: animation time, seconds.
@@ -176,12 +177,12 @@ class Renderer:
         return viewpoint_of(self._buffers, view, float(time_s))
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
-        """Renders a whole picture: a batch of framelets of all its pixels.
+        """Renders a whole picture.
 
         Args:
             time_s: animation time, seconds.
             width_px, height_px: size of the picture; the field of view spans its shorter axis.
-            samples_per_axis: a regular grid of this many samples squared is averaged per pixel.
+            samples_per_axis: side of the regular grid of samples that is averaged in each pixel.
 
         Returns:
             ``(height, width, 3)`` float32 linear RGB on the CPU, row 0 at the top.
@@ -212,17 +213,17 @@ class Renderer:
 
     @property
     def shutter_s(self) -> tuple[float, float]:
-        """When the scene's shutter opens and closes, from a frame's time, seconds."""
+        """Opening and closing time of the scene's shutter, relative to a frame's time, seconds."""
         opening, closing = getattr(self._camera, "shutter_s", (0.0, 0.0))
         return float(opening), float(closing)
 
     def close(self) -> None:
-        """Ends the worker threads; the renderer must not be used afterwards."""
+        """Stops the worker threads; the renderer must not be used afterwards."""
         if self._pool is not None:
             self._pool.shutdown()
 
     def _shade(self, batch: FrameletBatch, aspect: float, footprint_px: float) -> SampleBatch:
-        """Colours, ray counts, and hits if asked for, of a batch from :func:`renderer.batches.checked`."""
+        """Colours, ray counts, and hits if requested, of a batch from :func:`renderer.batches.checked`."""
         groups, group_size, _ = batch.position.shape
         count, home = groups * group_size, batch.position.device
         if count == 0:
@@ -247,7 +248,7 @@ class Renderer:
         return SampleBatch(color if color.device == home else color.to(home), counters, hits)
 
     def _packet_batches(self, aspect: float, footprint_px: float) -> PacketBatches:
-        """Recorded launches for pictures of one shape."""
+        """Recorded launches for pictures of one aspect and footprint."""
         key = aspect, footprint_px
         if key not in self._batches:
             still, moving = (self._view(*key) for _ in range(2))
@@ -255,10 +256,10 @@ class Renderer:
         return self._batches[key]
 
     def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int) -> None:
-        """Runs a kernel over ``count`` elements: one launch on a GPU, one a host thread on the CPU.
+        """Runs a kernel over ``count`` elements: one launch on a GPU, one per host thread on the CPU.
 
-        Launches on the CPU release the interpreter lock. Those of packets take what is left to do from one counter;
-        single samples are dealt out in ranges.
+        Launches on the CPU release the global interpreter lock. Those of packets take work from a shared counter;
+        single samples are distributed in ranges.
         """
         if self.packets:
             taken = wp.zeros(1, dtype=wp.int32, device="cpu")
@@ -272,7 +273,7 @@ class Renderer:
             wp.launch(kernel, dim=dim, inputs=[self._buffers.data, view, stack, first, *shared], device=self.device)
 
         if self.device != "cpu":
-            torch.cuda.synchronize()  # Warp launches on a stream of its own
+            torch.cuda.synchronize()  # Warp launches on its own stream
             for first in range(0, count, _RANGE_CUDA):
                 run(first, min(_RANGE_CUDA, count - first))
             wp.synchronize_device(self.device)
@@ -288,7 +289,7 @@ class Renderer:
         return view
 
     def _pose(self, view: ViewData, time_s: float) -> None:
-        """Adds the poses of all tracks at the one time of all samples."""
+        """Adds the poses of all tracks at the common time of all samples."""
         count = len(self._buffers.tracks.tracks)
         poses = wp.empty(count, wp.vec3, self.device), wp.empty(count, wp.quat, self.device)
         inputs = [self._buffers.data, view, *poses, wp.float64(time_s)]

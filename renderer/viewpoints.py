@@ -1,4 +1,4 @@
-"""Camera and poses at one time, for those who take hits back to the image."""
+"""Camera and poses at one time, for the reprojection of hits."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _KINDS: dict[int, Literal["perspective", "parallel", "panorama"]] = {
 
 
 def viewpoint_of(buffers: SceneBuffers, view: ViewData, time_s: float) -> Viewpoint:
-    """What a launch at one time works with, in double precision.
+    """The poses that a launch at one time uses, in double precision.
 
     Args:
         buffers: the scene.
-        view: the camera, with the poses of all tracks at ``time_s``.
+        view: camera, with the poses of all tracks at ``time_s``.
         time_s: animation time, seconds.
     """
     rotation = _matrices(view.pose_rotation.numpy().astype(np.float64))
@@ -49,8 +49,8 @@ def viewpoint_of(buffers: SceneBuffers, view: ViewData, time_s: float) -> Viewpo
 
 
 def _matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations ``(n, 3, 3)`` as kernels turn by quaternions ``(n, 4)``, ``(x, y, z, w)``:
-    ``v (2 w^2 - 1) + 2 w (a x v) + 2 a (a . v)`` for the axis part ``a``."""
+    """Rotation matrices ``(n, 3, 3)`` of quaternions ``(n, 4)``, ``(x, y, z, w)``, as kernels apply them:
+    ``v (2 w² - 1) + 2 w (a × v) + 2 a (a · v)`` with the vector part ``a``."""
     x, y, z, w = quaternions.T
     none = np.zeros_like(w)
     across = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=-1).reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""Where kernels run: the only file that initialises Warp or picks a device."""
+"""Devices: the only module that initialises Warp or selects a device."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from tsar.memory import core_count
 
 DEVICES = ("cpu", "cuda:0")
 WARP_TESTED = "1.19"
-"""Release of Warp that this package was tested with, any patch of it: launches use what it does not promise to keep."""
+"""Release of Warp with which this package was tested, in any patch version: launches use parts that are not its public
+interface."""
 
 _SLOW_LOAD_S = 0.4
 _LINE_INTERVAL_S = 2.0
@@ -30,29 +31,29 @@ _lock = threading.Lock()
 
 
 class DeviceError(ValueError):
-    """The device asked for cannot be used here."""
+    """The requested device cannot be used here."""
 
 
 class VersionError(ImportError):
-    """A package is installed in a version that does not serve here."""
+    """A package is installed in an unsupported version."""
 
 
 def require_tested(found: str) -> None:
     """Checks a version of Warp.
 
     Raises:
-        VersionError: if it is not of the release that was tested.
+        VersionError: if it does not belong to the tested release.
     """
     if found.split(".")[:2] != WARP_TESTED.split("."):
         raise VersionError(f"warp-lang: expected version {WARP_TESTED}.x, which was tested, found {found}")
 
 
-require_tested(wp.__version__)  # before anything else of it is touched
+require_tested(wp.__version__)  # before any other part of it is used
 
 
 @contextlib.contextmanager
 def _quiet_stderr() -> Iterator[None]:
-    """Hides what native code writes to standard error."""
+    """Hides the output of native code on standard error."""
     sys.stderr.flush()
     kept = os.dup(2)
     sink = os.open(os.devnull, os.O_WRONLY)
@@ -66,23 +67,23 @@ def _quiet_stderr() -> Iterator[None]:
 
 
 def initialise() -> None:
-    """Starts Warp, silently and without code for gradients; does nothing the second time."""
+    """Starts Warp silently and without code for gradients; further calls have no effect."""
     wp.config.quiet = True
     wp.config.log_level = _WARNINGS_ONLY
     wp.config.enable_backward = False
-    # Without a CUDA driver Warp warns on every start; that is no fault here, and asking for CUDA reports it anyway.
+    # Without a CUDA driver Warp warns at every start. That is no error here, and a request for CUDA reports it anyway.
     with contextlib.nullcontext() if ctypes.util.find_library("cuda") else _quiet_stderr():
         wp.init()
 
 
 def pick(device: str) -> str:
-    """Checks a device name and that the device is there.
+    """Checks the name of a device and that the device exists.
 
     Args:
         device: one of :data:`DEVICES`.
 
     Returns:
-        The name, to hand to Warp.
+        The name of the device for Warp.
 
     Raises:
         DeviceError: if the name is unknown or the machine has no such device.
@@ -95,22 +96,22 @@ def pick(device: str) -> str:
 
 
 Kernels = ModuleType | wp.Module
-"""What holds kernels: a Python module, or one that Warp made for a set of features."""
+"""A module of kernels: a Python module, or one that Warp created for a set of features."""
 
 
 def load_kernels(
     modules: Kernels | Sequence[Kernels], device: str, report: Callable[[str], None] | None = None
 ) -> None:
-    """Loads modules of kernels before their first launch, and says how far it is when that takes a while.
+    """Loads modules of kernels before their first launch, and reports progress if that takes a while.
 
     Compiling a module that is not in the cache takes seconds; loading a cached one takes milliseconds. Loading before
-    the first launch also keeps worker threads from compiling the same module at once. Several modules are compiled side
-    by side: Warp locks what they share while it writes their source, and not while it compiles that.
+    the first launch also keeps worker threads from compiling the same module at once. Several modules are compiled in
+    parallel: Warp holds its lock while it generates their source, but not while it compiles.
 
     Args:
-        modules: what defines kernels.
+        modules: modules to load.
         device: from :func:`pick`.
-        report: called with a line of text at times while kernels are compiled; by default a status on a terminal, or
+        report: called with a line of text from time to time during compilation; by default a status on a terminal, or
             lines on standard error.
     """
     with _lock:
@@ -131,7 +132,7 @@ def _name(module: Kernels) -> str:
 
 
 def _watch(loads: Mapping[Future, str], device: str, report: Callable[[str], None] | None) -> None:
-    """Waits until all loads have ended, and reports on them if that is not at once."""
+    """Waits until all loads have ended, and reports progress if that takes a while."""
     began = time.perf_counter()
     if not wait(loads, timeout=_SLOW_LOAD_S).not_done:
         return
@@ -147,10 +148,10 @@ def _watch(loads: Mapping[Future, str], device: str, report: Callable[[str], Non
 
 @contextlib.contextmanager
 def _shown(report: Callable[[str], None] | None) -> Iterator[tuple[Callable[[str], object], float]]:
-    """What takes lines of text, and the seconds from one to the next."""
+    """A function that shows a line of text, and the interval between lines, seconds."""
     if report is not None:
         yield report, _LINE_INTERVAL_S
-    # where a progress bar stands on the terminal it has put itself in the place of the stream
+    # a progress bar on the terminal replaces the stream, so that the condition is false
     elif sys.stderr is sys.__stderr__ and sys.stderr.isatty():
         from rich.console import Console
         from rich.text import Text
@@ -161,5 +162,5 @@ def _shown(report: Callable[[str], None] | None) -> Iterator[tuple[Callable[[str
         yield lambda line: print(line, file=sys.stderr, flush=True), _LINE_INTERVAL_S
 
 
-# on import: declaring the first record or kernel would otherwise start Warp with its defaults
+# on import: otherwise the declaration of the first record or kernel would start Warp with its defaults
 initialise()

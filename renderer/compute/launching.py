@@ -1,6 +1,6 @@
-"""Launches that cost little: recorded once, their arguments set anew each time.
+"""Launches with little overhead: each is recorded once, and only its arguments are set anew.
 
-``wp.launch`` checks and packs all its arguments, which takes as long as some of these kernels run.
+``wp.launch`` checks and packs all its arguments, which takes as long as some of these kernels.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from torch import Tensor
 from tsar.config import TsarConfig
 
 Address = wp.uint64
-"""In a kernel: of the first element of a contiguous tensor on the CPU."""
+"""Type of a kernel's argument: the address of the first element of a contiguous tensor on the CPU."""
 
 
 def address(name: str, values: Tensor | NDArray, dtype: torch.dtype, count: int) -> int:
-    """Where an array's elements lie for native code, which takes their kind and number on trust.
+    """Address of an array's elements for native code, which does not check their type and number itself.
 
     Args:
-        name: of the array, for the error.
-        values: the array, which the caller keeps alive.
-        dtype, count: kind and number of elements that are read or written there.
+        name: name of the array, for the error.
+        values: array, which the caller keeps alive.
+        dtype, count: type and number of the elements that are read or written.
 
     Raises:
-        ValueError: unless the array has these, one after the other, on the CPU.
+        ValueError: unless the array has this type and number of elements, contiguous and on the CPU.
     """
     if isinstance(values, np.ndarray):
         values = torch.from_numpy(values)
@@ -47,13 +47,13 @@ def _described(values: Tensor) -> str:
 
 
 def shared(values: NDArray, dtype: type) -> wp.array:
-    """A contiguous NumPy array as a Warp one on the CPU, in the same memory.
+    """A contiguous NumPy array as a Warp array on the CPU, in the same memory.
 
     Raises:
-        ValueError: if its elements are of another kind, or do not lie one after the other.
+        ValueError: if its elements have another type or are not contiguous.
     """
     made = wp.array(values, dtype=dtype, device="cpu", copy=False)
-    # where the kind differs Warp makes a copy unasked; an empty array has no address
+    # for another type Warp would copy silently; an empty array has no address
     if values.size and (made.ptr != values.ctypes.data or not made.is_contiguous):
         raise ValueError(
             f"expected contiguous elements of {dtype.__name__}, got shape {values.shape} of {values.dtype}"
@@ -62,7 +62,7 @@ def shared(values: NDArray, dtype: type) -> wp.array:
 
 
 def require_same(config: TsarConfig, own: TsarConfig) -> None:
-    """Refuses a run that compiled stages were not made for.
+    """Rejects a run with another configuration than that of the compiled stages.
 
     Raises:
         ValueError: if the configurations differ.
@@ -72,14 +72,14 @@ def require_same(config: TsarConfig, own: TsarConfig) -> None:
 
 
 class Command:
-    """A kernel to be launched on the CPU over and over; its arguments are not to be set by two threads at once.
+    """A kernel that is launched on the CPU repeatedly. Its arguments must not be set by two threads at once.
 
-    Its first arguments stay as they are, the others are plain numbers: values, or addresses of tensors, which the
-    caller keeps alive and contiguous during the launch.
+    Its first arguments are fixed. The others are plain numbers: values, or addresses of tensors, which the caller keeps
+    alive and contiguous during the launch.
 
     Attributes:
-        launch: runs the kernel with the arguments set last.
-        entry: addresses of the compiled kernel and of its two parameters, to launch it from elsewhere.
+        launch: runs the kernel with the current arguments.
+        entry: addresses of the compiled kernel and of its two parameters, for launches by native code.
     """
 
     def __init__(self, kernel: Any, *fixed: Any, size: int = 1) -> None:
@@ -87,7 +87,7 @@ class Command:
         varying = len(kernel.adj.args) - len(fixed)
         self._record = wp.launch(kernel, size, inputs=[*fixed, *[0] * varying], device="cpu", record_cmd=True)
         bounds, *values = self._record.params
-        # What Warp makes of these at each launch, made once: a structure of all arguments, by name.
+        # The structure of all arguments that Warp would create at each launch, created once.
         names = (argument.label for argument in kernel.adj.args)
         layout = [(name, type(value)) for name, value in zip(names, values, strict=True)]
         arguments = type("Arguments", (ctypes.Structure,), {"_fields_": layout})(*values)
@@ -98,17 +98,17 @@ class Command:
         self.entry = function, ctypes.addressof(bounds), ctypes.addressof(arguments)
 
     def set(self, *arguments: float) -> None:
-        """Sets the last arguments."""
+        """Sets the variable arguments."""
         self._set(*arguments)
 
     def __call__(self, *arguments: float) -> None:
-        """Launches with these last arguments."""
+        """Launches with these variable arguments."""
         self._set(*arguments)
         self.launch()
 
 
 def _packer(structure: type[ctypes.Structure], first: int) -> Callable[..., None]:
-    """A function of such a structure and of numbers, which writes these into its fields from number ``first`` on."""
+    """A function that writes numbers into the fields of such a structure, from the field ``first`` on."""
     layout, end = "=", 0
     for number, (name, kind) in enumerate(structure._fields_):
         offset = getattr(structure, name).offset
@@ -121,14 +121,14 @@ def _packer(structure: type[ctypes.Structure], first: int) -> Callable[..., None
 
 
 class Record:
-    """A structure of native code that launches read by its address: words of eight bytes.
+    """A structure of native code that launches read through its address; it consists of words of eight bytes.
 
     Attributes:
-        address: where it lies.
+        address: address of the structure.
     """
 
     def __init__(self, layout: str) -> None:
-        """Takes the kinds of its words as :mod:`struct` names them."""
+        """``layout`` has the types of its words, as format characters of :mod:`struct`."""
         self._pack = struct.Struct("=" + layout).pack_into
         self._bytes = ctypes.create_string_buffer(struct.calcsize("=" + layout))
         self.address = ctypes.addressof(self._bytes)
@@ -145,4 +145,4 @@ _CODES = {
     ctypes.c_float: "f",
     ctypes.c_double: "d",
 }
-"""Kinds of numbers that a launch takes, as :mod:`struct` names them."""
+"""Types of numbers that a launch takes, as format characters of :mod:`struct`."""

@@ -1,4 +1,4 @@
-"""Tensors that recorded launches know by address only, kept alive by name; and memory that is used again."""
+"""Tensors that recorded launches refer to by address only, kept alive by name; and recycled memory."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from renderer.compute.launching import address
 
 
 class Memory:
-    """Holds tensors for as long as it lives itself, and says where they lie."""
+    """Keeps tensors alive for its own lifetime, and gives their addresses."""
 
     def __init__(self) -> None:
         self._kept: dict[str, Tensor] = {}
 
     def keep(self, name: str, tensor: Tensor, dtype: torch.dtype, count: int) -> int:
-        """Address of a tensor, made contiguous.
+        """Keeps a tensor, made contiguous, and returns its address.
 
         Raises:
             ValueError: as :func:`renderer.compute.launching.address`.
@@ -24,30 +24,31 @@ class Memory:
         return address(name, self._kept[name], dtype, count)
 
     def room(self, name: str, count: int, dtype: torch.dtype = torch.float32) -> int:
-        """Address of ``count`` elements that hold anything at first."""
+        """Address of ``count`` uninitialised elements."""
         return self.keep(name, torch.empty(count, dtype=dtype), dtype, count)
 
     def zeros(self, name: str, count: int, dtype: torch.dtype = torch.float32) -> int:
-        """Address of ``count`` elements that are zero at first."""
+        """Address of ``count`` elements, initially zero."""
         return self.keep(name, torch.zeros(count, dtype=dtype), dtype, count)
 
 
 class Recycled:
-    """Blocks of one size that are handed out again when no tensor lies in them any more.
+    """Blocks of memory of one size that are reused once no tensor refers to them.
 
-    New memory comes from the system page by page at the first touch, which takes longer than writing to it does.
+    The system maps new memory page by page at the first access, which takes longer than writing to it.
     """
 
     KEPT = 4
-    """Most blocks that are kept: of the state before and after a cycle, and of two that somebody looks at."""
+    """Maximum number of blocks that are kept: two for the states before and after a cycle, and two for states in use
+    elsewhere."""
 
     def __init__(self, size: int) -> None:
-        """Blocks of ``size`` bytes."""
+        """Creates a pool of blocks of ``size`` bytes."""
         self._size = size
         self._blocks: list[tuple[Tensor, int]] = []
 
     def block(self) -> Tensor:
-        """Bytes that hold anything; they are the caller's until the last tensor that shares them is gone."""
+        """An uninitialised block of bytes; it belongs to the caller until the last tensor that shares it is gone."""
         for block, idle in self._blocks:
             if _uses(block) == idle:
                 return block.view(-1)

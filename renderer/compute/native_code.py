@@ -1,4 +1,5 @@
-"""What a module of kernels needs to call the C++ in the rooms' ``native/``, which Warp's compiler builds with it."""
+"""Module options with which kernels can call the C++ in the ``native/`` folders; Warp's compiler builds it with
+them."""
 
 from __future__ import annotations
 
@@ -13,8 +14,9 @@ from renderer.compute import sizes
 
 _NATIVE = sorted(path for path in Path(__file__).resolve().parents[1].glob("*/native"))
 _QUIET = '#pragma clang diagnostic ignored "-Wpsabi"\n'
-"""Where registers are narrower than sixteen floats Clang warns, at every function that takes or returns a vector, that
-code compiled for wider ones would call it differently. All of a module is compiled at once, for one processor."""
+"""Where registers are narrower than sixteen floats, Clang warns at every function that takes or returns a vector that
+its calling convention differs from that of code for wider registers. That does not apply: a module is compiled as a
+whole, for one processor."""
 
 
 def module_options(*headers: str, given: Mapping[str, float] | None = None) -> dict[str, Any]:
@@ -22,7 +24,7 @@ def module_options(*headers: str, given: Mapping[str, float] | None = None) -> d
 
     Args:
         headers: names of files in a room's ``native/``.
-        given: constants that the headers find in the namespace ``given``, beside those of
+        given: constants in the namespace ``given`` of the headers, in addition to those of
             :mod:`renderer.compute.sizes`.
     """
     constants = declarations({**sizes.GIVEN, **(given or {})})
@@ -35,7 +37,7 @@ def module_options(*headers: str, given: Mapping[str, float] | None = None) -> d
 
 
 def declarations(given: Mapping[str, float]) -> str:
-    """C++ that declares constants: whole numbers as ``int``, ``numpy.float64`` as ``double``, others as ``float``."""
+    """C++ declarations of constants: integers as ``int``, ``numpy.float64`` as ``double``, others as ``float``."""
     return "namespace given {\n" + "".join(_declared(name, value) for name, value in given.items()) + "}\n"
 
 

@@ -1,7 +1,7 @@
-"""Launches side by side: the caller's thread and helpers that stay awake for a moment between one and the next.
+"""Parallel launches on the caller's thread and on helper threads that spin for a moment between two launches.
 
-A cycle hands work to other threads several times within milliseconds. Waking a thread takes longer than some of that
-work, so a helper waits actively for a while before it sleeps.
+A cycle gives work to other threads several times within milliseconds. Waking a thread takes longer than some of that
+work, so a helper spins for a while before it sleeps.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from renderer.compute.launching import Command, address
 from renderer.compute.sizes import MAIL_WORDS, Mail, State
 
 PATIENCE_US = 1000
-"""How long a helper waits actively: longer than any pause between the launches of one cycle."""
+"""Time for which a helper spins, microseconds: longer than any pause between the launches of one cycle."""
 
 
 class _Helper:
-    """A thread that runs one launch at a time for another."""
+    """A thread that runs one launch at a time for the caller."""
 
     def __init__(self, patience_us: int) -> None:
         self._mail = np.zeros(MAIL_WORDS, np.int64)
@@ -41,7 +41,7 @@ class _Helper:
             self._serve.launch()
 
     def start(self, command: Command) -> None:
-        """Hands a launch over; the command must not change until :meth:`finish`."""
+        """Posts a launch; the command must not change until :meth:`finish`."""
         self._post(*command.entry)
         if self._mail[Mail.ANSWER]:
             self._wake.release()
@@ -53,7 +53,7 @@ class _Helper:
             command.launch()
 
     def rest(self) -> None:
-        """Parks; returns when the thread has left the kernel, or does not within a second."""
+        """Parks the thread; returns when it has left the kernel, at the latest after a second."""
         self._mail[Mail.REST] = 1
         until = time.monotonic() + 1.0
         while self._mail[Mail.STATE] != State.PARKED and time.monotonic() < until:
@@ -62,14 +62,14 @@ class _Helper:
 
 
 class Team:
-    """Helpers for one caller at a time; who comes while they are busy works alone."""
+    """Helper threads for one caller at a time; a caller that finds them busy works alone."""
 
     def __init__(self) -> None:
         self._busy = threading.Lock()
         self._helpers: list[_Helper] = []
 
     def run(self, commands: Sequence[Command]) -> None:
-        """Runs all launches, the first one here; returns when all are done."""
+        """Runs all launches, the first one on the caller's thread; returns when all are done."""
         first, *others = commands
         if not others or not self._busy.acquire(blocking=False):
             for command in commands:
@@ -88,7 +88,7 @@ class Team:
             self._busy.release()
 
     def rest(self) -> None:
-        """Parks all helpers: before the interpreter ends, for kernels are unloaded then."""
+        """Parks all helpers, before the interpreter unloads kernels at exit."""
         with self._busy:
             for helper in self._helpers:
                 helper.rest()
@@ -96,12 +96,12 @@ class Team:
     def _helper(self, number: int) -> _Helper:
         if number == len(self._helpers):
             devices.load_kernels(kernels, "cpu")
-            # More threads than cores would wait for each other's waiting.
+            # With more threads than cores, spinning threads would delay working ones.
             self._helpers.append(_Helper(PATIENCE_US if number + 1 < devices.core_count() else 0))
         return self._helpers[number]
 
 
 TEAM = Team()
-"""That of this process."""
+"""The team of this process."""
 
 atexit.register(TEAM.rest)

@@ -24,17 +24,17 @@ def native_join(mailbox: Address): ...
 
 @wp.kernel
 def serve(mailbox: Address, patience_us: wp.int64):
-    """A helper's loop."""
+    """The loop of a helper."""
     native_serve(mailbox, patience_us)
 
 
 @wp.kernel
 def post(mailbox: Address, function: wp.int64, bounds: wp.int64, arguments: wp.int64):
-    """Hands a launch to a helper."""
+    """Posts a launch to a helper."""
     native_post(mailbox, function, bounds, arguments)
 
 
 @wp.kernel
 def join(mailbox: Address):
-    """Waits for a helper, or takes the work back."""
+    """Waits for a helper, or takes back work that it has not begun."""
     native_join(mailbox)

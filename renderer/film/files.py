@@ -1,6 +1,6 @@
 """Image files: EXR (linear, half or float), PNG and PPM (sRGB, 8 bit), and MP4 sequences.
 
-Every writer writes to a temporary name and moves it into place, and returns how many values were not finite.
+Every writer writes to a temporary file, moves it into place, and returns the number of non-finite values.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ class FilmError(ValueError):
 
 @contextmanager
 def placed(path: Path) -> Iterator[Path]:
-    """A temporary name beside ``path``, moved there when the block ends well and removed when it does not."""
+    """A temporary path beside ``path``. The file is moved to ``path`` when the block succeeds, and removed when it
+    fails."""
     temporary = path.with_name(f"{path.stem}.partial{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -47,7 +48,7 @@ def placed(path: Path) -> Iterator[Path]:
 
 
 def count_nonfinite(image: Tensor) -> int:
-    """Values that are infinite or NaN."""
+    """Number of infinite and NaN values."""
     return int((~torch.isfinite(image)).sum())
 
 
@@ -59,7 +60,7 @@ def encode_srgb(image: Float[Tensor, "h w 3"]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=1)
 def _steps() -> NDArray[np.float32]:
-    """Least radiance of each of the codes 1 to 255. Comparing with these gives the same codes on every processor."""
+    """Least radiance of each of the codes 1 to 255; comparison with them gives the same codes on every processor."""
     middle = (np.arange(255) + 0.5) / 255.0
     return np.where(middle > 0.04045, power((middle + 0.055) / 1.055, 2.4), middle / 12.92).astype(np.float32)
 
@@ -73,7 +74,7 @@ def write_exr(path: Path, image: Float[Tensor, "h w 3"], half: bool = True) -> i
         half: 16-bit floats; False keeps 32 bits.
 
     Returns:
-        How many values were not finite (they are written as they are).
+        Number of non-finite values (they are written unchanged).
 
     Raises:
         FilmError: the file cannot be written.
@@ -83,7 +84,7 @@ def write_exr(path: Path, image: Float[Tensor, "h w 3"], half: bool = True) -> i
     pixels = np.ascontiguousarray(image.detach().cpu().numpy(), dtype=np.float32)
     if half:
         limit = np.float32(np.finfo(np.float16).max)
-        # values beyond half's range would silently become infinite
+        # values beyond the range of half would silently become infinite
         pixels = np.where(np.isfinite(pixels), np.clip(pixels, -limit, limit), pixels).astype(np.float16)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with placed(path) as temporary:
@@ -123,11 +124,11 @@ def write_ppm(path: Path, image: Float[Tensor, "h w 3"]) -> int:
 
 
 def write_image(path: str | Path, image: Float[Tensor, "h w 3"] | NDArray[np.floating]) -> int:
-    """Writes in the format that the name ends in; returns and raises as :func:`write_exr`.
+    """Writes the format given by the ending of the name; returns and raises as :func:`write_exr`.
 
     Args:
         path: ending in .exr, .png or .ppm.
-        image: linear RGB; an array, too.
+        image: linear RGB, a tensor or an array.
     """
     path, image = Path(path), torch.as_tensor(image)
     writers = {".exr": write_exr, ".png": write_png, ".ppm": write_ppm}
@@ -138,12 +139,12 @@ def write_image(path: str | Path, image: Float[Tensor, "h w 3"] | NDArray[np.flo
 
 
 class _FilmWriter:
-    """A film, written frame by frame.
+    """Writer of a film, frame by frame.
 
-    A context manager: the file appears under its name when the block ends well. 8-bit frames.
+    A context manager: the file appears under its name when the block succeeds. Frames have 8 bits.
 
     Attributes:
-        frames: how many were written.
+        frames: number of frames written.
     """
 
     def __init__(self, path: Path, fps: float, width_px: int, height_px: int) -> None:
@@ -155,7 +156,7 @@ class _FilmWriter:
         self._placing = placed(path)
 
     def _add_stream(self, container: Any) -> Any:
-        """The stream of frames of a container, set up."""
+        """A configured video stream in the container."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -184,7 +185,7 @@ class _FilmWriter:
         self.frames += 1
 
     def _converted(self, frame: Any) -> Any:
-        """A frame in the colours of the stream."""
+        """A frame converted to the colour space of the stream."""
         return frame
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool | None:
@@ -195,7 +196,7 @@ class _FilmWriter:
         return self._placing.__exit__(kind, error, trace)  # type: ignore[arg-type]
 
     def _finish(self, complete: bool) -> FilmError | None:
-        """Writes what the encoder still holds and closes the file; returns what went wrong."""
+        """Flushes the encoder and closes the file; returns the error, if there was one."""
         from av.error import FFmpegError
 
         try:
@@ -210,10 +211,11 @@ class _FilmWriter:
 
 
 class Mp4Writer(_FilmWriter):
-    """An H.264 film (MPEG-4 part 2 where there is no encoder for it), of even width and height.
+    """Writer of an H.264 film (MPEG-4 part 2 where there is no H.264 encoder) of even width and height.
 
-    Luma and chroma are those of ITU-R BT.709 in the limited range, and the stream says so; its transfer function is
-    that of sRGB (IEC 61966-2-1), in which frames are encoded. Without tags a player guesses the matrix by the size.
+    Luma and chroma are those of ITU-R BT.709 in the limited range; the transfer function is that of sRGB (IEC
+    61966-2-1), in which frames are encoded. The stream is tagged accordingly: without tags a player would guess the
+    matrix from the size.
     """
 
     def __init__(self, path: Path, fps: float, width_px: int, height_px: int, crf: int = 18) -> None:
@@ -249,7 +251,7 @@ class Mp4Writer(_FilmWriter):
 
 
 class LosslessWriter(_FilmWriter):
-    """A film that keeps every 8-bit value: FFV1 in Matroska (RFC 9043, RFC 9559).
+    """Writer of a lossless 8-bit film: FFV1 in Matroska (RFC 9043, RFC 9559).
 
     The same frames give the same bytes.
     """

@@ -1,4 +1,4 @@
-"""EXR files of several layers: the picture and what is known of its pixels."""
+"""EXR files with several layers: the picture and further data of its pixels."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from numpy.typing import NDArray
 from renderer.film.files import FilmError, placed
 
 CHANNELS = {1: ("",), 2: ("X", "Y"), 3: ("R", "G", "B")}
-"""Endings of the channels of a layer by its depth; layers of vectors name their own."""
+"""Suffixes of a layer's channels by their number; vector layers have suffixes of their own."""
 
 
-def write_layers(
-    path: Path, layers: Mapping[str, NDArray[np.floating] | NDArray[np.integer]], half: bool = False
-) -> None:
+def write_layers(path: Path, layers: Mapping[str, NDArray[np.floating] | NDArray[np.integer]]) -> None:
     """Writes layers ``(h, w)`` or ``(h, w, channels)``.
 
-    A layer named ``""`` is the picture, channels R, G and B; a layer ``normal`` has ``normal.X``, ``.Y`` and ``.Z``,
-    other ones of three channels ``.R``, ``.G`` and ``.B``, of two ``.X`` and ``.Y``, and one of a single channel its
-    name alone (``Z`` for depth, as programs that composite pictures expect). All are floats of 32 bits.
+    The layer ``""`` is the picture with the channels R, G and B. A layer ``normal`` has the channels ``normal.X``,
+    ``.Y`` and ``.Z``; other layers of three channels have ``.R``, ``.G`` and ``.B``, those of two ``.X`` and ``.Y``,
+    and a layer of one channel has its name alone (``Z`` for depth, as compositing programs expect). All channels are
+    32-bit floats.
 
     Raises:
         FilmError: the file cannot be written.

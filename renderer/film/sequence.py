@@ -1,4 +1,4 @@
-"""Stills of a sequence: their names, and films of them."""
+"""Stills of a sequence: their names, and films made from them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from renderer.film.files import LosslessWriter, Mp4Writer
 
 
 def still_path(folder: Path, number: int, ending: str) -> Path:
-    """Where the still of a number lies; ``ending`` is ``.exr``, ``.png`` or ``.ppm``."""
+    """Path of the still with a number; ``ending`` is ``.exr``, ``.png`` or ``.ppm``."""
     return folder / f"frame{number:05d}{ending}"
 
 
 def write_lossless(frames: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> None:
-    """Joins 8-bit frames ``(h, w, 3)`` of equal size into a film that keeps every value.
+    """Joins 8-bit frames ``(h, w, 3)`` of equal size into a lossless film.
 
     Raises:
         FilmError: the film cannot be written.
@@ -32,7 +32,7 @@ def write_lossless(frames: Iterable[NDArray[np.uint8]], path: Path, fps: float) 
 
 
 def write_film(stills: Sequence[Path], path: Path, fps: float) -> None:
-    """Joins 8-bit stills of equal size into an MP4; a row or column beyond an even size is cut off.
+    """Joins 8-bit stills of equal size into an MP4; the last row or column of an odd size is cut off.
 
     Raises:
         FilmError: the film cannot be written.

@@ -1,4 +1,4 @@
-"""Shading normals that pictures bend: normal maps and bump maps."""
+"""Perturbed shading normals: normal maps and bump maps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from renderer.layout.structs import Hit, SceneData, Surface, ViewData
 
 @wp.func
 def along_uv(features: wp.int32, scene: SceneData, view: ViewData, time_s: wp.float64, hit: Hit, surface: Surface):
-    """How a point of the world moves with each of the two texture coordinates; zero where there are none."""
+    """Derivatives of the world position by the two texture coordinates; zero where there are none."""
     record = scene.instances[hit.instance]
     local = local_surface(features, scene, record, hit, record.to_local * surface.in_track + record.to_local_offset)
     across = record.from_local * local.tangent_u
@@ -59,7 +59,7 @@ def bent_normal(
     direction: wp.vec3,
     footprint: wp.float32,
 ) -> wp.vec3:
-    """The normal on the viewer's side that a normal map or a height says; seen from behind, both are turned round."""
+    """The normal on the viewer's side from a normal map or a bump map; seen from behind, both are reversed."""
     across, along = along_uv(features, scene, view, time_s, hit, surface)
     normal = surface.normal
     side = wp.where(surface.inside, -1.0, 1.0)
@@ -90,7 +90,7 @@ def bent_normal(
         bent = (record.bend_scale * mapped[0]) * first + (record.bend_scale * mapped[1]) * second + mapped[2] * outer
         bent = wp.normalize(bent)
     bent = side * bent
-    # as smooth normals: bent back until it is seen edge-on, and on the side of the true surface
+    # as with smooth normals: rotated back until it is edge-on to the viewer and on the side of the true surface
     if wp.dot(bent, surface.geometric_normal) < 0.0:
         bent = normal
     away = wp.dot(bent, direction)

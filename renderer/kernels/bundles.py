@@ -1,4 +1,4 @@
-"""Rays that a surface sends on: mirrored and refracted ones, spread about a perfect direction, some of them waiting."""
+"""Secondary rays: mirrored and refracted ones, spread about a perfect direction; all but one wait on a stack."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from renderer.layout.structs import MaterialRecord, Ray, Surface
 
 @wp.func
 def above(towards: wp.vec3, normal: wp.vec3) -> wp.vec3:
-    """A direction kept above a surface, where a smooth normal or the spread of rays would send it below."""
+    """A direction moved above a surface where a smooth normal or the spread of rays would send it below."""
     height = wp.dot(towards, normal)
     if height < ABOVE_LEAST:
         towards = towards + (ABOVE_LEAST - height) * normal
@@ -21,7 +21,7 @@ def above(towards: wp.vec3, normal: wp.vec3) -> wp.vec3:
 
 @wp.func
 def mirror_direction(surface: Surface, direction: wp.vec3) -> wp.vec3:
-    """Mirrored viewing direction, above the true surface."""
+    """The mirrored viewing direction, kept above the true surface."""
     mirrored = direction - 2.0 * wp.dot(direction, surface.normal) * surface.normal
     return above(mirrored, surface.geometric_normal)
 
@@ -38,7 +38,8 @@ def sent_on(
     rays: wp.int32,
     purpose: wp.int32,
 ) -> Ray:
-    """One of the ``rays`` that go on about a perfect direction: up for reflection, down for refraction."""
+    """One of ``rays`` secondary rays about a perfect direction: above the surface for reflection, below it for
+    refraction."""
     side = wp.where(purpose == PURPOSE_REFLECT, 1.0, -1.0)
     normal = side * surface.geometric_normal
     child = Ray()
@@ -69,7 +70,8 @@ def leave_waiting(
     row: wp.int32,
     waiting: wp.int32,
 ) -> wp.int32:
-    """Puts rays ``first`` to ``rays - 1`` of a bundle of even weights on the stack; how many wait now."""
+    """Pushes the rays ``first`` to ``rays - 1`` of a bundle of equal weights on the stack; returns the number of
+    waiting rays."""
     for number in range(first, rays):
         stack[row, waiting] = sent_on(features, surface, material, ray, perfect, weight, number, rays, purpose)
         waiting = waiting + 1
@@ -78,16 +80,17 @@ def leave_waiting(
 
 @wp.func
 def bundle_size(features: wp.int32, material: MaterialRecord, ray: Ray, rays: wp.int32) -> wp.int32:
-    """Rays to send about a perfect direction: several at the first surface, where it spreads them."""
+    """Number of rays about a perfect direction: several at the first surface if its material spreads them, else one."""
     if (features & Feature.MANY_RAYS) != 0 and ray.bounces == 0 and material.cos_spread < 1.0:
         return rays
     return 1
 
 
 def stack_size(features: Feature, depth: int, reflection_rays: int, refraction_rays: int) -> int:
-    """Rays that can wait at once while one camera ray is followed.
+    """Maximum number of rays that wait at once while one camera ray is followed.
 
-    The first surface leaves at most ``refraction_rays + reflection_rays - 1`` behind, each deeper one a single one.
+    The first surface leaves at most ``refraction_rays + reflection_rays - 1`` waiting rays, each deeper one a single
+    ray.
     """
     if not features & (Feature.GLASS | Feature.MANY_RAYS):
         return 1

@@ -1,4 +1,4 @@
-"""Camera rays and rigid motion at a ray's own time."""
+"""Camera rays, and rigid motion at the time of each ray."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from renderer.layout.structs import Draw, SceneData, ViewData
 
 @wp.func
 def rotation_between(a: wp.quat, b: wp.quat, angle: wp.float32, fraction: wp.float32) -> wp.quat:
-    """Spherical interpolation; ``angle`` lies between the quaternions, radians."""
+    """Spherical linear interpolation; ``angle`` is the angle between the quaternions, radians."""
     weight_a = 1.0 - fraction
     weight_b = fraction
     if angle > SLERP_ANGLE_LEAST:
@@ -25,7 +25,7 @@ def rotation_between(a: wp.quat, b: wp.quat, angle: wp.float32, fraction: wp.flo
 
 @wp.func
 def track_key(scene: SceneData, track: wp.int32, time_s: wp.float64):
-    """Indices of the keys around a time, and how far between them it lies; float64 keeps hours of animation exact."""
+    """Indices of the keys around a time, and its fraction between them; float64 keeps hours of animation exact."""
     record = scene.tracks[track]
     last = record.key_count - 1
     at = wp.clamp((time_s - record.start_s) / record.interval_s, wp.float64(0.0), wp.float64(last))
@@ -36,7 +36,7 @@ def track_key(scene: SceneData, track: wp.int32, time_s: wp.float64):
 
 @wp.func
 def track_translation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp.float64) -> wp.vec3:
-    """Where a track's origin is; looked up where all samples of a launch share one time."""
+    """Translation of a track at a time; looked up where all samples of a launch share one time."""
     if view.single_time == 1:
         return view.pose_translation[track]
     first, second, fraction = track_key(scene, track, time_s)
@@ -47,7 +47,7 @@ def track_translation(scene: SceneData, view: ViewData, track: wp.int32, time_s:
 
 @wp.func
 def track_rotation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp.float64) -> wp.quat:
-    """How a track is turned, as :func:`track_translation`."""
+    """Rotation of a track at a time; see :func:`track_translation`."""
     if view.single_time == 1:
         return view.pose_rotation[track]
     first, second, fraction = track_key(scene, track, time_s)
@@ -60,7 +60,7 @@ def track_rotation(scene: SceneData, view: ViewData, track: wp.int32, time_s: wp
 def camera_ray(features: wp.int32, scene: SceneData, view: ViewData, draw: Draw, position: wp.vec2, time_s: wp.float64):
     """Origin and unit direction, in world space, of a ray through an image position in [0, 1)² from the top left.
 
-    With a lens the ray starts at a point of it and meets that of the pinhole in the plane in focus.
+    With a lens the ray starts at a point on it and meets the ray of the pinhole in the focal plane.
     """
     x = (2.0 * position[0] - 1.0) * view.tan_x
     y = (1.0 - 2.0 * position[1]) * view.tan_y

@@ -1,6 +1,6 @@
 """Kernel entry points: index, load, call, store.
 
-Those that shade are compiled for the features of a scene (:func:`specialised`).
+Shading kernels are compiled for the features of a scene (:func:`specialised`).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class ShadingKernels:
 
     Attributes:
         shade_samples: shades a list of samples in groups.
-        render_pixels: shades the samples of a regular grid in every pixel, and takes their means. None for paths, whose
-            kernels take long to compile.
-        module: what holds both, for loading.
+        render_pixels: shades a regular grid of samples in every pixel and averages them. None for paths, whose kernels
+            take long to compile.
+        module: module that contains both, for loading.
     """
 
     shade_samples: wp.Kernel
@@ -40,22 +40,25 @@ class ShadingKernels:
 _MODULE = "renderer.kernels.shading_"
 
 SETS_MAX = 24
-"""Sets of features that one process compiles kernels for; scenes beyond them get kernels for everything there is."""
+"""Maximum number of sets of features for which one process compiles kernels; further scenes use kernels with all
+features."""
 
 
 def compiled_count() -> int:
-    """How many sets of features this process has kernels for."""
+    """Number of sets of features for which this process has kernels."""
     return specialised.cache_info().currsize
 
 
 def kept_count() -> int:
-    """How many sets of features this machine keeps compiled kernels for, of this revision and earlier ones."""
+    """Number of sets of features for which compiled kernels are cached on this machine, from this and earlier
+    revisions."""
     folders = Path(wp.config.kernel_cache_dir or "").glob(f"wp_{_MODULE}*")
     return len({folder.name.removeprefix(f"wp_{_MODULE}")[:8] for folder in folders if folder.is_dir()})
 
 
 def nearest(features: Feature) -> Feature:
-    """The set that kernels for ``features`` are compiled for: they themselves, or everything once there are enough."""
+    """The set for which kernels for ``features`` are compiled: that set itself, or all features once the maximum number
+    of sets is reached."""
     if features in _asked or len(_asked) < SETS_MAX:
         _asked.add(features)
         return features
@@ -67,7 +70,7 @@ _asked: set[Feature] = set()
 
 @cache
 def specialised(features: Feature) -> ShadingKernels:
-    """Kernels that can do what is in ``features`` and hold no code for the rest; the same object for the same set."""
+    """Kernels for ``features`` that contain no code for other features; the same object for the same set."""
     mask = int(features)
     transport = along_path if Feature.PATHS in features else radiance
     name = f"{_MODULE}{mask:08x}"
@@ -89,7 +92,8 @@ def specialised(features: Feature) -> ShadingKernels:
         occluder: wp.array(dtype=wp.int32),
         rays: wp.array(dtype=wp.vec3i),
     ):
-        """Shades the samples from ``first`` on; ``rays`` receives the shadow, reflected and refracted rays of each.
+        """Shades the samples from ``first`` on; ``rays`` receives the numbers of shadow, reflected and refracted rays
+        of each.
 
         ``footprint_scale``, and the three arrays of first hits, may be empty.
         """
@@ -123,8 +127,9 @@ def specialised(features: Feature) -> ShadingKernels:
         time_s: wp.float64,
         image: wp.array2d(dtype=wp.vec3),
     ):
-        """Renders pixels, each the mean of a regular grid of ``samples`` squared samples, ``first`` counted like
-        threads: along the Morton curve within blocks of ``BLOCK_PX`` squared pixels, those by rows."""
+        """Renders pixels from number ``first`` on, each the mean of a regular grid of ``samples`` squared samples.
+        Pixels are numbered along the Morton curve within blocks of ``BLOCK_PX`` squared pixels, and the blocks row by
+        row."""
         pixel = first + wp.tid()
         height = image.shape[0]
         width = image.shape[1]
@@ -162,14 +167,14 @@ def along_path(
     stack: wp.array2d(dtype=Ray),
     row: wp.int32,
 ):
-    """Light along one path, with the arguments of the tree of rays, of which none waits."""
+    """Radiance along one path, with the arguments of the tree of rays; the stack is not used."""
     total, counts, first = path_radiance(features, scene, view, time_s, draw, origin, direction, footprint_scale)
     return total, counts, first
 
 
 @wp.func
 def every_second_bit(code: wp.int32) -> wp.int32:
-    """Bits 0, 2, 4 and 6 of a Morton code, side by side."""
+    """Bits 0, 2, 4 and 6 of a Morton code as a number."""
     return (code & 1) | ((code >> 1) & 2) | ((code >> 2) & 4) | ((code >> 3) & 8)
 
 
@@ -177,7 +182,7 @@ def every_second_bit(code: wp.int32) -> wp.int32:
 def grid_position(
     column: wp.int32, row: wp.int32, sample: wp.int32, samples: wp.int32, width: wp.int32, height: wp.int32
 ) -> wp.vec2:
-    """Where a sample of a pixel's regular grid lies on the image."""
+    """Position on the image of a sample of a pixel's regular grid."""
     x = column * samples + sample % samples
     y = row * samples + sample / samples
     return wp.vec2(
@@ -193,7 +198,7 @@ def pose_tracks(
     rotation: wp.array(dtype=wp.quat),
     time_s: wp.float64,
 ):
-    """Poses of all tracks at one time, to the bit those that samples find for themselves."""
+    """Poses of all tracks at one time, with the same bits as those computed for a sample."""
     track = wp.tid()
     translation[track] = track_translation(scene, view, track, time_s)
     rotation[track] = track_rotation(scene, view, track, time_s)

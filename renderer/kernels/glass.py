@@ -1,4 +1,4 @@
-"""Dielectrics: Snell's law and Fresnel's equations, and what a surface of glass sends on."""
+"""Dielectrics: Snell's law and Fresnel's equations, and the secondary rays of glass."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from renderer.layout.structs import MaterialRecord, SceneData, Surface
 
 @wp.struct
 class Sent:
-    """What leaves a surface along the two perfect directions: what each ray is weighed with."""
+    """Weights of the rays along the two perfect directions of a surface, and the direction of the refracted one."""
 
     reflection: wp.vec3
     refraction: wp.vec3
@@ -21,14 +21,16 @@ class Sent:
 def dielectric_reflectance(cosine: wp.float32, ratio: wp.float32) -> wp.float32:
     """Unpolarised reflectance of a dielectric; 1 beyond the critical angle.
 
-    ``cosine`` is that of the arriving ray against the normal on its side; ``ratio`` is the index on the arriving side
-    over that beyond.
+    ``cosine`` is the cosine of the incident angle; ``ratio`` is the refractive index on the incident side over that on
+    the other side. With ``beyond = sqrt(1 - ratio² (1 - cosine²))`` the amplitudes are
+    ``(ratio cosine - beyond) / (ratio cosine + beyond)`` and ``(cosine - ratio beyond) / (cosine + ratio beyond)``; the
+    reflectance is the mean of their squares.
     """
     squared = ratio * ratio * wp.max(1.0 - cosine * cosine, 0.0)
     if squared >= 1.0:
         return 1.0
     beyond = wp.sqrt(1.0 - squared)
-    # amplitudes across and in the plane of incidence (Born and Wolf, sec. 1.5.2), divided by the index beyond
+    # amplitudes perpendicular and parallel to the plane of incidence (Born and Wolf, sec. 1.5.2)
     across = (ratio * cosine - beyond) / (ratio * cosine + beyond)
     within = (cosine - ratio * beyond) / (cosine + ratio * beyond)
     return wp.min(0.5 * (across * across + within * within), 1.0)
@@ -36,7 +38,7 @@ def dielectric_reflectance(cosine: wp.float32, ratio: wp.float32) -> wp.float32:
 
 @wp.func
 def refracted(direction: wp.vec3, normal: wp.vec3, cosine: wp.float32, ratio: wp.float32) -> wp.vec3:
-    """Unit direction beyond a surface (Snell's law), for a ray below the critical angle."""
+    """Unit direction of the refracted ray (Snell's law), for a ray below the critical angle."""
     squared = ratio * ratio * wp.max(1.0 - cosine * cosine, 0.0)
     beyond = wp.sqrt(wp.max(1.0 - squared, 0.0))
     return wp.normalize(ratio * direction + (ratio * cosine - beyond) * normal)
@@ -52,7 +54,7 @@ def sent_by_glass(
     footprint: wp.float32,
     direction: wp.vec3,
 ) -> Sent:
-    """The shares of Fresnel's equations; ``thin`` panes sum the reflections between their faces."""
+    """Weights from Fresnel's equations; for ``thin`` panes the reflections between their faces are summed."""
     sent = Sent()
     ratio = 1.0 / material.ior
     if surface.inside and material.thin == 0:
@@ -64,7 +66,7 @@ def sent_by_glass(
         reflectance = 2.0 * reflectance / (1.0 + reflectance)
     elif reflectance < 1.0:
         sent.through = refracted(direction, surface.normal, cosine, ratio)
-        # radiance is squeezed into, or let out of, the smaller solid angle inside (Veach 1997, eq. 5.2)
+        # radiance scales with the square of the index (Veach 1997, eq. 5.2)
         scale = ratio * ratio
     sent.reflection = texture_color(features, scene, material.mirror, surface.uv, footprint) * reflectance
     passed = (1.0 - reflectance) * scale

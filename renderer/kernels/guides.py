@@ -1,4 +1,4 @@
-"""What a camera ray meets first, told by itself: the layers beside a picture."""
+"""First hits of camera rays without shading, for the auxiliary layers of a picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ _SEEN = (
 
 @cache
 def guides(features: Feature) -> wp.Kernel:
-    """A kernel for what of a set decides where rays go and what they meet; the same object for the same set."""
+    """A kernel for those features of a set that determine camera rays and their first hits; the same object for the
+    same set."""
     mask = int(features & _SEEN)
     name = f"renderer.kernels.guides_{mask:08x}"
     wp.get_module(name).options.update(MODULE_OPTIONS)
@@ -43,7 +44,8 @@ def guides(features: Feature) -> wp.Kernel:
         normal: wp.array(dtype=wp.vec3),
         albedo: wp.array(dtype=wp.vec3),
     ):
-        """Tells of the samples from ``first`` on; of a miss all but the instance, -1, and the direction is zero."""
+        """Stores the first hits of the samples from ``first`` on. For a miss the instance is -1, the point is the ray's
+        direction, and the rest is zero."""
         i = first + wp.tid()
         leader = (i / group_size) * group_size
         draw = group_draw(scene.seed, position[leader], time_s[leader], i - leader, group_size)

@@ -1,13 +1,14 @@
-"""Height fields: rays marched through the relief below a rectangle.
+"""Height fields: ray marching through the relief below a rectangle.
 
-In the unit space of the rectangle the relief is the sheet ``z = (h(x, y) - 1) depth`` over the square [-1, 1]², ``h``
-bilinear between the samples of its map. It is marched in even steps until the ray has passed through the sheet, from
-either side, and the crossing is then found by secants (Policarpo, Oliveira and Comba 2005; Tatarchuk 2006). The sheet
-has two sides and no walls, as a displaced mesh has none: rays that leave over the border go on.
+In the unit space of the rectangle the relief is the surface ``z = (h(x, y) - 1) depth`` over the square [-1, 1]², with
+``h`` interpolated bilinearly between the samples of its map. The ray is marched in equal steps until it has passed
+through the surface from either side, and the crossing is then found by the secant method (Policarpo, Oliveira and Comba
+2005; Tatarchuk 2006). The surface has two sides and, like a displaced mesh, no walls: rays that leave across the border
+continue.
 
-A step is at most ``2 / steps`` of the unit space wide. What a ray enters and leaves within one step may be missed: a
-ridge or groove that is narrower than ``width / steps`` samples of the map. Of several crossings within one step any may
-be taken.
+A step is at most ``2 / steps`` of the unit space wide. A ridge or groove that a ray enters and leaves within one step,
+narrower than ``width / steps`` samples of the map, may be missed. Of several crossings within one step any may be
+returned.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ import warp as wp
 from renderer.layout.sizes import TINY
 from renderer.layout.structs import Hit, InstanceRecord, LevelRecord, LocalSurface, ReliefRecord, SceneData
 
-_SECANTS = wp.constant(32)  # at most; a few are enough where the sheet is smooth
+_SECANTS = wp.constant(32)  # maximum; a few suffice where the surface is smooth
 _FEWEST_STEPS = wp.constant(4)
 
 
 @wp.func
 def height_sample(scene: SceneData, level: LevelRecord, column: wp.int32, row: wp.int32) -> wp.float32:
-    """One sample of the map; beyond the border the nearest."""
+    """One sample of the map; beyond the border, the nearest one."""
     x = wp.clamp(column, 0, level.width - 1)
     y = wp.clamp(row, 0, level.height - 1)
     return scene.texels[level.first_texel + y * level.width + x][0]
@@ -31,7 +32,7 @@ def height_sample(scene: SceneData, level: LevelRecord, column: wp.int32, row: w
 
 @wp.func
 def height_patch(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32) -> wp.vec3:
-    """Height between 0 and 1 at a point of the square, and its derivatives by x and y within the bilinear patch there.
+    """Height in [0, 1] at a point of the square, and its derivatives by x and y in the bilinear patch there.
 
     Row 0 of the map is at ``y = 1``.
     """
@@ -56,7 +57,7 @@ def height_patch(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.floa
 
 @wp.func
 def height_at(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32) -> wp.float32:
-    """Height between 0 and 1 at a point of the square."""
+    """Height in [0, 1] at a point of the square."""
     patch = height_patch(scene, level, x, y)
     return patch[0]
 
@@ -65,7 +66,7 @@ def height_at(scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32
 def above_sheet(
     scene: SceneData, relief: ReliefRecord, origin: wp.vec3, direction: wp.vec3, t: wp.float32
 ) -> wp.float32:
-    """How far a point of a ray is above the sheet, along z."""
+    """Height of a point of a ray above the surface, along z."""
     p = origin + t * direction
     return p[2] - (height_at(scene, scene.levels[relief.level], p[0], p[1]) - 1.0) * relief.depth
 
@@ -81,10 +82,10 @@ def crossing(
     gap_before: wp.float32,
     gap_after: wp.float32,
 ) -> wp.float32:
-    """Where a ray passes through the sheet, between two points on either side of it.
+    """Distance at which a ray passes through the surface, between two points on either side of it.
 
-    Regula falsi that halves the weight of an end which stays (the Illinois rule of Dowell and Jarratt 1971), so that
-    it always closes in.
+    Regula falsi that halves the weight of an end point that stays (the Illinois algorithm, Dowell and Jarratt 1971), so
+    that it always converges.
     """
     low = wp.float32(before)
     high = wp.float32(after)
@@ -115,12 +116,13 @@ def crossing(
 
 @wp.func
 def passage(relief: ReliefRecord, origin: wp.vec3, direction: wp.vec3, reach: wp.float32):
-    """A ray's way through the box around a relief: distance to it, where it enters, and how far it goes from there.
+    """The segment of a ray in the box around a relief: distance to the box, entry point, and length of the segment.
 
-    The last is negative for none. The entry is put on the face of the box exactly and the way measured from it:
-    otherwise a ray from afar is rounded by more than a shallow relief is deep, and passes it unseen.
+    The length is negative if the ray misses the box. The entry point lies exactly on the face of the box, and distances
+    are measured from it: otherwise the rounding error of a distant ray could exceed the depth of a shallow relief, and
+    the ray would miss it.
     """
-    # a little more than the sheet fills, so that its highest and lowest parts are not on the very border
+    # slightly larger than the surface, so that its highest and lowest parts do not lie on the faces
     lower = wp.vec3(-1.0, -1.0, -1.0001 * relief.depth)
     upper = wp.vec3(1.0, 1.0, 0.0001 * relief.depth)
     near = wp.float32(0.0)
@@ -156,8 +158,8 @@ def relief_distance(
 ) -> wp.float32:
     """Distance along a unit direction to a relief in its unit space, negative for none before ``reach``.
 
-    The whole width of the relief is crossed in its number of steps, a part of it in as many fewer, and a ray straight
-    down in a few.
+    A ray across the whole width of the relief takes its number of steps, one across a part of it proportionally fewer,
+    and a vertical ray a few.
     """
     relief = scene.reliefs[record.relief]
     near, start, way = passage(relief, origin, direction, reach)
@@ -182,8 +184,8 @@ def relief_distance(
 def relief_surface(scene: SceneData, record: InstanceRecord, hit: Hit, point: wp.vec3) -> LocalSurface:
     """The surface of a relief at a hit.
 
-    The geometric normal is that of the bilinear patch; the shading normal is taken over a whole sample's width, so that
-    it does not jump from one patch to the next.
+    The geometric normal is that of the bilinear patch. The shading normal comes from differences over one sample's
+    width, so that it is continuous between patches.
     """
     relief = scene.reliefs[record.relief]
     level = scene.levels[relief.level]
@@ -221,6 +223,6 @@ def slope(
     dx: wp.float32,
     dy: wp.float32,
 ) -> wp.float32:
-    """Rise of the sheet between two points on either side, over their distance."""
+    """Slope of the surface: its rise between two points on either side over their distance."""
     rise = height_at(scene, level, x + dx, y + dy) - height_at(scene, level, x - dx, y - dy)
     return rise * relief.depth * 0.5 / (dx + dy)

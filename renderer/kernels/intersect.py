@@ -12,7 +12,7 @@ from renderer.layout.kinds import Shape
 from renderer.layout.sizes import LIT
 from renderer.layout.structs import Hit, InstanceRecord, SceneData, ViewData
 
-# On a GPU no mesh comes without a tree of Warp's, so that this is never called there.
+# On a GPU every mesh has a tree of Warp's, so this is never called there.
 _NATIVE = """
 #if defined(__CUDACC__) || defined(__CUDA_ARCH__) || defined(__CUDACC_RTC__)
     return wp::vec4(-1.0f, 0.0f, 0.0f, 0.0f);
@@ -103,7 +103,7 @@ def instance_blocks(
     direction: wp.vec3,
     t_max: wp.float32,
 ) -> wp.bool:
-    """Whether an instance lies along a ray in track space before ``t_max``; any hit will do."""
+    """Whether a ray in track space hits an instance before ``t_max``; any hit suffices."""
     if (features & Feature.MESH) != 0 and record.shape == Shape.MESH:
         start = record.to_local * origin + record.to_local_offset
         towards = record.to_local * direction
@@ -169,8 +169,8 @@ def occluder(
     direction: wp.vec3,
     t_max: wp.float32,
 ) -> wp.int32:
-    """An instance that lies along a world ray before ``t_max``, the first in the order of the groups and their nodes;
-    ``LIT`` for none."""
+    """The first instance, in the order of the groups and their nodes, that a world ray hits before ``t_max``; ``LIT``
+    for none."""
     for g in range(scene.group_count):
         group = scene.groups[g]
         start = wp.vec3(origin[0], origin[1], origin[2])

@@ -1,4 +1,4 @@
-"""Light that arrives at a point, before occlusion, and radiance from infinity."""
+"""Light that arrives at a point, without occlusion, and radiance from infinity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from renderer.layout.structs import LightRecord, SceneData, ViewData
 
 @wp.struct
 class Arriving:
-    """Unit direction towards a light, its irradiance on a surface facing it, and how far its shadow ray reaches."""
+    """Unit direction towards a light, its irradiance on a surface that faces it, and the length of its shadow ray."""
 
     direction: wp.vec3
     irradiance: wp.vec3
@@ -24,7 +24,7 @@ class Arriving:
 
 @wp.func
 def has_extent(record: LightRecord) -> wp.bool:
-    """Whether a light is seen in more than one direction, of which :func:`arriving_light` takes one."""
+    """Whether a light spans more than one direction, so that :func:`arriving_light` samples one."""
     return record.kind != LightKind.POINT and record.kind != LightKind.DIRECTIONAL and record.kind != LightKind.SPOT
 
 
@@ -52,7 +52,7 @@ def from_spot(record: LightRecord, position: wp.vec3) -> Arriving:
 
 @wp.func
 def from_sun(record: LightRecord, sample: wp.vec2) -> Arriving:
-    """A disc of even radiance at infinity, one direction in it."""
+    """Sun: a sampled direction in a disc of uniform radiance at infinity."""
     light = Arriving()
     light.direction = cone_direction(record.place, record.cos_inner, sample)
     light.irradiance = record.color
@@ -62,7 +62,8 @@ def from_sun(record: LightRecord, sample: wp.vec2) -> Arriving:
 
 @wp.func
 def from_quad(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arriving:
-    """A point of a parallelogram that shines to one side: radiance times the solid angle of an even share of it."""
+    """A sampled point of a parallelogram that emits to one side: radiance times the solid angle that the whole area
+    would have at that point."""
     light = Arriving()
     on_light = record.place + (2.0 * sample[0] - 1.0) * record.across + (2.0 * sample[1] - 1.0) * record.along
     towards = on_light - position
@@ -78,7 +79,8 @@ def from_quad(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arrivi
 
 @wp.func
 def from_sphere(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arriving:
-    """A direction into the cone that a sphere fills: radiance times the cone's solid angle; nothing from inside."""
+    """A sampled direction in the cone that a sphere subtends: radiance times the cone's solid angle; no light from
+    inside."""
     light = Arriving()
     towards = record.place - position
     distance = wp.length(towards)
@@ -89,7 +91,7 @@ def from_sphere(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arri
     narrow = sine * sine / (1.0 + cosine)  # 1 - cosine, without the cancellation of a far sphere
     light.direction = cone_direction(towards / distance, 1.0 - narrow, sample)
     light.irradiance = record.color * (2.0 * wp.pi * narrow)
-    # the nearer meeting with the sphere, or the point nearest to it where rounding makes them miss
+    # the nearer intersection with the sphere, or the closest point where rounding makes the ray miss
     along = wp.dot(towards, light.direction)
     aside = towards - along * light.direction
     inside = wp.max(record.radius * record.radius - wp.dot(aside, aside), 0.0)
@@ -99,7 +101,7 @@ def from_sphere(record: LightRecord, sample: wp.vec2, position: wp.vec3) -> Arri
 
 @wp.func
 def cell_of(chances: wp.array(dtype=wp.float32), count: wp.int32, x: wp.float32) -> wp.int32:
-    """Which of ``count`` intervals between rising limits from 0 to 1 holds ``x``."""
+    """Index of the interval that contains ``x``, of ``count`` intervals between increasing limits from 0 to 1."""
     low = wp.int32(0)
     high = wp.int32(count)
     while high - low > 1:
@@ -122,7 +124,8 @@ def map_radiance(scene: SceneData, level: wp.int32, to_map: wp.mat33, scale: wp.
 
 @wp.func
 def from_environment(scene: SceneData, sample: wp.vec2) -> Arriving:
-    """A direction into the map, chosen by the brightness of its texels: radiance over the density of the choice."""
+    """A direction of the environment, sampled by the brightness of its texels: radiance over the density of the
+    choice."""
     light = Arriving()
     height = scene.lighting_columns.shape[0]
     width = scene.lighting_columns.shape[1] - 1
@@ -138,9 +141,9 @@ def from_environment(scene: SceneData, sample: wp.vec2) -> Arriving:
     polar = wp.pi * v
     turn = 2.0 * wp.pi * u
     local = wp.vec3(wp.sin(turn) * wp.sin(polar), wp.cos(polar), -wp.cos(turn) * wp.sin(polar))
-    # the transpose of a rotation takes the map's directions back to the world's
+    # the transpose of the rotation takes directions from the map to the world
     light.direction = wp.normalize(wp.transpose(scene.lighting_to_map) * local)
-    solid_angle = 2.0 * wp.pi * wp.pi * wp.sin(polar)  # of the whole map, were it as dense as here
+    solid_angle = 2.0 * wp.pi * wp.pi * wp.sin(polar)  # that of the whole map, if every texel were as wide as this one
     density = row_chance * column_chance * wp.float32(width * height)
     radiance = map_radiance(scene, scene.lighting_level, scene.lighting_to_map, scene.lighting_scale, light.direction)
     light.irradiance = radiance * (solid_angle / density)
@@ -158,10 +161,10 @@ def arriving_light(
     sample: wp.vec2,
     position: wp.vec3,
 ) -> Arriving:
-    """Light from one direction towards a light.
+    """The light from one direction towards a light source.
 
-    Of a light with an extent ``sample``, in [0, 1)², picks a point; the irradiance is then such that its mean over
-    even samples, weighed by the cosine of each, is the light's.
+    For a light with an extent, ``sample`` in [0, 1)² selects a point. The irradiance is scaled so that its mean over
+    uniform samples, each weighted by its cosine, is that of the light.
     """
     if (features & Feature.POINT) != 0 and record.kind == LightKind.POINT:
         return from_point(record, position)
@@ -196,7 +199,7 @@ def arriving_light(
 
 @wp.func
 def environment_radiance(features: wp.int32, scene: SceneData, direction: wp.vec3) -> wp.vec3:
-    """Radiance that is seen at infinity along a unit world direction."""
+    """Radiance from infinity along a unit world direction."""
     if (features & Feature.SKY) == 0 or scene.environment_level < 0:
         return wp.vec3(0.0, 0.0, 0.0)
     return map_radiance(scene, scene.environment_level, scene.environment_to_map, scene.environment_scale, direction)

@@ -1,9 +1,9 @@
-"""Kernels that trace sixteen neighbouring samples at once: the fast path of the CPU.
+"""Kernels that trace sixteen neighbouring samples at once, the fast path of the CPU.
 
-Sixteen consecutive samples on the Morton curve are a block of 4 x 4, so their rays take nearly the same way. The C++ in
-``native/`` carries them through the scene side by side, in vector registers; Warp's own compiler builds it together
-with these kernels. The same computation for one sample, in Python, is
-:func:`renderer.kernels.entry.shade_samples`: what CUDA runs and what tests compare with.
+Sixteen consecutive samples on the Morton curve are a block of 4 x 4, so their rays are coherent. The C++ in ``native/``
+traces them together in vector registers; Warp's compiler builds it with these kernels.
+:func:`renderer.kernels.entry.shade_samples` is the same computation for one sample in Python, which CUDA runs and with
+which tests compare.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from renderer.layout.structs import SceneData, ViewData
 
 @wp.struct
 class Queries:
-    """Rays through one mesh, and where their hits go: ``face`` is -1 for a miss, or a flag where any hit will do."""
+    """Rays through one mesh, and arrays for their hits: ``face`` is -1 for a miss, or a flag where any hit suffices."""
 
     nodes: wp.array(dtype=wp.float32)
     blocks: wp.array(dtype=wp.float32)
@@ -34,7 +34,7 @@ class Queries:
 
 
 def suffice_for(features: Feature) -> bool:
-    """Whether packets can do all that is in a set."""
+    """Whether packets support all features of a set."""
     return features | PACKETS == PACKETS
 
 
@@ -109,19 +109,19 @@ def build_tree(
     blocks: wp.array(dtype=wp.float32),
     counts: wp.array(dtype=wp.int32),
 ):
-    """Fills ``nodes`` and ``blocks`` and how many of each there are; ``boxes`` and ``order`` are scratch."""
+    """Fills ``nodes`` and ``blocks``, and ``counts`` with the number of each; ``boxes`` and ``order`` are scratch."""
     native_build_tree(vertices, faces, boxes, order, nodes, blocks, counts)
 
 
 @wp.kernel(enable_backward=False)
 def trace_singles(scene: SceneData, rays: Queries, first: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)):
-    """Traces a ray a thread through the scene's first mesh, from ray ``first`` on, and adds up what that takes."""
+    """Traces one ray per thread through the scene's first mesh, from ray ``first`` on, and sums the work."""
     native_trace_single(scene, rays, first + wp.tid(), nearest, work)
 
 
 @wp.kernel(enable_backward=False)
 def trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32):
-    """Traces sixteen rays a thread, from ray ``first`` on."""
+    """Traces sixteen rays per thread, from ray ``first`` on."""
     native_trace_queries(rays, first + LANES * wp.tid(), nearest)
 
 
@@ -140,11 +140,11 @@ def shade_samples(
     occluder: Address,
     rays: Address,
 ):
-    """As the kernel of the same name in ``entry.py``, for all samples that no other launch has taken.
+    """Like the kernel of the same name in ``entry.py``, for all samples that no other launch has taken.
 
-    Host threads launch it side by side, one thread each, with the same ``taken``, which starts at zero. ``rays``
-    receives the totals. Arrays come as addresses, for a launch that is recorded once; zero stands for those that are
-    not given or not asked for.
+    Host threads launch it in parallel, with the same counter ``taken``, which starts at zero. ``rays`` receives the
+    totals. Arrays are passed as addresses, because a launch is recorded once; zero stands for arrays that are not given
+    or not requested.
     """
     native_shade_samples(
         scene, view, taken, count, position, time_s, footprint_scale, color, instance, point, occluder, rays
@@ -160,5 +160,5 @@ def render_pixels(
     time_s: wp.float64,
     image: wp.array2d(dtype=wp.vec3),
 ):
-    """As the kernel of the same name in ``entry.py``, shared between launches like :func:`shade_samples`."""
+    """Like the kernel of the same name in ``entry.py``, shared between launches as :func:`shade_samples` is."""
     native_render_pixels(scene, view, taken, samples, time_s, image)

@@ -1,4 +1,5 @@
-"""Lights along paths: which is asked, how likely a direction towards one was, and what a shadow ray lets through."""
+"""Lights along paths: densities of light sampling, weights of the two ways to a light, and transmittance of shadow
+rays."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from renderer.layout.structs import SceneData, Surface, ViewData
 
 @wp.func
 def preferred(own: wp.float32, other: wp.float32) -> wp.float32:
-    """Weight of a direction that was chosen one way and might have been the other way: the power heuristic.
+    """Weight of a direction that was sampled in one of two ways, by the power heuristic ``own² / (own² + other²)``.
 
     Source: Veach 1997, "Robust Monte Carlo Methods for Light Transport Simulation", sec. 9.2.4.
     """
@@ -32,7 +33,7 @@ def preferred(own: wp.float32, other: wp.float32) -> wp.float32:
 
 @wp.func
 def sky_density(scene: SceneData, direction: wp.vec3) -> wp.float32:
-    """Density, per solid angle, by which a world direction into the environment is chosen as a light."""
+    """Density, per solid angle, with which a world direction into the environment is sampled as a light."""
     local = wp.normalize(scene.lighting_to_map * direction)
     height = scene.lighting_columns.shape[0]
     width = scene.lighting_columns.shape[1] - 1
@@ -57,7 +58,8 @@ def lamp_density(
     direction: wp.vec3,
     surface: Surface,
 ) -> wp.float32:
-    """Density by which the direction from a point to a place on a rectangle or sphere is chosen as a light."""
+    """Density, per solid angle, with which the direction from a point to a point of a rectangle or sphere is sampled as
+    a light."""
     record = scene.lights[light]
     if (features & Feature.QUAD) != 0 and record.kind == LightKind.QUAD:
         way = surface.position - origin
@@ -83,7 +85,7 @@ def lamp_density(
 def opacity_at(
     features: wp.int32, scene: SceneData, record: ScatterRecord, surface: Surface, footprint: wp.float32
 ) -> wp.float32:
-    """Share of light that a surface stops: what lies in a hole stops none."""
+    """Share of light that a surface stops; 0 in a hole."""
     if record.opacity < 0:
         return 1.0
     opacity = texture_color(features, scene, record.opacity, surface.uv, footprint)[0]
@@ -102,7 +104,7 @@ def let_through(
     direction: wp.vec3,
     reach: wp.float32,
 ) -> wp.vec3:
-    """Share of light that comes along a shadow ray: all or none, unless there are holes and clear panes on the way."""
+    """Transmittance of a shadow ray: 1 or 0, unless it passes holes or clear panes."""
     shut = wp.vec3(0.0, 0.0, 0.0)
     share = wp.vec3(1.0, 1.0, 1.0)
     if (features & Feature.PASSING) == 0:

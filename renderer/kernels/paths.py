@@ -1,8 +1,8 @@
-"""Light transport along paths: every surface scatters light from the lights and from other surfaces.
+"""Path tracing: every surface scatters light from the lights and from other surfaces.
 
-At each surface of a path one light is asked, and the path goes on in one direction of the surface; where both ways find
-the same light they are weighed by how likely each was. Long paths end by chance (Russian roulette), the others counting
-for more.
+At each surface of a path one light is sampled, and the path continues in one direction sampled from the surface; where
+both find the same light, they are weighted by multiple importance sampling. Long paths end at random (Russian
+roulette), and the weights of the others are increased.
 
 Source: Kajiya 1986, "The Rendering Equation"; Veach 1997, "Robust Monte Carlo Methods for Light Transport Simulation",
 chs 9 and 10.
@@ -28,12 +28,12 @@ from renderer.layout.sizes import FAR, SLANT_LEAST, UNLIT
 from renderer.layout.structs import Draw, FirstHit, SceneData, Surface, ViewData
 
 PURPOSE_VERTEX = 4
-_PLACE, _PICK, _TURN, _CHANCE = range(4)  # purposes of the numbers of one surface of a path
+_PLACE, _PICK, _TURN, _CHANCE = range(4)  # purposes of the random numbers at one surface of a path
 
 
 @wp.func
 def numbers(draw: Draw, purpose: wp.int32, bounces: wp.int32) -> wp.vec2:
-    """Two numbers: spread well over the group at the first surfaces, and simply random at deeper ones."""
+    """Two random numbers, stratified over the group at the first surfaces and independent at deeper ones."""
     if bounces < SPREAD_FIRST:
         return draw_2d(draw, purpose)
     return cell_2d(draw, purpose, 0, 1)
@@ -52,7 +52,7 @@ def asked_light(
     pick: wp.float32,
     place: wp.vec2,
 ):
-    """Radiance that a surface scatters from one of the lights, and the shadow rays it took: one or none."""
+    """Radiance that a surface scatters from one sampled light, and the number of shadow rays: one or none."""
     light = wp.min(wp.int32(pick * wp.float32(scene.light_count)), scene.light_count - 1)
     record = scene.lights[light]
     arriving = arriving_light(features, scene, view, time_s, record, place, surface.position)
@@ -61,7 +61,7 @@ def asked_light(
         return found, 0
     local = frame * arriving.direction
     height = wp.dot(surface.geometric_normal, arriving.direction)
-    # light must not leak over a smooth normal, nor through it
+    # light must not leak through the surface where smooth and true normal disagree
     if height * local[2] <= 0.0:
         return found, 0
     response = response_of(features, lobes, outgoing, local)
@@ -74,7 +74,7 @@ def asked_light(
         count = wp.float32(scene.light_count)
         weight = wp.float32(1.0)
         if record.kind == LightKind.QUAD or record.kind == LightKind.SPHERE:
-            # radiance over irradiance is the density of the place
+            # radiance over irradiance is the density of the sampled direction
             weight = preferred(wp.max(record.color) / (wp.max(arriving.irradiance) * count), response.density)
         if (features & Feature.ENVIRONMENT) != 0 and record.kind == LightKind.ENVIRONMENT:
             weight = preferred(sky_density(scene, arriving.direction) / count, response.density)
@@ -84,9 +84,10 @@ def asked_light(
 
 @wp.func
 def from_infinity(features: wp.int32, scene: SceneData, direction: wp.vec3, density: wp.float32) -> wp.vec3:
-    """Radiance that a path finds at infinity, along a direction that was chosen with a density; none for perfect ones.
+    """Radiance that a path finds at infinity, along a direction that was sampled with a density; 0 for perfect
+    directions.
 
-    What is shown instead of the light is seen by the camera, in mirrors and through glass alone.
+    A background that replaces the environment is visible only to the camera, in mirrors and through glass.
     """
     if density <= 0.0:
         return environment_radiance(features, scene, direction)
@@ -108,7 +109,7 @@ def path_radiance(
     direction: wp.vec3,
     footprint_scale: wp.float32,
 ):
-    """As :func:`renderer.kernels.shading.radiance`, along one path; reflected rays are those that go on."""
+    """Like :func:`renderer.kernels.shading.radiance`, along one path; the continuing rays count as reflected rays."""
     total = wp.vec3(0.0, 0.0, 0.0)
     counts = wp.vec3i(0, 0, 0)
     first = FirstHit()
@@ -119,7 +120,7 @@ def path_radiance(
     start = wp.vec3(origin[0], origin[1], origin[2])
     towards = wp.vec3(direction[0], direction[1], direction[2])
     scattered_at = wp.vec3(origin[0], origin[1], origin[2])
-    density = wp.float32(0.0)  # by which ``towards`` was chosen, zero for a perfect direction
+    density = wp.float32(0.0)  # with which ``towards`` was sampled; zero for a perfect direction
     squeeze = wp.float32(1.0)
     travelled = wp.float32(0.0)
     bounces = wp.int32(0)

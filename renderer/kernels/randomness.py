@@ -1,8 +1,9 @@
-"""Numbers that decide where secondary rays go: counter-based, and well spread over a group of samples.
+"""Random numbers of secondary rays: counter-based, and stratified over a group of samples.
 
-A group is what is looked at together: the samples of one framelet, or those of one pixel of a frame. A sample's numbers
-follow from where and when its group's first sample lies, from its place in the group and from a purpose; so they depend
-on neither batch, thread nor machine, and the same samples get the same numbers as a framelet and as part of a frame.
+A group is a set of samples that are viewed together: those of one framelet, or of one pixel of a frame. The numbers of
+a sample are a function of the position and time of its group's first sample, of its index in the group and of a
+purpose. So they do not depend on the batch, the thread or the machine, and the same samples get the same numbers as a
+framelet and as part of a frame.
 
 Source of the stratification: Kensler 2013, "Correlated Multi-Jittered Sampling".
 """
@@ -13,7 +14,7 @@ import warp as wp
 
 from renderer.layout.structs import Draw
 
-# literals beyond 2^31 would be taken for int32
+# larger literals would be taken for int32
 _MIX_A = wp.constant(wp.uint32(0x7FEB352D))
 _MIX_B = wp.constant(wp.uint32(0x846CA68B))
 _SPREAD = wp.constant(wp.uint32(0x9E3779B9))
@@ -26,7 +27,7 @@ PURPOSE_LENS, PURPOSE_REFLECT, PURPOSE_REFRACT, PURPOSE_LIGHT = range(4)
 
 @wp.func
 def mixed(x: wp.uint32) -> wp.uint32:
-    """A bijection of 32-bit words without visible structure; constants by Wellons 2018 ("lowbias32")."""
+    """A mixing bijection of 32-bit words; constants by Wellons 2018 ("lowbias32")."""
     x = (x ^ (x >> wp.uint32(16))) * _MIX_A
     x = (x ^ (x >> wp.uint32(15))) * _MIX_B
     return x ^ (x >> wp.uint32(16))
@@ -34,21 +35,21 @@ def mixed(x: wp.uint32) -> wp.uint32:
 
 @wp.func
 def hashed(a: wp.uint32, b: wp.uint32) -> wp.uint32:
-    """One word from two."""
+    """A hash of two words."""
     return mixed(a ^ (mixed(b + _SPREAD) + _OFFSET))
 
 
 @wp.func
 def unit_interval(word: wp.uint32) -> wp.float32:
-    """A number in [0, 1) of 24 bits."""
+    """A number in [0, 1) from 24 bits of a word."""
     return wp.float32(word >> wp.uint32(8)) * wp.float32(5.9604644775390625e-08)
 
 
 @wp.func
 def permuted(index: wp.int32, length: wp.int32, key: wp.uint32) -> wp.int32:
-    """Where a permutation of ``length`` numbers, one of many chosen by ``key``, sends ``index``.
+    """The image of ``index`` under a permutation of ``length`` numbers, selected by ``key``.
 
-    Rounds of bijections on the next power of two; what falls beyond the length goes round again.
+    Bijections on the next power of two are iterated until the result is below ``length`` (cycle walking).
     """
     bits = wp.uint32(1)
     while (wp.uint32(1) << bits) < wp.uint32(length):
@@ -70,7 +71,7 @@ def permuted(index: wp.int32, length: wp.int32, key: wp.uint32) -> wp.int32:
 
 @wp.func
 def group_draw(seed: wp.uint32, position: wp.vec2, time_s: wp.float64, index: wp.int32, count: wp.int32) -> Draw:
-    """The numbers of sample ``index`` of a group of ``count``, the first of which lies at a position and time."""
+    """The draw of sample ``index`` in a group of ``count`` samples, whose first sample has this position and time."""
     instant = wp.cast(time_s, wp.uint64)
     key = hashed(seed, wp.cast(position[0], wp.uint32))
     key = hashed(key, wp.cast(position[1], wp.uint32))
@@ -84,7 +85,7 @@ def group_draw(seed: wp.uint32, position: wp.vec2, time_s: wp.float64, index: wp
 
 @wp.func
 def branched(draw: Draw, ray: wp.int32, rays: wp.int32, kind: wp.int32) -> Draw:
-    """The numbers of one of ``rays`` that a sample sends on; together a group's are spread as well as its samples."""
+    """The draw of one of ``rays`` secondary rays of a sample; those of a group are stratified together."""
     child = Draw()
     child.key = hashed(draw.key, wp.uint32(kind + 1))
     child.index = draw.index * rays + ray
@@ -94,15 +95,15 @@ def branched(draw: Draw, ray: wp.int32, rays: wp.int32, kind: wp.int32) -> Draw:
 
 @wp.func
 def draw_2d(draw: Draw, purpose: wp.int32) -> wp.vec2:
-    """A point of the unit square, correlated multi-jittered over the group."""
+    """A point in the unit square, correlated multi-jittered over the group."""
     key = hashed(draw.key, wp.uint32(purpose) + _POINT)
     columns = wp.max(wp.int32(wp.sqrt(wp.float32(draw.count))), 1)
     rows = (draw.count + columns - 1) / columns
-    # of all cells, also where there are more than samples: any left out must be left out by chance
+    # over all cells, even where there are more cells than samples: omitted cells must be random
     cell = permuted(draw.index, columns * rows, key)
     column = cell % columns
     row = cell / columns
-    # a cell's place within its column and row: a permutation of the rows and of the columns
+    # the position in a cell's column and row: a permutation of the rows and of the columns
     down = permuted(row, rows, hashed(key, wp.uint32(2)))
     across = permuted(column, columns, hashed(key, wp.uint32(1)))
     noise = hashed(key, wp.uint32(cell) + wp.uint32(3))
@@ -124,7 +125,7 @@ def cell_2d(draw: Draw, purpose: wp.int32, cell: wp.int32, cells: wp.int32) -> w
 
 @wp.func
 def cone_direction(axis: wp.vec3, cos_half_angle: wp.float32, sample: wp.vec2) -> wp.vec3:
-    """A unit direction in a cone about a unit axis, even in solid angle."""
+    """A unit direction in a cone about a unit axis, uniform in solid angle."""
     height = 1.0 - sample[0] * (1.0 - cos_half_angle)
     ring = wp.sqrt(wp.max(1.0 - height * height, 0.0))
     turn = 2.0 * wp.pi * sample[1]

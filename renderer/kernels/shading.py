@@ -1,8 +1,8 @@
 """Light transport along one camera ray: Phong reflection, shadows, mirrors and glass.
 
-The tree of Whitted 1980 with the spread rays of Cook, Porter and Carpenter 1984. Every function takes the set of
-features (:mod:`renderer.layout.features`) that its kernel is compiled for; it is a literal there, so that the compiler
-drops what lies behind tests of other features.
+Source: Whitted 1980 (tree of rays); Cook, Porter and Carpenter 1984 (spread rays). Every function takes the set of
+features (:mod:`renderer.layout.features`) for which its kernel is compiled. It is a literal in the kernel, so the
+compiler removes code for other features.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ def direct_light(
     albedo: wp.vec3,
     direction: wp.vec3,
 ):
-    """Radiance reflected from the lights towards the viewer, the shadow rays it took, and what the first of these meets
-    on its way to the first light.
+    """Radiance reflected from the lights towards the viewer, the number of shadow rays, and the occluder of the first
+    shadow ray to the first light.
 
-    ``albedo`` is the diffuse colour, scaled by what the mirrored part leaves; ``direction`` is the viewing ray's.
+    ``albedo`` is the diffuse colour, reduced by the mirrored part; ``direction`` is that of the viewing ray.
     """
     total = wp.vec3(0.0, 0.0, 0.0)
     rays = wp.int32(0)
@@ -63,7 +63,7 @@ def direct_light(
             arriving = arriving_light(features, scene, view, time_s, record, sample, start)
             towards = arriving.direction
             cosine = wp.dot(surface.normal, towards)
-            # light from behind the true surface must not leak in over a smooth normal
+            # light from behind the true surface must not leak through a smooth normal
             if cosine > 0.0 and wp.dot(surface.geometric_normal, towards) > 0.0 and wp.max(arriving.irradiance) > 0.0:
                 reflected = albedo * (cosine / wp.pi)
                 if (features & Feature.HIGHLIGHT) != 0:
@@ -96,7 +96,7 @@ def sent_by(
     footprint: wp.float32,
     direction: wp.vec3,
 ) -> Sent:
-    """What leaves a surface along the perfect directions."""
+    """Weights of the secondary rays along the perfect directions of a surface."""
     if (features & Feature.GLASS) != 0 and material.transmission >= 0:
         return sent_by_glass(features, scene, surface, material, cosine, footprint, direction)
     sent = Sent()
@@ -120,8 +120,8 @@ def left_by(
     cosine: wp.float32,
     footprint: wp.float32,
 ):
-    """Radiance that leaves a surface against a ray, but for what it mirrors or lets through; its shadow rays, and the
-    occluder of the first light."""
+    """Radiance that leaves a surface against a ray, without mirrored and transmitted light; the number of shadow rays,
+    and the occluder of the first light."""
     glow = material.emission
     shadow_rays = wp.int32(0)
     between = wp.int32(UNLIT)
@@ -151,10 +151,10 @@ def radiance(
     stack: wp.array2d(dtype=Ray),
     row: wp.int32,
 ):
-    """Radiance along a world ray; how many rays it took: to the lights, reflected, refracted; and what it meets first.
+    """Radiance along a world ray; the numbers of shadow, reflected and refracted rays; and the first hit.
 
-    ``footprint_scale`` multiplies the footprint that textures are filtered for.
-    Rays still to follow wait in ``stack[row]``; without glass and spread bundles there never are any.
+    ``footprint_scale`` multiplies the footprint over which textures are filtered. Rays that are still to be traced wait
+    in ``stack[row]``; without glass and spread bundles there are none.
     """
     total = wp.vec3(0.0, 0.0, 0.0)
     counts = wp.vec3i(0, 0, 0)

@@ -1,4 +1,4 @@
-"""Rays against boxes, spheres, flat shapes and cubes, each in a space of its own."""
+"""Intersection of rays with boxes, spheres, flat shapes and cubes, each in its own space."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from renderer.layout.sizes import FAR, SPHERE_SLACK, TINY
 
 @wp.func
 def reciprocal(direction: wp.vec3) -> wp.vec3:
-    """Component-wise 1 / x, large but finite for zero so that slab tests meet no NaN."""
+    """Component-wise 1 / x, large but finite for zero, so that slab tests produce no NaN."""
     x = wp.where(wp.abs(direction[0]) > TINY, direction[0], TINY)
     y = wp.where(wp.abs(direction[1]) > TINY, direction[1], TINY)
     z = wp.where(wp.abs(direction[2]) > TINY, direction[2], TINY)
@@ -28,7 +28,7 @@ def meets_box(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.vec3,
 
 @wp.func
 def sphere_distance(origin: wp.vec3, direction: wp.vec3) -> wp.float32:
-    """Distance to the unit sphere along a unit direction, negative for none.
+    """Distance to the unit sphere along a unit direction, negative for a miss.
 
     Source: Haines, Günther and Akenine-Möller 2019, "Precision Improvements for Ray/Sphere Intersection".
     """
@@ -54,7 +54,7 @@ def sphere_distance(origin: wp.vec3, direction: wp.vec3) -> wp.float32:
 
 @wp.func
 def plane_distance(origin: wp.vec3, direction: wp.vec3, disk: wp.bool) -> wp.float32:
-    """Distance to the unit disk or to the square [-1, 1]² at z = 0, negative for none."""
+    """Distance to the unit disk or to the square [-1, 1]² at z = 0, negative for a miss."""
     if direction[2] == 0.0:
         return -1.0
     t = -origin[2] / direction[2]
@@ -70,7 +70,7 @@ def plane_distance(origin: wp.vec3, direction: wp.vec3, disk: wp.bool) -> wp.flo
 
 @wp.func
 def cube_distance(origin: wp.vec3, direction: wp.vec3):
-    """Distance to the cube [-1, 1]³ (negative for none) and its face: axis, plus 3 for the negative side."""
+    """Distance to the cube [-1, 1]³, negative for a miss, and the face: its axis, plus 3 on the negative side."""
     inverse = reciprocal(direction)
     near = wp.float32(-FAR)
     far = wp.float32(FAR)
@@ -96,11 +96,12 @@ def cube_distance(origin: wp.vec3, direction: wp.vec3):
 
 @wp.func
 def misses_sphere(from_center: wp.vec3, direction: wp.vec3, radius: wp.float32, t_max: wp.float32) -> wp.bool:
-    """Whether a ray that starts at ``from_center`` surely stays outside a sphere up to ``t_max``."""
+    """Whether a ray from ``from_center``, relative to a sphere's centre, certainly stays outside the sphere up to
+    ``t_max``."""
     b = wp.dot(from_center, direction)
     squared = wp.dot(from_center, from_center)
     if squared <= radius * radius:
         return False
     nearest = from_center - b * direction
-    # the slack covers what rounding takes from a far start
+    # the slack covers the rounding error of a distant origin
     return b > 0.0 or -b - radius > t_max or wp.dot(nearest, nearest) > radius * radius + SPHERE_SLACK * squared

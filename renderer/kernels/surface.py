@@ -25,7 +25,7 @@ def mesh_surface(scene: SceneData, record: InstanceRecord, hit: Hit) -> LocalSur
     local.position = a * hit.u + b * hit.v + c * w
     local.tangent_u = b - a
     local.tangent_v = c - a
-    # made unit at once: that of a tiny face in a large scene would vanish in float32
+    # normalised at once: the normal of a tiny face in a large scene would underflow in float32
     local.geometric_normal = wp.normalize(wp.cross(local.tangent_u, local.tangent_v))
     local.normal = local.geometric_normal
     if mesh.first_normal >= 0:
@@ -49,7 +49,7 @@ def mesh_surface(scene: SceneData, record: InstanceRecord, hit: Hit) -> LocalSur
 
 @wp.func
 def sphere_surface(point: wp.vec3) -> LocalSurface:
-    """The unit sphere; u turns about +z from +x, v rises from -z to +z."""
+    """The unit sphere; u is the angle about +z from +x, and v rises from -z to +z."""
     local = LocalSurface()
     p = wp.normalize(point)
     local.position = p
@@ -67,7 +67,8 @@ def sphere_surface(point: wp.vec3) -> LocalSurface:
 
 @wp.func
 def flat_surface(point: wp.vec3, axis: wp.int32, side: wp.float32) -> LocalSurface:
-    """A face of the unit cube, or with axis 2 and no shift the plane z = 0; uv from the two other axes."""
+    """A face of the cube [-1, 1]³ with the normal ``side`` along ``axis``, or the plane z = 0 with axis 2; uv from the
+    two other axes."""
     local = LocalSurface()
     normal = wp.vec3(0.0, 0.0, 0.0)
     normal[axis] = side
@@ -91,7 +92,8 @@ def flat_surface(point: wp.vec3, axis: wp.int32, side: wp.float32) -> LocalSurfa
 def local_surface(
     features: wp.int32, scene: SceneData, record: InstanceRecord, hit: Hit, point: wp.vec3
 ) -> LocalSurface:
-    """The hit in the unit space of its shape; ``point`` is the hit along the ray, snapped onto the shape here."""
+    """The hit in the unit space of its shape; ``point`` is the hit point along the ray, which is projected onto the
+    shape."""
     if (features & Feature.MESH) != 0 and record.shape == Shape.MESH:
         return mesh_surface(scene, record, hit)
     if (features & Feature.SPHERE) != 0 and record.shape == Shape.SPHERE:
@@ -109,7 +111,7 @@ def local_surface(
 
 @wp.func
 def facing(normal: wp.vec3, direction: wp.vec3) -> wp.vec3:
-    """A normal turned against a direction."""
+    """A normal flipped against a direction."""
     if wp.dot(normal, direction) > 0.0:
         return -normal
     return normal
@@ -117,7 +119,7 @@ def facing(normal: wp.vec3, direction: wp.vec3) -> wp.vec3:
 
 @wp.func
 def greatest(v: wp.vec3) -> wp.float32:
-    """Greatest component without its sign."""
+    """Greatest absolute component."""
     return wp.max(wp.max(wp.abs(v[0]), wp.abs(v[1])), wp.abs(v[2]))
 
 
@@ -160,7 +162,7 @@ def surface_at(
     shading = wp.normalize(shading)
     if wp.dot(shading, surface.geometric_normal) < 0.0:
         shading = -shading
-    # a smooth normal that faces away from the viewer is bent back until it is seen edge-on
+    # a smooth normal that faces away from the viewer is rotated back until it is edge-on
     away = wp.dot(shading, direction)
     if away > -EDGE_ON:
         shading = wp.normalize(shading - (away + EDGE_ON) * direction)

@@ -12,7 +12,7 @@ from renderer.layout.structs import LevelRecord, SceneData, TextureRecord
 
 @wp.func
 def wrapped(index: wp.int32, count: wp.int32, wrap: wp.int32) -> wp.int32:
-    """Texel index inside ``0..count - 1``, or negative where the texture is black."""
+    """Texel index in ``0..count - 1``, or negative where the texture is black."""
     if index >= 0 and index < count:
         return index
     if wrap == Wrap.REPEAT:
@@ -37,7 +37,7 @@ def texel(scene: SceneData, level: LevelRecord, x: wp.int32, y: wp.int32) -> wp.
 def bilinear(
     scene: SceneData, level: LevelRecord, x: wp.float32, y: wp.float32, wrap_x: wp.int32, wrap_y: wp.int32
 ) -> wp.vec3:
-    """Bilinear lookup at ``x``, ``y`` in texels from the top left corner of the image."""
+    """Bilinear lookup at ``x``, ``y``, texels from the top left corner of the image."""
     left = wp.floor(x - 0.5)
     top = wp.floor(y - 0.5)
     fx = x - 0.5 - left
@@ -53,7 +53,7 @@ def bilinear(
 
 @wp.func
 def image_bilinear_wrapped_around(scene: SceneData, index: wp.int32, u: wp.float32, v: wp.float32) -> wp.vec3:
-    """Lookup in a latitude–longitude image, ``u`` in turns and ``v`` from the top row."""
+    """Bilinear lookup in a latitude–longitude image, with ``u`` in turns and ``v`` from the top row."""
     level = scene.levels[index]
     x = (u - wp.floor(u)) * wp.float32(level.width)
     y = v * wp.float32(level.height)
@@ -71,15 +71,15 @@ def level_lookup(scene: SceneData, record: TextureRecord, index: wp.int32, u: wp
 
 @wp.func
 def image_lookup(scene: SceneData, record: TextureRecord, uv: wp.vec2, footprint_uv: wp.float32) -> wp.vec3:
-    """Image texture at a surface's ``uv``; ``footprint_uv`` is the width of the ray's cone in units of uv.
+    """Colour of an image texture at ``uv``; ``footprint_uv`` is the width of the ray's cone in units of uv.
 
-    Mip maps are blended between levels: otherwise a line where the level changes would run over the ground with the
-    camera.
+    Levels of a mip map are blended: otherwise a visible line where the level changes would move over the ground with
+    the camera.
     """
     u = uv[0] * record.uv_scale[0] + record.uv_offset[0]
     v = uv[1] * record.uv_scale[1] + record.uv_offset[1]
     if record.wrap == Wrap.REPEAT:
-        # before scaling to texels, so that far repetitions keep their precision
+        # before scaling to texels, so that distant repetitions keep their precision
         u = u - wp.floor(u)
         v = v - wp.floor(v)
     else:
@@ -106,7 +106,7 @@ def image_lookup(scene: SceneData, record: TextureRecord, uv: wp.vec2, footprint
 def texture_color(
     features: wp.int32, scene: SceneData, texture: wp.int32, uv: wp.vec2, footprint_uv: wp.float32
 ) -> wp.vec3:
-    """Colour of a texture; descends through checkerboards to the constant or image below."""
+    """Colour of a texture; follows checkerboards down to a constant or an image."""
     record = scene.textures[texture]
     tint = record.value
     while (features & Feature.CHECKERBOARD) != 0 and record.kind == TextureKind.CHECKERBOARD:

@@ -1,7 +1,7 @@
-"""Parts of the renderer that a scene may do without.
+"""Optional features of the renderer, which a scene may not need.
 
 Each feature is one bit. Kernels are compiled for a set of them (:func:`renderer.kernels.entry.specialised`): code for
-what is not in the set is left out, not skipped.
+other features is not compiled at all.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from enum import IntFlag, auto
 
 
 class Feature(IntFlag):
-    """Parts of the renderer that a scene may do without."""
+    """Optional features of the renderer, which a scene may not need."""
 
     MESH = auto()
     SPHERE = auto()
@@ -45,7 +45,7 @@ class Feature(IntFlag):
 
 
 ALL = Feature((1 << len(Feature)) - 1) & ~Feature.PATHS
-"""Everything that one integrator can do; with :attr:`Feature.PATHS` the other one."""
+"""All features of one integrator, the tree of rays; with :attr:`Feature.PATHS`, those of path tracing."""
 
 PACKETS = (
     Feature.MESH
@@ -61,7 +61,7 @@ PACKETS = (
     | Feature.POINT
     | Feature.DIRECTIONAL
 )
-"""What the packets of ``native/`` can do."""
+"""Features that the packets of ``native/`` support."""
 
 MEANING = {
     Feature.MESH: "triangle meshes",

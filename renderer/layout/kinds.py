@@ -1,4 +1,4 @@
-"""Kinds of things that records name by a number."""
+"""Enumerations of the kinds in records."""
 
 from __future__ import annotations
 
@@ -6,48 +6,48 @@ from enum import IntEnum
 
 
 class Shape(IntEnum):
-    """Shapes of instances."""
+    """Kinds of shapes of instances."""
 
     MESH, SPHERE, DISK, RECTANGLE, CUBE, RELIEF = range(6)
 
 
 class TextureKind(IntEnum):
-    """Nodes of a texture."""
+    """Kinds of texture nodes."""
 
     CONSTANT, IMAGE, CHECKERBOARD = range(3)
 
 
 class Wrap(IntEnum):
-    """What lies outside an image."""
+    """Values of a texture outside its image."""
 
     REPEAT, CLAMP, BLACK = range(3)
 
 
 class Filter(IntEnum):
-    """How an image is looked up."""
+    """Filters of image lookup."""
 
     NEAREST, BILINEAR, MIPMAP = range(3)
 
 
 class LightKind(IntEnum):
-    """Lights."""
+    """Kinds of lights."""
 
     POINT, DIRECTIONAL, SUN_DISC, SPOT, QUAD, SPHERE, ENVIRONMENT = range(7)
 
 
 class CameraKind(IntEnum):
-    """Projections."""
+    """Kinds of camera projections."""
 
     PERSPECTIVE, PARALLEL, PANORAMA = range(3)
 
 
 class ScatterKind(IntEnum):
-    """How surfaces scatter light along paths."""
+    """Kinds of scattering by surfaces along paths."""
 
     BLACK, DIFFUSE, PHONG, MIRROR, METAL, GLASS, COATED, METALLIC = range(8)
 
 
 class StructureKind(IntEnum):
-    """Acceleration structures over the triangles of a mesh."""
+    """Kinds of acceleration structures over the triangles of a mesh."""
 
     BVH, KDTREE, BRUTE = range(3)

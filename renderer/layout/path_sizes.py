@@ -1,14 +1,14 @@
-"""Sizes and tolerances of paths, which the C++ does not know."""
+"""Sizes and tolerances of path tracing, which the C++ does not use."""
 
 from __future__ import annotations
 
 ALPHA_LEAST = 1.0e-4
-"""Least alpha of facets of a metallic and rough surface."""
+"""Least alpha of the facets of a metallic-roughness surface."""
 PASSED_MOST = 64
-"""Holes and clear panes that a ray passes at most."""
+"""Maximum number of holes and clear panes that a ray passes."""
 ROULETTE_FIRST = 3
-"""Bounces after which a path may end by chance."""
+"""Number of bounces after which a path may end at random."""
 ROULETTE_MOST = 0.95
-"""Greatest chance that it goes on."""
+"""Greatest probability that it continues."""
 SPREAD_FIRST = 2
-"""Bounces whose random numbers are spread well over a group of samples."""
+"""Number of bounces whose random numbers are stratified over a group of samples."""

@@ -1,4 +1,4 @@
-"""The record of how a material scatters light along paths, as it lies in memory."""
+"""The memory layout of a material's scattering along paths."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ import warp as wp
 
 @wp.struct
 class ScatterRecord:
-    """How a material scatters light along paths; of its kind see :class:`renderer.layout.kinds.ScatterKind`.
+    """Scattering of a material along paths; ``kind`` is a :class:`renderer.layout.kinds.ScatterKind`.
 
-    A negative texture means none. What Phong reflection and spread mirrors need stands in the material's other record.
+    A negative texture means none. The parameters of Phong reflection and of spread mirrors are in the material's other
+    record.
     """
 
     kind: wp.int32
-    base: wp.int32  # colour: diffuse, of a metal, or of what glass lets through
-    specular: wp.int32  # what multiplies the reflection of a coat, a mirror or glass
-    parts: wp.int32  # green multiplies the roughness, blue the share of metal
-    alpha: wp.float32  # of the facets
-    rough: wp.vec2  # Oren and Nayar's A and B
+    base: wp.int32  # diffuse colour, colour of a metal, or transmittance of glass
+    specular: wp.int32  # factor of the reflection of a coat, a mirror or glass
+    parts: wp.int32  # green multiplies the roughness, blue the metallic share
+    alpha: wp.float32  # roughness of the facets
+    rough: wp.vec2  # A and B of Oren and Nayar
     roughness: wp.float32
     metallic: wp.float32
     clear: wp.float32  # strength of a clear coat
@@ -26,11 +27,11 @@ class ScatterRecord:
     thin: wp.int32
     eta: wp.vec3
     k: wp.vec3
-    inner: wp.float32  # share of diffuse light that a coat throws back inside
+    inner: wp.float32  # internal diffuse reflectance of a coat
     glow: wp.int32
     emission: wp.vec3
     opacity: wp.int32
-    cutoff: wp.float32  # opacity below which there is a hole; negative where it is the share of light that is stopped
-    bend: wp.int32  # normal map, or height of a bump map
+    cutoff: wp.float32  # opacity below which there is a hole; negative if opacity is the share of light stopped
+    bend: wp.int32  # normal map or bump map
     bend_scale: wp.float32
-    bumps: wp.int32  # 1 where ``bend`` is a height
+    bumps: wp.int32  # 1 if ``bend`` is a bump map

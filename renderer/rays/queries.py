@@ -1,4 +1,4 @@
-"""Rays through a single mesh, for those who need hits rather than pictures."""
+"""Ray queries on a single mesh, for callers that need hits rather than pictures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RayHits:
 
     Attributes:
         face: ``(n,)`` int32 face, -1 for a miss.
-        t: ``(n,)`` float32 distance in units of the direction's length; how far the ray reached for a miss.
+        t: ``(n,)`` float32 distance in units of the direction's length; the length of the ray for a miss.
         u, v: ``(n,)`` float32 weights of the face's first two corners.
     """
 
@@ -35,10 +35,10 @@ class RayHits:
 
 
 class RayQueries:
-    """A mesh that rays are traced through, on the CPU.
+    """A mesh for ray queries on the CPU.
 
-    Sixteen consecutive rays that keep together are traced as a packet, others one by one; the hits are the same bits
-    either way. Of two faces hit at the same distance the one with the lower number is reported.
+    Sixteen consecutive coherent rays are traced as a packet, others one by one; the bits of the hits are the same
+    either way. Of two faces at the same distance the one with the lower number is reported.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, threads: int = 1) -> None:
@@ -47,10 +47,11 @@ class RayQueries:
         Args:
             vertices: ``(v, 3)``, best within ``[-1, 1]³``.
             faces: ``(f, 3)`` indices of corners.
-            threads: host threads.
+            threads: number of host threads.
 
         Raises:
-            ValueError: if the mesh is not one (see :func:`renderer.tables.trees.build_tree`), or threads is below 1.
+            ValueError: if the mesh is invalid (see :func:`renderer.tables.trees.build_tree`), or ``threads`` is below
+                1.
         """
         if threads < 1:
             raise ValueError(f"threads: expected at least 1, got {threads}")
@@ -62,15 +63,15 @@ class RayQueries:
         """Nearest hits of rays ``(n, 3)`` up to ``t_max``, a number or ``(n,)``; directions need not be unit.
 
         Raises:
-            ValueError: if the shapes do not fit.
+            ValueError: if the shapes do not match.
         """
         return self._trace(origin, direction, t_max, nearest=True)
 
     def blocked(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None = None) -> NDArray[np.bool_]:
-        """Whether anything lies along rays ``(n, 3)`` before ``t_max``, a number or ``(n,)``.
+        """Whether rays ``(n, 3)`` hit any face before ``t_max``, a number or ``(n,)``.
 
         Raises:
-            ValueError: if the shapes do not fit.
+            ValueError: if the shapes do not match.
         """
         return self._trace(origin, direction, t_max, nearest=False).face != 0
 

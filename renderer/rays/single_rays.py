@@ -1,4 +1,4 @@
-"""Rays one by one through a mesh, by the structure of one's choice, and what they take."""
+"""Single ray queries on a mesh with a choice of structures, and counts of their work."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _RANGE_RAYS = 1 << 12
 
 @dataclass(frozen=True)
 class Work:
-    """What rays took.
+    """Counts of the work of ray queries.
 
     Attributes:
-        node_visits: nodes whose boxes or plane a ray was tested against.
-        triangle_tests: triangles a ray was tested against.
+        node_visits: number of nodes whose boxes or plane were tested.
+        triangle_tests: number of ray–triangle tests.
     """
 
     node_visits: int
@@ -35,7 +35,7 @@ class Work:
 
 
 class SingleRays:
-    """A mesh that rays are traced through alone, on the CPU; the hits are the same bits for every structure.
+    """A mesh for single ray queries on the CPU; the bits of the hits are the same for every structure.
 
     See :mod:`renderer.tables.accelerators` for the one exception.
     """
@@ -46,8 +46,8 @@ class SingleRays:
         Args:
             vertices: ``(v, 3)`` finite, best within ``[-1, 1]³``.
             faces: ``(f, 3)`` indices of corners.
-            structure: over the triangles.
-            threads: host threads.
+            structure: acceleration structure over the triangles.
+            threads: number of host threads.
         """
         devices.load_kernels(packets, "cpu")
         points, corners = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32)
@@ -70,7 +70,7 @@ class SingleRays:
     def counted(
         self, origin: ArrayLike, direction: ArrayLike, t_max: float = FAR, nearest: bool = True
     ) -> tuple[RayHits, Work]:
-        """As :meth:`closest`, or for any hit at all, with what it took."""
+        """Nearest hits as in :meth:`closest`, or any hits if ``nearest`` is false, and counts of the work."""
         work = np.zeros(2, np.int64)
         hits = self._trace(origin, direction, t_max, nearest, work)
         return hits, Work(*work.tolist())

@@ -1,4 +1,4 @@
-"""Points: where in a pixel, and when in the shutter's time, samples lie. Imports nothing large."""
+"""Point sets: positions of samples in a pixel and times within the shutter's. Imports nothing large."""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
-"""Spatiotemporal blue noise: a mask whose values differ most between neighbours, and between frames of a pixel.
+"""Spatiotemporal blue noise: a mask whose values differ strongly between neighbours in a frame, and between frames of a
+pixel.
 
-The mask is a ranking of the voxels of a torus (frame, row, column) by void and cluster: first a few voxels spread as
-evenly as can be, numbered down as the tightest cluster is taken away, then the rest, each in the largest void.
+The mask is a ranking of the voxels of a torus (frame, row, column) by the void-and-cluster method. A few voxels are
+first spread as evenly as possible; they are ranked from the last down by removing the tightest cluster each time. The
+others follow, each in the largest void.
 
 Source: Ulichney 1993, "The void-and-cluster method for dither array generation"; Wolfe et al. 2022, "Spatiotemporal
 blue noise masks": two voxels of one frame repel in space, two of one pixel repel in time, and others do not repel.
@@ -19,17 +21,18 @@ from scenes.arithmetic import exp
 
 SIDE_PX = 64
 FRAMES = 16
-"""Size of the mask; it repeats."""
+"""Size of the mask, which is periodic."""
 
 _SIGMA = 1.9
-"""Reach of the repulsion, pixels and frames (Ulichney takes 1.5, Wolfe et al. 1.9)."""
+"""Standard deviation of the repulsion, pixels and frames (1.5 in Ulichney, 1.9 in Wolfe et al.)."""
 
-_FIRST_SHARE = 0.1  # of voxels in the pattern that is evened out at the beginning
+_FIRST_SHARE = 0.1  # share of the voxels in the initial pattern
 
 
 @lru_cache(maxsize=1)
 def mask() -> Float[NDArray[np.float64], "frames side side"]:
-    """The mask, every value ``(i + 1/2) / n`` once; made when first asked for, in some seconds, always the same."""
+    """The mask, which has every value ``(i + 1/2) / n`` once. It is computed at the first call, in some seconds, and
+    always the same."""
     ranks = _ranked(FRAMES, SIDE_PX, np.random.default_rng(0))
     values = (ranks + 0.5) / ranks.size
     values.flags.writeable = False
@@ -42,7 +45,7 @@ def _ranked(frames: int, side: int, rng: np.random.Generator) -> NDArray[np.int6
     first = max(2, int(_FIRST_SHARE * field.count))
     for voxel in rng.permutation(field.count)[:first]:
         field.put(voxel)
-    while True:  # the tightest cluster moves to the largest void, until they are the same
+    while True:  # the tightest cluster moves to the largest void until both are the same voxel
         cluster = field.tightest()
         field.take(cluster)
         void = field.largest_void()
@@ -63,14 +66,14 @@ def _ranked(frames: int, side: int, rng: np.random.Generator) -> NDArray[np.int6
 
 
 class _Field:
-    """Voxels that are set, and how close each voxel is to those."""
+    """The set voxels, and the energy of every voxel: its proximity to them."""
 
     def __init__(self, frames: int, side: int) -> None:
         self.frames, self.side, self.count = frames, side, frames * side * side
         along = np.minimum(np.arange(side), side - np.arange(side))
         near = exp(-(along**2) / (2.0 * _SIGMA**2))
         plane = np.outer(near, near)
-        # twice the plane, so that any shift of it round the torus is a view
+        # the plane repeated, so that any cyclic shift of it is a view
         self._plane = np.tile(plane, (2, 2))
         later = np.minimum(np.arange(frames), frames - np.arange(frames))
         times = exp(-(later**2) / (2.0 * _SIGMA**2))
@@ -78,7 +81,7 @@ class _Field:
         self._times = np.tile(times, 2)
         self._energy = np.zeros((frames, side, side))
         self._set = np.zeros(self.count, bool)
-        # the same energy where a voxel is not set, respectively set; elsewhere out of the running
+        # the energy of the voxels that are not set, and of those that are; infinite elsewhere
         self._voids, self._clusters = np.zeros(self.count), np.full(self.count, -np.inf)
 
     def copy(self) -> _Field:
@@ -99,11 +102,11 @@ class _Field:
         self._change(voxel, -1.0)
 
     def tightest(self) -> int:
-        """The voxel with the most others around it, of those that are set."""
+        """The set voxel with the greatest energy."""
         return int(self._clusters.argmax())
 
     def largest_void(self) -> int:
-        """The voxel with the fewest around it, of those that are not set."""
+        """The voxel with the least energy that is not set."""
         return int(self._voids.argmin())
 
     def _change(self, voxel: int, sign: float) -> None:

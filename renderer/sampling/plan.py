@@ -1,8 +1,8 @@
-"""Where in a pixel and when in the shutter's time samples lie: shifts and warps of point sets.
+"""Positions of samples in pixels and times within the shutter's: shifts and warps of point sets.
 
-A pixel's samples are a point set (u, v, t) in the unit cube, shifted round the torus by an amount of its own, then
-warped so that even points become those of the reconstruction filter (filter importance sampling): their colours count
-alike.
+The samples of a pixel are a point set (u, v, t) in the unit cube, shifted cyclically by an amount of the pixel's own
+and then warped to the density of the reconstruction filter (filter importance sampling), so that their colours have
+equal weights.
 
 Source: motion-blur perception thesis, chapters 2 (filters) and 3 (shift, warps; figs 14 and 16).
 """
@@ -29,9 +29,9 @@ from tsar.config import closed_choices
 def pixel_shift(
     seed: int, column: Int[NDArray[np.int64], " n"], row: Int[NDArray[np.int64], " n"], frame: int = 0
 ) -> Points:
-    """How far each pixel's points are shifted round the torus, ``(n, 3)`` in [0, 1).
+    """Cyclic shift of each pixel's points, ``(n, 3)`` in [0, 1).
 
-    A function of its arguments alone: the same whatever the order of pixels, threads or machines.
+    A function of its arguments alone, independent of the order of pixels, of threads and of the machine.
     """
     key = np.zeros(len(column), np.uint64)
     with np.errstate(over="ignore"):
@@ -41,14 +41,14 @@ def pixel_shift(
     return (axes >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
 
-_CHANNELS = ((0, 0, 0), (5, 23, 37), (11, 47, 13))  # how far apart in the mask u, v and t are read
+_CHANNELS = ((0, 0, 0), (5, 23, 37), (11, 47, 13))  # distance in the mask between the values for u, v and t
 
 
 def blue_shift(
     seed: int, column: Int[NDArray[np.int64], " n"], row: Int[NDArray[np.int64], " n"], frame: int = 0
 ) -> Points:
-    """Shifts as those of :func:`pixel_shift`, but of spatiotemporal blue noise: errors of neighbours, and of one pixel
-    in frames that follow each other, differ, and so are less seen.
+    """Shifts as in :func:`pixel_shift`, but from spatiotemporal blue noise: the errors of neighbouring pixels, and of a
+    pixel in successive frames, differ and so are less visible.
 
     Source: Georgiev and Fajardo 2016, "Blue-noise dithered sampling"; see :mod:`renderer.sampling.blue_noise`.
     """
@@ -70,8 +70,8 @@ def gaussian_warp(
 ) -> tuple[Float[NDArray[np.float64], "*n"], Float[NDArray[np.float64], "*n"]]:
     """Offsets from the pixel's centre with a Gaussian density, pixels (Box and Muller 1958; thesis fig. 16).
 
-    Deviation: the radius is that of ``1 - u``, which is never 0 for ``u`` in [0, 1). The thesis takes ``u``, which may
-    be 0 and then has no logarithm.
+    Deviation: the radius is ``sigma sqrt(-2 ln(1 - u))``, which is finite for ``u`` in [0, 1). The thesis has ``u`` in
+    place of ``1 - u``, which may be 0.
     """
     radius = sigma_px * np.sqrt(-2.0 * log1p(-np.asarray(u)))
     turn = 2.0 * np.pi * np.asarray(v)
@@ -79,12 +79,13 @@ def gaussian_warp(
 
 
 def box_warp(t: Float[NDArray[np.float64], "*n"], share: float) -> Float[NDArray[np.float64], "*n"]:
-    """Times of a box that spans the middle ``share`` of [0, 1]; the thesis' truncated box has 0.5."""
+    """Times of a box filter over the middle ``share`` of [0, 1]; the truncated box of the thesis has 0.5."""
     return 0.5 + share * (np.asarray(t) - 0.5)
 
 
 def triangle_warp(t: Float[NDArray[np.float64], "*n"]) -> Float[NDArray[np.float64], "*n"]:
-    """Times in [0, 1] of the triangle that peaks in the middle: its inverse distribution (thesis fig. 16)."""
+    """Times in [0, 1] of a triangle filter with its peak in the middle, by its inverse distribution (thesis fig.
+    16)."""
     t = np.asarray(t)
     return np.where(t <= 0.5, np.sqrt(0.5 * t), 1.0 - np.sqrt(0.5 * (1.0 - t)))
 
@@ -100,26 +101,26 @@ def _cached_set(name: str, count: int, seed: int) -> Points:
 @dataclass(frozen=True)
 @closed_choices("SamplePlan.")
 class SamplePlan:
-    """How every pixel of a picture or sequence is sampled."""
+    """The sampling of every pixel of a picture or sequence."""
 
     samples_per_pixel: int = 16
-    """Samples of a pixel; a cube for stratified."""
+    """Number of samples of a pixel; a cube for stratified."""
     point_set: str = "hammersley"
-    """The points that all pixels share, each shifted."""
+    """Point set that all pixels share, each with its own shift."""
     seed: int = 0
-    """Of the set and of the shifts."""
+    """Seed of the set and of the shifts."""
     space_filter: Literal["box", "gaussian"] = "box"
     """Reconstruction filter in space: the pixel's own square, or a Gaussian about its centre."""
     sigma_px: float = 0.5
-    """Of the Gaussian, pixels; the thesis has 0.5."""
+    """Standard deviation of the Gaussian, pixels; 0.5 in the thesis."""
     time_filter: Literal["box", "triangle"] = "box"
     """Reconstruction filter over the time the shutter is open."""
     box_share: float = 1.0
-    """The middle part of that time which a box spans; the thesis has 0.5."""
+    """Share of that time, in its middle, that a box spans; 0.5 in the thesis."""
     shift: Literal["white", "blue"] = "white"
-    """How far each pixel shifts the points: independently of its neighbours, or by spatiotemporal blue noise."""
+    """Shift of the points in each pixel: independent of its neighbours, or by spatiotemporal blue noise."""
     new_set_each_frame: bool = False
-    """Whether every frame has a point set of its own, rather than all the same."""
+    """Whether every frame has its own point set, instead of one for all."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.sigma_px < math.inf:
@@ -142,8 +143,8 @@ class SamplePlan:
     ) -> tuple[Float[NDArray[np.float32], "pixels n 2"], Float[NDArray[np.float64], "pixels n"]]:
         """Positions on the image, from (0, 0) at its top left corner to (1, 1), and times in seconds.
 
-        The Gaussian's tails leave the pixel, and the image at its border. A pixel's samples do not depend on which
-        others are asked for.
+        The tails of the Gaussian leave the pixel, and at the border the image. The samples of a pixel do not depend on
+        which others are requested.
         """
         points = _cached_set(self.point_set, self.samples_per_pixel, self.seed + self.new_set_each_frame * frame)
         shifted = points[None] + _SHIFTS[self.shift](self.seed, columns, rows, frame)[:, None]

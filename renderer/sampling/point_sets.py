@@ -1,4 +1,4 @@
-"""Point sets (u, v, t) in the unit cube: where in a pixel, and when in the shutter's time, samples lie.
+"""Point sets (u, v, t) in the unit cube: positions in a pixel and times within the shutter's.
 
 Source: motion-blur perception thesis, chapter 2; Owen 1995, "Randomly permuted (t, m, s)-nets and (t, s)-sequences".
 """
@@ -24,17 +24,17 @@ COUNT_MAX = 1 << 16
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 _POISSON_MAX = 4096
-_POISSON_START = 0.75  # share of the densest packing's distance to begin with: darts alone reach about 0.7
+_POISSON_START = 0.75  # initial share of the densest packing's distance: dart throwing alone reaches about 0.7
 _POISSON_TRIES = 4096
 
 _BALANCED = ("sobol", "owen")
-"""Sets of which every power of two of the first points is a net; other numbers of them are not."""
+"""Sets whose first points form a net if their number is a power of two, and not otherwise."""
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 def mixed_words(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """A bijection of 64-bit words without visible structure; constants of SplitMix64 (Steele et al. 2014)."""
+    """A mixing bijection of 64-bit words; constants of SplitMix64 (Steele et al. 2014)."""
     words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return words ^ (words >> np.uint64(31))
@@ -44,18 +44,17 @@ def point_set(name: str, count: int, seed: int = 0) -> Points:
     """Points ``(u, v, t)`` in [0, 1)³, float64.
 
     Args:
-        name: ``hammersley`` (even in u, radical inverses to bases 2 and 3 in v and t), ``stratified`` (one random point
-            in each cell of a cubic grid), ``poisson`` (no two closer than a distance round the torus), ``halton`` and
+        name: ``hammersley`` (uniform steps in u, radical inverses to bases 2 and 3 in v and t), ``stratified`` (one
+            random point in each cell of a cubic grid), ``poisson`` (a least distance on the torus), ``halton`` and
             ``sobol`` (scrambled digit by digit), ``owen`` (Sobol with Owen's nested scrambling), ``cells-even``,
             ``cells-space``, ``cells-time`` (one random point in each cell of a grid with about as many, an eighth and
             eight times as many cells in time as along a side of the pixel), ``random``, or one that was added to
             :data:`renderer.sampling.POINT_SETS`.
-        count: how many, at most 65,536; for ``stratified`` a cube.
-        seed: of all but ``hammersley``.
+        count: number of points, at most 65,536; for ``stratified`` a cube.
+        seed: seed of all sets except ``hammersley``.
 
-    Warns:
-        UserWarning: for ``sobol`` and ``owen`` and a count that is no power of two. Some elementary intervals then have
-            a point more than others, so that the set is no net.
+    Warns: UserWarning: for ``sobol`` and ``owen`` with a count that is not a power of two: some elementary intervals
+        then have one point more than others, so the set is not a net.
 
     Raises:
         ValueError: for another name, a count that the set cannot have, or points that do not lie in the cube.
@@ -93,7 +92,7 @@ def stratified(count: int, rng: np.random.Generator) -> Points:
 
 
 def poisson(count: int, rng: np.random.Generator) -> Points:
-    """Darts that keep a distance; where no more fit, the distance shrinks, so that this ends."""
+    """Dart throwing with a least distance, which shrinks when no more darts fit, so that the search ends."""
     radius = _POISSON_START * packing_distance(count)
     points = np.empty((count, 3))
     placed, tries = 0, 0
@@ -118,7 +117,7 @@ def packing_distance(count: int) -> float:
 def toroidal_distance(
     a: Float[NDArray[np.float64], "*n 3"], b: Float[NDArray[np.float64], "*n 3"]
 ) -> Float[NDArray[np.float64], "*n"]:
-    """Distance in the unit cube whose opposite faces are one."""
+    """Distance on the torus: in the unit cube with opposite faces identified."""
     apart = np.abs(a - b)
     return np.linalg.norm(np.minimum(apart, 1.0 - apart), axis=-1)
 
@@ -132,7 +131,7 @@ def sobol(count: int, rng: np.random.Generator) -> Points:
 
 
 def owen(count: int, rng: np.random.Generator) -> Points:
-    """Nested uniform scrambling: a bit is flipped or not by chance, by the bits before it alone."""
+    """Nested uniform scrambling: whether a bit is flipped is random, but a function of the bits before it."""
     digits = qmc.Sobol(3, scramble=False, bits=32).random_base2(max(count - 1, 0).bit_length())[:count]
     x = (digits * 2.0**32).astype(np.uint64)
     keys = rng.integers(0, 1 << 63, 3, dtype=np.uint64)
@@ -154,8 +153,9 @@ def _cells(density_ratio: float) -> Callable[[int, np.random.Generator], Points]
 
 
 def cell_counts(count: int, density_ratio: float) -> tuple[int, int, int]:
-    """Sides (u, v, t) of the grid of ``count`` cells whose cells in time, over those along a side of the pixel, are
-    nearest to a ratio, and whose pixel is nearest to square; the former counts twice.
+    """Numbers of cells (u, v, t) of a grid of ``count`` cells. The ratio of the cells in time to those along a side of
+    the pixel is closest to ``density_ratio``, and the two spatial numbers are as equal as possible; the former counts
+    twice.
     """
 
     def far(sides: tuple[int, int, int]) -> float:

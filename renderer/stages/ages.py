@@ -1,6 +1,7 @@
-"""Reconstruction, first half, in C++ (``native/ages.h``): ages of the newest samples, and framelets that may be seen.
+"""Reconstruction, first half, in C++ (``native/ages.h``): ages of the newest samples, and framelets that may be
+visible.
 
-*Cells* are tiles of the finest level, raster order. Definitions in ``tsar/reconstruction.py``.
+*Cells* are tiles of the finest level, in raster order. Definitions are in ``tsar/reconstruction.py``.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from renderer.compute.launching import Address
 
 @wp.struct
 class DisplayPlan:
-    """What of the configuration reconstruction depends on, and where its working memory lies."""
+    """Parameters of the reconstruction, and the addresses of its tables and working memory."""
 
     resolution: wp.int32
     level_low: wp.int32
@@ -20,44 +21,45 @@ class DisplayPlan:
     side: wp.int32
     """Samples along a framelet's side."""
     half: wp.int32
-    """Pixels that the smoothing of ages reaches to either side."""
+    """Half width of the smoothing of ages, pixels."""
     reach: wp.int32
-    """Cells that smoothing and the widest margin reach to either side."""
+    """Reach of smoothing and the widest margin to either side, cells."""
     band: wp.int32
-    """Rows of the image that are finished at a time."""
+    """Number of rows of a band, which is finished at a time."""
     order: wp.uint64
     """int32, raster to Morton order of a framelet's samples."""
     left: wp.uint64
     right: wp.uint64
-    """int32, of each pixel of a tile along an axis, margin included: the two samples that it lies between; level after
-    level from the coarsest, as are the next three."""
+    """int32: the two samples around each pixel of a tile along an axis, including its margin; one level after the other
+    from the coarsest. The next three arrays have the same order."""
     share_left: wp.uint64
     share_right: wp.uint64
-    """float32, their shares, which sum to one."""
+    """float32: weights of the two samples, whose sum is one."""
     weight: wp.uint64
-    """float32, below one in the margin and at the border, where the neighbouring tile adds the rest."""
+    """float32: total weight of each pixel, below one in the margin and at the border, where the neighbouring tile adds
+    the rest."""
     first: wp.uint64
-    """int32, where a level's pixels begin in these."""
+    """int32: first index of each level in these arrays."""
     margin: wp.uint64
-    """int32, pixels of margin of a level's tiles."""
+    """int32: width of the margin of each level's tiles, pixels."""
     node_time: wp.uint64
-    """float64, of every node of the quadtree."""
+    """float64: newest sample time of every node of the quadtree."""
     node_level: wp.uint64
-    """int32, the same."""
+    """int32: level of that sample."""
     cell_age: wp.uint64
-    """float32, per cell."""
+    """float32: age of each cell, cycles."""
     cell_least: wp.uint64
     """float32, per cell, and as much again to work in."""
     row_sum: wp.uint64
-    """float64, per row of cells the sums of ages over a box of pixels around each column."""
+    """float64: for each row of cells, the sums of ages over a box of pixels around each column."""
     row_integral: wp.uint64
-    """float64, working memory: one for each pixel of a row that smoothing reaches, and one more."""
+    """float64, working memory: one element for each pixel of a row within reach of the smoothing, and one more."""
     slot_age: wp.uint64
-    """float32, per slot."""
+    """float32: age of each slot, cycles."""
     candidate: wp.uint64
-    """int32, slots that may be seen."""
+    """int32: slots that may be visible."""
     seen: wp.uint64
-    """int32, per slot."""
+    """int32: whether each slot was visible."""
 
 
 @wp.func_native(
@@ -75,7 +77,7 @@ def map_newest(
     newest_s: Address,
     newest_level: Address,
 ) -> wp.float64:
-    """Newest time and its level over every cell. Returns the newest of all, 0 where there is none."""
+    """Newest sample time and its level over every cell. Returns the newest of all times, 0 if there is none."""
     ...
 
 
@@ -100,5 +102,6 @@ def list_candidates(
     index: Address,
     time_s: Address,
 ) -> wp.int32:
-    """Slots not older than everything that smoothing and their margins reach; the others cannot be seen."""
+    """Lists the slots that are not older than all cells within reach of smoothing and their margins; the others cannot
+    be visible."""
     ...

@@ -1,8 +1,8 @@
 """Reconstruction, second half, in C++ (``native/bands.h``): from the threshold of ages to finished pixels.
 
-Bands of rows are each small enough for the second-level cache. A band's working memory holds five planes of its pixels:
+Each band of rows is small enough for the second-level cache. A band's working memory holds five planes of its pixels:
 threshold, sums of weight, red, green, blue. A framelet is first expanded along rows to pixels (*rows*, one per row of
-samples), then every row of pixels is a blend of two of these: ``native/display.h``. Definitions in
+samples); then every row of pixels is a blend of two of these (``native/display.h``). Definitions are in
 ``tsar/reconstruction.py``.
 """
 
@@ -16,13 +16,13 @@ from renderer.stages.ages import DisplayPlan
 
 @wp.func_native("display::begin_band(plan, top, bottom, (float*)planes, (double*)box, (float*)ages);")
 def begin_band(plan: DisplayPlan, top: wp.int32, bottom: wp.int32, planes: Address, box: Address, ages: Address):
-    """Thresholds of the rows from ``top`` to before ``bottom``, and empty sums."""
+    """Sets the thresholds of the rows from ``top`` to before ``bottom``, and clears the sums."""
     ...
 
 
 @wp.func_native("return display::corner(plan, level, index, axis);")
 def corner(plan: DisplayPlan, level: wp.int32, index: wp.int64, axis: wp.int32) -> wp.int32:
-    """First pixel of a tile along an axis, x being 0."""
+    """First pixel of a tile along an axis; 0 is x."""
     ...
 
 
@@ -55,7 +55,7 @@ def expand_rows(
     samples: Address,
     rows: Address,
 ):
-    """Rows of a framelet's samples, as many as the band needs, interpolated to pixels; per row red, green, blue."""
+    """Interpolates the rows of a framelet's samples that the band needs to pixels; per row red, green, blue."""
     ...
 
 
@@ -71,17 +71,18 @@ def blend_rows(
     rows: Address,
     planes: Address,
 ):
-    """Adds a framelet to the band's sums: cycles by which it is newer than the threshold, and half a cycle more."""
+    """Adds a framelet to the band's sums, weighted by the cycles by which it is newer than the threshold, plus half a
+    cycle."""
     ...
 
 
 @wp.func_native("return display::finish_band(plan, top, bottom, (const float*)planes, (float*)image);")
 def finish_band(plan: DisplayPlan, top: wp.int32, bottom: wp.int32, planes: Address, image: Address) -> wp.int32:
-    """Sums to colours. Returns whether some pixel has none."""
+    """Converts sums to colours. Returns whether any pixel has none."""
     ...
 
 
 @wp.func_native("return display::bury(plan, slots, (const long long*)level, (unsigned char*)dead);")
 def bury(plan: DisplayPlan, slots: wp.int32, level: Address, dead: Address) -> wp.float64:
-    """Flags the framelets that passed nowhere. Returns the area of the others, in units of the image."""
+    """Flags the framelets that were visible nowhere. Returns the total area of the others, in units of the image."""
     ...

@@ -1,4 +1,4 @@
-"""The bookkeeping of the cache in C++ (``native/claims.h``): slots that a batch takes, and what was in them.
+"""The bookkeeping of the cache in C++ (``native/claims.h``): slots that a batch takes, and the states that they held.
 
 Definition: ``tsar/cache.py``.
 """
@@ -29,24 +29,24 @@ class CacheView:
 
 @wp.struct
 class ClaimMemory:
-    """Addresses of what a batch got in the cache, and of working memory."""
+    """Addresses of a batch's slots and of working memory."""
 
     slot: wp.uint64
-    """Where each framelet goes."""
+    """int64: slot of each framelet."""
     past: wp.uint64
     """Address of the wavelet state of each tile's last framelet, 0 where there is none."""
     spare: wp.uint64
-    """Room for the wavelet states of a batch: those whose slots are taken are saved there."""
+    """Room for the wavelet states of a batch; states in slots that are overwritten are saved there."""
     marks: wp.uint64
-    """uint8, one a slot, all 0 between calls."""
+    """uint8: one per slot, all 0 between calls."""
 
 
 @wp.func_native("return claims::rank_slots(cache, wanted, (double*)age);")
 def rank_slots(cache: CacheView, wanted: wp.int32, age: Address) -> wp.int32:
-    """Ages to choose victims by: of the dead slots where they are enough, else of the live ones.
+    """Ages by which slots are chosen for replacement: those of the dead slots if they suffice, else of the live ones.
 
     Returns:
-        How many dead slots go beside those chosen by age: all, or none.
+        The number of dead slots that are replaced in addition to those chosen by age: all, or none.
     """
     ...
 
@@ -57,7 +57,7 @@ def rank_slots(cache: CacheView, wanted: wp.int32, age: Address) -> wp.int32:
 def list_victims(
     cache: CacheView, key: Address, threshold: wp.uint64, ties: wp.int32, with_dead: wp.int32, slot: Address
 ):
-    """Slots to be overwritten, ascending."""
+    """Lists the slots to overwrite, in ascending order."""
     ...
 
 
@@ -72,13 +72,13 @@ def sign_over(
     index: Address,
     time_s: Address,
 ):
-    """Hands slots over to the tiles of a batch, and finds the wavelet state of each tile's last framelet."""
+    """Assigns slots to the tiles of a batch, and finds the wavelet state of each tile's last framelet."""
     ...
 
 
 @wp.func
 def choose_victims(cache: CacheView, age: Address, key: Address, count: wp.int32, slot: Address):
-    """The slots that are worth least: dead ones, oldest first, then the oldest of the others."""
+    """The least valuable slots: dead ones from the oldest on, then the oldest of the others."""
     all_dead = rank_slots(cache, count, age)
     rank_keys(age, cache.slots, key)
     by_age = count - all_dead

@@ -1,7 +1,7 @@
-"""The control stages as kernels on the CPU: what the pipeline decides between two batches, in a few launches.
+"""The control stages as CPU kernels: the decisions of the pipeline between two batches, in a few launches.
 
-They compute what the functions of ``tsar`` compute, within rounding. Where a configuration or a tensor is not theirs
-they hand the work to those: what ``coverage.py`` does not list, and batches with samples that are not finite.
+They compute the same as the functions of ``tsar``, up to rounding. They call these functions for configurations that
+``coverage.py`` does not list, and for framelets with non-finite samples.
 """
 
 from __future__ import annotations
@@ -43,15 +43,16 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
     """The stages of a run.
 
     Args:
-        config: of the run; the compiled stages serve no other.
+        config: configuration of the run; the compiled stages support no other.
         name: ``compiled``, or ``reference`` for the tensor operations of ``tsar``.
-        threads: host threads that share a batch's observation and a reconstruction. No result depends on it.
+        threads: number of host threads that share the observation of a batch and a reconstruction. No result depends on
+            it.
     """
     return compiled_stages(config, threads) if name == "compiled" else reference(config)
 
 
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
-    """Kernels throughout, but for what they do not cover of a configuration (:mod:`renderer.stages.coverage`)."""
+    """Kernels for all stages, except where they do not cover the configuration (:mod:`renderer.stages.coverage`)."""
     devices.load_kernels((kernels, reconstruction_kernels, filtering_kernels, picture_kernels), "cpu")
     control, reconstructor = Control(config, threads), Reconstructor(config, threads)
     return Stages(
@@ -66,12 +67,12 @@ def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
 class Control:
     """The stages between two batches for one configuration.
 
-    Holds constants of the configuration, recorded launches and working memory, and nothing of a run: every method gives
-    the same for the same arguments.
+    Holds constants of the configuration, recorded launches and working memory, but no state of a run: every method
+    returns the same for the same arguments.
     """
 
     def __init__(self, config: TsarConfig, threads: int = 1) -> None:
-        """Prepares the launches of a configuration; ``threads`` share what is large."""
+        """Prepares the launches of a configuration; ``threads`` host threads share the larger stages."""
         self.config, self._threads = config, threads
         self._covered: dict[StageName, bool] = {stage: covers(config, stage) for stage in get_args(StageName)}
         self._elements = config.sdf_side**2
@@ -88,10 +89,10 @@ class Control:
     def observe(
         self, batch: FrameletBatch, color: Tensor, cache: FrameletCache, config: TsarConfig, timer: StageTimer
     ) -> Observation:
-        """As :func:`tsar.observation.observe`; framelets with samples that are not finite are repaired and observed
-        after the others.
+        """Like :func:`tsar.observation.observe`. Framelets with non-finite samples are repaired and observed after the
+        others.
 
-        The slots are chosen first, so that colours and wavelet states can go straight there.
+        The slots are chosen first, so that colours and wavelet states are written there directly.
 
         Raises:
             ValueError: if the batch is larger than the configuration's.
@@ -121,7 +122,7 @@ class Control:
     def decide(
         self, densities: Densities, errors: Errors, history: Tensor, config: TsarConfig, timer: StageTimer
     ) -> Decision:
-        """As :func:`tsar.decision.decide`; responses that are not compiled are the reference's.
+        """Like :func:`tsar.decision.decide`; the reference runs responses that are not compiled.
 
         Raises:
             ValueError: if a density is negative or not finite, or the tiling is too small for a batch.
@@ -179,7 +180,7 @@ class Control:
         return Decision(Densities(spatial, temporal, surplus), tiling, request)
 
     def account(self, densities: Densities, errors: Errors, newest_s: Tensor, config: TsarConfig) -> Account:
-        """As :func:`tsar.accounting.account`."""
+        """Like :func:`tsar.accounting.account`."""
         if not self._covered["account"]:
             return REFERENCE.account(densities, errors, newest_s, config)
         fields = (
@@ -198,7 +199,7 @@ class Control:
         return address(name, values, dtype, self._elements)
 
     def _times_of(self, batch: FrameletBatch) -> int:
-        """Address of the time of each framelet, that of its first sample."""
+        """Address of the times of the framelets, those of their first samples."""
         time_s, count = batch.time_s, len(batch.level)
         if isinstance(time_s, Tensor) and len(time_s) != count:
             raise ValueError(f"batch.time_s: expected {count} framelets, got {len(time_s)}")
@@ -206,13 +207,13 @@ class Control:
         return self._times_address
 
     def _run(self, observe: Command, *arguments: int) -> None:
-        """All threads take rows of a batch."""
+        """Runs the observation of a batch on all threads."""
         self._progress[:] = 0
         observe.set(*arguments)
         TEAM.run([observe] * self._threads)
 
     def _record(self, cache: FrameletCache) -> tuple[Command, Command]:
-        """Launches that know where a cache lies: one claims slots, one observes a batch."""
+        """Launches recorded for a cache: one claims slots, one observes a batch."""
         pending = address("pending", self._pending, torch.uint8, self.config.batch_size)
         fixed = self._error_plan, plans.cache_view(cache, self.config), self._claim, pending
         progress = address("progress", self._progress, _I32, 2)

@@ -1,5 +1,5 @@
-"""Which configurations the compiled stages were written for: the fields that they know, and of closed choices those
-that they have. Whatever else the reference learns, a field or a choice, runs there until it is listed here."""
+"""Configurations that the compiled stages cover: their fields, and the choices that are implemented. A new field or
+choice of the reference runs there until it is listed here."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _KNOWN: Mapping[str, Mapping[str, tuple[str, ...] | None]] = {
     },
     "reconstruction": {"age_support_px": None, "method": ("blend",)},
 }
-"""Records of the configuration by name, and what is known of each: a field's choices, or None for what is a number."""
+"""Covered fields of each record of the configuration, by name: the choices of a field, or None for numbers."""
 
 _DEPENDS: Mapping[StageName, tuple[str, ...]] = {
     "observe": ("", "tiling", "error"),
@@ -48,7 +48,7 @@ _DEPENDS: Mapping[StageName, tuple[str, ...]] = {
     "reconstruct": ("", "tiling", "reconstruction"),
     "account": ("", "tiling"),
 }
-"""What a stage reads of the configuration. To respond is a part of to decide, which goes on after it."""
+"""Records of the configuration that a stage reads. ``respond`` is the first part of ``decide``."""
 
 FilterStageName = Literal["chosen", "taken_in"]
 
@@ -63,22 +63,22 @@ _OPTIONS_OF: Mapping[FilterStageName, Mapping[str, tuple[bool, ...] | None]] = {
     "chosen": _OPTIONS,
     "taken_in": {**_OPTIONS, "wavelets": (False,)},
 }
-"""Options of the filter that each stage knows, of the stages that take them; as in :data:`_KNOWN`."""
+"""Covered options of the filter's stages that take options; values as in :data:`_KNOWN`."""
 
 
 def covers(config: TsarConfig, stage: StageName) -> bool:
-    """Whether a compiled stage does what a configuration says; where not, that of the reference runs."""
+    """Whether a compiled stage covers a configuration; otherwise the stage of the reference runs."""
     return all(_known(getattr(config, name) if name else config, _KNOWN[name]) for name in _DEPENDS[stage])
 
 
 @lru_cache(maxsize=64)
 def covers_options(options: FilterOptions, stage: FilterStageName) -> bool:
-    """The same for a stage of the filter, and its options."""
+    """Whether a compiled stage of the filter covers its options."""
     return _known(options, _OPTIONS_OF[stage])
 
 
 def covered(compiled: FilterStages, reference: FilterStages) -> FilterStages:
-    """Compiled stages of the filter that hand over to the reference where they do not cover the options."""
+    """Compiled stages of the filter that call the reference where they do not cover the options."""
 
     def of(options: FilterOptions, stage: FilterStageName) -> FilterStages:
         return compiled if covers_options(options, stage) else reference

@@ -1,4 +1,4 @@
-"""From colours to signed errors in C++ (``native/framelets.h``); defined in ``tsar/error.py``,
+"""The estimate of signed errors from colours in C++ (``native/framelets.h``), as defined in ``tsar/error.py``,
 ``tsar/estimators.py`` and ``tsar/haar.py``."""
 
 from __future__ import annotations
@@ -11,24 +11,24 @@ from renderer.stages.cache import CacheView, ClaimMemory
 
 @wp.struct
 class ErrorPlan:
-    """What of the configuration the estimate depends on."""
+    """Parameters of the estimate."""
 
     samples: wp.int32
-    """Per framelet, at most 1024."""
+    """Number of samples per framelet, at most 1024."""
     octaves: wp.int32
     state: wp.int32
-    """Coefficients kept per framelet."""
+    """Number of coefficients kept per framelet."""
     field_level: wp.int32
     linf: wp.int32
     """Whether the norm is the greatest power instead of the total."""
     difference: wp.int32
     """Whether the error is a difference of logarithms instead of a contrast."""
     greatest: wp.int32
-    """Whether the octave of the greatest error decides, instead of the sums over octaves."""
+    """Whether the octave of the greatest error counts, instead of the sums over octaves."""
     per_tile: wp.int32
     """Whether a tile has one error, instead of one for each element."""
     templates: wp.uint64
-    """Powers that the template tolerates: float32, for space and time, by 4^k parts of a tile, by octave."""
+    """float32: tolerated powers of the template, by space and time, number 4^k of parts of a tile, and octave."""
     radiance_max: wp.float32
 
 
@@ -38,7 +38,7 @@ class ErrorPlan:
 def start_observing(
     plan: ErrorPlan, count: wp.int32, pending: Address, errors_spatial: Address, errors_temporal: Address
 ):
-    """Fields of zeros, and all framelets pending."""
+    """Clears the fields of errors, and marks all framelets as pending."""
     ...
 
 
@@ -60,10 +60,11 @@ def observe_framelets(
     errors_spatial: Address,
     errors_temporal: Address,
 ):
-    """Errors of framelets that are pending, and colours and wavelet states into their slots; threads share them.
+    """Computes the errors of pending framelets, and stores colours and wavelet states in their slots; threads share the
+    framelets.
 
     Args:
-        pending: uint8 flags; what remains set holds a sample that is not finite.
-        progress: int32, how many are taken, and how many remain.
+        pending: uint8 flags; those of framelets with a non-finite sample remain set.
+        progress: int32: number of framelets taken, and number that remain pending.
     """
     ...

@@ -1,4 +1,4 @@
-"""The stages of the filter as kernels on the CPU, with the bits of the reference; threads take rows."""
+"""The stages of the filter as CPU kernels with the same bits as the reference; threads share rows."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ _KINDS = {
     "color": (3, _F32), "aged": (1, _F32), "inverse": (1, _F32), "time_s": (1, _F64), "roughness": (1, _F32),
     "instance": (1, _I64), "point": (3, _F32), "position": (2, _F32), "step": (2, _F32),
 }  # fmt: skip
-"""Planes of estimates and surfels, in the order of the native records, and the kind of their elements."""
+"""Planes of estimates and surfels in the order of the native records: their number and element type."""
 
 _APART = 320
-"""Bytes between planes, which are read and written together: addresses that differ by whole pages alone take turns."""
+"""Padding between planes, bytes, which avoids cache conflicts of addresses that differ by whole pages."""
 
 
 def filter_stages(side: int, threads: int = 1, picture: tuple[int, int] | None = None) -> FilterStages:
-    """Kernels for a plane of ``side`` pixels, a power of two of at least 16, and the height and width of the part of it
-    that is the picture, by default all."""
+    """Kernels for a plane of ``side`` pixels, a power of two of at least 16. ``picture`` is the height and width of the
+    picture within it, by default the whole plane."""
     made = _Compiled(side, threads, picture or (side, side))
     return FilterStages(made.advanced, made.chosen, made.taken_in, made.drifted, made.displayed)
 
 
 class _Compiled:
-    """Recorded launches and working memory for one size, nothing of a run."""
+    """Recorded launches and working memory for one size, without state of a run."""
 
     def __init__(self, side: int, threads: int, picture: tuple[int, int]) -> None:
         self._side, self._pixels, self._memory = side, side * side, Memory()
@@ -55,7 +55,7 @@ class _Compiled:
         front = self._memory.keep("front", torch.full((frame,), inf, dtype=_F64), _F64, frame)
         source = room("source", self._pixels, torch.int32)
         slot = self._memory.keep("slot", torch.full((self._pixels,), -1, dtype=torch.int32), torch.int32, self._pixels)
-        pixel = room("pixel", self._pixels * PIXEL_WORDS, _I64)  # more than the image has are never hit
+        pixel = room("pixel", self._pixels * PIXEL_WORDS, _I64)  # at most one for each pixel of the image
         for perspective, plan in enumerate(self._plans):
             plan.side, plan.perspective = side, perspective
             plan.height, plan.width = picture
@@ -87,7 +87,7 @@ class _Compiled:
     def advanced(
         self, estimates: Estimates, surfels: Surfels, rate: Tensor, seconds: float, view: Viewpoint
     ) -> tuple[Estimates, Surfels]:
-        """As :func:`tsar.filtering.motion.advanced`."""
+        """Like :func:`tsar.filtering.motion.advanced`."""
         rows, rate = rows_of(view), rate.contiguous()
         before = _planes(estimates, surfels)
         after = self._new_planes()
@@ -110,11 +110,11 @@ class _Compiled:
     def taken_in(
         self, estimates: Estimates, surfels: Surfels, known: Change, traced: Traced, options: FilterOptions
     ) -> tuple[Estimates, Surfels, Change]:
-        """As :func:`tsar.filtering.batches.taken_in`; estimates that were moved are changed in place."""
+        """Like :func:`tsar.filtering.batches.taken_in`; estimates that were moved are changed in place."""
         hits, view, tiles = traced.hits, traced.view, len(traced.color)
         moves = view is not None and hits is not None
         planes = _planes(estimates, surfels)
-        if not moves:  # aged, but for that those of the cycle before
+        if not moves:  # these share planes with the cycle before
             planes[:5] = [plane.clone() for plane in planes[:5]]
         samples = tiles * TILE_SIDE**2
         if samples > self._pixels:
@@ -158,7 +158,7 @@ class _Compiled:
         count: int,
         options: FilterOptions,
     ) -> list[Tensor]:
-        """As :func:`tsar.filtering.tiles.chosen`."""
+        """Like :func:`tsar.filtering.tiles.chosen`."""
         kept = [("variance", variance), ("roughness", roughness), ("rate", rate)]
         if surfels is not None:
             kept += [("step", surfels.step), ("instance", surfels.instance)]
@@ -179,7 +179,7 @@ class _Compiled:
     def drifted(
         self, before: Tensor, position: Tensor, hits: Hits, view: Viewpoint, earlier: Viewpoint, cycle_s: float
     ) -> Tensor:
-        """As :func:`tsar.filtering.shadows.drifted`."""
+        """Like :func:`tsar.filtering.shadows.drifted`."""
         before, samples, after = before.contiguous(), hits.instance.numel(), torch.empty_like(before)
         planes = [
             (position, _F32, 2 * samples), (hits.instance, torch.int32, samples), (hits.point, _F32, 3 * samples),
@@ -199,7 +199,7 @@ class _Compiled:
     def displayed(
         self, estimates: Estimates, surfels: Surfels | None, rate: Tensor, seconds: float
     ) -> tuple[Tensor, Tensor]:
-        """As :func:`tsar.filtering.display.displayed`."""
+        """Like :func:`tsar.filtering.display.displayed`."""
         rate = rate.contiguous()
         names = ["color", "roughness", "aged", "inverse"]
         planes = [getattr(estimates, name).contiguous() for name in names]
@@ -244,7 +244,7 @@ class _Compiled:
         self._spacings = spacings(self._side)
         sides = [int(self._side / (TILE_SIDE * spacing)) for spacing in self._spacings]
         self._sides, total = sides, sum(side * side for side in sides)
-        fit = len(spacings(min(self._height, self._width)))  # those of the levels before are too wide
+        fit = len(spacings(min(self._height, self._width)))  # tiles of the levels before are too wide
         self._unfit = sum(side * side for side in sides[: len(sides) - fit])
         self._gains, self._taken = torch.zeros(total, dtype=_F64), torch.zeros(total, dtype=torch.bool)
         self._found = np.zeros(1, np.int32)
@@ -290,11 +290,11 @@ class _Compiled:
 
 
 def _shares(rows: int, threads: int) -> list[tuple[int, int]]:
-    """First and last row, exclusive, of each thread that has any."""
+    """Range of rows (end exclusive) of each thread that has any."""
     edges = [rows * number // threads for number in range(threads + 1)]
     return [(first, last) for first, last in pairwise(edges) if last > first]
 
 
 def _planes(estimates: Estimates, surfels: Surfels) -> list[Tensor]:
-    """In the order of :data:`_KINDS`, each contiguous."""
+    """The planes in the order of :data:`_KINDS`, each contiguous."""
     return [getattr(record, field.name).contiguous() for record in (estimates, surfels) for field in fields(record)]

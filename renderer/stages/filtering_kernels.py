@@ -1,5 +1,5 @@
-"""Kernel entry points of the filter's stages that move estimates and take batches in (``native/surfels.h``,
-``taking.h``, ``changes.h``, ``batches.h``, ``shadows.h``), defined in ``tsar/filtering``. Threads take rows."""
+"""Kernel entry points of the filter's stages that move estimates and update them by batches (``native/surfels.h``,
+``taking.h``, ``changes.h``, ``batches.h``, ``shadows.h``), as defined in ``tsar/filtering``. Threads share rows."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ wp.set_module_options(module_options("batches.h", "shadows.h", given=sizes.FILTE
 
 @wp.struct
 class FilterPlan:
-    """Sides of the plane and of the picture, its upper left part, and addresses of working memory for each of the
-    plane's pixels."""
+    """Sides of the plane and of the picture, its upper left part, and addresses of working memory for the plane's
+    pixels."""
 
     side: wp.int32
     width: wp.int32
     height: wp.int32
     perspective: wp.int32
     motion: wp.uint64
-    """float32, where surfels are and how far they moved, pixels: x, y, x, y."""
+    """float32: positions of the surfels and their displacements, pixels: x, y, x, y."""
     aged: wp.uint64
-    """float32, variance by change at the new time."""
+    """float32: variance from change at the new time."""
     depth: wp.uint64
-    """float64."""
+    """float64: depth of each surfel."""
     front: wp.uint64
-    """float64, depth of the surfel that each pixel takes, infinite in the frame around them."""
+    """float64: depth of the surfel that each pixel takes, infinite in the frame around the pixels."""
     source: wp.uint64
-    """int32, the surfel that each pixel takes, -1 where it takes none."""
+    """int32: surfel that each pixel takes, -1 for none."""
     slot: wp.uint64
-    """int32, where the sums of a pixel's samples are, -1 between launches."""
+    """int32: index of the sums of a pixel's samples, -1 between launches."""
     pixel: wp.uint64
     """``batches::Pixel`` for every sample of a batch."""
 
@@ -128,7 +128,7 @@ def offer(
     rate: Address,
     seconds: wp.float32,
 ):
-    """Where the surfels of a band are seen, and the best of them for each of its pixels; ``bands`` are
+    """Projects the surfels of a band, and finds the best of them for each of its pixels; ``bands`` are
     ``surfels::Band``."""
     native_offer(plan, bands, number, rows, row_count, tan_x, tan_y, instance, point, inverse, roughness, position,
                  aged, rate, seconds)  # fmt: skip
@@ -149,43 +149,43 @@ def choose(
     inverse: Address,
     roughness: Address,
 ):
-    """The best of all surfels for each pixel of a band, once all bands were offered theirs."""
+    """Finds the best of all surfels for each pixel of a band, after the projection of all bands."""
     native_choose(plan, bands, band_count, number, rows, row_count, tan_x, tan_y, instance, point, inverse,
                   roughness)  # fmt: skip
 
 
 @wp.kernel
 def take(plan: FilterPlan, bands: Address, number: wp.int32, planes: Address):
-    """Estimates and surfels that the pixels of a band keep; ``planes`` are addresses of int64: of what there was
-    (``surfels::Before``), then of what is written (``surfels::Planes``)."""
+    """Copies the estimates and surfels that the pixels of a band take. ``planes`` are int64 addresses: those of the
+    planes before (``surfels::Before``), then those that are written (``surfels::Planes``)."""
     native_take(plan, bands, number, planes)
 
 
 @wp.kernel
 def locate(plan: FilterPlan, batch: Address, first: wp.int32, last: wp.int32):
-    """The pixels of the samples of some tiles; ``batch`` is a ``batches::Batch``."""
+    """Finds the pixels of the samples of some tiles; ``batch`` is a ``batches::Batch``."""
     native_locate(plan, batch, first, last)
 
 
 @wp.kernel
 def gather(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
-    """What the samples of each pixel of some rows say; ``parts`` are ``batches::Part``."""
+    """Sums the samples of each pixel of some rows; ``parts`` are ``batches::Part``."""
     native_gather(plan, batch, parts, number)
 
 
 @wp.kernel
 def learn(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
-    """Roughness and change in some rows, once all parts are gathered."""
+    """Updates roughness and change in some rows, after all parts are gathered."""
     native_learn(plan, batch, parts, number)
 
 
 @wp.kernel
 def take_in(plan: FilterPlan, batch: Address, parts: Address, number: wp.int32):
-    """Rates, estimates and surfels of some rows after a batch, once all parts have learnt."""
+    """Updates rates, estimates and surfels of some rows by a batch, after change is updated in all parts."""
     native_take_in(plan, batch, parts, number)
 
 
 @wp.kernel
 def drifted(batch: Address):
-    """How fast shadows move over each element; ``batch`` is a ``shadows::Batch``."""
+    """Updates the speed of the shadows over each element; ``batch`` is a ``shadows::Batch``."""
     native_drifted(batch)

@@ -1,7 +1,7 @@
-"""Kernel entry points of the control stages: each the recipe of its stages in ``tsar``.
+"""Kernel entry points of the control stages; each follows its stages in ``tsar`` step by step.
 
-They run on the CPU, where a launch is one call on one thread, and threads share what is large; the passes they call are
-in C++.
+They run on the CPU, where a launch is one call on one thread; threads share the larger ones. The passes that they call
+are in C++.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ wp.set_module_options(module_options(*_HEADERS, given=sizes.GIVEN))
 
 @wp.struct
 class Scratch:
-    """Addresses of working memory that holds nothing between launches."""
+    """Addresses of working memory without contents between launches."""
 
     value: wp.uint64
-    """float64, one a tile or slot."""
+    """float64: one per tile or slot."""
     key: wp.uint64
-    """The same, unsigned."""
+    """uint64: one per tile or slot."""
 
 
 @wp.struct
 class TilingPlan:
-    """What of the configuration the tiling depends on."""
+    """Parameters of the tiling."""
 
     field_level: wp.int32
     level_low: wp.int32
@@ -51,7 +51,7 @@ class TilingPlan:
     splits_most: wp.int32
     threshold: wp.float64
     order: wp.uint64
-    """Order in which equal nodes split."""
+    """int64: order in which equal nodes split."""
     sums: wp.uint64
     key: wp.uint64
     split: wp.uint64
@@ -77,7 +77,7 @@ def claim_slots(
     errors_spatial: Address,
     errors_temporal: Address,
 ):
-    """Gives a batch its slots: of the dead framelets, oldest first, then of the oldest of the rest."""
+    """Assigns slots to a batch: those of dead framelets from the oldest on, then those of the oldest others."""
     choose_victims(cache, scratch.value, scratch.key, count, memory.slot)
     sign_over(cache, memory, count, level, index, time_s)
     start_observing(plan, count, pending, errors_spatial, errors_temporal)
@@ -97,7 +97,7 @@ def observe_batch(
     errors_spatial: Address,
     errors_temporal: Address,
 ):
-    """The batch into its slots, and its errors; threads share it."""
+    """Stores a batch in its slots and computes its errors; threads share it."""
     observe_framelets(
         plan, cache, memory, pending, progress, count, level, index, color, errors_spatial, errors_temporal
     )
@@ -105,7 +105,7 @@ def observe_batch(
 
 @wp.func
 def build_tiling(plan: TilingPlan, density: Address, level: Address, index: Address) -> wp.int32:
-    """The tiling of a density field. Returns the number of tiles."""
+    """Builds the tiling of a density field. Returns the number of tiles."""
     sum_nodes(plan.field_level, plan.level_low, density, plan.sums)
     base, end = first_node(plan.level_low), first_node(plan.level_high)
     nodes, values = end - base, plan.sums + Address(8 * base)
@@ -131,7 +131,7 @@ def request_batch(
     history: Address,
     due: Due,
 ):
-    """The most overdue tiles, the credit that is left, and where the samples lie."""
+    """Selects the most overdue tiles, and computes the remaining credit and the positions of the samples."""
     gather_credit(tiles, plan.field_level, level, index, temporal, history, scratch.value, due.history)
     rank_keys(scratch.value, tiles, scratch.key)
     threshold = kth_greatest(scratch.key, tiles, plan.batch)
@@ -166,11 +166,11 @@ def decide_next(
     due_index: Address,
     due_position: Address,
 ):
-    """New densities, unless they have been decided elsewhere, their tiling, and what is due in it.
+    """Computes new densities, unless the reference has, their tiling, and the tiles that are due.
 
-    ``surplus_after`` and ``tile_count`` receive what they say, and ``times`` the ticks at the start and after each of
-    the three. Where a density is negative or not finite the count is 0; where the tiling is too small for a batch,
-    nothing is requested.
+    ``surplus_after`` receives the surplus, ``tile_count`` the number of tiles, and ``times`` the ticks at the start and
+    after each of the three steps. If a density is negative or not finite, the count is 0; if the tiling is too small
+    for a batch, nothing is requested.
     """
     clock = wp.array(ptr=times, shape=(4,), dtype=wp.int64)
     clock[0] = ticks()
@@ -204,5 +204,5 @@ def take_account(
     error_temporal: Address,
     newest_s: Address,
 ):
-    """Sums for the record of a cycle: combined density, spread of ages, values that are not finite."""
+    """Sums for the record of a cycle: combined density, spread of ages, number of non-finite values."""
     sum_account(elements, fast, spatial, temporal, error_spatial, error_temporal, newest_s, part_of_element, result)

@@ -1,5 +1,5 @@
 """Kernel entry points of the filter's stages that show a picture and choose tiles (``native/pyramid.h``, ``gains.h``),
-defined in ``tsar/filtering``. Threads take rows."""
+as defined in ``tsar/filtering``. Threads share rows."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def gain(
     life_min_s: wp.float32,
     life_max_s: wp.float32,
 ):
-    """What the tiles of all levels gain, in some rows of the coarsest."""
+    """Computes the gains of the tiles of all levels within some rows of the coarsest."""
     native_gain(side, coarsest, levels, spacing, gain, first, last, variance, roughness, rate, step, instance,
                 cycle_s, reach_px, life_min_s, life_max_s)  # fmt: skip
 
@@ -100,23 +100,24 @@ def best(
     found: Address,
     limit: wp.int32,
 ):
-    """The best tiles of all levels, and how many they are."""
+    """Finds the best tiles of all levels; ``found`` receives their number."""
     native_best(gain, levels, coarsest, most, taken, found, limit)
 
 
 @wp.kernel
 def shrink(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address, seconds: wp.float32):
-    """Some rows of the second finest level from the estimates; ``picture`` is a ``pyramid::Picture``."""
+    """Computes some rows of the second finest level from the estimates; ``picture`` is a ``pyramid::Picture``."""
     native_shrink(picture, side, first, last, spare, seconds)
 
 
 @wp.kernel
 def smooth(levels: Address, side: wp.int32, width: wp.int32, height: wp.int32, spare: Address):
-    """The coarser levels, from the second finest on, in place; ``width`` and ``height`` are the picture's there."""
+    """Computes the coarser levels from the second finest and smooths them, in place; ``width`` and ``height`` are those
+    of the picture at the second finest level."""
     native_smooth(levels, side, width, height, spare)
 
 
 @wp.kernel
 def show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address):
-    """The picture, from some rows of the second finest level."""
+    """Computes the picture from some rows of the second finest level."""
     native_show(picture, side, first, last, spare)

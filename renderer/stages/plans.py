@@ -1,4 +1,4 @@
-"""What the kernels of the control stages know of a configuration: its constants, and where their working memory is."""
+"""Parameters of the control stages' kernels for a configuration: constants, and addresses of working memory."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _F32, _F64, _I32, _I64 = torch.float32, torch.float64, torch.int32, torch.int64
 
 
 def scratch(config: TsarConfig, memory: Memory) -> Scratch:
-    """Room to rank all tiles, or all slots of the cache."""
+    """Working memory to rank all tiles, or all slots of the cache."""
     made, count = Scratch(), max(4**config.level_max, config.cache_slots)
     made.value, made.key = memory.room("values", count, _F64), memory.room("keys", count, _F64)
     return made
 
 
 def error_plan(config: TsarConfig, memory: Memory) -> ErrorPlan:
-    """For the estimate of errors."""
+    """Parameters of the estimate of errors."""
     error, plan = config.error, ErrorPlan()
     octaves = octave_count(config.samples)
     plan.samples, plan.octaves, plan.state = config.samples, octaves, state_size(config.samples, error)
@@ -50,7 +50,7 @@ def error_plan(config: TsarConfig, memory: Memory) -> ErrorPlan:
 
 
 def claim_memory(config: TsarConfig, memory: Memory) -> ClaimMemory:
-    """For the slots that a batch takes."""
+    """Working memory for the slots that a batch takes."""
     claim, batch, slots = ClaimMemory(), config.batch_size, config.cache_slots
     claim.slot, claim.past = memory.room("slots", batch, _I64), memory.room("pasts", batch, _I64)
     claim.spare = memory.room("spare", batch * state_size(config.samples, config.error))
@@ -59,7 +59,7 @@ def claim_memory(config: TsarConfig, memory: Memory) -> ClaimMemory:
 
 
 def cache_view(cache: FrameletCache, config: TsarConfig) -> CacheView:
-    """Where a cache's tensors lie."""
+    """Addresses of a cache's tensors."""
     view = CacheView()
     view.samples, view.state = config.samples, state_size(config.samples, config.error)
     point_at_cache(view, cache, config)
@@ -67,7 +67,7 @@ def cache_view(cache: FrameletCache, config: TsarConfig) -> CacheView:
 
 
 def response_plan(config: TsarConfig, memory: Memory) -> ResponsePlan:
-    """For the control decision."""
+    """Parameters of the control decision."""
     plan, elements = ResponsePlan(), config.sdf_side**2
     (spatial_low, spatial_high), (temporal_low, temporal_high) = config.spatial_bounds, config.temporal_bounds
     plan.elements = elements
@@ -81,7 +81,7 @@ def response_plan(config: TsarConfig, memory: Memory) -> ResponsePlan:
 
 
 def tiling_plan(config: TsarConfig, memory: Memory) -> TilingPlan:
-    """For the tiling."""
+    """Parameters of the tiling."""
     plan, nodes = TilingPlan(), 4**config.field_level
     low, high = config.level_min, config.level_max
     plan.field_level, plan.level_low, plan.level_high = config.field_level, low, high
@@ -95,7 +95,7 @@ def tiling_plan(config: TsarConfig, memory: Memory) -> TilingPlan:
 
 
 def selection_plan(config: TsarConfig, memory: Memory) -> SelectionPlan:
-    """For the selection of tiles."""
+    """Parameters of the selection of tiles."""
     plan = SelectionPlan()
     plan.batch, plan.field_level, plan.samples = config.batch_size, config.field_level, config.samples
     plan.centre = memory.keep("centres", cell_centres(config.framelet_side), _F32, 2 * config.samples)
@@ -103,7 +103,7 @@ def selection_plan(config: TsarConfig, memory: Memory) -> SelectionPlan:
 
 
 def part_of_element(config: TsarConfig, memory: Memory) -> int:
-    """Address of the part of the map of samples that each element lies in, raster order."""
+    """Address of int32 indices: for each element, the part of the sample map that contains it, raster order."""
     count = config.sdf_side**2
     x, y = deinterleave(torch.arange(count))
     shift = config.field_level - config.level_max

@@ -1,4 +1,4 @@
-"""Reconstruction as kernels on the CPU: cached framelets of many ages and sizes to an image, in one pass over bands of
+"""Reconstruction of an image from cached framelets of many ages and sizes, as CPU kernels, in one pass over bands of
 rows that threads share."""
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from tsar.stages import REFERENCE
 from tsar.types import SampleMap
 
 _BAND_PIXELS = 1 << 15
-"""About as many pixels to a band, 20 bytes each, as a second-level cache holds beside the framelets."""
+"""Number of pixels of a band, 20 bytes each: about as many as fit into a second-level cache with the framelets."""
 _BAND_ROWS_LEAST = 8
 _SPARE = LANES
-"""Elements behind arrays that are read or written so many at a time."""
+"""Padding of arrays that are read or written this many elements at a time."""
 
 
 @dataclass(frozen=True)
 class _Launches:
-    """Recorded launches that know where a cache lies; one of ``paint`` per thread."""
+    """Launches recorded for a cache; one of ``paint`` per thread."""
 
     find: Command
     paint: list[Command]
@@ -43,7 +43,8 @@ class _Launches:
 
 
 class Reconstructor:
-    """Reconstruction for one configuration. Holds constants, recorded launches and working memory, nothing of a run."""
+    """Reconstruction for one configuration. Holds constants, recorded launches and working memory, but no state of a
+    run."""
 
     def __init__(self, config: TsarConfig, threads: int = 1) -> None:
         """Prepares launches for ``threads`` threads."""
@@ -139,7 +140,8 @@ class Reconstructor:
 
 
 def _axis(side: int, width_px: int) -> tuple[Tensor, ...]:
-    """For each pixel of a tile along an axis, margin included: two samples, their shares, and the weight."""
+    """For each pixel of a tile along an axis, including its margin: the two samples around it, their weights, and the
+    total weight."""
     if width_px <= side:
         pixel = torch.arange(width_px, dtype=torch.int32)
         return pixel, pixel, torch.ones(width_px), torch.zeros(width_px), torch.ones(width_px)

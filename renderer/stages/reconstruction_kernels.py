@@ -31,12 +31,12 @@ class Worker:
 
     planes: wp.uint64
     samples: wp.uint64
-    """float32, a framelet's rows before they are interpolated."""
+    """float32: rows of a framelet before interpolation."""
     rows: wp.uint64
     box: wp.uint64
     ages: wp.uint64
     result: wp.uint64
-    """int32, whether there is a hole."""
+    """int32: whether there is a hole."""
 
 
 @wp.kernel
@@ -48,8 +48,8 @@ def find_candidates(
     newest_s: Address,
     newest_level: Address,
 ):
-    """Newest samples of every cell, their smoothed ages, and the framelets that may be seen; ``result`` receives how
-    many these are."""
+    """Computes the newest samples of every cell and their smoothed ages, and lists the framelets that may be visible;
+    ``result`` receives their number."""
     reference = map_newest(plan, cache.slots, cache.level, cache.index, cache.time_s, newest_s, newest_level)
     smooth_rows(plan, reference, cycle_s, newest_s)
     count = wp.array(ptr=result, shape=(1,), dtype=wp.int32)
@@ -58,7 +58,7 @@ def find_candidates(
 
 @wp.func_native("return __atomic_fetch_add((int*)counter, 1, __ATOMIC_RELAXED);")
 def take(counter: Address) -> wp.int32:
-    """The next number, each to one thread only."""
+    """The next number of a shared counter."""
     ...
 
 
@@ -71,8 +71,8 @@ def paint_bands(
     candidates: wp.int32,
     image: Address,
 ):
-    """Bands that no other thread has taken. A pixel adds up its framelets in the order of their slots, so its bits do
-    not depend on how bands are shared out."""
+    """Renders bands that no other thread has taken. A pixel sums its framelets in the order of their slots, so its bits
+    do not depend on the distribution of bands."""
     slots = wp.array(ptr=plan.candidate, shape=(candidates,), dtype=wp.int32)
     levels = wp.array(ptr=cache.level, shape=(cache.slots,), dtype=wp.int64)
     indices = wp.array(ptr=cache.index, shape=(cache.slots,), dtype=wp.int64)
@@ -100,6 +100,6 @@ def paint_bands(
 
 @wp.kernel
 def bury_dead(plan: DisplayPlan, cache: CachedFramelets, result: Address):
-    """Flags the framelets that were not seen; ``result`` receives the area of the others."""
+    """Flags the framelets that were not visible; ``result`` receives the area of the others."""
     overdraw = wp.array(ptr=result, shape=(1,), dtype=wp.float64)
     overdraw[0] = bury(plan, cache.slots, cache.level, cache.dead)

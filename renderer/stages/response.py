@@ -1,4 +1,5 @@
-"""The control decision in C++ (``native/response.h``), for the solver ``waterfill``; defined in ``tsar/response``."""
+"""The control decision in C++ (``native/response.h``), for the solver ``waterfill``, as defined in
+``tsar/response``."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from renderer.compute.launching import Address
 
 @wp.struct
 class ResponsePlan:
-    """What of the configuration the response depends on; densities are normalised by their maxima."""
+    """Parameters of the response; densities are normalised by their maxima."""
 
     elements: wp.int32
     spatial_high: wp.float64
@@ -18,13 +19,13 @@ class ResponsePlan:
     temporal_min: wp.float64
     gain: wp.float64
     surplus_max: wp.float64
-    """Normalised as combined density is."""
+    """Bound of the surplus, normalised as combined density is."""
     shift: wp.float64
-    """Factor by which a decision slides towards space: 2 to the bias."""
+    """Factor by which a decision moves towards space: ``2^bias``."""
     columns: wp.uint64
-    """Working memory: float64, ``COLUMNS`` for each element."""
+    """float64, working memory: ``COLUMNS`` for each element."""
     active: wp.uint64
-    """Working memory: int32, one for each element."""
+    """int32, working memory: one for each element."""
 
 
 @wp.func_native("""

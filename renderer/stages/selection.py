@@ -1,5 +1,5 @@
-"""Selection in C++ (``native/selection.h``): passes over the field and over the tiles. They are put together in
-``kernels.py``; the definition is in ``tsar/selection.py``."""
+"""Selection in C++ (``native/selection.h``): passes over the field and over the tiles. ``kernels.py`` combines them;
+the definition is in ``tsar/selection.py``."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from renderer.compute.launching import Address
 
 @wp.struct
 class SelectionPlan:
-    """What of the configuration the selection depends on."""
+    """Parameters of the selection."""
 
     batch: wp.int32
     field_level: wp.int32
     samples: wp.int32
     centre: wp.uint64
-    """Address of the offsets of a tile's samples, in tile widths."""
+    """float32: offsets of a tile's samples, in tile widths."""
 
 
 @wp.struct
@@ -46,7 +46,7 @@ def gather_credit(
     overdue: Address,
     credit: Address,
 ):
-    """Credit of every element, and its mean over every tile."""
+    """Updates the credit of every element, and computes its mean over every tile."""
     ...
 
 
@@ -67,11 +67,12 @@ def refresh_due(
     ties: wp.int32,
     due: Due,
 ):
-    """Tiles above the threshold, and the ``ties`` first of those at it; a refresh is taken off their credit."""
+    """Selects the tiles above the threshold and the first ``ties`` of those at it, and subtracts a refresh from their
+    credit."""
     ...
 
 
 @wp.func_native("selection::place_framelets(plan, (const long long*)level, (const long long*)index, due);")
 def place_framelets(plan: SelectionPlan, level: Address, index: Address, due: Due):
-    """The tiles of a batch, and the positions of its samples."""
+    """Stores the tiles of a batch and the positions of its samples."""
     ...

@@ -1,4 +1,4 @@
-"""Numbers that the compiled stages, their C++ and the reference share; no header repeats one of them."""
+"""Constants that the compiled stages, their C++ and the reference share; no header repeats one of them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tsar.response.local import AT_WALL
 from tsar.types import LUMINANCE
 
 SAMPLES_MAX = 1024
-"""Samples of a framelet that the estimate of errors has room for."""
+"""Maximum number of samples of a framelet in the estimate of errors."""
 OCTAVES_MAX = 5
-"""Octaves of such a framelet."""
+"""Number of octaves of such a framelet."""
 COLUMNS = 8
-"""Quantities of an element that the passes of the response hand on."""
+"""Number of quantities of an element that the passes of the response share."""
 PLANES = 5
-"""Of a band of the image: the threshold of ages, and sums of weight, red, green and blue."""
+"""Number of planes of a band of the image: the threshold of ages, and sums of weight, red, green and blue."""
 
 GIVEN: dict[str, float] = {
     "SAMPLES_MAX": SAMPLES_MAX,
@@ -31,16 +31,16 @@ GIVEN: dict[str, float] = {
     "AT_WALL": np.float64(AT_WALL),
     **dict(zip(("LUMINANCE_RED", "LUMINANCE_GREEN", "LUMINANCE_BLUE"), LUMINANCE, strict=True)),
 }
-"""As in :mod:`renderer.compute.sizes`."""
+"""The constants of this module as the C++ gets them."""
 
 PIXEL_WORDS = 6
-"""Words of eight bytes for what the samples of a pixel say together."""
+"""Size of the sums over a pixel's samples in words of eight bytes."""
 FRAME = 8
-"""Columns of nothing beside each row of depths, so that every pixel has neighbours."""
+"""Empty columns on either side of each row of depths, so that every pixel has neighbours."""
 POSE_NUMBERS = 12
-"""Of what takes an instance to the camera: three rows of a matrix, and an offset."""
+"""Count of numbers that take an instance to the camera: three rows of a matrix, and an offset."""
 LEVEL_PLANES = 5
-"""Of a level of the picture's pyramid: red, green, blue, variance, roughness."""
+"""Number of planes of a level of the picture's pyramid: red, green, blue, variance, roughness."""
 
 FILTERING: dict[str, float] = {
     "PIXEL_WORDS": PIXEL_WORDS,
@@ -78,4 +78,4 @@ FILTERING: dict[str, float] = {
     "BISECTIONS": tiles.BISECTIONS,
     "PRICE_LEAST": tiles.PRICE_LEAST,
 }
-"""The same for the filter's stages."""
+"""Constants of the filter's stages as their C++ gets them."""

@@ -1,7 +1,7 @@
 """Tiling and the sums of a cycle's record in C++ (``native/tiling.h``, ``native/account.h``).
 
-Nodes of the quadtree lie one level after the other, coarse first: level ``L`` begins at ``(4^L - 1) / 3``. Definitions
-in ``tsar/tiling.py`` and ``tsar/accounting.py``.
+Nodes of the quadtree are stored one level after the other, coarse first: level ``L`` begins at ``(4^L - 1) / 3``.
+Definitions are in ``tsar/tiling.py`` and ``tsar/accounting.py``.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from renderer.compute.launching import Address
 
 @wp.func_native("return (int)quadtree::first_node(level);")
 def first_node(level: wp.int32) -> wp.int32:
-    """Nodes of all levels above one."""
+    """Number of the nodes of all levels above ``level``."""
     ...
 
 
@@ -25,13 +25,13 @@ def are_densities(elements: wp.int32, field: Address) -> wp.bool:
 
 @wp.func_native("tiling::sum_nodes(field_level, level_low, (const double*)density, (double*)sums);")
 def sum_nodes(field_level: wp.int32, level_low: wp.int32, density: Address, sums: Address):
-    """Integrals over all nodes above the elements."""
+    """Computes the integrals over all nodes above the elements."""
     ...
 
 
 @wp.func_native("return ranking::count_above((const double*)value, count, bound);")
 def count_exceeding(value: Address, count: wp.int32, bound: wp.float64) -> wp.int32:
-    """How many values exceed the bound."""
+    """Number of values above the bound."""
     ...
 
 
@@ -42,7 +42,7 @@ def count_exceeding(value: Address, count: wp.int32, bound: wp.float64) -> wp.in
     """
 )
 def mark_splits(count: wp.int32, key: Address, order: Address, threshold: wp.uint64, ties: wp.int32, split: Address):
-    """Nodes above the threshold, and the ``ties`` first of those at it in the order for equals."""
+    """Marks the nodes above the threshold, and the first ``ties`` of those at it in the order for equal nodes."""
     ...
 
 
@@ -53,7 +53,7 @@ def mark_splits(count: wp.int32, key: Address, order: Address, threshold: wp.uin
     """
 )
 def emit_tiles(level_low: wp.int32, level_high: wp.int32, split: Address, level: Address, index: Address) -> wp.int32:
-    """The undivided nodes in Morton order. Returns how many."""
+    """Lists the nodes that are not split, in Morton order. Returns their number."""
     ...
 
 
@@ -74,6 +74,6 @@ def sum_account(
     part_of_element: Address,
     result: Address,
 ):
-    """Combined density over the field, the spread of ages among elements of fast refresh, and how many values of the
-    four fields are not finite."""
+    """Computes the combined density over the field, the spread of ages in elements of fast refresh, and the number of
+    non-finite values of the four fields."""
     ...

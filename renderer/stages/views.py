@@ -1,4 +1,4 @@
-"""A framelet cache's tensors as native code sees them: checked once, and what is launched on them recorded once."""
+"""A framelet cache's tensors for native code: they are checked once, and launches on them are recorded once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def point_at_cache(view: Any, cache: FrameletCache, config: TsarConfig) -> None:
     """Sets those fields of a kernel's record that are addresses of a cache's tensors, and its number of slots.
 
     Raises:
-        ValueError: if a tensor is not what a cache of this configuration has.
+        ValueError: if a tensor does not match the cache of this configuration.
     """
     slots, samples = config.cache_slots, config.samples
     expected = {
@@ -44,14 +44,14 @@ def point_at_cache(view: Any, cache: FrameletCache, config: TsarConfig) -> None:
 
 
 class PerCache(Generic[Recorded]):
-    """What is recorded for each cache: once, and anew where a cache has been given another tensor."""
+    """Records per cache, created once, and again if a tensor of the cache has been replaced."""
 
     def __init__(self, record: Callable[[FrameletCache], Recorded]) -> None:
         self._record = record
         self._kept: WeakKeyDictionary[FrameletCache, tuple[tuple[Tensor, ...], Recorded]] = WeakKeyDictionary()
 
     def __call__(self, cache: FrameletCache) -> Recorded:
-        """What is recorded for a cache."""
+        """The record of a cache."""
         tensors, kept = _tensors_of(cache), self._kept.get(cache)
         if kept is None or not all(map(operator.is_, kept[0], tensors)):
             kept = self._kept[cache] = tensors, self._record(cache)

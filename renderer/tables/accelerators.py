@@ -1,9 +1,8 @@
-"""Structures over a mesh's triangles that can stand in for its tree of boxes: a kd-tree, or none at all.
+"""Alternatives to the tree of boxes over a mesh's triangles: a kd-tree, or no structure.
 
-They exist to be compared. Every structure holds the same triangles, and the kernels that walk them test triangles alike
-(``native/structures.h``), so every structure gives the same pictures. There is one exception: whether a ray meets a
-triangle so small that float32 hardly tells its corners apart is a matter of rounding, and a structure may keep the ray
-away from it.
+They serve comparisons. All structures hold the same triangles, and the kernels use the same triangle test
+(``native/structures.h``), so all give the same pictures. There is one exception: whether a ray hits a triangle so small
+that float32 hardly separates its corners depends on rounding, and a structure may cull it.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ Structure = Literal["bvh", "kdtree", "brute"]
 STRUCTURES: tuple[Structure, ...] = get_args(Structure)
 
 CANDIDATES = 32
-"""Planes tried along each axis of a node."""
+"""Number of candidate planes along each axis of a node."""
 LEAF_TRIANGLES = 9
 """Greatest number of triangles of a node that is not split further."""
 TRAVERSAL_COST, TEST_COST = 1.0, 1.0
-"""Of stepping into a node and of testing a triangle, in the surface area heuristic."""
+"""Costs of a node visit and of a triangle test in the surface area heuristic."""
 
 _KD_NODE = np.dtype([("split", np.float32), ("axis", np.int32), ("first", np.int32), ("count", np.int32)])
 
@@ -37,9 +36,9 @@ class KdTree:
     """Records of ``native/structures.h``.
 
     Attributes:
-        nodes: ``(n,)`` of split, axis (3 for a leaf), first child or block, and number of triangles.
-        blocks: ``(m, 40)`` one to four triangles.
-        depth: of the deepest leaf; that of the root is 0.
+        nodes: ``(n,)`` records of split, axis (3 for a leaf), first child or block, and number of triangles.
+        blocks: ``(m, 40)`` blocks of one to four triangles.
+        depth: depth of the deepest leaf; the root has depth 0.
     """
 
     nodes: NDArray[np.void]
@@ -48,14 +47,14 @@ class KdTree:
 
 
 def number_of(structure: Structure) -> int:
-    """Number of a structure in kernels."""
+    """The number of a structure in kernels."""
     return StructureKind[structure.upper()]
 
 
 def build_structure(
     structure: Structure, vertices: Float[NDArray[np.float32], "v 3"], faces: Int[NDArray[np.int32], "f 3"]
 ) -> tuple[NDArray[np.float32] | None, Float[NDArray[np.float32], "m 40"]]:
-    """Nodes of a structure over a mesh, laid out as floats, and its blocks; ``brute`` has no nodes."""
+    """The nodes of a structure over a mesh as floats, and its blocks; ``brute`` has no nodes."""
     if structure == "bvh":
         tree = build_tree(vertices, faces)
         return tree.nodes, tree.blocks
@@ -73,18 +72,18 @@ def build_kdtree(vertices: Float[NDArray[np.float32], "v 3"], faces: Int[NDArray
     each axis, where ``cost = traversal + (area below · triangles below + area above · triangles above) / area · test``.
     It stays a leaf where testing all of its triangles costs no more than the cheapest split.
 
-    Deviation: triangles are counted and sorted by their boxes, cut to the node, rather than by their exact shape.
+    Deviation: triangles are counted and sorted by their boxes, clipped to the node, not by their exact shape.
 
     Source: Olszewski, "Distribution Ray Tracing", section on spatial subdivision.
     """
     triangles = np.asarray(vertices, np.float32)[faces].astype(np.float64)
     lower, upper = triangles.min(axis=1), triangles.max(axis=1)
-    # the nodes of the level that is being split, and which triangles each of them holds
+    # the nodes of the level that is being split, and the triangles of each
     box = np.stack([lower.min(axis=0), upper.max(axis=0)])[None]
     owner, item = np.zeros(len(faces), np.int64), np.arange(len(faces))
     levels: list[NDArray[np.void]] = []
     leaf_items: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
-    index = np.zeros(1, np.int64)  # of the level's nodes among all
+    index = np.zeros(1, np.int64)  # indices of the level's nodes among all nodes
     used, depth = 1, 0
     while len(index):
         counts = np.bincount(owner, minlength=len(index))
@@ -120,7 +119,8 @@ def _cheapest(
     upper: NDArray[np.float64],
     counts: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Axis and place of every node's cheapest plane; axis 3 where it is no cheaper to split than to test all."""
+    """Axis and position of every node's cheapest plane; axis 3 where splitting is not cheaper than testing all
+    triangles."""
     nodes = len(box)
     extent = box[:, 1] - box[:, 0]
     whole = _area(extent)
@@ -129,7 +129,7 @@ def _cheapest(
     share = np.arange(1, CANDIDATES + 1) / (CANDIDATES + 1.0)
     for axis in range(3):
         planes = box[:, 0, axis, None] + share * extent[:, axis, None]
-        # a triangle is below the planes after the last that it lies wholly above, and the other way round
+        # a triangle is below all planes after the last one that it lies entirely above, and vice versa
         width = np.where(extent[:, axis] > 0.0, extent[:, axis], 1.0)[owner]
         spot = np.stack([lower[:, axis], upper[:, axis]]) - box[owner, 0, axis]
         cell = np.clip(spot / width * (CANDIDATES + 1), -1.0, CANDIDATES + 1.0)
@@ -154,12 +154,12 @@ def _cheapest(
         best = np.where(better, value, best)
         axis_of = np.where(better, axis, axis_of)
         plane_of = np.where(better, planes[np.arange(nodes), choice], plane_of)
-    axis_of[best >= TEST_COST * counts] = KD_LEAF  # testing all costs no more
+    axis_of[best >= TEST_COST * counts] = KD_LEAF  # testing all triangles costs no more
     return axis_of, plane_of.astype(np.float32).astype(np.float64)
 
 
 def _area(extent: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Surface of boxes, ``2 (hw + hd + wd)``."""
+    """Surface area of boxes, ``2 (hw + hd + wd)``."""
     x, y, z = np.moveaxis(extent, -1, 0)
     return 2.0 * (x * y + y * z + z * x)
 
@@ -173,7 +173,7 @@ def _divided(
     splits: NDArray[np.bool_],
     row: NDArray[np.void],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Boxes of the next level, side by side, and the triangles of each: those that touch a plane are on both sides."""
+    """Boxes of the next level in pairs, and the triangles of each; those that touch a plane are on both sides."""
     chosen = np.flatnonzero(splits)
     axis, plane = row["axis"][chosen], row["split"][chosen].astype(np.float64)
     below, above = box[chosen].copy(), box[chosen].copy()

@@ -1,4 +1,4 @@
-"""Canonical scene to Warp arrays. Whatever the kernels cannot do is refused here, in one clear line."""
+"""Conversion of a canonical scene to Warp arrays. Unsupported parts are rejected here, with an error of one line."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from scenes.canonical import (
 )
 
 DEPTH_MAX = 64
-"""Greatest number of bounces, also where the scene sets no limit: rays between facing mirrors end here."""
+"""Greatest number of bounces, even if the scene sets no limit: it ends rays between facing mirrors."""
 
 _UNIT_SHAPES = {Sphere: Shape.SPHERE, Disk: Shape.DISK, Rectangle: Shape.RECTANGLE, Cube: Shape.CUBE}
 
@@ -55,10 +55,10 @@ class SceneBuffers:
     """A scene on a device.
 
     Attributes:
-        data: what kernels read.
-        tracks: rigid motions by their index.
+        data: record that kernels read.
+        tracks: rigid motions by index.
         keep: objects that ``data`` refers to by number only.
-        triangle_count: of all unique meshes.
+        triangle_count: number of triangles of all unique meshes.
     """
 
     data: SceneData
@@ -90,7 +90,7 @@ class _Builder:
         self.light_of: dict[int, int] = {}
 
     def assembly(self, assembly: Assembly) -> None:
-        """Adds meshes that became one."""
+        """Adds meshes that were merged into one."""
         indices = [self.materials.add(part.material, part.name) for part in assembly.parts]
         unit = self.meshes.add(assembly.mesh, np.repeat(indices, assembly.face_counts))
         row = {"shape": Shape.MESH, "track": self.tracks.add(assembly.track), "material": -1}
@@ -125,7 +125,7 @@ class _Builder:
         self._place({"shape": _UNIT_SHAPES[type(shape)], **row}, unit, instance.to_world, name)
 
     def _relief(self, row: dict, instance: Instance, material: HeightField) -> None:
-        """Adds a rectangle that is carved."""
+        """Adds a rectangle with a height field."""
         name = instance.name
         if not isinstance(instance.shape, Rectangle):
             raise SceneError(
@@ -152,7 +152,7 @@ class _Builder:
             check_finite(matrix, f"Instance {name!r}: to_world of a shape of half size {unit.scale:g}")
         corners = np.stack(np.meshgrid(*zip(unit.lower, unit.upper, strict=True), indexing="ij"), -1).reshape(-1, 3)
         placed = product(corners, from_local[:3, :3].T) + from_local[:3, 3]
-        # a little wider, so that a flat box is not missed by a rounded ray
+        # slightly wider, so that rounding does not make a ray miss a flat box
         margin = 4.0e-6 * (np.abs(placed).max() + np.ptp(placed, axis=0).max())
         row |= {
             "mesh": unit.index,
@@ -169,10 +169,10 @@ class _Builder:
         groups: list[dict] = []
         nodes: list[dict] = []
         tracks = np.array([row["track"] for row, _, _ in self.instance_rows], np.int64)
-        for track in np.unique(tracks):  # what stands still first: it hides much of the rest
+        for track in np.unique(tracks):  # static instances first: they hide much of the rest
             members = np.flatnonzero(tracks == track)
             lower, upper = (np.stack([self.instance_rows[i][corner] for i in members]) for corner in (1, 2))
-            # whatever the turn: the farthest corner of any box
+            # for any rotation: the farthest corner of any box
             radius = 1.00001 * float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper)), axis=1).max())
             extent = np.ptp([lower.min(axis=0), upper.max(axis=0)], axis=0)
             surface = 2.0 * np.pi * radius**2 if track else product(extent, np.roll(extent, 1))
@@ -241,9 +241,9 @@ def build_buffers(scene: Scene, device: str, structure: Structure | None) -> Sce
     Args:
         scene: canonical scene.
         device: from :func:`renderer.compute.device.pick`.
-        structure: over the triangles of meshes, for the CPU's kernels; None for Warp's own trees.
+        structure: structure over the triangles of meshes, for CPU kernels; None for Warp's own trees.
 
     Raises:
-        SceneError: for anything the renderer does not support, or values that cannot be rendered.
+        SceneError: if the renderer does not support a part of the scene, or values cannot be rendered.
     """
     return _Builder(scene, device, structure).build()

@@ -1,4 +1,4 @@
-"""Checks of values of a scene or a picture that no kernel can use; the errors are one line."""
+"""Checks that reject values of a scene or a picture that kernels cannot use; errors have one line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tsar.memory import free_memory_bytes
 
 _BYTES_PER_PIXEL = 12
 _SAMPLES_PER_PIXEL_AXIS_MAX = 1024
-_SAMPLES_PER_AXIS_MAX = 1 << 22  # float32 tells two of so many apart
+_SAMPLES_PER_AXIS_MAX = 1 << 22  # float32 distinguishes that many positions
 
 
 def check_finite(values: object, what: str) -> None:
@@ -21,7 +21,7 @@ def check_finite(values: object, what: str) -> None:
 
 
 def check_light(values: object, what: str) -> None:
-    """Raises SceneError unless all values, of a radiance or reflectance, are finite and not negative."""
+    """Raises SceneError unless all values of a radiance or reflectance are finite and not negative."""
     check_finite(values, what)
     if (np.asarray(values) < 0.0).any():
         raise SceneError(f"{what}: expected no negative values, got {_short(values)}")
@@ -47,7 +47,7 @@ def _short(values: object) -> str:
 
 
 def check_frame_size(width_px: int, height_px: int, samples_per_axis: int) -> None:
-    """Raises ValueError where a picture has too many samples along an axis or does not fit into memory."""
+    """Raises ValueError if a picture has too many samples along an axis or does not fit into memory."""
     if samples_per_axis > _SAMPLES_PER_PIXEL_AXIS_MAX:
         raise ValueError(f"samples_per_axis: expected at most {_SAMPLES_PER_PIXEL_AXIS_MAX}, got {samples_per_axis}")
     if max(width_px, height_px) * samples_per_axis > _SAMPLES_PER_AXIS_MAX:

@@ -1,7 +1,7 @@
-"""A tree of boxes over the instances of a group, laid out so that kernels walk it without a stack.
+"""A tree of boxes over the instances of a group, laid out for traversal without a stack.
 
-Nodes lie in depth-first order, and each knows where its subtree ends: a ray goes on to the next node where it meets a
-box, and behind the subtree where it does not.
+Nodes are in depth-first order, and each has the index of the end of its subtree: a ray that hits a box continues with
+the next node, and one that misses it continues after the subtree.
 
 Source: Smits 1998, "Efficiency Issues for Ray Tracing"; splits after Wald 2007, "On fast Construction of SAH-based
 Bounding Volume Hierarchies".
@@ -24,7 +24,7 @@ class Node:
 
     Attributes:
         lower, upper: ``(3,)`` corners.
-        skip: index of the first node behind this one's subtree.
+        skip: index of the first node after this one's subtree.
         item: the boxed item of a leaf, -1 for inner nodes.
     """
 
@@ -35,21 +35,21 @@ class Node:
 
 
 def box_tree(lower: Boxes, upper: Boxes, enclosing: float) -> list[Node]:
-    """Nodes of a tree in depth-first order.
+    """Builds a tree; nodes are in depth-first order.
 
     Args:
         lower, upper: ``(n, 3)`` corners of the items' boxes.
-        enclosing: half the surface of what rays are known to meet before they come here.
+        enclosing: half the surface area of a bound that rays are known to hit before they reach the tree.
 
     Returns:
-        One leaf for each item, and inner nodes where they spare more tests than they cost. Of two siblings the one
-        with the greater surface comes first: a near hit in it spares a ray the other.
+        One leaf for each item, and inner nodes where they save more tests than they cost. Of two siblings the one with
+            the greater surface area comes first: a near hit in it saves the test of the other.
     """
     nodes: list[Node] = []
     pending: list[tuple[Items, float] | Node] = [(np.arange(len(lower)), enclosing)]
     while pending:
         entry = pending.pop()
-        if isinstance(entry, Node):  # everything below it is laid out
+        if isinstance(entry, Node):  # its whole subtree is laid out
             entry.skip = len(nodes)
             continue
         items, around = entry
@@ -58,7 +58,7 @@ def box_tree(lower: Boxes, upper: Boxes, enclosing: float) -> list[Node]:
             nodes.append(Node(low, high, len(nodes) + 1, int(items[0])))
             continue
         surface = float(_surface(low, high))
-        if len(items) * (around - surface) > around:  # tests spared, from the share of rays that miss the box
+        if len(items) * (around - surface) > around:  # tests saved, from the share of rays that miss the box
             nodes.append(Node(low, high, 0, -1))
             pending.append(nodes[-1])
             around = surface
@@ -68,13 +68,14 @@ def box_tree(lower: Boxes, upper: Boxes, enclosing: float) -> list[Node]:
 
 
 def _surface(lower: Boxes, upper: Boxes) -> Boxes:
-    """Half the surface of boxes ``(..., 3)``."""
+    """Half the surface area of boxes ``(..., 3)``."""
     x, y, z = np.moveaxis(upper - lower, -1, 0)
     return x * y + y * z + z * x
 
 
 def _halves(lower: Boxes, upper: Boxes, items: Items) -> tuple[Items, Items]:
-    """Splits items where the boxes of both halves, weighed by their counts, have the least surface; greater first."""
+    """Splits items where the surface areas of both boxes, weighted by their counts, have the least sum; the greater
+    half comes first."""
     count = np.arange(1, len(items))
     best = (np.inf, items, 1, False)
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""Lights of a scene as rows of the table that kernels read, and what the choice of a direction into the sky takes."""
+"""Lights of a scene as rows of the table that kernels read, and the distributions for sampling the environment."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tsar.types import LUMINANCE
 
 @dataclass
 class LightTable:
-    """Rows of lights, and the environment among them."""
+    """Rows of lights, including the environment."""
 
     rows: list[dict] = field(default_factory=list)
     environment: EnvironmentLight | None = None
@@ -39,7 +39,7 @@ class LightTable:
         """Adds a light of the scene.
 
         Raises:
-            SceneError: for one that the renderer does not have, or values that cannot be used.
+            SceneError: for an unsupported light, or values that cannot be used.
         """
         if isinstance(light, PointLight):
             check_finite(light.position, "PointLight.position")
@@ -54,14 +54,14 @@ class LightTable:
                 raise SceneError("expected at most one EnvironmentLight among the lights, got 2")
             check_environment(light)
             self.environment = light
-            # a black one would have no texel to choose
+            # a black one has no texel to sample
             if light.scale > 0.0 and np.max(light.image) > 0.0:
                 self.rows.append({"kind": LightKind.ENVIRONMENT})
         else:
             raise SceneError(f"light {type(light).__name__} is not supported yet")
 
     def add_emitter(self, instance: Instance, track: int) -> None:
-        """Adds a shape that gives light; ``track`` is the number of its motion."""
+        """Adds a light-emitting shape; ``track`` is the number of its motion."""
         name, matrix = f"Instance {instance.name!r}", np.asarray(instance.to_world, np.float64)
         check_light(instance.emission, f"{name}: emission")
         check_affine(matrix, f"{name}: to_world")
@@ -74,7 +74,7 @@ class LightTable:
         row = {"color": instance.emission, "place": matrix[:3, 3], "track": track}
         linear = matrix[:3, :3]
         if isinstance(instance.shape, Rectangle):
-            # the cross product of the edges points outside: of a mirrored rectangle, against the turn of its axes
+            # the cross product of the edges must point outside; mirroring reverses it
             along = linear[:, 1] * np.sign(np.linalg.det(linear))
             self.rows.append({**row, "kind": LightKind.QUAD, "across": linear[:, 0], "along": along})
             return
@@ -84,12 +84,12 @@ class LightTable:
         self.rows.append({**row, "kind": LightKind.SPHERE, "radius": instance.shape.radius * norm(linear[:, 0])})
 
     def place_environment(self, data: SceneData, materials: MaterialTable, seen: EnvironmentLight | None) -> None:
-        """Fills what kernels read of the environment.
+        """Fills the kernels' data of the environment.
 
         Args:
-            data: changed here.
-            materials: takes the pictures.
-            seen: what rays that leave the scene see instead, if anything.
+            data: record that is changed.
+            materials: table that stores the images.
+            seen: background that rays leaving the scene see instead, if any.
         """
         data.environment_level = data.lighting_level = -1
         shown = seen or self.environment
@@ -110,7 +110,7 @@ class LightTable:
 
 
 def check_environment(light: EnvironmentLight) -> None:
-    """Raises SceneError unless the picture can be shown."""
+    """Raises SceneError unless the image of the environment can be used."""
     name, shape = f"EnvironmentLight {light.source!r}", light.image.shape
     if len(shape) != 3 or shape[2] != 3 or min(shape) < 1:
         raise SceneError(f"{name}: expected an image (h, w, 3), got {shape}")
@@ -128,14 +128,15 @@ def _map(light: EnvironmentLight, materials: MaterialTable) -> tuple[int, wp.mat
 def summed_chances(
     image: Float[NDArray[np.float32], "h w 3"],
 ) -> tuple[Float[NDArray[np.float64], " h1"], Float[NDArray[np.float64], "h w1"]]:
-    """Chances of an environment's rows, and of the texels within each, summed up from 0 to 1.
+    """Cumulative probabilities of an environment's rows, and of the texels within each row, from 0 to 1.
 
-    A texel's chance is its luminance, integrated over the texel as it is interpolated, times its solid angle.
+    The probability of a texel is proportional to its luminance, integrated over the texel with interpolation, times its
+    solid angle.
 
     Source: Pharr, Jakob and Humphreys 2016, "Physically Based Rendering", sec. 14.2.4.
     """
     bright = product(image.astype(np.float64), LUMINANCE)
-    # the integral of a linear interpolation over a cell: an eighth comes from each neighbour
+    # integral of a linear interpolation over a cell: each neighbour contributes an eighth
     bright = 0.75 * bright + 0.125 * (np.roll(bright, 1, axis=1) + np.roll(bright, -1, axis=1))
     above, below = np.vstack([bright[:1], bright[:-1]]), np.vstack([bright[1:], bright[-1:]])
     bright = 0.75 * bright + 0.125 * (above + below)
@@ -160,7 +161,7 @@ def _directional_row(light: DirectionalLight) -> dict:
     if light.angle_deg == 0.0:
         return row
     cosine = cos(np.radians(light.angle_deg) / 2.0)
-    # the mean cosine over the disc is (1 + cosine) / 2: a surface that faces its middle gets the whole irradiance
+    # the mean cosine over the disc is (1 + cosine) / 2: a surface that faces its centre receives the whole irradiance
     color = np.asarray(light.irradiance) * 2.0 / (1.0 + cosine)
     return row | {"kind": LightKind.SUN_DISC, "cos_inner": cosine, "color": color}
 

@@ -33,13 +33,13 @@ _WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 
 def mip_levels(image: np.ndarray) -> list[np.ndarray]:
-    """Mip map of an image, each level the area average of the one before, down to one texel.
+    """Mip map of an image: each level is the area average of the one before, down to one texel.
 
     Args:
         image: ``(height, width, 3)`` float32.
 
     Returns:
-        Levels from the full image on; sides halve and round down, but not below 1.
+        Levels from the full image on; sides are halved and rounded down, to at least 1.
     """
     levels = [np.ascontiguousarray(image, np.float32)]
     while max(levels[-1].shape[:2]) > 1:
@@ -54,7 +54,7 @@ class MaterialTable:
     """Rows of materials, textures and mip levels, and the pool of texels."""
 
     def __init__(self, device: str, paths: bool = False) -> None:
-        """Starts empty; with ``paths`` each material has a row of how it scatters light along them as well."""
+        """Creates an empty table; with ``paths`` each material also has a row for scattering along paths."""
         self.device, self.paths = device, paths
         self.rows: list[dict] = []
         self.scattering: list[dict] = []
@@ -68,7 +68,7 @@ class MaterialTable:
         self._alive: list[object] = []  # keys are object ids, so the objects must outlive the table
 
     def add_image(self, image: np.ndarray, mipmap: bool) -> tuple[int, int]:
-        """Puts an image into the pool; index of its first level and how many it has."""
+        """Adds an image to the pool; returns the index of its first level and the number of levels."""
         key = (id(image), mipmap)
         if key not in self._image_index:
             levels = mip_levels(image) if mipmap else [np.ascontiguousarray(image, np.float32)]
@@ -85,12 +85,12 @@ class MaterialTable:
         return self._image_index[key]
 
     def upload_texels(self) -> wp.array:
-        """All texels on a device, and a black one at the end, so that the last one can be read as four floats."""
+        """All texels on a device, followed by a black one, so that the last texel can be read as four floats."""
         table = np.concatenate([*self.texels, np.zeros((1, 3), np.float32)])
         return wp.array(table, dtype=wp.vec3, device=self.device, copy=self.device != "cpu")
 
     def add_texture(self, texture: Texture, where: str) -> int:
-        """Index of a texture; the same object is stored once."""
+        """Adds a texture and returns its index; the same object is stored once."""
         if id(texture) not in self._texture_index:
             row = self._texture_row(texture, where)  # children first
             self._texture_index[id(texture)] = len(self.textures)
@@ -132,7 +132,7 @@ class MaterialTable:
         raise SceneError(f"{where}: texture {type(texture).__name__} is not supported yet")
 
     def add(self, material: Material, where: str) -> int:
-        """Index of a material; the same object is stored once."""
+        """Adds a material and returns its index; the same object is stored once."""
         if id(material) not in self._material_index:
             where = f"Instance {where!r}"
             if self.paths:
@@ -193,7 +193,8 @@ class MaterialTable:
 
 
 def _along_tree(material: Material) -> Material:
-    """What the tree of rays draws of a material that is drawn along paths: only numbers that both share."""
+    """The material's equivalent for the tree of rays when the scene is rendered along paths: it holds only the
+    parameters that both use."""
     base = unwrapped(material)
     if isinstance(base, Glass):
         return dataclasses.replace(base, roughness=(0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Meshes that move together become one: a ray then walks one tree with one transform, nearest parts first."""
+"""Merging of meshes that move together: a ray then traverses one tree with one transform, nearest parts first."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from scenes.arithmetic import inverse, product
 from scenes.canonical import Instance, Mesh, RigidTrack
 
 COPIED_FACES_MAX = 1 << 20
-"""Faces that may be stored once more where instances share a mesh."""
+"""Maximum number of additional faces from copies of meshes that instances share."""
 
 SIZE_RATIO_MAX = 1024.0
-"""A part more than this many times smaller than the whole stays alone: float32 would be too coarse for it."""
+"""A part that is smaller than the whole by more than this factor stays separate: float32 would be too coarse for it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """Meshes on one track as one mesh in track space.
+    """Meshes on one track, merged into one mesh in track space.
 
     Attributes:
-        mesh: vertices in float64; normals are not unit, and zero where a part has none.
-        parts: the instances it is made of, whose faces follow each other.
+        mesh: merged mesh; vertices are float64, normals are not unit vectors and are zero where a part has none.
+        parts: merged instances, in the order of their faces.
     """
 
     mesh: Mesh
@@ -37,7 +37,7 @@ class Assembly:
 
     @property
     def face_counts(self) -> list[int]:
-        """Faces of each part."""
+        """Number of faces of each part."""
         return [len(part.shape.faces) for part in self.parts if isinstance(part.shape, Mesh)]
 
 
@@ -45,10 +45,10 @@ def assemble(instances: Sequence[Instance]) -> tuple[list[Assembly], list[Instan
     """Merges meshes track by track.
 
     Args:
-        instances: of a scene.
+        instances: instances of a scene.
 
     Returns:
-        Merged meshes, and the instances that stay as they are.
+        Merged meshes, and the instances that stay separate.
     """
     shared = _shared_meshes(instances)
     by_track: dict[int, list[Instance]] = defaultdict(list)
@@ -65,7 +65,7 @@ def assemble(instances: Sequence[Instance]) -> tuple[list[Assembly], list[Instan
 
 
 def _shared_meshes(instances: Sequence[Instance]) -> set[int]:
-    """Ids of meshes used more than once, where copies of them all would be too many."""
+    """Ids of the meshes that are used more than once, if copies of all of them would exceed the limit."""
     meshes = [instance.shape for instance in instances if isinstance(instance.shape, Mesh)]
     uses = Counter(id(mesh) for mesh in meshes)
     copied = sum(len(mesh.faces) for mesh in meshes) - sum(
@@ -75,7 +75,7 @@ def _shared_meshes(instances: Sequence[Instance]) -> set[int]:
 
 
 def _of_like_size(instances: list[Instance]) -> list[Instance]:
-    """Those that are not tiny beside all of them together."""
+    """The instances that are not tiny relative to all of them together."""
     points = [_placed(instance)[0] for instance in instances]
     sizes = np.array([np.ptp(part, axis=0).max() for part in points])
     whole = np.ptp(np.concatenate(points), axis=0).max()
@@ -90,7 +90,7 @@ def _placed(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.float32
     vertices = product(mesh.vertices.astype(np.float64), linear.T) + offset
     if mesh.normals is None:
         return vertices, np.zeros((len(vertices), 3), np.float32)
-    # their lengths keep their ratios, so that they interpolate as they would in object space
+    # the ratios of their lengths are kept, so that they interpolate as in object space
     normals = product(mesh.normals.astype(np.float64), inverse(linear))
     longest = np.linalg.norm(normals, axis=1).max(initial=0.0)
     return vertices, (normals / (longest if longest > 0.0 else 1.0)).astype(np.float32)
@@ -100,7 +100,7 @@ def _joined(parts: list[Instance]) -> Mesh:
     vertices, normals = zip(*(_placed(part) for part in parts), strict=True)
     first = np.cumsum([0, *(len(part) for part in vertices[:-1])])
     meshes = [part.shape for part in parts if isinstance(part.shape, Mesh)]
-    # a mirrored part turns its faces round, so that their outside stays outside
+    # faces of a mirrored part are reversed, so that their outside stays outside
     mirrored = [np.linalg.det(part.to_world[:3, :3]) < 0.0 for part in parts]
     wound = [mesh.faces[:, ::-1] if flip else mesh.faces for mesh, flip in zip(meshes, mirrored, strict=True)]
     faces = [rows.astype(np.int64) + start for rows, start in zip(wound, first, strict=True)]

@@ -14,16 +14,16 @@ from renderer.tables.trees import aligned
 from scenes.canonical import Mesh, SceneError
 
 _BOX_PADDING = 2.0e-5
-"""How much wider than its triangles a box of the tree is, in units of the mesh's half size.
+"""Padding of the boxes of the tree, in units of the mesh's half size.
 
-Warp's test of a ray against a triangle is watertight, its test against a box is not: rounding loses rays that pass just
-where boxes touch. This covers rays that start up to some hundred half sizes away.
+Warp's ray–triangle test is watertight, but its ray–box test is not: rounding loses rays that pass exactly where boxes
+touch. The padding covers rays that start up to a few hundred half sizes away.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class UnitMesh:
-    """A mesh moved into ``[-1, 1]³``; ``center`` and ``scale`` lead back to object space."""
+    """A mesh transformed into ``[-1, 1]³``; ``center`` and ``scale`` take it back to object space."""
 
     index: int
     center: np.ndarray
@@ -33,7 +33,7 @@ class UnitMesh:
 
 
 class _Pool:
-    """Arrays, concatenated."""
+    """A pool of concatenated arrays."""
 
     def __init__(self, width: int, scalar: type, dtype: type) -> None:
         self.width, self.scalar, self.dtype = width, scalar, dtype
@@ -41,7 +41,7 @@ class _Pool:
         self.count = 0
 
     def append(self, array: np.ndarray | None) -> int:
-        """Adds an array; the index its first row gets, or -1 for None."""
+        """Adds an array and returns the index of its first row, or -1 for None."""
         if array is None:
             return -1
         first = self.count
@@ -50,9 +50,9 @@ class _Pool:
         return first
 
     def upload(self, device: str) -> wp.array:
-        """Everything on a device; one row of zeros where there is nothing."""
+        """The pool on a device; one row of zeros if it is empty."""
         table = np.concatenate(self.arrays) if self.arrays else np.zeros((1, self.width), self.scalar)
-        if self.dtype is wp.float32:  # trees, of the CPU
+        if self.dtype is wp.float32:  # trees of the CPU
             return wp.array(aligned(table), dtype=wp.float32, device=device, copy=device != "cpu")
         flat = table.reshape(-1) if self.dtype is wp.int32 else table
         return wp.array(np.ascontiguousarray(flat), dtype=self.dtype, device=device)
@@ -62,11 +62,12 @@ class MeshTable:
     """The unique meshes of a scene."""
 
     def __init__(self, device: str, structure: Structure | None) -> None:
-        """Starts empty; ``structure`` is over triangles on the CPU, None for Warp's own trees."""
+        """Creates an empty table; ``structure`` is the structure over triangles on the CPU, None for Warp's own
+        trees."""
         self.device, self.structure = device, structure
         self.rows: list[dict] = []
         self.triangle_count = 0
-        self.keep: list[object] = []  # kernels know a Warp mesh by number only; ids of meshes must not be used again
+        self.keep: list[object] = []  # kernels refer to a Warp mesh by number only; ids of meshes must not be reused
         self.pools = {
             "tree_nodes": _Pool(NODE_FLOATS, np.float32, wp.float32),
             "tree_blocks": _Pool(BLOCK_FLOATS, np.float32, wp.float32),
@@ -80,10 +81,10 @@ class MeshTable:
         self._units: dict[int, UnitMesh] = {}
 
     def add(self, mesh: Mesh, face_materials: Sequence[int] | np.ndarray | None = None) -> UnitMesh:
-        """Stores a mesh once, however many instances share it.
+        """Adds a mesh; it is stored once, however many instances share it.
 
         Args:
-            mesh: in object space.
+            mesh: mesh in object space.
             face_materials: material of each face, or None where instances decide.
 
         Raises:
@@ -102,7 +103,7 @@ class MeshTable:
                 bvh = padded_mesh(vertices[mesh.faces], self.device)
                 self.keep.append(bvh)
                 tree = {"id": bvh.id}
-            # normals of the unit mesh are those of the mesh: centring and uniform scaling do not turn them
+            # normals are unchanged: centring and uniform scaling do not rotate them
             self.rows.append(
                 {
                     **tree,
@@ -120,7 +121,7 @@ class MeshTable:
 
 
 def check_mesh(mesh: Mesh) -> None:
-    """Raises SceneError for values that the canonical mesh lets pass."""
+    """Raises SceneError for values that the canonical mesh does not check."""
     for name, array in (("normals", mesh.normals), ("uvs", mesh.uvs)):
         if array is not None and not np.isfinite(array).all():
             raise SceneError(f"Mesh {mesh.source!r}: {name} hold non-finite values")
@@ -133,10 +134,10 @@ def padded_mesh(triangles: np.ndarray, device: str) -> wp.Mesh:
 
     Args:
         triangles: corners ``(f, 3, 3)`` float32 in ``[-1, 1]³``.
-        device: where it is built.
+        device: device on which the tree is built.
     """
     lower, upper = triangles.min(axis=1) - _BOX_PADDING, triangles.max(axis=1) + _BOX_PADDING
-    # the tree is built over the points as they are now, and queries read them as they are later
+    # the tree is built over the current points, and queries read the points that are set later
     points = wp.array(np.stack([lower, upper, upper], axis=1).reshape(-1, 3), dtype=wp.vec3, device=device)
     mesh = wp.Mesh(points, wp.array(np.arange(points.size, dtype=np.int32), dtype=wp.int32, device=device))
     points.assign(np.ascontiguousarray(triangles.reshape(-1, 3)))

@@ -1,7 +1,8 @@
-"""Where the origin of the kernels' space lies: single precision is fine only near it.
+"""Choice of the origin of the kernels' space: single precision is accurate only near it.
 
-Kernels compute in float32, whose steps grow with the distance from the origin: of a room 1e5 of its sizes away they are
-a hundredth of it. A scene that lies far away is therefore moved here, in float64, before anything is rounded.
+Kernels compute in float32, whose resolution falls with the distance from the origin: at a distance of 1e5 times the
+size of a room, a step is a hundredth of the room. A distant scene is therefore translated in float64 before it is
+rounded.
 """
 
 from __future__ import annotations
@@ -18,25 +19,29 @@ from scenes.arithmetic import product
 from scenes.canonical import Disk, Instance, Light, Matrix, Mesh, PointLight, RigidTrack, Scene, Sphere, SpotLight
 
 _NEAR = 128.0
-"""Typical half sizes from the origin within which a scene stays where it is: half its instances are no larger."""
+"""Distance from the origin, in typical half sizes, within which a scene is not moved. The typical half size is the
+median over the instances."""
 
 _EXTENTS, _SIZES = 4.0, 64.0
-"""The origin moves in steps of at least so many half sizes of the whole scene, or typical ones, whichever is less."""
+"""Least step of the origin, in half sizes of the whole scene and in typical ones; the lesser of both counts."""
 
 _TOO_FAR = 1.0e5
-"""Half sizes from the origin beyond which something is drawn too coarsely: at 1e5 a step is 1/170 of it."""
+"""Distance from the origin, in half sizes of an instance, beyond which it is rendered too coarsely: at 1e5 a step is
+1/170 of it."""
 
 _COARSE = 1.0e-3
-"""Step of float32 vertices, in half sizes of their mesh, beyond which the mesh has lost its form."""
+"""Step of the vertices' precision, in half sizes of their mesh, beyond which the mesh has lost its shape."""
 
 Vector = NDArray[np.float64]
 
 
 def near_origin(scene: Scene) -> Scene:
-    """The scene, moved so that what the camera sees at time zero lies near the origin; itself where that is so already.
+    """The scene, moved so that the part near the camera at time zero lies near the origin; the same object if it does
+    already.
 
-    The shift is a multiple of a power of two that depends on the sizes in the scene: a scene gives the same picture
-    wherever it is, to the bit where its shift is such a multiple too. Warns of what is still too far away.
+    The shift is a multiple of a power of two that depends on the sizes in the scene. So a scene gives the same picture
+    at any place, and the same bits if its displacement is such a multiple. Warns of instances that are still too far
+    away.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         bounds = [_bounds(instance) for instance in scene.instances]
@@ -52,12 +57,12 @@ def near_origin(scene: Scene) -> Scene:
 
 
 def _shift(seen: Vector, lower: Vector, upper: Vector, half: Vector) -> Vector:
-    """Where the origin is to be: zero where ``seen`` is near it, or else the nearest multiple of a power of two."""
+    """The new origin: zero if ``seen`` is near it, otherwise the nearest multiple of a power of two."""
     typical = float(np.quantile(half, 0.5, method="lower"))
     if np.abs(seen).max() <= _NEAR * typical:
         return np.zeros(3)
     whole = float(np.max(upper.max(axis=0) - lower.min(axis=0))) / 2.0
-    # a little more, so that a scene of just such a size has the same step wherever it is
+    # slightly more, so that a scene of exactly such a size has the same step at any place
     size = max(1.001 * min(_EXTENTS * whole, _SIZES * typical), float(np.abs(seen).max()) * 2.0**-52)
     step = math.ldexp(1.0, math.frexp(size)[1])
     return step * np.round(seen / step)
@@ -68,7 +73,7 @@ def _pose(track: RigidTrack | None) -> Matrix:
 
 
 def _box(instance: Instance) -> tuple[Vector, Vector]:
-    """Middle and half size of an instance's box, in the space of its track."""
+    """Centre and half size of an instance's box, in the space of its track."""
     shape = instance.shape
     if isinstance(shape, Mesh):
         lower, upper = (end.astype(np.float64) for end in (shape.vertices.min(axis=0), shape.vertices.max(axis=0)))
@@ -80,7 +85,7 @@ def _box(instance: Instance) -> tuple[Vector, Vector]:
 
 
 def _bounds(instance: Instance) -> tuple[Vector, Vector]:
-    """Of an instance, in the world, at time zero."""
+    """Lower and upper corner of an instance's box in the world at time zero."""
     pose = _pose(instance.track)
     middle, reach = _box(instance)
     turned, place = pose[:3, :3], pose[:3, 3]
@@ -96,7 +101,7 @@ def _moved(scene: Scene, shift: Vector) -> Scene:
         return tracks.setdefault(id(track), replace(track, translation=track.translation + shift))
 
     def placed(thing: object) -> dict:
-        """What changes of an instance or a camera: its motion, which is the outer one, or else its place."""
+        """The changed fields of an instance or a camera: its track, which is applied last, or else its placement."""
         track = getattr(thing, "track", None)
         if track is not None:
             return {"track": track_of(track)}
@@ -123,7 +128,8 @@ def _place(position: tuple[float, float, float], shift: Vector) -> tuple[float, 
 
 
 def _too_coarse(scene: Scene, shift: Vector, half: Vector) -> list[str]:
-    """A line on what single precision cannot draw well, the worst instance of each kind; empty where all is well."""
+    """Warnings about instances that single precision cannot render well, the worst of each kind; empty if there are
+    none."""
     lines = []
     distance = np.array([_farthest(instance, shift) for instance in scene.instances])
     ratio = distance / np.maximum(half, 1e-300)
@@ -143,7 +149,7 @@ def _too_coarse(scene: Scene, shift: Vector, half: Vector) -> list[str]:
 
 
 def _farthest(instance: Instance, shift: Vector) -> float:
-    """Greatest distance of an instance's middle from the kernels' origin, along an axis."""
+    """Greatest distance of an instance's centre from the kernels' origin along an axis."""
     middle, _ = _box(instance)
     if instance.track is None:
         return float(np.abs(middle - shift).max())

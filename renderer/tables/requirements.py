@@ -1,4 +1,4 @@
-"""What a scene requires of the kernels, so that they model nothing else."""
+"""Features that a scene requires of the kernels, so that they are compiled without the others."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _SHAPES = {Mesh: Feature.MESH, Sphere: Feature.SPHERE, Rectangle: Feature.FLAT, 
 
 
 def explain(scene: Scene) -> dict[Feature, str]:
-    """What a scene requires, each with the first thing in it that does."""
+    """Required features, each with the first part of the scene that requires it."""
     found: dict[Feature, str] = {}
     scene = lit_by_all(scene)
     lit = any(_is_lit(instance.material) for instance in scene.instances)
@@ -66,7 +66,7 @@ def required(scene: Scene) -> Feature:
 
 
 def explanation(scene: Scene) -> list[str]:
-    """Lines that say of every feature whether a scene requires it, and what in the scene does."""
+    """Lines that state for every feature whether a scene requires it, and which part does."""
     found = explain(scene)
     lines = [
         f"{'yes' if feature in found else ' - '}  {MEANING[feature]:44} {found.get(feature, '')}" for feature in Feature
@@ -77,8 +77,8 @@ def explanation(scene: Scene) -> list[str]:
 
 
 def lit_by_all(scene: Scene) -> Scene:
-    """A scene for paths: a background without an environment light lights surfaces, and there is no ambient light,
-    which stands for that between surfaces; other scenes stay as they are."""
+    """A scene prepared for path tracing: a background without an environment light becomes a light, and ambient light
+    is removed, because it approximates the light between surfaces. Other scenes are returned unchanged."""
     if scene.integrator.kind != "path":
         return scene
     lights, background = scene.lights, scene.background
@@ -174,7 +174,7 @@ def _of_material(material: Material, scene: Scene) -> Iterator[Feature]:
 
 
 def _is_lit(material: Material) -> bool:
-    """Whether a material takes light from the lights, not only from where it mirrors and refracts."""
+    """Whether a material reflects light from the light sources directly, not only by mirroring and refraction."""
     bare = unwrapped(material)
     return not isinstance(bare, Mirror | Glass | Emissive) or (isinstance(bare, Glass) and max(bare.roughness) > 0.0)
 

@@ -1,6 +1,6 @@
-"""Materials as rows of how they scatter light along paths: a function a material.
+"""Rows of the materials' scattering along paths, one function per material.
 
-Wrappers (height fields, holes, bent normals) add to the row of what they wrap.
+Wrappers (height fields, holes, perturbed normals) extend the row of their base.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Row = dict[str, Any]
 
 
 class Textures(Protocol):
-    """What gives textures their numbers."""
+    """A table that numbers textures."""
 
     def add_texture(self, texture: Texture, where: str) -> int: ...
 
@@ -178,14 +178,14 @@ ROWS: dict[type, Callable[[Any, Textures, str], Row]] = {
     Bumped: _bumped,
     NormalMapped: _normal_mapped,
 }
-"""What fills the row of each material."""
+"""The function for the row of each material."""
 
 
 def scatter_row(material: Material, textures: Textures, where: str) -> Row:
-    """The row of a material; a field for each of :class:`renderer.layout.structs.ScatterRecord`.
+    """The row of a material, with the fields of :class:`renderer.layout.scattering.ScatterRecord`.
 
     Raises:
-        SceneError: for a material that paths do not draw, or values that they cannot.
+        SceneError: for a material or values that path tracing does not support.
     """
     if type(material) not in ROWS:
         raise SceneError(f"{where}: material {type(material).__name__} is not supported by paths")
@@ -196,7 +196,7 @@ def scatter_row(material: Material, textures: Textures, where: str) -> Row:
 
 
 def unwrapped(material: Material) -> Material:
-    """A material without height field, holes and bent normals."""
+    """The base of a material without height field, holes and perturbed normals."""
     while isinstance(material, HeightField | Masked | Bumped | NormalMapped):
         material = material.base
     return material
@@ -208,7 +208,7 @@ def mean_alpha(roughness: tuple[float, float]) -> float:
 
 
 def thrown_back(ior: float) -> float:
-    """Share of even light that a smooth dielectric throws back inside: ``1 - (1 - r) / ior²`` with ``r`` outside.
+    """Internal diffuse reflectance of a smooth dielectric: ``1 - (1 - r) / ior²`` with the external one ``r``.
 
     By Simpson's rule over the sine of the angle outside, 0 to 90 degrees.
     """

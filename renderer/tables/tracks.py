@@ -12,12 +12,12 @@ _STILL = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]])
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    # by the chord: well conditioned for near keys, where an arc cosine is not
+    # from the chord, which is well conditioned for close keys, unlike an arc cosine
     return 2.0 * arcsin(np.clip(np.linalg.norm(b - a, axis=-1) / 2.0, 0.0, 1.0))
 
 
 class TrackTable:
-    """The unique tracks of a scene; index 0 stands for "does not move"."""
+    """The unique tracks of a scene; index 0 means static."""
 
     def __init__(self, device: str) -> None:
         self.device = device
@@ -26,7 +26,7 @@ class TrackTable:
         self._index: dict[int, int] = {}
 
     def add(self, track: RigidTrack | None) -> int:
-        """Index of a track; the same object gets the same index."""
+        """Adds a track and returns its index; the same object gets the same index."""
         if track is None:
             return 0
         if id(track) not in self._index:
@@ -47,7 +47,8 @@ class TrackTable:
         """Translations (float64), rotations and angles to the next key (float32) of all tracks, on the device."""
         translation = np.concatenate([track.translation for track in self.tracks]).astype(np.float64)
         rotation = np.concatenate([track.rotation for track in self.tracks]).astype(np.float64)
-        # across the border of two tracks the angle is meaningless, and never read with a fraction above zero
+        # the angle between the last key of a track and the first of the next is meaningless, but only read with
+        # fraction zero
         angle = np.append(_angle(rotation[:-1], rotation[1:]), 0.0)
         return (
             wp.array(translation, dtype=wp.vec3d, device=self.device),

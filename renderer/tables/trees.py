@@ -1,4 +1,4 @@
-"""Trees of boxes over the triangles of a mesh, as the kernels of ``packets.py`` walk them."""
+"""Trees of boxes over the triangles of a mesh, for the kernels of ``packets.py``."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from renderer.compute.launching import shared
 from renderer.kernels import packets
 from renderer.layout.sizes import BLOCK_FLOATS, NODE_FLOATS
 
-_LINE_FLOATS = 16  # of a cache line
+_LINE_FLOATS = 16  # size of a cache line
 _COORDINATE_MAX = 1.0e18
-_FACES_MAX = (1 << 25) - 1  # their nodes fill what Warp can address in one array
+_FACES_MAX = (1 << 25) - 1  # their nodes fill the largest array that Warp can address
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,8 @@ class Tree:
     """Records of ``native/tree.h``, laid out as floats.
 
     Attributes:
-        nodes: ``(n, 64)`` boxes of eight children and what these are.
-        blocks: ``(m, 40)`` one to four triangles.
+        nodes: ``(n, 64)`` boxes of eight children, and references to these.
+        blocks: ``(m, 40)`` blocks of one to four triangles.
     """
 
     nodes: NDArray[np.float32]
@@ -42,8 +42,8 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
         The tree; the same mesh gives the same bits.
 
     Raises:
-        ValueError: if a mesh has no faces or too many, an index is out of range, or a vertex that is used is not finite
-            or so great that areas overflow.
+        ValueError: if the mesh has no faces or too many, an index is out of range, or a used vertex is not finite or so
+            large that areas overflow.
     """
     points = np.ascontiguousarray(vertices, np.float32)
     corners = np.ascontiguousarray(faces, np.int32)
@@ -56,8 +56,8 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
     count = len(corners)
     if count > _FACES_MAX:
         raise ValueError(f"faces: expected at most {_FACES_MAX:,}, got {count:,}")
-    # As many nodes as faces suffice: below the root every node has at least two children. Pages that stay empty cost
-    # nothing, and what no node uses is zero.
+    # As many nodes as faces suffice: below the root every node has at least two children. Untouched pages cost nothing,
+    # and unused nodes are zero.
     nodes, blocks = np.zeros(count * NODE_FLOATS, np.float32), np.zeros(count * BLOCK_FLOATS, np.float32)
     boxes, order, used = np.empty(6 * count, np.float32), np.empty(count, np.int32), np.zeros(2, np.int32)
     scratch = boxes, order, nodes, blocks, used
@@ -72,7 +72,7 @@ def build_tree(vertices: ArrayLike, faces: ArrayLike) -> Tree:
 
 
 def aligned(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A flat copy that starts at a cache line, as nodes should."""
+    """A flat copy that is aligned to cache lines, as nodes should be."""
     room = np.empty(values.size + _LINE_FLOATS, np.float32)
     first = -room.ctypes.data // 4 % _LINE_FLOATS
     room[first : first + values.size] = values.reshape(-1)

@@ -1,4 +1,4 @@
-"""A scene's camera as the record that kernels read."""
+"""The record of a scene's camera for kernels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def check_camera(scene: Scene) -> ViewingCamera:
     """The camera of a scene.
 
     Raises:
-        SceneError: if it is none of those that the renderer has, or its values cannot be used.
+        SceneError: if the kind of camera is not supported, or its values cannot be used.
     """
     camera = scene.camera
     name = type(camera).__name__
@@ -38,13 +38,13 @@ def check_camera(scene: Scene) -> ViewingCamera:
 
 
 def camera_view(camera: ViewingCamera, tracks: TrackTable, aspect: float, footprint_px: float) -> ViewData:
-    """Camera record for samples of many times.
+    """The camera's record for samples of many times.
 
     Args:
         camera: from :func:`check_camera`.
-        tracks: of the scene.
+        tracks: tracks of the scene.
         aspect: width over height of the picture.
-        footprint_px: pixels along its shorter axis that textures are filtered for.
+        footprint_px: number of pixels along its shorter axis for which textures are filtered.
     """
     view = ViewData()
     to_world = np.asarray(camera.to_world, np.float64)

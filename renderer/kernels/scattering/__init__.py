@@ -1,6 +1,8 @@
-"""How surfaces scatter light along paths: a file a kind, each with the response to a direction and the choice of one.
+"""Scattering by surfaces along paths: one module per kind, each with its response to a direction and the sampling of
+one.
 
 Directions lie in a frame whose z axis is the shading normal on the viewer's side. A response is the scattering function
-times the cosine of the arriving direction, with the density by which the kind chooses that direction; perfect mirrors
-and panes have none, and are chosen with a weight alone. :mod:`renderer.kernels.scattering.kinds` brings them together.
+times the cosine of the incident direction, with the density with which the kind samples that direction. Perfect mirrors
+and panes have no response; their directions are sampled with a weight only. :mod:`renderer.kernels.scattering.kinds`
+dispatches to the kinds.
 """

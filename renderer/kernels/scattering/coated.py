@@ -1,7 +1,7 @@
-"""A dielectric coat over a diffuse base, smooth or of facets.
+"""A dielectric coat over a diffuse base, smooth or rough.
 
-The base gets what the coat lets through, both ways; what the coat throws back inside is summed up. Deviation: a rough
-coat lets through what a smooth one does.
+The coat transmits light to the base and back; its internal reflections are summed. Deviation: the transmittance of a
+rough coat is that of a smooth one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, brightnes
 
 @wp.func
 def coat_chance(lobes: Lobes, reflectance: wp.float32) -> wp.float32:
-    """Chance of a direction of the coat."""
+    """Probability of sampling a direction from the coat."""
     coat = reflectance * brightness(lobes.specular)
     base = (1.0 - reflectance) * brightness(lobes.base)
     return coat / wp.max(coat + base, 1.0e-12)
@@ -23,7 +23,7 @@ def coat_chance(lobes: Lobes, reflectance: wp.float32) -> wp.float32:
 
 @wp.func
 def coated_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """``albedo (1 - F_o) (1 - F_i) ratio^2 / (pi (1 - inner)) cos``, and the facets of a rough coat."""
+    """``albedo (1 - F_o) (1 - F_i) ratio² cos / (pi (1 - inner))``, plus the facets of a rough coat."""
     response = Response()
     if arriving[2] <= 0.0 or outgoing[2] <= 0.0:
         return response
@@ -46,7 +46,7 @@ def coated_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respo
 
 @wp.func
 def coated_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.vec2) -> Chosen:
-    """A direction of the coat or of the base."""
+    """A direction sampled from the coat or from the base."""
     chosen = Chosen()
     chosen.squeeze = 1.0
     reflectance = dielectric_reflectance(outgoing[2], lobes.ratio)

@@ -1,4 +1,4 @@
-"""Diffuse surfaces: Lambert's, and rough ones."""
+"""Diffuse surfaces: Lambertian ones and rough ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from renderer.kernels.scattering.lobes import Lobes, Response
 
 @wp.func
 def diffuse_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """``albedo / pi (A + B max(0, cos dphi) sin a tan b)`` times the cosine; A is 1 and B 0 for Lambert's.
+    """``albedo / pi (A + B max(0, cos dphi) sin a tan b)`` times the cosine; A is 1 and B is 0 for a Lambertian
+    surface.
 
     Source: Oren and Nayar 1994, "Generalization of Lambert's Reflectance Model", eq. 30.
     """

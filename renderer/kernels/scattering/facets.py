@@ -1,6 +1,6 @@
-"""Facets with the distribution of Trowbridge and Reitz (GGX), alike along both axes.
+"""Isotropic microfacets with the distribution of Trowbridge and Reitz (GGX).
 
-Masking and shadowing are Smith's, in the separable form.
+Masking and shadowing follow Smith, in the separable form.
 
 Source: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz 2018, "Sampling the GGX
 Distribution of Visible Normals".
@@ -13,7 +13,8 @@ import warp as wp
 
 @wp.func
 def facet_density(alpha: wp.float32, cosine: wp.float32) -> wp.float32:
-    """Area of facets per solid angle of their normal and area of the surface."""
+    """Density ``D`` of the facets' normals at a cosine to the surface normal: area of facets per solid angle and area
+    of the surface."""
     a = alpha * alpha
     b = (a - 1.0) * cosine * cosine + 1.0
     return a / wp.max(wp.pi * b * b, 1.0e-20)
@@ -21,7 +22,7 @@ def facet_density(alpha: wp.float32, cosine: wp.float32) -> wp.float32:
 
 @wp.func
 def seen_share(alpha: wp.float32, cosine: wp.float32) -> wp.float32:
-    """Share of facets that are not hidden along a direction."""
+    """Masking ``G₁``: share of the facets that are not hidden along a direction."""
     squared = wp.max(cosine * cosine, 1.0e-12)
     tangent = (1.0 - squared) / squared
     return 2.0 / (1.0 + wp.sqrt(1.0 + alpha * alpha * wp.max(tangent, 0.0)))
@@ -36,7 +37,7 @@ def visible_density(alpha: wp.float32, outgoing: wp.vec3, normal: wp.vec3) -> wp
 
 @wp.func
 def visible_normal(alpha: wp.float32, outgoing: wp.vec3, point: wp.vec2) -> wp.vec3:
-    """A facet's normal, as often as its facets are seen from a direction above the surface."""
+    """A facet's normal, sampled by the visible area of the facets from a direction above the surface."""
     stretched = wp.normalize(wp.vec3(alpha * outgoing[0], alpha * outgoing[1], outgoing[2]))
     squared = stretched[0] * stretched[0] + stretched[1] * stretched[1]
     first = wp.vec3(1.0, 0.0, 0.0)
@@ -56,7 +57,7 @@ def visible_normal(alpha: wp.float32, outgoing: wp.vec3, point: wp.vec2) -> wp.v
 
 @wp.func
 def schlick(straight: wp.vec3, cosine: wp.float32) -> wp.vec3:
-    """Reflectance that rises to one at grazing incidence (Schlick 1994)."""
+    """Schlick's approximation of the reflectance, ``F₀ + (1 - F₀) (1 - cos)⁵`` (Schlick 1994)."""
     away = wp.clamp(1.0 - cosine, 0.0, 1.0)
     share = away * away * away * away * away
     return straight + (wp.vec3(1.0, 1.0, 1.0) - straight) * share

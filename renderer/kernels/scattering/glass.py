@@ -1,4 +1,4 @@
-"""Glass along paths: smooth, thin, spread over a cone, or of facets."""
+"""Glass along paths: smooth, thin, spread over a cone, or rough."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, mirrored
 
 @wp.func
 def bent(outgoing: wp.vec3, normal: wp.vec3, cosine: wp.float32, ratio: wp.float32) -> wp.vec3:
-    """Where light along ``outgoing`` comes from, beyond a facet (Snell's law)."""
+    """Direction beyond a facet from which light along ``outgoing`` comes (Snell's law)."""
     beyond = wp.sqrt(wp.max(1.0 - ratio * ratio * (1.0 - cosine * cosine), 0.0))
     return wp.normalize((ratio * cosine - beyond) * normal - ratio * outgoing)
 
 
 @wp.func
 def pane_reflectance(reflectance: wp.float32) -> wp.float32:
-    """Reflectance of a pane: the reflections between its faces summed up."""
+    """Reflectance ``2 r / (1 + r)`` of a pane: the sum of the reflections between its faces."""
     return 2.0 * reflectance / (1.0 + reflectance)
 
 
 @wp.func
 def glass_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """Reflection and refraction by facets; smooth glass has none.
+    """Response of rough glass by reflection and refraction; smooth glass has none.
 
     Source: Walter et al. 2007, eqs 20 and 21.
     """
@@ -52,7 +52,7 @@ def glass_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respon
         response.value = lobes.specular * (reflectance * shape * 0.25)
         response.density = reflectance * choice / (4.0 * beside)
         return response
-    # by the index on the viewer's side over that beyond; radiance is squeezed by its square
+    # ``ratio`` is the index on the viewer's side over that beyond; radiance scales with its square
     root = ratio * toward + beside
     spread = wp.abs(beside) / wp.max(root * root, 1.0e-12)
     response.value = lobes.through * ((1.0 - reflectance) * shape * toward * spread * ratio * ratio)
@@ -62,7 +62,7 @@ def glass_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respon
 
 @wp.func
 def glass_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.vec2) -> Chosen:
-    """Reflection or refraction, as often as Fresnel's equations say."""
+    """Reflection or refraction, sampled by Fresnel's reflectance."""
     chosen = Chosen()
     chosen.squeeze = 1.0
     normal = wp.vec3(0.0, 0.0, 1.0)
@@ -85,7 +85,7 @@ def glass_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.
         chosen.direction = bent(outgoing, normal, cosine, lobes.ratio)
         chosen.squeeze = lobes.ratio * lobes.ratio
         chosen.weight = lobes.through * chosen.squeeze
-    # light that a steep facet sends to the wrong side is lost, as all that meets several facets
+    # light that a steep facet sends to the wrong side is lost, as is light scattered by several facets
     if rough and (choice < reflectance) != (chosen.direction[2] > 0.0):
         chosen.density = 0.0
         chosen.weight = wp.vec3(0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""All kinds of surfaces in one place: what a point scatters by, its response, and the choice of a direction."""
+"""All kinds of surfaces: the parameters of a point, its response, and the sampling of a direction."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from renderer.layout.structs import MaterialRecord, SceneData, Surface
 def looked_up(
     features: wp.int32, scene: SceneData, texture: wp.int32, surface: Surface, footprint: wp.float32
 ) -> wp.vec3:
-    """Colour of a texture at a surface; white where there is none."""
+    """Colour of a texture at a surface; white without a texture."""
     if texture < 0:
         return wp.vec3(1.0, 1.0, 1.0)
     return texture_color(features, scene, texture, surface.uv, footprint)
@@ -40,7 +40,7 @@ def lobes_at(
     cosine: wp.float32,
     footprint: wp.float32,
 ) -> Lobes:
-    """What a surface scatters by, towards a viewer at an angle of this cosine to its normal."""
+    """Scattering parameters of a surface for a viewing direction with this cosine to its normal."""
     lobes = Lobes()
     lobes.kind = record.kind
     lobes.base = looked_up(features, scene, record.base, surface, footprint)
@@ -77,7 +77,7 @@ def lobes_at(
 
 @wp.func
 def response_of(features: wp.int32, lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """The response of a surface that is lit along a direction, without its perfect directions."""
+    """The response of a surface that is lit from a direction, without perfect reflection and refraction."""
     if lobes.kind == ScatterKind.DIFFUSE:
         return diffuse_response(lobes, outgoing, arriving)
     if lobes.kind == ScatterKind.PHONG:
@@ -96,7 +96,7 @@ def response_of(features: wp.int32, lobes: Lobes, outgoing: wp.vec3, arriving: w
 
 @wp.func
 def chosen_of(features: wp.int32, lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.vec2) -> Chosen:
-    """A direction that light is followed back along, and what it counts for; a weight of zero ends a path."""
+    """A sampled direction and its weight; a weight of zero ends the path."""
     chosen = Chosen()
     chosen.squeeze = 1.0
     if lobes.kind == ScatterKind.DIFFUSE:

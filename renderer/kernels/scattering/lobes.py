@@ -1,4 +1,4 @@
-"""Records that kinds of surfaces share, and the frame that directions lie in."""
+"""Records that kinds of surfaces share, and the frame of directions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import warp as wp
 
 @wp.struct
 class Lobes:
-    """What a point of a surface scatters by, all textures looked up."""
+    """Scattering parameters of a point of a surface, with all textures evaluated."""
 
     kind: wp.int32
     base: wp.vec3
@@ -18,7 +18,7 @@ class Lobes:
     metallic: wp.float32
     clear: wp.float32
     clear_alpha: wp.float32
-    ratio: wp.float32  # index on the viewer's side over that beyond
+    ratio: wp.float32  # refractive index on the viewer's side over that beyond
     thin: wp.int32
     eta: wp.vec3
     k: wp.vec3
@@ -29,7 +29,7 @@ class Lobes:
 
 @wp.struct
 class Response:
-    """Scattering function times cosine, and the density of the choice per solid angle."""
+    """Scattering function times cosine, and the sampling density per solid angle."""
 
     value: wp.vec3
     density: wp.float32
@@ -37,11 +37,11 @@ class Response:
 
 @wp.struct
 class Chosen:
-    """A direction that light is followed back along.
+    """A sampled direction of incident light.
 
-    ``weight`` is the response over the density where ``density`` is positive. Without a density the direction is a
-    perfect one, or spread by a cone that lights are not sampled for. ``passes`` marks light that goes on unbent, as if
-    there were a hole; ``squeeze`` is the squared ratio of indices that radiance was multiplied by.
+    ``weight`` is the response over the density where ``density`` is positive. Without a density the direction is
+    perfect, or lies in a cone for which lights are not sampled. ``passes`` marks light that continues undeflected, as
+    through a hole; ``squeeze`` is the squared ratio of refractive indices by which radiance was multiplied.
     """
 
     direction: wp.vec3
@@ -69,7 +69,7 @@ def frame_about(axis: wp.vec3) -> wp.mat33:
 
 @wp.func
 def cosine_direction(point: wp.vec2) -> wp.vec3:
-    """A direction above the surface, with a density of its cosine over pi."""
+    """A direction above the surface with the density ``cos / pi``."""
     radius = wp.sqrt(point[0])
     turn = 2.0 * wp.pi * point[1]
     return wp.vec3(radius * wp.cos(turn), radius * wp.sin(turn), wp.sqrt(wp.max(1.0 - point[0], 0.0)))
@@ -77,11 +77,11 @@ def cosine_direction(point: wp.vec2) -> wp.vec3:
 
 @wp.func
 def mirrored(outgoing: wp.vec3, normal: wp.vec3) -> wp.vec3:
-    """A direction turned half round about another."""
+    """A direction reflected about a normal."""
     return 2.0 * wp.dot(outgoing, normal) * normal - outgoing
 
 
 @wp.func
 def brightness(color: wp.vec3) -> wp.float32:
-    """Mean of the channels, by which lobes are chosen."""
+    """Mean of the channels, from which the probabilities of lobes are computed."""
     return (color[0] + color[1] + color[2]) / 3.0

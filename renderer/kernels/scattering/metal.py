@@ -1,4 +1,4 @@
-"""Metals: facets that reflect by a complex index of refraction."""
+"""Metals: microfacets with a complex refractive index."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from renderer.kernels.scattering.lobes import Lobes, Response
 
 @wp.func
 def conductor_reflectance(cosine: wp.float32, eta: wp.float32, k: wp.float32) -> wp.float32:
-    """Unpolarised reflectance of a conductor of index ``eta + i k`` (Born and Wolf, sec. 14.2)."""
+    """Unpolarised reflectance of a conductor with the index ``eta + i k`` (Born and Wolf, sec. 14.2)."""
     c = wp.clamp(cosine, 0.0, 1.0)
     s = 1.0 - c * c
     inner = eta * eta - k * k - s
@@ -35,7 +35,7 @@ def metal_reflectance(lobes: Lobes, cosine: wp.float32) -> wp.vec3:
 
 @wp.func
 def metal_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """``F D G / (4 cos)`` of the facets halfway between both directions."""
+    """``F D G / (4 cos_o)`` of the facets halfway between both directions, with the cosine of the outgoing one."""
     response = Response()
     if arriving[2] <= 0.0 or outgoing[2] <= 0.0:
         return response

@@ -1,4 +1,4 @@
-"""The metallic and rough surface of glTF, with a clear coat.
+"""The metallic-roughness surface of glTF, with a clear coat.
 
 Source: Khronos Group, "glTF 2.0 specification", appendix B; extension KHR_materials_clearcoat.
 """
@@ -13,20 +13,20 @@ from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, brightnes
 
 @wp.func
 def straight_reflectance(lobes: Lobes) -> wp.vec3:
-    """Reflectance at normal incidence: that of the index, or of a metal its colour."""
+    """Reflectance at normal incidence: that of the refractive index, or the colour of a metal."""
     straight = wp.pow((1.0 - lobes.ratio) / (1.0 + lobes.ratio), 2.0)
     return wp.vec3(straight, straight, straight) * (1.0 - lobes.metallic) + lobes.base * lobes.metallic
 
 
 @wp.func
 def clear_reflectance(lobes: Lobes, outgoing: wp.vec3) -> wp.float32:
-    """What the clear coat takes from the surface below and reflects itself."""
+    """Share of light that the clear coat reflects."""
     return lobes.clear * schlick(wp.vec3(0.04, 0.04, 0.04), outgoing[2])[0]
 
 
 @wp.func
 def metallic_shares(lobes: Lobes, outgoing: wp.vec3) -> wp.vec3:
-    """Chances of the clear coat, the facets and the diffuse part."""
+    """Probabilities of the clear coat, the facets and the diffuse part."""
     clear = clear_reflectance(lobes, outgoing)
     facets = brightness(schlick(straight_reflectance(lobes), outgoing[2])) * (1.0 - clear)
     diffuse = brightness(lobes.base) * (1.0 - lobes.metallic) * (1.0 - clear)
@@ -35,7 +35,8 @@ def metallic_shares(lobes: Lobes, outgoing: wp.vec3) -> wp.vec3:
 
 @wp.func
 def metallic_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """``(1 - F) diffuse / pi + F D G / (4 cos cos)``, under what the coat leaves, times the cosine."""
+    """``((1 - F) diffuse / pi + F D G / (4 cos_i cos_o)) cos_i``, attenuated by the clear coat, plus the coat's own
+    response."""
     response = Response()
     if arriving[2] <= 0.0 or outgoing[2] <= 0.0:
         return response
@@ -62,7 +63,7 @@ def metallic_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Res
 
 @wp.func
 def metallic_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.vec2) -> Chosen:
-    """A direction of one of the three parts."""
+    """A direction sampled from one of the three parts."""
     chosen = Chosen()
     chosen.squeeze = 1.0
     chosen.density = 1.0

@@ -1,4 +1,4 @@
-"""Phong reflection as the tree of rays has it: a diffuse part, a highlight, and a mirror of its own weight."""
+"""Phong reflection, as in the tree of rays: a diffuse part, a highlight, and a mirror with a separate weight."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from renderer.kernels.scattering.lobes import (
 
 @wp.func
 def phong_shares(lobes: Lobes) -> wp.vec3:
-    """Chances of the mirror, the highlight and the diffuse part."""
+    """Probabilities of the mirror, the highlight and the diffuse part."""
     shares = wp.vec3(brightness(lobes.through), brightness(lobes.specular), brightness(lobes.base))
     return shares / wp.max(shares[0] + shares[1] + shares[2], 1.0e-12)
 
 
 @wp.func
 def phong_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """``diffuse cos / pi + specular (e + 2) / 2 pi cos^e``: as :class:`scenes.canonical.Phong` without its mirror."""
+    """``diffuse cos / pi + specular (e + 2) / (2 pi) cos_r^e``, with ``cos_r`` against the mirrored direction:
+    :class:`scenes.canonical.Phong` without its mirror."""
     response = Response()
     if arriving[2] <= 0.0:
         return response
@@ -42,7 +43,7 @@ def phong_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respon
 
 @wp.func
 def mirror_chosen(lobes: Lobes, outgoing: wp.vec3, weight: wp.vec3, point: wp.vec2) -> Chosen:
-    """The mirrored direction, or one in the cone about it."""
+    """The mirrored direction, or a direction in the cone about it."""
     chosen = Chosen()
     chosen.squeeze = 1.0
     chosen.direction = mirrored(outgoing, wp.vec3(0.0, 0.0, 1.0))
@@ -56,7 +57,7 @@ def mirror_chosen(lobes: Lobes, outgoing: wp.vec3, weight: wp.vec3, point: wp.ve
 
 @wp.func
 def phong_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.vec2) -> Chosen:
-    """One of the three parts, and a direction of it."""
+    """A direction sampled from one of the three parts."""
     shares = phong_shares(lobes)
     if choice < shares[0]:
         return mirror_chosen(lobes, outgoing, lobes.through / shares[0], point)
