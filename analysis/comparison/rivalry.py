@@ -41,7 +41,7 @@ class Panels:
 
     @classmethod
     def of(cls, mse: Mapping[str, Floats], own: str) -> Panels:
-        """From the errors of all runs."""
+        """Chooses the panels by the errors of all runs."""
         framed = [name for name in mse if name != own and (name == FRAMED or name.startswith(f"{FRAMED}-"))]
         best = min(framed, key=lambda name: float(np.median(mse[name])), default=None)
         others = [name for name in mse if name != own and name not in framed]

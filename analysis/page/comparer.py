@@ -1,7 +1,7 @@
-"""The comparer of a page: pictures of many times that are compared two at a time, and curves with a common cursor.
+"""The comparer of a page: pictures at many times that are compared two at a time, and curves with a common cursor.
 
-All that changes from step to step is put into the page: one block of JSON, and a block for each picture, of which equal
-ones are stored once. Pages are read back by :func:`read_comparer`, so that runs of different days can be compared.
+The page contains everything that changes from step to step: one block of JSON, and a block for each picture, with equal
+pictures stored once. :func:`read_comparer` reads a page back, so that runs of different days can be compared.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class Panel:
     """A picture that changes over time.
 
     Attributes:
-        label: its name, which no other has.
-        truth: label of the reference that its errors are to; empty for references and maps.
-        scale: of a map; None for pictures.
+        label: its unique name.
+        truth: label of the reference for its errors; empty for references and maps.
+        scale: scale of a map; None for pictures.
     """
 
     label: str
@@ -40,11 +40,11 @@ class Panel:
 
 @dataclass(frozen=True)
 class Step:
-    """Pictures of one time.
+    """Pictures at one time.
 
     Attributes:
-        time_s: the time.
-        pictures: files by label, of one size but for maps; those that lack or are None are said to be missing.
+        time_s: the time, seconds.
+        pictures: image files by label, all of one size except maps; absent ones and None are shown as missing.
     """
 
     time_s: float
@@ -58,7 +58,7 @@ class Comparer:
     Attributes:
         panels: in the order of their thumbnails, at least one.
         steps: at least one, in order of time.
-        left, right: labels of the two that are compared to begin with.
+        left, right: labels of the two panels that are compared at first.
         plots: curves below the pictures.
         note: one sentence on how pictures are stored.
     """
@@ -80,13 +80,13 @@ class Comparer:
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """Of the steps and the first plot."""
+        """First and last time of the steps and of the first plot, seconds."""
         times = [step.time_s for step in self.steps]
         times += [float(t) for plot in self.plots[:1] for curve in plot.curves for t in curve.times_s]
         return min(times), max(times)
 
     def stored(self) -> tuple[dict[str, Any], list[bytes]]:
-        """What the scripts of the page are given, and the pictures that it numbers, each once."""
+        """The JSON data for the scripts of the page, and the pictures that it numbers, each once."""
         numbers: dict[bytes, int] = {}
         steps = []
         for step in self.steps:
@@ -130,17 +130,17 @@ def _plot(plot: Plot) -> dict[str, Any]:
 
 
 def source(picture: bytes) -> str:
-    """A picture as an address that holds it."""
+    """A picture as a data URL."""
     return f"data:image/{kind_of(picture)};base64,{base64.b64encode(picture).decode()}"
 
 
 def kind_of(picture: bytes) -> str:
-    """png, avif or webp."""
+    """Kind of an image file: png, avif or webp."""
     return "png" if picture.startswith(b"\x89PNG") else "avif" if picture[4:8] == b"ftyp" else "webp"
 
 
 def block(given: Any) -> str:
-    """JSON that can stand in a page: "<" is the only character by which text could end the block."""
+    """JSON for a block of a page, with "<" escaped: no other character could end the block."""
     return json.dumps(given, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -152,7 +152,7 @@ def read_comparer(path: Path) -> Comparer:
     """The comparer of a page that :func:`analysis.page.report.write_report` wrote.
 
     Raises:
-        ValueError: there is none in it, or one of another version.
+        ValueError: the page has no comparer, or one of another version.
     """
     text = path.read_text(encoding="utf-8")
     found = _DATA.search(text)

@@ -1,4 +1,4 @@
-"""Curves of a page over time: records, and where they lie in a plot."""
+"""Curves of a page over time: their values, and their layout in a plot."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from analysis.page.figures import DASHES, spread
 
 Floats = NDArray[np.float64]
 
-# a plot in units of its view box
+# size of a plot in units of its view box
 WIDTH = 560.0
 LEFT, TOP = 62.0, 14.0
 _LINE, _LETTER = 19.0, 9.2  # of text
@@ -24,12 +24,12 @@ _BELOW = 26.0
 
 @dataclass(frozen=True)
 class Curve:
-    """Values over time; on a logarithmic axis those that are not positive and finite leave gaps.
+    """Values over time; on a logarithmic axis values that are not positive and finite leave gaps.
 
     Attributes:
-        label: stands at its end.
-        times_s, values: of equal length.
-        style: number of its ink and dashes; 0 is that of the run's own.
+        label: text at the end of the curve.
+        times_s, values: times in seconds and values, of equal length.
+        style: number of its ink and dashes; 0 is the style of the run's own policy.
     """
 
     label: str
@@ -47,12 +47,12 @@ class Plot:
     """Curves of one quantity.
 
     Attributes:
-        title: what they are of, a sentence or less.
-        unit: of the values; empty for none.
+        title: text above the plot, at most a sentence.
+        unit: unit of the values; empty for none.
         curves: at least one.
-        logarithmic: whether their axis is.
-        level: a value that is marked by a line; None for none.
-        marks_s: times that are marked.
+        logarithmic: whether the axis of the values is logarithmic.
+        level: value marked by a line; None for none.
+        marks_s: marked times, seconds.
     """
 
     title: str
@@ -69,7 +69,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Label:
-    """Text, and where it stands."""
+    """Text and its position."""
 
     text: str
     x: float
@@ -78,7 +78,7 @@ class Label:
 
 @dataclass(frozen=True)
 class Line:
-    """A curve as a path, its label beside its end, and where it ends; NaN where it has no point."""
+    """A curve as an SVG path, its label, and its end point; NaN if it has no point."""
 
     path: str
     label: Label
@@ -89,7 +89,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A plot as a page draws it, in units of its view box."""
+    """The layout of a plot, in units of its view box."""
 
     width: float
     height: float
@@ -105,13 +105,13 @@ class Drawing:
 
 
 def letters_of(plots: Sequence[Plot]) -> int:
-    """Letters of the longest label, for plots whose times shall lie below each other."""
+    """Number of letters of the longest label, for plots with aligned time axes."""
     return min(max((len(curve.label) for plot in plots for curve in plot.curves), default=0), _LETTERS_MOST)
 
 
 def drawing(plot: Plot, span_s: tuple[float, float], letters: int = 0) -> Drawing:
-    """Where everything of a plot lies, for times from the one to the other, beside labels of so many letters, by
-    default its own."""
+    """Lays out a plot over a span of time, with room for labels of ``letters`` letters, by default those of its own
+    labels."""
     height = max(230.0, _LINE * len(plot.curves) + TOP + _BELOW)
     axis = _Axis.of(plot, span_s, WIDTH - _LEAD - _LETTER * (letters or letters_of([plot])), height - _BELOW)
     lines = [_line(curve, axis) for curve in plot.curves]
@@ -142,7 +142,7 @@ def _shortened(text: str) -> str:
 
 @dataclass(frozen=True)
 class _Axis:
-    """From time and value to places in the plot."""
+    """Maps time and value to positions in the plot."""
 
     start_s: float
     end_s: float
@@ -178,7 +178,7 @@ class _Axis:
         return self.bottom - (scaled - self.low) / (self.high - self.low) * (self.bottom - TOP)
 
     def values(self) -> list[float]:
-        """Values to label: 1, 2 and 5 of every decade, or the decades where they are many."""
+        """Values to label: 1, 2 and 5 times every power of ten, or the powers of ten alone if there are many."""
         if not self.logarithmic:
             return _round_steps(self.low, self.high, 5)
         steps = (1.0, 2.0, 5.0) if self.high - self.low < 2.0 else (1.0,)
@@ -190,7 +190,7 @@ class _Axis:
 
 
 def _round_steps(low: float, high: float, most: int) -> list[float]:
-    """Round numbers from low to high, so many at most."""
+    """At most ``most`` round numbers from low to high."""
     step = 10.0 ** math.floor(math.log10((high - low) / most))
     step *= next(s for s in (1, 2, 5, 10, 20) if (high - low) / (s * step) <= most)
     numbers = np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
@@ -203,7 +203,7 @@ def _line(curve: Curve, axis: _Axis) -> Line:
         here = axis.start_s <= time_s <= axis.end_s and math.isfinite(value) and (value > 0 or not axis.logarithmic)
         if here:
             drawn = axis.y(value)
-            # a point starts a new piece of line where the one before it is missing
+            # a point starts a new segment if the one before it is missing
             points.append(f"{'L' if before else 'M'}{axis.x(time_s):.1f} {drawn:.1f}")
         before = here
     return Line("".join(points), Label(curve.label, 0, 0), drawn, curve.style, DASHES[curve.style % len(DASHES)])

@@ -1,8 +1,7 @@
-"""The explorer of a page: points in a plot of two quantities that are chosen, each with its setting and its picture.
+"""The explorer of a page: points in a plot of two chosen quantities, each with its setting and its picture.
 
-All points are put into the page as one block of JSON, which the script of the page (``explorer_page.js``) draws in its
-template. Where
-a point is hovered over its setting is shown, and where it is clicked its picture.
+The page contains all points as one block of JSON, which the script of the page (``explorer_page.js``) draws in its
+template. Hovering over a point shows its setting, and a click shows its picture.
 """
 
 from __future__ import annotations
@@ -37,11 +36,11 @@ class Point:
     """A point of the plot.
 
     Attributes:
-        group: of points that are shown together.
-        kind: what decides its colour.
+        group: name of the points that are shown together.
+        kind: name that decides its colour.
         title: its setting.
-        values: quantities by name; those that are not positive and finite are not drawn.
-        picture: name of its picture; empty where there is none.
+        values: quantities by name; those that are not finite, or not positive on a logarithmic axis, are not drawn.
+        picture: name of its picture; empty for none.
     """
 
     group: str
@@ -57,11 +56,11 @@ class Explorer:
 
     Attributes:
         points: at least one.
-        across, upward: quantities that either axis may show, the first to begin with.
-        colours: of kinds.
-        pictures: PNG or WebP by name.
-        truths: names of the pictures that groups are compared with, by group.
-        note: below the plot.
+        across, upward: quantities that either axis may show, with the one shown at first in front.
+        colours: colours by kind.
+        pictures: PNG or WebP files by name.
+        truths: names of the pictures with which groups are compared, by group.
+        note: text below the plot.
     """
 
     points: Sequence[Point]
@@ -78,7 +77,7 @@ class Explorer:
 
 
 def shown(explorer: Explorer) -> dict[str, Any]:
-    """What the template of the page is given."""
+    """The data for the template of the page."""
     given = {
         "across": list(explorer.across),
         "upward": list(explorer.upward),

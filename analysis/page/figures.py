@@ -1,7 +1,7 @@
-"""What all figures share: axes, inks, dashes, labels at the ends of lines, and files.
+"""Shared by all figures: axes, inks, dashes, labels at the ends of lines, and files.
 
-Inks are those of Okabe and Ito (2008), which people who confuse red and green tell apart; each goes with a dash pattern
-of its own, so that a figure in grey can be read.
+Inks are those of Okabe and Ito (2008), which people who confuse red and green can tell apart. Each has its own dash
+pattern, so that a figure in grey can be read.
 """
 
 from __future__ import annotations
@@ -24,17 +24,16 @@ from analysis.storage.files import atomic
 Floats = NDArray[np.float64]
 
 INKS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9")
-"""Vermilion is the ink of the run's own; yellow is left out: it cannot be seen on white."""
+"""Vermilion is the ink of the run's own policy. Yellow is left out, because it is hard to see on white."""
 DASHES = ("", "7 3", "2 2", "8 3 2 3", "5 2 1 2 1 2", "12 3", "1 3")
 """Dash patterns beside the inks, in points or pixels."""
 ADAPTIVE, FRAMED, OTHER = INKS[:3]
 _GRID = {"color": "0.85", "linewidth": 0.6}
-_LINE_PX = 12  # between labels, at the resolution of a figure
+_LINE_PX = 12  # pixels between labels, at the resolution of a figure
 
 
 def save(figure: Figure, path: Path, dpi: int = 130) -> None:
-    """Writes a figure as PNG, and beside it as SVG of the same name, each atomically and with the same bytes every
-    time."""
+    """Writes a figure as PNG and as SVG of the same name, each atomically and with reproducible bytes."""
     FigureCanvasAgg(figure)
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=dpi, format="png")
@@ -43,7 +42,7 @@ def save(figure: Figure, path: Path, dpi: int = 130) -> None:
 
 
 def styles(runs: Sequence[str], own: str) -> dict[str, int]:
-    """The number of ink and dashes of each run: 0 is the run's own, the rivals' repeat where there are many."""
+    """The number of ink and dashes of each run: 0 for ``own``; those of the rivals repeat if there are many."""
     rivals = itertools.cycle(range(1, len(INKS)))
     return {name: 0 if name == own else next(rivals) for name in runs}
 
@@ -54,21 +53,21 @@ def inks(runs: Sequence[str], own: str) -> dict[str, str]:
 
 
 def dashed(style: int, width: float = 1.0) -> Any:
-    """Dashes of a line of matplotlib of that width, in points: it multiplies them by the width."""
+    """Dashes of a matplotlib line of the given width in points; matplotlib multiplies them by the width."""
     dashes = tuple(float(length) / width for length in DASHES[style % len(DASHES)].split())
     return (0, dashes) if dashes else "solid"
 
 
 def line_style(style: int) -> dict:
-    """Ink, dashes and width of a line of matplotlib."""
+    """Ink, dashes and width of a matplotlib line."""
     width = 2.0 if style == 0 else 1.4
     ink = INKS[style % len(INKS)]
     return {"color": ink, "linewidth": width, "linestyle": dashed(style, width), "zorder": 3 - 0.1 * style}
 
 
 def label_ends(axis: Axes) -> None:
-    """Writes the label of every line beside its last point, right of the axes, apart from each other. The scales of the
-    axes must be final."""
+    """Writes the label of every line beside its last point, to the right of the axes, without overlap. The scales of
+    the axes must be final."""
     figure = axis.figure
     known = [line for line in axis.lines if not str(line.get_label()).startswith("_")]
     ends = []
@@ -92,8 +91,8 @@ def label_ends(axis: Axes) -> None:
 
 
 def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:
-    """Places near those that are wanted, in their order, at least so far apart and, where there is room, within the
-    bounds; those of NaN come last."""
+    """Positions near the wanted ones, in the same order, at least ``apart`` from each other and, if there is room, in
+    [``low``, ``high``]; those of NaN come last."""
     order = sorted(range(len(wanted)), key=lambda i: (math.isnan(wanted[i]), wanted[i]))
     found, least = [0.0] * len(wanted), low
     for i in order:

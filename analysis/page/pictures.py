@@ -1,7 +1,7 @@
 """Pictures of tilings and density fields as arrays, without a loop over pixels or tiles.
 
-A map is stored as one byte a place: 1 to 255 are the places of its value between the bounds of its scale, on a
-logarithm, and 0 is what has no value. Colours are chosen when it is shown.
+A map is stored as one byte for each place: 1 to 255 divide the bounds of its scale logarithmically, and 0 means no
+value. Colours are applied when the map is shown.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ DENSITY_MAP = "viridis"
 RATE_MAP = "inferno"
 AGE_MAP = "YlGnBu"
 NEVER = (176, 48, 48)
-"""Colour, in no map, of what has not been sampled yet."""
+"""Colour of places that have not been sampled yet; no palette contains it."""
 EDGE = (90, 130, 150)
 """Colour of the edges of tiles."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What the bytes of a map mean and how they are coloured.
+    """The meaning of the bytes of a map, and their colours.
 
     Attributes:
         bounds: values of the bytes 1 and 255.
-        unit: of the values, in words.
-        palette: name of the colours, of which the lightness only rises or only falls.
+        unit: unit of the values, in words.
+        palette: name of a palette of monotonic lightness.
         shown: values at the two ends of the palette, within the bounds.
         special: colour of the byte 0.
-        meaning: what the byte 0 means; empty where no place has it.
+        meaning: meaning of the byte 0; empty if no place has it.
     """
 
     bounds: tuple[float, float]
@@ -55,15 +55,15 @@ class Scale:
 
     @classmethod
     def of(cls, bounds: tuple[float, float], unit: str, palette: str, **more) -> Scale:
-        """One whose palette spans its bounds."""
+        """A scale whose palette spans its bounds."""
         return cls(bounds, unit, palette, bounds, **more)
 
     def fitted(self, counts: NDArray[np.int64]) -> Scale:
-        """The same with the ends of the palette next to the values of the middle 98 %, rounded outwards to 1, 2 or 5
-        times a power of ten.
+        """The same scale with a palette that spans the middle 98 % of the values, rounded outwards to 1, 2 or 5 times a
+        power of ten.
 
         Args:
-            counts: how many places have each byte, 256 of them.
+            counts: number of places with each of the 256 bytes.
         """
         known = np.cumsum(counts[1:])
         if known[-1] == 0:
@@ -86,7 +86,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Map:
-    """A byte for each place, ``(rows, columns)``, and what it means."""
+    """A byte for each place, ``(rows, columns)``, and the scale of the bytes."""
 
     places: Pixels
     scale: Scale
@@ -97,7 +97,7 @@ class Map:
 
 
 def round_number(value: float, up: bool) -> float:
-    """The nearest of 1, 2 and 5 times a power of ten that is not smaller, or not greater, within rounding."""
+    """The nearest 1, 2 or 5 times a power of ten that is not smaller, or not greater, up to rounding."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
     steps = [s for s in (1.0, 2.0, 5.0, 10.0) if (s * power >= value * 0.999 if up else s * power <= value * 1.001)]
     return (steps[0] if up else steps[-1]) * power
@@ -105,7 +105,7 @@ def round_number(value: float, up: bool) -> float:
 
 @lru_cache(maxsize=8)
 def font(size_px: int) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans as matplotlib ships it, so that no font of the system is needed."""
+    """DejaVu Sans from matplotlib, so that no system font is needed."""
     import matplotlib
 
     path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
@@ -114,7 +114,7 @@ def font(size_px: int) -> ImageFont.FreeTypeFont:
 
 @lru_cache(maxsize=4)
 def palette(name: str) -> Pixels:
-    """``(256, 3)`` colours of a map whose lightness only rises or only falls."""
+    """``(256, 3)`` colours of a colour map of monotonic lightness."""
     import matplotlib
 
     return (matplotlib.colormaps[name](np.arange(256))[:, :3] * 255.0 + 0.5).astype(np.uint8)
@@ -144,7 +144,7 @@ def _pixel_curve(resolution_px: int, level: int) -> Tensor:
 
 
 def tile_map(tiling: Tiling, resolution_px: int) -> NDArray[np.int64]:
-    """For each pixel the tile that covers it, ``(resolution, resolution)``."""
+    """Index of the tile that covers each pixel, ``(resolution, resolution)``."""
     level = int(tiling.level.max())
     first, order = torch.sort(tiling.index << (2 * (level - tiling.level)))
     position = torch.searchsorted(first, _pixel_curve(resolution_px, level), right=True) - 1
@@ -180,22 +180,22 @@ def tiling_map(
 
 
 def density_map(density: Float[Tensor, " e"], bounds: tuple[float, float], unit: str, name: str = DENSITY_MAP) -> Map:
-    """A field in Morton order in raster order, a byte an element."""
+    """A field in Morton order as a map in raster order, one byte an element."""
     side = math.isqrt(density.numel())
     raster = density[raster_to_morton(side)].reshape(side, side).numpy().astype(np.float64)
     return Map(stored(raster, bounds), Scale.of(bounds, unit, name))
 
 
 def age_map(newest_s: Float[Tensor, "h w"], time_s: float, bounds_s: tuple[float, float]) -> Map:
-    """Age in milliseconds at ``time_s`` of the newest samples; ``NEVER`` where there are none."""
+    """Age of the newest samples at ``time_s``, milliseconds; ``NEVER`` where there are none."""
     bounds = 1e3 * bounds_s[0], 1e3 * bounds_s[1]
     age_ms = 1e3 * (time_s - newest_s.numpy().astype(np.float64))
     return Map(stored(age_ms, bounds), Scale.of(bounds, "ms", AGE_MAP, meaning="not sampled yet"))
 
 
 def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
-    """A picture at another size, by default a square: whole pixels when it grows by whole numbers, a smooth average
-    otherwise."""
+    """A picture at another size, by default a square: pixels are repeated if it grows by whole factors, and averaged
+    smoothly otherwise."""
     size, (height, width) = (height_px or width_px, width_px), image.shape[:2]
     if (height, width) == size:
         return image
@@ -208,7 +208,7 @@ def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
 def scale_strip(
     width_px: int, height_px: int, scale: Scale, ink: tuple[int, int, int], paper: Pixels | tuple
 ) -> Pixels:
-    """A colour scale with its ends and its unit, to stand below a map: bar above, text below."""
+    """A colour scale with its ends and its unit, for the place below a map: a bar, and text below it."""
     picture = Image.new("RGB", (width_px, height_px), tuple(paper))
     draw, margin, bar = ImageDraw.Draw(picture), max(4, width_px // 40), max(3, height_px // 5)
     ramp = palette(scale.palette)[np.linspace(0, 255, width_px - 2 * margin).astype(np.int64)]
@@ -222,15 +222,15 @@ def scale_strip(
 
 
 def number(value: float) -> str:
-    """Three digits; reciprocals of whole numbers as 1/n."""
+    """A number with three digits; reciprocals of integers as 1/n."""
     if 0 < value < 1 and abs(1 / value - round(1 / value)) < 1e-9:
         return f"1/{round(1 / value)}"
     return f"{value:.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
 
 
 def picture_bytes(pixels: Pixels, exact: bool) -> bytes:
-    """An array ``(h, w, 3)`` or ``(h, w)`` uint8 as a file that browsers show: WebP without loss, or AVIF, without
-    subsampling of colours, whose codes are off by about 1 of 255 in the mean and by less than 6 in 99 % of places."""
+    """An array ``(h, w, 3)`` or ``(h, w)`` uint8 as an image file for browsers: lossless WebP, or AVIF without chroma
+    subsampling, whose codes are off by about 1 of 255 on average and by less than 6 in 99 % of places."""
     buffer, image = io.BytesIO(), Image.fromarray(pixels)
     if exact:
         image.save(buffer, format="WEBP", lossless=True, quality=20, method=0)

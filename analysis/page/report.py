@@ -29,13 +29,13 @@ class Report:
     """Content of a report.
 
     Attributes:
-        title: of the page.
-        lead: what came out, one sentence, and then paragraphs that say what was compared.
+        title: title of the page.
+        lead: one sentence with the outcome, and then paragraphs on the comparison.
         key_numbers: table before the figures; None for none.
         figures: caption and PNG bytes.
-        comparer: pictures of many times and curves, before everything else; None for a page without one.
-        tables: in order, after the figures.
-        details: nested mappings shown as lists of names and values (configuration, provenance).
+        comparer: pictures at many times and curves, before everything else; None for a page without one.
+        tables: tables after the figures, in order.
+        details: nested mappings that are shown as lists of names and values (configuration, provenance).
         explorer: points with settings and pictures, before everything else; None for a page without one.
     """
 
@@ -91,11 +91,11 @@ def render(report: Report) -> str:
 def _safe(style: str) -> Any:
     from markupsafe import Markup
 
-    return Markup(style)  # of this package alone
+    return Markup(style)  # styles come from this package alone
 
 
 def _policy(script: str) -> str:
-    """Nothing may be loaded, and nothing run but the script of the page."""
+    """Content security policy of the page: nothing may be loaded, and only the script of the page may run."""
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     run = f"'sha256-{digest}'" if script else "'none'"
     return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {run}; base-uri 'none'"

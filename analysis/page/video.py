@@ -1,4 +1,4 @@
-"""The comparison film: the reference and runs side by side, with what they decided."""
+"""The comparison film: the reference and the runs side by side, with maps of their decisions."""
 
 from __future__ import annotations
 
@@ -34,25 +34,25 @@ INK, PAPER = (235, 235, 235), (24, 24, 24)
 OWN = (255, 176, 64)
 RIVALS = ((96, 176, 255), (140, 205, 95), (225, 130, 215), (240, 225, 90), (110, 220, 210), (235, 115, 105))
 _COLUMNS = 4, 6
-"""Panels side by side at least and at most; within that, as many as there are photographs."""
+"""Least and greatest number of panels side by side; between them, the number of photographs."""
 
 
 def inks(runs: Sequence[str], own: str) -> list[tuple[int, int, int]]:
-    """A colour for the curve of each run; colours repeat where there are many."""
+    """A colour for the curve of each run; colours repeat if there are many."""
     rivals = itertools.cycle(RIVALS)
     return [OWN if name == own else next(rivals) for name in runs]
 
 
 class FrameSink(Protocol):
-    """Where finished frames go, such as an MP4 writer."""
+    """Destination of finished frames, such as an MP4 writer."""
 
     def add(self, pixels: Pixels) -> None: ...
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Bounds of the colour scales, the same in every frame: least and greatest density, and age in seconds; of ages
-    the part is shown that the data have."""
+    """Bounds of the colour scales, the same in every frame: least and greatest densities, and ages in seconds. The
+    palette of the ages spans only the range of the data."""
 
     spatial: tuple[float, float]
     temporal: tuple[float, float]
@@ -66,26 +66,26 @@ def to_pixels(image: Tensor) -> Pixels:
 
 
 def images(view: View) -> dict[str, Tensor]:
-    """The reference and what every display shows, by name, linear."""
+    """The reference and the images on all displays, by name, linear RGB."""
     return {REFERENCE: view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
 
 
 def photographs(view: View, side_px: int) -> dict[str, Pixels]:
-    """The reference and what every display shows, by name, at one size."""
+    """The reference and the images on all displays, by name, at one size."""
     size = side_px, height_of(view, side_px)
     return {label: enlarge(to_pixels(image), *size) for label, image in images(view).items()}
 
 
 def height_of(view: View, width_px: int) -> int:
-    """Height of pictures that are so wide: even, in the proportions of the reference; of very long ones, from a quarter
-    of the width to four times."""
+    """Even height of a picture of the given width with the aspect of the reference, limited to between a quarter of the
+    width and four times the width."""
     height, width = view.reference.shape[:2]
     return width_px if height == width else 2 * round(0.5 * width_px * min(max(height / width, 0.25), 4.0))
 
 
 def maps(view: View, own: str, scales: Scales) -> dict[str, Map]:
-    """What runs say of their decisions, by label: what the run ``own`` knows of every place, how old its samples are,
-    and tiling and densities of every run that records its cycles. The labels of other runs begin with their names."""
+    """Maps of the runs' decisions, by label: the maps of the run ``own``, the ages of its samples, and tiling and
+    densities of every run that records its cycles. The labels of other runs begin with their names."""
     found: dict[str, Map] = {}
     height, width = view.reference.shape[:2]
     for name in (own, *(name for name in view.shown if name != own)):
@@ -108,7 +108,7 @@ def maps(view: View, own: str, scales: Scales) -> dict[str, Map]:
 
 class ComparisonFilm:
     """Composes frames of rows of panels: photographs first, then maps with their colour scales below them, and last the
-    errors so far, which take what is left of the last row. Keeps no images.
+    errors so far, which fill the rest of the last row. Keeps no images.
 
     Attributes:
         width_px, height_px: size of a frame, even.
@@ -126,9 +126,9 @@ class ComparisonFilm:
         height_px: int = 0,
         scales: Mapping[str, Scale] | None = None,
     ) -> None:
-        """Takes the width of a panel and, where that differs, its height, the span of time on the error panel's axis,
-        the runs whose errors are drawn, the labels of all panels but that of the errors, how many panels are best
-        seen side by side, and the colour scales of maps by label."""
+        """Takes the width of a panel and, if it differs, its height, the time span of the error panel's axis, the runs
+        whose errors are drawn, the labels of all panels except that of the errors, the number of panels in a row,
+        and the colour scales of maps by label."""
         self._side = side_of(side_px)
         self._height = height_px or self._side
         self._strip = 2 * max(9, self._side // 24)
@@ -151,8 +151,8 @@ class ComparisonFilm:
         times_s: Sequence[float],
         errors: Mapping[str, Sequence[float]],
     ) -> Pixels:
-        """One frame; ``errors`` of each run up to now, at ``times_s``. Pictures by label; those that lack leave their
-        place empty."""
+        """One frame, with ``errors`` of each run up to now at ``times_s``. ``pictures`` are by label; the place of a
+        missing one stays empty."""
         canvas = Image.new("RGB", (self.width_px, self.height_px), PAPER)
         draw = ImageDraw.Draw(canvas)
         for slot, label in enumerate(self._labels):
@@ -184,7 +184,7 @@ class ComparisonFilm:
 
 
 def side_of(side_px: int) -> int:
-    """The width of a panel that is asked to be so wide: even, and wide enough for its label."""
+    """Width of a panel for a requested width: even, and wide enough for its label."""
     return max(96, side_px - side_px % 2)
 
 
@@ -195,10 +195,10 @@ def draw_errors(
     times_s: Sequence[float],
     curves: dict[str, tuple[Sequence[float], tuple[int, int, int]]],
 ) -> None:
-    """Curves on a logarithmic axis of whole decades that covers what there is so far, drawn into ``box``."""
+    """Draws curves into ``box``, on a logarithmic axis of whole decades that covers the values so far."""
     size = max(9, (box[3] - box[1]) // 24)
     left, top, right, bottom = box[0] + 4 * size, box[1] + size, box[2] - size, box[3] - 2 * size
-    beside = box[2] - box[0] > 1.5 * (box[3] - box[1])  # the values stand where there is room for them
+    beside = box[2] - box[0] > 1.5 * (box[3] - box[1])  # values are printed only if there is room for them
     right -= 15 * size if beside else 0
     values = [value for series, _ in curves.values() for value in series if value > 0]
     low = math.floor(math.log10(min(values))) if values else -4

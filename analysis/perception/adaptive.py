@@ -1,4 +1,4 @@
-"""Adaptive and framed rendering judged by the same observer: the batch sizes at which a difference is noticed."""
+"""Adaptive and framed rendering, judged by the same observer: the batch sizes at which a difference is noticed."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ SIDE_PX = 512
 
 
 def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
-    """JOD from the reference of both renderers at equal cost, a row an input and batch size.
+    """JOD from the reference of both renderers at equal cost, a row for each input and batch size.
 
-    Results and references are kept as those of the other studies are, so that this goes on where it was stopped.
+    Results and references are kept as in the other studies, so that this continues where it was stopped.
 
     Raises:
         InputError: a run failed.
@@ -68,11 +68,11 @@ def _distance(result: dict[str, Any] | None) -> float:
 
 
 def judged(table: pd.DataFrame, sigma: float) -> pd.DataFrame:
-    """What a simulated observer without lapses makes of the distances.
+    """The judgements of a simulated observer without lapses.
 
-    Adds the shares of right answers in the dual-pair task of either renderer against the reference, and of preferring
-    ``thesis`` to the framed renderer (of two stimuli with noise ``sigma`` each, the one that looks nearer the
-    reference).
+    Adds the probability of a right answer in the dual-pair task for each renderer against the reference, and the
+    probability of preferring ``thesis`` to the framed renderer: of two stimuli with noise ``sigma`` each, the observer
+    prefers the one that looks nearer to the reference.
     """
     from scipy import stats
 
@@ -86,8 +86,8 @@ def judged(table: pd.DataFrame, sigma: float) -> pd.DataFrame:
 
 
 def thresholds(table: pd.DataFrame) -> pd.DataFrame:
-    """By input: the batch sizes at which ``thesis`` differs noticeably from the reference, and is preferred, or not, to
-    the framed renderer in three of four pairs."""
+    """For each input the batch sizes at which ``thesis`` differs noticeably from the reference, and those at which it,
+    or the framed renderer, is preferred in three of four pairs."""
     rows = []
     for name in dict.fromkeys(table["input"]):
         part = table.loc[table["input"] == name]

@@ -16,7 +16,7 @@ from analysis.perception.psychometrics import FitError, correct_share, fit, pair
 from analysis.perception.trials import CONDITIONS
 
 THESIS_JND = {"planescene": 40.0, "spheresscene": 100.0}
-"""Samples per pixel, read off figures 19 and 20 of the thesis."""
+"""Just-noticeable differences, samples per pixel, read off figures 19 and 20 of the thesis."""
 
 THESIS_P = {
     ("planescene", "spheresscene"): {27: 0.0027, 64: 0.000025, 125: 0.1296, 216: 0.0477},
@@ -36,12 +36,12 @@ _GROUPS = (
 
 
 def fits(trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> pd.DataFrame:
-    """Fits by scene, by scene and filter, by set and filter, and by all three; a row each.
+    """Fits by scene, by scene and filter, by set and filter, and by all three; one row a fit.
 
     Args:
-        trials: answered.
-        bootstraps, seed: of the intervals.
-        peer: whether psignifit fits the same data too.
+        trials: answered trials.
+        bootstraps, seed: number of bootstrap data sets of each interval, and their seed.
+        peer: whether psignifit also fits the data.
     """
     rows = []
     for keys in _GROUPS:
@@ -52,7 +52,7 @@ def fits(trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -
 
 
 def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> dict[str, Any]:
-    """One fit as a row; a reason instead of numbers where there is none."""
+    """One fit as a row; if it fails, the reason in place of the numbers."""
     levels, correct, asked = counts(part)
     try:
         found = fit(levels.tolist(), correct, asked, bootstraps, seed)
@@ -73,7 +73,7 @@ def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) 
 def counts(
     part: pd.DataFrame,
 ) -> tuple[NDArray[np.int64], Int[NDArray[np.int64], "observers levels"], Int[NDArray[np.int64], "observers levels"]]:
-    """Levels, and right answers and answers of every observer at each."""
+    """Levels, and the numbers of right answers and of answers of every observer at each."""
     levels, level = np.unique(np.asarray(part["samples"], np.int64), return_inverse=True)
     names, person = np.unique(np.asarray(part["observer"], str), return_inverse=True)
     shape = len(names), len(levels)
@@ -91,13 +91,13 @@ _STRONGEST = ("of", "first", "second", "samples", "t", "degrees", "p", "mean_dif
 
 
 def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
-    """Paired t-tests level by level, of scenes, of sets and of filters, an entry an observer.
+    """Paired t-tests at each level, of scenes, of sets and of filters, with one entry per observer.
 
-    An entry is the mean over what the two conditions have in common, such as sets and filters where scenes are
-    compared. No rows where there is one of each. ``pairs`` counts observers.
+    An entry is the mean over the cells that both conditions have, such as sets and filters if scenes are compared.
+    The table is empty if there is one condition of each kind. ``pairs`` counts observers.
 
-    Deviation: the thesis counts every combination of observer, set and filter as an entry of its own. An observer's
-    answers are alike, so that tests of equal conditions find too many differences.
+    Deviation: the thesis counts every combination of observer, set and filter as a separate entry. The answers of one
+    observer are correlated, so such tests of equal conditions find too many differences.
     """
     rows = []
     for column in CONDITIONS:
@@ -121,8 +121,8 @@ def comparisons(trials: pd.DataFrame) -> pd.DataFrame:
 
 
 def strongest(tested: pd.DataFrame) -> pd.DataFrame:
-    """Of each pair of conditions the level where they differ most clearly, and its p times the number of levels
-    compared (Bonferroni), at most 1.
+    """For each pair of conditions the level with the smallest p, and that p times the number of compared levels
+    (Bonferroni), at most 1.
     """
     rows = []
     asked = tested.loc[tested["p"].notna()]
@@ -136,11 +136,11 @@ def strongest(tested: pd.DataFrame) -> pd.DataFrame:
 
 
 def _by_observer(shares: pd.DataFrame, first: str, second: str, samples: float) -> NDArray[np.float64]:
-    """Shares ``(observers, 2)`` of two conditions at one level, means of the cells that have both."""
+    """Shares ``(observers, 2)`` of two conditions at one level, as means over the cells that have both."""
     both: list[dict[Any, Any]] = [dict(shares[samples].xs(name).dropna().items()) for name in (first, second)]
     found: dict[str, list[tuple[float, float]]] = {}
     for cell in both[0]:
-        if cell in both[1]:  # of observer, and of the other conditions
+        if cell in both[1]:  # columns of the observer, and of the other conditions
             found.setdefault(cell[0], []).append((float(both[0][cell]), float(both[1][cell])))
     return np.array([np.mean(entries, axis=0) for entries in found.values()]).reshape(-1, 2)
 
@@ -156,20 +156,20 @@ def recovery(
     bootstraps: int,
     seed: int,
 ) -> dict[str, Any]:
-    """How well fits give back a known threshold, of observers that differ.
+    """How well fits recover a known threshold of observers that differ.
 
     Args:
         levels: samples per pixel.
         jnd, sigma, lapse: threshold of the mean of all observers' functions; width in octaves and lapse rate of each.
-        spread: standard deviation of the observers' thresholds, octaves; every experiment has observers of its own.
-        people: observers, and answers of each at each level.
-        experiments: studies simulated.
-        bootstraps: of each interval.
-        seed: of all.
+        spread: standard deviation of the observers' thresholds, octaves; every experiment draws new observers.
+        people: number of observers, and of answers of each at each level.
+        experiments: number of simulated studies.
+        bootstraps: bootstrap data sets of each interval.
+        seed: seed of all random numbers.
 
     Returns:
-        The share of intervals that hold the threshold, with Wilson's 95 % interval of that share; the median of the
-        fitted thresholds over the true one, and that of the intervals' upper over their lower ends.
+        The share of intervals that contain the threshold, with Wilson's 95 % interval of that share; the median of the
+        fitted thresholds over the true one; and the median ratio of the intervals' upper to their lower ends.
     """
     from scipy.stats import binomtest
 
@@ -193,7 +193,7 @@ def recovery(
 
 
 def population_mu(jnd: float, sigma: float, lapse: float, spread: float) -> float:
-    """Mean ``μ`` of observers whose mean function, of width ``√(σ² + spread²)``, has this threshold."""
+    """Mean ``μ`` of observers whose mean function, of width ``√(σ² + spread²)``, has the threshold ``jnd``."""
     return float(np.log2(jnd) - np.log2(threshold_samples(0.0, float(np.hypot(sigma, spread)), lapse)))
 
 
@@ -214,18 +214,18 @@ def power(
     seed: int,
     spread: float = 0.0,
 ) -> pd.DataFrame:
-    """How often two conditions of given thresholds are told apart, by observers and answers per level.
+    """Share of experiments that distinguish two conditions of given thresholds, by observers and answers per level.
 
-    Two conditions count as told apart where the 95 % intervals of their thresholds, from as many answers of the same
-    observers, do not overlap.
+    Two conditions count as distinguished if the 95 % intervals of their thresholds, from equally many answers of the
+    same observers, do not overlap.
 
     Args:
         levels: samples per pixel.
         jnds: true thresholds.
         sigma: width of both functions, octaves.
-        observers, repetitions: numbers to tabulate.
-        experiments: simulated for each cell.
-        seed: of those.
+        observers, repetitions: numbers of observers, and of answers per level, to tabulate.
+        experiments: number of simulated experiments for each cell.
+        seed: seed of the experiments.
         spread: standard deviation of the observers' thresholds, octaves.
     """
     rows = []

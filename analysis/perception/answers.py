@@ -1,8 +1,8 @@
-"""Answers of a session on disk. An acknowledged answer is not lost when the process is killed or the disk is full.
+"""Answers of a session on disk. An acknowledged answer is not lost if the process is killed or the disk is full.
 
 The store is one SQLite file. An answer is acknowledged once its transaction is on disk. Every row carries a seal, a
-SHA-256 over the seal before it and its own text, and the last seal stands beside the number of answers: a row that is
-changed, left out or added by anything but this module is noticed when the store is opened.
+SHA-256 over the previous seal and its own text, and the last seal is stored with the number of answers. A row that
+anything but this module changes, removes or adds is therefore detected when the store is opened.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ class Answers:
     """The store of one session, opened by one process at a time."""
 
     def __init__(self, file: Path, identity: Mapping[str, Any], earlier: Iterable[Mapping[str, Any]] = ()) -> None:
-        """Opens a store and checks all of it, or makes one.
+        """Opens a store and checks all of it, or creates one.
 
         Args:
             file: the store.
-            identity: of the session: what must be the same whenever it is opened.
-            earlier: answers that a new store begins with.
+            identity: values that must be the same whenever the session is opened.
+            earlier: first answers of a new store.
 
         Raises:
-            InputError: the file is damaged, or of a session with another identity.
-            OSError: it cannot be opened or written.
+            InputError: the file is damaged, or belongs to a session with another identity.
+            OSError: the file cannot be opened or written.
         """
         self.file = file
         if not file.exists():
@@ -55,7 +55,7 @@ class Answers:
                     f"out: {file}: expected a session of {identity.get('observer')!r} with these stimuli, found another"
                 )
             with self._writing():
-                pass  # a store that cannot be written is noticed before the first trial
+                pass  # a store that cannot be written fails before the first trial
         except BaseException:
             self.close()
             raise
@@ -68,7 +68,7 @@ class Answers:
         """Stores an answer; it is on disk when this returns.
 
         Raises:
-            OSError: it could not be stored, and is not.
+            OSError: the answer cannot be stored; the store is unchanged.
         """
         body = json.dumps(row, allow_nan=False)
         seal = _sealed(self._seal, body)
@@ -85,7 +85,7 @@ class Answers:
         """Identity, token, number of answers, last seal and answers.
 
         Raises:
-            ValueError: they do not belong together.
+            ValueError: the parts are inconsistent.
         """
         execute = self._connection.execute
         (whole,) = execute("pragma integrity_check(1)").fetchone()
@@ -102,7 +102,7 @@ class Answers:
 
     @contextlib.contextmanager
     def _readable(self) -> Iterator[None]:
-        """Raises InputError, naming the file, where what is read is no whole store."""
+        """Raises InputError, naming the file, if the block does not read a complete store."""
         try:
             yield
         except (sqlite3.Error, ValueError, TypeError) as error:
@@ -112,7 +112,7 @@ class Answers:
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:
-        """A transaction: on disk when the block ends well, as if it had never begun when it does not.
+        """A transaction: on disk if the block succeeds, undone if it fails.
 
         Raises:
             OSError: the disk is full, the file may not be written, …
@@ -125,14 +125,14 @@ class Answers:
             raise OSError(errno.EIO, str(error), str(self.file)) from error
         finally:
             if self._connection.in_transaction:
-                with contextlib.suppress(sqlite3.Error):  # what could not be undone now is when the file is opened
+                with contextlib.suppress(sqlite3.Error):  # what cannot be undone now is undone when the file is opened
                     self._connection.execute("rollback")
 
 
 def _connected(file: Path) -> sqlite3.Connection:
-    """A connection that begins no transaction of its own, and waits for the disk at the end of each."""
-    # between two answers a session is one file, so that a copy of it is whole; answers come from one thread at a time,
-    # though not always the same
+    """A connection without implicit transactions that waits for the disk at the end of each one."""
+    # between two answers a session is one file, so that a copy of it is complete; answers come from one thread at a
+    # time, though not always the same one
     connection = sqlite3.connect(file, isolation_level=None, check_same_thread=False)
     try:
         connection.execute("pragma journal_mode = delete")
@@ -144,7 +144,7 @@ def _connected(file: Path) -> sqlite3.Connection:
 
 
 def _create(file: Path, identity: str, earlier: Iterable[Mapping[str, Any]]) -> None:
-    """Makes a store under another name first: one that is there is always whole."""
+    """Creates a store under a temporary name first, so that an existing store is always complete."""
     bodies = [json.dumps(row, allow_nan=False) for row in earlier]
     token = secrets.token_urlsafe(32)
     seal = _sealed(_sealed("", identity), token)
@@ -175,13 +175,13 @@ def _sealed(before: str, text: str) -> str:
 
 
 def answers_of_lines(file: Path) -> list[dict[str, Any]]:
-    """Answers of a file that earlier versions wrote, one JSON object a line; the first of each trial counts.
+    """Answers of a file that earlier versions wrote, one JSON object a line; the first answer to each trial counts.
 
-    A write that was cut off was never acknowledged: what is left of it, at the end of the file or before the answer
-    that was given next, does not count.
+    An interrupted write was never acknowledged: its remains, at the end of the file or before the next answer, are
+    ignored.
 
     Raises:
-        InputError: something else stands in a line.
+        InputError: a line holds anything else.
     """
     decoder, found = json.JSONDecoder(), dict[int, dict[str, Any]]()
     lines = file.read_text(encoding="utf-8", errors="replace").splitlines()

@@ -18,7 +18,7 @@ NEEDS = {SimulateOptions: ("perception",), AdaptiveOptions: ("study", "perceptio
 
 
 def main() -> None:
-    """Parses, runs one step of the study, prints what came out."""
+    """Parses, runs one step of the study, prints the outcome."""
     options = parse(Step, __doc__ or "")  # type: ignore[arg-type]
     require_extra(*NEEDS.get(type(options), ()))
     from analysis.command.console import show

@@ -1,4 +1,4 @@
-"""Simulated observers: how visible a difference is to them, and how they answer.
+"""Simulated observers: the visibility of a difference to them, and their answers.
 
 The task is a dual pair: of two pairs shown side by side one is identical and one differs, and the observer says which
 differs. An observer that compares the differences within the pairs is right with probability
@@ -27,7 +27,7 @@ COLUMNS = (
     "observer", "observer_kind", "task", "session", "trial", "scene", "point_set", "time_filter", "samples",
     "repetition", "differing_side", "answer", "correct", "response_s",
 )  # fmt: skip
-"""Columns of a table of trials, of people and simulated observers alike."""
+"""Columns of a table of trials, both of people and of simulated observers."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Observer:
     """A simulated observer.
 
     Attributes:
-        name: in the table.
-        sensitivity: multiplies the difference in JOD.
+        name: name in the table.
+        sensitivity: factor of the difference in JOD.
         lapse: share of answers that are guesses.
     """
 
@@ -46,7 +46,7 @@ class Observer:
 
 
 def dual_pair_share(d_prime: Float[NDArray[np.float64], "*n"]) -> Float[NDArray[np.float64], "*n"]:
-    """Probability that a differencing observer names the pair that differs."""
+    """Probability ``Φ(d'/2)² + Φ(-d'/2)²`` that a differencing observer names the pair that differs."""
     half = np.asarray(d_prime, np.float64) / 2.0
     return stats.norm.cdf(half) ** 2 + stats.norm.cdf(-half) ** 2
 
@@ -54,7 +54,7 @@ def dual_pair_share(d_prime: Float[NDArray[np.float64], "*n"]) -> Float[NDArray[
 def correct_probability(
     jod: Float[NDArray[np.float64], "*n"], observer: Observer, sigma: float = JOD_SIGMA
 ) -> Float[NDArray[np.float64], "*n"]:
-    """Probability of a right answer to stimuli that differ by so many JOD; negative ones count as none."""
+    """Probability of a right answer to stimuli that differ by ``jod``; negative differences count as 0."""
     seen = dual_pair_share(np.maximum(jod, 0.0) * observer.sensitivity / sigma)
     return (1.0 - observer.lapse) * seen + observer.lapse * 0.5
 
@@ -63,10 +63,10 @@ def drawn_observers(count: int, seed: int, spread: float, lapse_mean: float) -> 
     """Observers whose sensitivities are log-normal about 1 and whose lapses are exponential.
 
     Args:
-        count: how many.
-        seed: of the draw.
+        count: number of observers.
+        seed: seed of the draw.
         spread: standard deviation of the logarithm of the sensitivity.
-        lapse_mean: mean lapse rate; none exceeds 0.2.
+        lapse_mean: mean of the exponential distribution of the lapse rate; rates are at most 0.2.
     """
     rng = np.random.default_rng([seed, 0x0B5])
     sensitivity = np.exp(spread * rng.standard_normal(count))
@@ -79,18 +79,18 @@ def drawn_observers(count: int, seed: int, spread: float, lapse_mean: float) -> 
 def simulated_trials(
     stimuli: pd.DataFrame, observers: Sequence[Observer], repetitions: int, seed: int, sigma: float = JOD_SIGMA
 ) -> pd.DataFrame:
-    """Every observer answers every stimulus so many times, in an order of its own.
+    """Trials in which every observer answers every stimulus ``repetitions`` times, in a random order.
 
     Args:
         stimuli: rows of ``scene``, ``point_set``, ``time_filter``, ``samples`` and ``jod``, the difference from the
             reference.
-        observers: who answers.
-        repetitions: of every stimulus.
-        seed: of orders, sides and answers. An observer's do not depend on the others.
+        observers: the observers.
+        repetitions: number of answers to every stimulus.
+        seed: seed of orders, sides and answers. Those of one observer do not depend on the others.
         sigma: noise of a single stimulus, JOD.
 
     Returns:
-        Trials with the columns :data:`COLUMNS`; ``response_s`` is not known.
+        Trials with the columns :data:`COLUMNS`; ``response_s`` is NaN.
     """
     tables = [
         _trials_of(stimuli, observer, number, repetitions, seed, sigma) for number, observer in enumerate(observers)

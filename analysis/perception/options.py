@@ -22,7 +22,7 @@ STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_
 @dataclass(frozen=True)
 @closed_choices()
 class StimuliOptions:
-    """Renders the stimuli of job files, and a manifest with their hashes; goes on where it was stopped."""
+    """Renders the stimuli of job files, and a manifest with their hashes; continues where it was stopped."""
 
     jobs: Annotated[tuple[Path, ...], tyro.conf.Positional] = STUDY_JOBS
     """Job files; by default the thesis' study: two scenes, eight levels, three point sets, truncated box."""
@@ -31,15 +31,15 @@ class StimuliOptions:
     first_frame: int = 60
     """First frame of the sequence."""
     frames: int = 60
-    """How many frames."""
+    """Number of frames."""
     format: Literal["png", "exr"] = "png"
-    """Of the frames; EXR is linear radiance, and shown as the PNG that it would be."""
+    """Format of the frames; EXR holds linear radiance, and is shown encoded, like PNG."""
     video: bool = False
-    """Also write stimulus.mkv beside the frames of each, which keeps every 8-bit value (FFV1)."""
+    """Also write stimulus.mkv beside the frames of each stimulus, lossless in 8 bits (FFV1)."""
     box_share: float = 0.5
-    """The middle part of the shutter's time that the box filter spans."""
+    """Share of the shutter time, in its middle, that the box filter spans."""
     seed: int = 0
-    """Of point sets and shifts."""
+    """Seed of point sets and shifts."""
     threads: Threads = 0
     out: Path = Path("out/perception")
     """Folder for the stimuli, manifest.json and summary.json."""
@@ -59,12 +59,12 @@ class StimuliOptions:
 
 @dataclass(frozen=True)
 class SimulateOptions:
-    """Has simulated observers answer the stimuli of a folder; one row a trial in trials-simulated.parquet."""
+    """Simulates observers that answer the stimuli of a folder; trials-simulated.parquet has one row a trial."""
 
     stimuli: Annotated[Path, tyro.conf.Positional] = Path("out/perception")
     """Folder of the command ``stimuli``."""
     observers: int = 12
-    """How many observers."""
+    """Number of observers."""
     repetitions: int = 4
     """Answers of each observer to each stimulus."""
     sigma_jod: float = 1.048
@@ -74,9 +74,9 @@ class SimulateOptions:
     lapse_mean: float = 0.02
     """Mean share of answers that are guesses."""
     display: DisplayModel = field(default_factory=DisplayModel)
-    """That the JOD hold for."""
+    """Display that the JOD assume."""
     seed: int = 0
-    """Of observers, orders and answers."""
+    """Seed of observers, orders and answers."""
     out: Path = Path("out/perception-simulated")
     """Folder for trials-simulated.parquet, jod.csv and summary.json."""
 
@@ -99,17 +99,17 @@ class AnalyseOptions:
     """Fits psychometric functions to trials, compares scenes and point sets, draws figures 19 to 25 of the thesis."""
 
     trials: Annotated[Path, tyro.conf.Positional] = Path("out/perception-simulated/trials-simulated.parquet")
-    """Table of trials, of people or of simulated observers, not of both."""
+    """Table of trials, either of people or of simulated observers."""
     bootstraps: int = 400
     """Data sets drawn for each interval."""
     seed: int = 0
-    """Of those, and of the table of power."""
+    """Seed of these data sets, and of the table of power."""
     psignifit: bool = False
-    """Also fit with psignifit, where it is installed (an extra), and show its thresholds beside ours."""
+    """Also fit with psignifit, an optional extra, and show its thresholds beside ours."""
     power_repetitions: int = 40
     """Experiments simulated for each cell of the table of power; 0 leaves it out."""
     power_spread: float = 0.5
-    """Standard deviation of the thresholds of its observers, octaves."""
+    """Standard deviation of the observers' thresholds in the table of power, octaves."""
     out: Path = Path("out/perception-analysis")
     """Folder for fits.csv, tests.csv, power.csv, figures and summary.json."""
 
@@ -120,8 +120,8 @@ class AnalyseOptions:
 
 @dataclass(frozen=True)
 class RecoverOptions:
-    """Draws answers of observers with known psychometric functions; counts how often the fits' intervals hold the
-    threshold of their mean function."""
+    """Draws answers of observers with known psychometric functions, and counts how often the intervals of the fits
+    contain the threshold of the mean function."""
 
     jnds: tuple[float, ...] = (40.0, 100.0)
     """True thresholds, samples per pixel; the thesis' are about 40 and 100."""
@@ -132,7 +132,7 @@ class RecoverOptions:
     spreads: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Standard deviations of the observers' thresholds, octaves; each experiment draws its observers."""
     observers: int = 12
-    """How many observers."""
+    """Number of observers."""
     answers: int = 12
     """Answers of each at each of the eight levels; 4 in each of 3 point sets are 12."""
     experiments: int = 100
@@ -140,7 +140,7 @@ class RecoverOptions:
     bootstraps: int = 400
     """Data sets drawn for each interval."""
     seed: int = 0
-    """Of answers and bootstraps."""
+    """Seed of answers and bootstraps."""
     out: Path = Path("out/perception-recovery")
     """Folder for recovery.csv and summary.json."""
 
@@ -157,10 +157,10 @@ class RecoverOptions:
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """Shows the trials to a person on a page of this machine; goes on where it was stopped."""
+    """Shows the trials to a person on a page of this machine; continues where it was stopped."""
 
     observer: Annotated[str, tyro.conf.Positional]
-    """Name of the person, in the table."""
+    """Name of the person in the table of trials."""
     stimuli: Path = Path("out/perception")
     """Folder of the command ``stimuli``."""
     repetitions: int = 4
@@ -170,7 +170,7 @@ class ServeOptions:
     port: int = 0
     """Port of the page, on this machine only; 0 takes a free one."""
     seed: int = 0
-    """Of orders and sides."""
+    """Seed of orders and sides."""
     out: Path = Path("out/perception-human")
     """Folder for the session: answers.sqlite, trials-human.parquet and summary.json."""
 
@@ -182,22 +182,22 @@ class ServeOptions:
 @dataclass(frozen=True)
 @closed_choices()
 class AdaptiveOptions:
-    """Puts thesis and the framed renderer before the simulated observer, by batch size at equal cost."""
+    """Shows thesis and the framed renderer to the simulated observer, at equal cost and by batch size."""
 
     inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
     """Inputs of the study of suitability."""
     scale: Literal["thesis", "half", "quick"] = "quick"
     """Size of the runs."""
     span_s: tuple[float, float] = (0.4, 0.9)
-    """Part of each run that is scored, seconds after its start."""
+    """Beginning and end of the scored part of each run, seconds after its start."""
     sigma_jod: float = 1.048
     """Noise of a single stimulus, JOD."""
     display: DisplayModel = field(default_factory=DisplayModel)
-    """That the JOD hold for."""
+    """Display that the JOD assume."""
     workers: int = 0
     """Processes; 0 takes one per core."""
     seed: int = 0
-    """Of the runs."""
+    """Seed of the runs."""
     cache: References = REFERENCES
     out: Path = Path("out/perception-adaptive")
     """Folder for the runs, adaptive.csv, thresholds.csv and summary.json."""

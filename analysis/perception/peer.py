@@ -1,6 +1,6 @@
-"""The same data fitted by psignifit, an optional extra, to compare with our own fits.
+"""Fits of the same data by psignifit, an optional extra, for comparison with our own fits.
 
-psignifit is under the GPL: nothing else here imports it, and everything works without it.
+psignifit is under the GPL: no other module imports it, and everything works without it.
 
 Source: Schütt, Harmeling, Macke and Wichmann 2016, "Painfree and accurate Bayesian estimation of psychometric functions
 for (potentially) overdispersed data".
@@ -22,13 +22,13 @@ from analysis.perception.psychometrics import THRESHOLD
 
 @dataclass(frozen=True)
 class PeerFit:
-    """What psignifit makes of the data.
+    """The fit of psignifit.
 
     Attributes:
         jnd: samples per pixel at the threshold.
-        interval: credible, 95 %, of the middle of the function, which is the threshold where there are no lapses.
-        width: of the function between 5 % and 95 % of its rise, octaves.
-        overdispersion: ``eta``, 0 for answers as binomial as a coin's.
+        interval: 95 % credible interval of the middle of the function, which is the threshold if there are no lapses.
+        width: width of the function between 5 % and 95 % of its rise, octaves.
+        overdispersion: ``eta``, 0 for binomial answers.
     """
 
     jnd: float
@@ -46,7 +46,7 @@ def peer_fit(levels: Sequence[float], correct: Sequence[int], trials: Sequence[i
     require_extra("psignifit")
     import psignifit
 
-    # it wants functions that rise
+    # psignifit expects rising functions
     data = np.stack([-np.log2(np.asarray(levels, np.float64)), correct, trials], axis=1)
     data = data[data[:, 2] > 0][::-1]
     with warnings.catch_warnings():
@@ -54,7 +54,7 @@ def peer_fit(levels: Sequence[float], correct: Sequence[int], trials: Sequence[i
         try:
             found = psignifit.psignifit(data, sigmoid="norm", experiment_type="2AFC", verbose=False)
             at = float(np.squeeze(found.threshold(np.array(THRESHOLD), return_ci=False)))
-        except Exception as error:  # its own has no public name
+        except Exception as error:  # psignifit's error class has no public name
             raise InputError(f"psignifit: expected a threshold, got {error}") from None
     intervals: Any = found.confidence_intervals
     low, high = intervals["threshold"]["0.95"]

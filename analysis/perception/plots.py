@@ -1,4 +1,4 @@
-"""Figures 19 to 25 of the thesis: share of right answers against samples per pixel; computes nothing but the curves."""
+"""Figures 19 to 25 of the thesis: share of right answers against samples per pixel; computes only the curves."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def psychometric_figure(
     """A curve for each value of a column.
 
     Args:
-        trials: answered.
+        trials: answered trials.
         column: ``scene`` or ``point_set``.
-        fitted: rows of fits by value; those that failed have no ``mu``.
-        kind: of the observers, for the title: every figure says whom it shows.
+        fitted: rows of fits by value of the column; failed fits have no ``mu``.
+        kind: kind of the observers, which the title of every figure states.
     """
     figure = Figure(figsize=(5.6, 3.9), layout="constrained")
     axis = figure.subplots()
@@ -37,7 +37,7 @@ def psychometric_figure(
     axis.set(xscale="log", xlabel="samples per pixel", ylabel="share right", ylim=(0.35, 1.02))
     apart = [levels[0]]
     for level in levels[1:]:
-        if level > 1.25 * apart[-1]:  # labels of nearer ones would run into each other
+        if level > 1.25 * apart[-1]:  # labels of nearer levels would overlap
             apart.append(level)
     axis.set_xticks(apart, [f"{int(level)}" for level in apart], minor=False)
     axis.set_xticks([], minor=True)

@@ -37,11 +37,11 @@ class Trial:
     """One question: which of two pairs differs.
 
     Attributes:
-        number: in the session, from 0.
-        test, reference: numbers of stimuli of the manifest; the other pair is twice the reference.
-        repetition: of the stimulus, from 0.
-        side: ``left`` or ``right``, where the pair is that differs.
-        test_first: whether the test is the upper of that pair.
+        number: number in the session, from 0.
+        test, reference: indices of stimuli in the manifest; the other pair shows the reference twice.
+        repetition: repetition of the stimulus, from 0.
+        side: ``left`` or ``right``, the side of the pair that differs.
+        test_first: whether the test is the upper stimulus of that pair.
     """
 
     number: int
@@ -53,9 +53,9 @@ class Trial:
 
 
 class Session:
-    """The trials of one person, in a folder of their own; opened again it goes on where it was.
+    """The trials of one person, in a folder of their own; a session that is opened again continues where it was.
 
-    One process at a time has it open, until it is closed.
+    One process at a time may have it open.
 
     Attributes:
         fault: why a stimulus cannot be shown, or None.
@@ -65,15 +65,15 @@ class Session:
         """Opens the session of a folder, or begins it.
 
         Args:
-            folder: of the session.
+            folder: folder of the session.
             stimuli: folder of the stimuli.
-            observer: name of the person; that of a session begun before must be the same.
-            repetitions: of each stimulus.
-            seed: of orders and sides.
+            observer: name of the person, which must be that of an earlier session in the folder.
+            repetitions: number of trials of each stimulus.
+            seed: seed of orders and sides.
 
         Raises:
             ValueError: another process has the session open.
-            InputError: the folder holds a session of another person or other stimuli, a file of it is damaged, or
+            InputError: the folder holds a session of another person or other stimuli, one of its files is damaged, or
                 there is nothing to compare.
             OSError: the folder cannot be written.
         """
@@ -109,34 +109,34 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """Lets others open the session."""
+        """Closes the session, so that other processes can open it."""
         self._held.close()
 
     @property
     def token(self) -> str:
-        """What only the page of this session knows, whenever it is opened."""
+        """Secret of this session's page, the same whenever the session is opened."""
         return self._store.token
 
     @property
     def current(self) -> Trial | None:
-        """The first trial without an answer; None at the end."""
+        """The first trial without an answer; None if all are answered."""
         return next((trial for trial in self.trials if trial.number not in self.answers), None)
 
     def answer(self, number: int, side: str, facts: dict[str, Any]) -> bool:
         """Stores an answer, durably, if the trial has none.
 
         Args:
-            number: of the trial.
-            side: that was named.
-            facts: what the page measured: seconds to the answer, display rate, dropped frames, window.
+            number: number of the trial.
+            side: the chosen side.
+            facts: measurements of the page: seconds to the answer, display rate, dropped frames, window.
 
         Returns:
-            Whether it was stored; False where the trial was answered before.
+            Whether it was stored; False if the trial was answered before.
 
         Raises:
-            ValueError: there is no such trial, or its turn has not come, or the side is none, or a fact is not what it
-                should be.
-            OSError: it cannot be stored, and does not count.
+            ValueError: there is no such trial, it is not the current one, the side is neither left nor right, or a
+                measurement is invalid.
+            OSError: the answer cannot be stored, and does not count.
         """
         if side not in ("left", "right"):
             raise ValueError(f"answer: expected left or right, got {str(side)[:40]!r}")
@@ -154,8 +154,8 @@ class Session:
         """A frame of a stimulus as a PNG file.
 
         Raises:
-            IndexError: there is none.
-            InputError: the stimulus is not what it was when it was rendered; ``fault`` then says so.
+            IndexError: there is no such frame.
+            InputError: the stimulus has changed since it was rendered; ``fault`` then says so.
         """
         row = self.rows[stimulus]
         file = self.stimuli / row["folder"] / row["files"][number]
@@ -171,7 +171,7 @@ class Session:
         raise self.fault
 
     def table(self) -> pd.DataFrame:
-        """The answered trials, with the columns of simulated ones and what the page measured."""
+        """The answered trials, with the columns of simulated ones and the measurements of the page."""
         rows = []
         for trial in self.trials:
             if trial.number not in self.answers:
@@ -199,14 +199,14 @@ class Session:
         return pd.DataFrame(rows, columns=[*COLUMNS, *extra])
 
     def export(self) -> Path:
-        """Writes the table; where it is."""
+        """Writes the table; returns its path."""
         with atomic(self.folder / TABLE) as path:
             self.table().to_parquet(path, index=False)
         return self.folder / TABLE
 
 
 def _trials(rows: list[dict[str, Any]], repetitions: int, seed: int) -> list[Trial]:
-    """Every stimulus against the one with the most samples of its scene, set and filter, itself among them."""
+    """Trials of every stimulus against that with the most samples of its scene, set and filter, including itself."""
     groups: dict[tuple[str, str, str], list[int]] = {}
     for number, row in enumerate(rows):
         groups.setdefault((row["scene"], row["point_set"], row["time_filter"]), []).append(number)
@@ -229,10 +229,10 @@ def _trials(rows: list[dict[str, Any]], repetitions: int, seed: int) -> list[Tri
 
 
 def checked_facts(facts: Mapping[str, Any]) -> dict[str, float | bool]:
-    """What a page measured, in the types of the table; what it could not measure (None) is left out.
+    """Measurements of a page, in the types of the table; missing ones (None) are left out.
 
     Raises:
-        ValueError: an unknown name, or no number in the range that the table can hold.
+        ValueError: a name is unknown, or a value is not a number in the range of the table.
     """
     found: dict[str, float | bool] = {}
     for name, value in facts.items():
@@ -276,7 +276,7 @@ def _earlier(folder: Path, identity: dict[str, Any]) -> list[dict[str, Any]]:
         for name in list(facts):
             try:
                 checked_facts({name: facts[name]})
-            except ValueError:  # an earlier version took anything; the answer counts all the same
+            except ValueError:  # an earlier version accepted anything; the answer still counts
                 del facts[name]
         found[number] = {"trial": row["trial"], "answer": row["answer"], **checked_facts(facts)}
     return found

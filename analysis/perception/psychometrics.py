@@ -3,8 +3,8 @@
 The share of correct answers falls with the samples per pixel ``n`` from nearly 1 to the guess rate:
 ``p(n) = 1/2 + (1/2 - λ) Φ((μ - log2 n) / σ)``. The just-noticeable difference is the ``n`` at which ``p = 0.75``.
 
-Observers differ, and an observer's answers are alike: intervals resample observers, and tests count one entry an
-observer.
+Observers differ, and the answers of one observer are correlated. So intervals resample observers, and tests count one
+entry per observer.
 
 Source: motion-blur perception thesis, chapter 5; Wichmann and Hill 2001, "The psychometric function"; Hesterberg 2015,
 "What teachers should know about the bootstrap" (the expanded percentile interval).
@@ -25,15 +25,15 @@ from scipy import optimize, stats
 GUESS = 0.5
 THRESHOLD = 0.75
 LAPSE_MAX = 0.08
-"""Greatest lapse rate a fit may assume; with it, threshold is still within reach."""
+"""Greatest lapse rate of a fit; functions with this rate still reach the threshold."""
 
-_OCTAVES_BEYOND = 2.0  # that a fitted μ may lie beyond the levels
+_OCTAVES_BEYOND = 2.0  # octaves by which a fitted μ may lie beyond the levels
 _SIGMA_LIMITS = 0.25, 6.0
 _GRID = 161, 25, 5
 
 
 class FitError(ValueError):
-    """Data that no psychometric function can be fitted to; the message says what was expected."""
+    """Data to which no psychometric function can be fitted; the message says what was expected."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class Fit:
         mu: log2 of the samples at which the lapse-free function is at the threshold.
         sigma: width, octaves.
         lapse: rate of answers that do not depend on the stimulus.
-        jnd: samples per pixel at the threshold; infinite where it lies above the levels, 0 where below.
-        interval: of ``jnd``, 95 %, from a bootstrap; it holds ``jnd``. None without one.
+        jnd: samples per pixel at the threshold; infinite if it lies above the levels, 0 if below.
+        interval: 95 % interval of ``jnd`` from a bootstrap, which contains ``jnd``; None without a bootstrap.
         status: ``within`` the levels, ``above`` or ``below`` them.
-        log_likelihood: of the data.
-        trials: how many.
+        log_likelihood: logarithm of the likelihood of the data.
+        trials: number of answers.
     """
 
     mu: float
@@ -64,12 +64,12 @@ class Fit:
 def correct_share(
     samples: Float[NDArray[np.float64], "*n"], mu: float, sigma: float, lapse: float
 ) -> Float[NDArray[np.float64], "*n"]:
-    """Probability of a correct answer."""
+    """Probability ``1/2 + (1/2 - λ) Φ((μ - log2 n) / σ)`` of a correct answer at ``samples`` per pixel."""
     return GUESS + (1.0 - GUESS - lapse) * stats.norm.cdf((mu - np.log2(samples)) / sigma)
 
 
 def threshold_samples(mu: float, sigma: float, lapse: float) -> float:
-    """Samples per pixel at which a function passes the threshold."""
+    """Samples per pixel at which a function crosses the threshold."""
     return float(2.0 ** (mu - sigma * stats.norm.ppf((THRESHOLD - GUESS) / (1.0 - GUESS - lapse))))
 
 
@@ -82,16 +82,17 @@ def fit(
 ) -> Fit:
     """Fits the answers of all observers together, by maximum likelihood.
 
-    The interval is that of a bootstrap whose data sets have as many observers, drawn with replacement, each with all of
-    its answers. Its percentiles are moved outwards as far as those of Student's distribution lie beyond those of the
-    normal one, for few observers vary less than many would. With one observer, answers are drawn from the fit: such an
-    interval says nothing of other observers.
+    The interval is that of a bootstrap over observers: each data set has the same number of observers, drawn with
+    replacement, each with all of its answers. Its percentiles are expanded as far as those of Student's distribution
+    lie beyond those of the normal one, because a bootstrap of few observers is too narrow. With one observer, answers
+    are drawn from the fit: such an interval says nothing about other observers.
 
     Args:
         levels: samples per pixel.
-        correct, trials: right answers, and answers, at each level; with a row an observer, where there are several.
-        bootstraps: how many data sets are drawn for the interval; 0 leaves it out.
-        seed: of those.
+        correct, trials: numbers of right answers, and of answers, at each level; one row per observer if there are
+            several.
+        bootstraps: number of data sets that are drawn for the interval; 0 leaves it out.
+        seed: seed of these data sets.
 
     Raises:
         FitError: fewer than two levels with answers, more right answers than answers, or a level below 1.
@@ -122,10 +123,10 @@ def fit(
 
 
 def tail_share(observers: int) -> float:
-    """Share of a bootstrap's data sets beyond each end of a 95 % interval of so many observers.
+    """Share of a bootstrap's data sets beyond each end of a 95 % interval of ``n`` observers.
 
-    ``Φ(-√(n / (n - 1)) t)`` with ``t`` the 97.5th percentile of Student's distribution of ``n - 1`` degrees (Hesterberg
-    2015, sec. 4.3); 0.025 for a single observer.
+    ``Φ(-√(n / (n - 1)) t)``, where ``t`` is the 97.5th percentile of Student's distribution with ``n - 1`` degrees of
+    freedom (Hesterberg 2015, sec. 4.3); 0.025 for a single observer.
     """
     if observers < 2:
         return 0.025
@@ -138,7 +139,7 @@ def _checked(
     correct: Sequence[int] | NDArray[np.int64],
     trials: Sequence[int] | NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Levels in order, and counts ``(observers, levels)``, of the levels that have answers."""
+    """The levels that have answers, in order, and their counts ``(observers, levels)``."""
     x, k, n = np.asarray(levels, np.float64), np.asarray(correct, np.int64), np.asarray(trials, np.int64)
     if not x.shape == k.shape[-1:] == n.shape[-1:] or k.shape != n.shape or x.ndim != 1 or k.ndim > 2:
         raise FitError(f"fit: expected as many levels as counts, got {x.shape}, {k.shape} and {n.shape}")
@@ -155,7 +156,7 @@ def _checked(
 
 
 def _placed(jnd: float, x: NDArray[np.float64]) -> tuple[float, str]:
-    """A threshold beyond the levels is not known: only that it lies there."""
+    """The threshold and its status; of a threshold beyond the levels only the side is known."""
     if jnd > x[-1]:
         return math.inf, "above"
     return (0.0, "below") if jnd < x[0] else (jnd, "within")
@@ -165,7 +166,8 @@ def _placed(jnd: float, x: NDArray[np.float64]) -> tuple[float, str]:
 def _grid(
     levels: tuple[float, ...],
 ) -> tuple[Float[NDArray[np.float64], "g 3"], NDArray[np.float64], NDArray[np.float64]]:
-    """Parameters tried, and logarithms of the shares right and wrong at the levels ``(levels, g)``."""
+    """The grid of parameters, and logarithms of their shares of right and wrong answers at the levels ``(levels,
+    g)``."""
     octaves = np.log2(levels)
     mu = np.linspace(octaves[0] - _OCTAVES_BEYOND, octaves[-1] + _OCTAVES_BEYOND, _GRID[0])
     sigma = np.geomspace(*_SIGMA_LIMITS, _GRID[1])
@@ -185,14 +187,14 @@ def _best(
     rows, log_right, log_wrong = grid
     counts = np.concatenate([correct, trials - correct], axis=1).astype(
         np.float64
-    )  # whole numbers miss the fast product
+    )  # integers have no fast matrix product
     return rows[(counts @ np.concatenate([log_right, log_wrong])).argmax(axis=1)]
 
 
 def _polished(
     x: NDArray[np.float64], k: NDArray[np.int64], n: NDArray[np.int64], mu: float, sigma: float, lapse: float
 ) -> tuple[float, float, float]:
-    """The nearest maximum of the likelihood."""
+    """Parameters of the nearest maximum of the likelihood."""
 
     def cost(parameters: NDArray[np.float64]) -> float:
         share = np.clip(correct_share(x, parameters[0], math.exp(parameters[1]), parameters[2]), 1e-9, 1.0 - 1e-9)
@@ -221,8 +223,8 @@ class Comparison:
 
 
 def paired(first: Sequence[float], second: Sequence[float]) -> Comparison | None:
-    """Student's paired test of shares right, an entry an observer; None where there are fewer than two, or all
-    differences are the same."""
+    """Student's paired t-test of shares of right answers, one entry per observer; None if there are fewer than two, or
+    all differences are equal."""
     a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
     if a.shape != b.shape:
         raise FitError(f"paired: expected as many of both, got {a.shape} and {b.shape}")

@@ -37,7 +37,7 @@ Found = tuple[dict[str, Any], str]
 Options = StimuliOptions | SimulateOptions | ServeOptions | AdaptiveOptions | AnalyseOptions | RecoverOptions
 
 SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
-"""Noise of a stimulus, JOD, that the sweep of the observer covers."""
+"""Noise of a stimulus in the sweep of the observer, JOD."""
 
 POWER_OBSERVERS, POWER_ANSWERS = (6, 12, 24, 48), (4, 12)
 
@@ -127,20 +127,20 @@ def _answered(session: Session, options: ServeOptions, bars: Bars) -> None:
     task.reach(len(session.answers))
     try:
         with serving(session, options.port, options.break_every) as address:
-            bars.say(f"open {address} in a browser; Ctrl-C ends, and the same command goes on")
+            bars.say(f"open {address} in a browser; Ctrl-C ends, and the same command continues")
             while session.current is not None:
                 time.sleep(0.2)
                 task.reach(len(session.answers))
                 if session.fault is not None:
-                    time.sleep(1.0)  # for the page to hear of it
+                    time.sleep(1.0)  # so that the page learns of it
                     raise session.fault
-            time.sleep(1.0)  # for the page to hear of its last answer
+            time.sleep(1.0)  # so that the page learns of its last answer
     except KeyboardInterrupt:
         settled()  # answers are on disk
 
 
 def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
-    """Puts thesis and the framed renderer before the same observer."""
+    """Shows thesis and the framed renderer to the same observer."""
     from analysis.perception.adaptive import judged, scores, thresholds
 
     table = judged(scores(options, bars.task("runs", 12 * len(options.inputs))), options.sigma_jod)
@@ -207,8 +207,8 @@ def analyse(options: AnalyseOptions, bars: Bars) -> Found:
 
 
 def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame, kind: str) -> None:
-    """Figures 19 and 20 by scene, 21 to 23 by set, 24 and 25 of all of both; all of the first filter alone, and one of
-    the filters where there are several.
+    """Figures 19 to 25: shares of right answers by scene and by point set, each value alone and all together, for the
+    first filter; and one figure by filter if there are several.
     """
     from analysis.page.figures import save
 

@@ -29,11 +29,11 @@ from analysis.perception.protocol import Session
 
 HOST = "127.0.0.1"
 BODY_MAX = 1 << 16
-"""Bytes of an answer that are read."""
+"""Most bytes of an answer."""
 CONNECTIONS_MAX = 64
-"""Open connections; one more closes the oldest, so that idle connections block no other."""
+"""Most open connections; one more closes the oldest, so that idle connections block no others."""
 TIMEOUT_S = 30.0
-"""To send a whole request in."""
+"""Seconds within which a whole request must arrive."""
 
 _HERE = Path(__file__).parent
 _THREADS = 4
@@ -48,7 +48,7 @@ class _Service:
 
 
 class _Handler(RequestHandler):
-    """Refuses what does not come from the page of this session."""
+    """Refuses requests that do not come from the page of this session."""
 
     def initialize(self, service: _Service) -> None:
         self.service = service
@@ -59,17 +59,17 @@ class _Handler(RequestHandler):
             raise HTTPError(HTTPStatus.MISDIRECTED_REQUEST)
         origin = headers.get("Origin")
         if origin is not None and origin not in {f"http://{host}" for host in hosts}:
-            raise HTTPError(HTTPStatus.FORBIDDEN, "the page of another server asks")
+            raise HTTPError(HTTPStatus.FORBIDDEN, "the request comes from the page of another server")
 
     def write_error(self, status_code: int, **facts: Any) -> None:
-        """One line of text."""
+        """Answers an error with one line of text."""
         error = facts.get("exc_info", (None, None))[1]
         said = error.log_message % error.args if isinstance(error, HTTPError) and error.log_message else None
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{said or self._reason}\n")
 
     def log_exception(self, *error: Any) -> None:
-        """Says nothing: the page is told."""
+        """Logs nothing, because the page shows the error."""
 
     def state(self) -> None:
         self.set_header("Cache-Control", "no-store")
@@ -80,7 +80,7 @@ class _Asset(_Handler):
     def get(self, name: str) -> None:
         name = name or "trial_page.html"
         self.set_header("Content-Type", "text/javascript" if name.endswith(".js") else "text/html; charset=utf-8")
-        # the same address shows another session later
+        # the same address may serve another session later
         self.set_header("Cache-Control", "no-store")
         self.set_header("X-Frame-Options", "DENY")
         self.finish((_HERE / name).read_text(encoding="utf-8").replace("{{token}}", self.service.session.token))
@@ -119,7 +119,7 @@ class _Answer(_Guarded):
 
 class _Frame(_Guarded):
     async def get(self, stimulus: str, number: str) -> None:
-        """A frame of a stimulus by numbers; no path from outside reaches the disk."""
+        """Sends a frame of a stimulus by its numbers; no path from a request reaches the disk."""
         session, loop = self.service.session, asyncio.get_running_loop()
         try:
             content = await loop.run_in_executor(self.service.threads, session.frame, int(stimulus), int(number))
@@ -128,7 +128,7 @@ class _Frame(_Guarded):
         except InputError as error:
             raise HTTPError(HTTPStatus.INTERNAL_SERVER_ERROR, "%s", str(error)) from None
         self.set_header("Content-Type", "image/png")
-        # kept by the browser, but not for another session at this address
+        # the browser may cache it, but not for another session at this address
         self.set_header("Cache-Control", "private, max-age=3600")
         self.set_header("Vary", "X-Token")
         self.finish(content)
@@ -150,7 +150,7 @@ class _Bounded(HTTPServer):
 
 
 def _state(session: Session, break_every: int) -> dict[str, Any]:
-    """What the page needs to go on: the current trial, without saying which pair differs in words."""
+    """State of the page: the current trial, without naming the pair that differs."""
     trial = session.current
     done, total = len(session.answers), len(session.trials)
     found: dict[str, Any] = {
@@ -172,16 +172,16 @@ def _state(session: Session, break_every: int) -> dict[str, Any]:
 
 @contextmanager
 def serving(session: Session, port: int = 0, break_every: int = 24) -> Iterator[str]:
-    """Serves a session while the block runs; the address of its page.
+    """Serves a session while the block runs; yields the address of its page.
 
     Raises:
-        InputError: the port cannot be had.
+        InputError: the port is not available.
     """
-    logging.getLogger("tornado").setLevel(logging.CRITICAL)  # the terminal shows the progress
+    logging.getLogger("tornado").setLevel(logging.CRITICAL)  # no log: the terminal shows the progress
     try:
         (listener,) = bind_sockets(port, HOST)
     except OSError as error:
-        raise InputError(f"port: expected one that is free, got {port} ({error.strerror})") from None
+        raise InputError(f"port: expected a free one, got {port} ({error.strerror})") from None
     port = listener.getsockname()[1]
     hosts = frozenset(f"{name}{end}" for name in (HOST, "localhost") for end in [f":{port}", *([""] * (port == 80))])
     loop, over = asyncio.new_event_loop(), asyncio.Event()

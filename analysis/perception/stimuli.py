@@ -1,4 +1,4 @@
-"""Stimuli of the study: sequences rendered from job files, a manifest of what they are, and how far they differ."""
+"""Stimuli of the study: sequences rendered from job files, their manifest, and their differences in JOD."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from analysis.tracer.options import JobOptions
 
 MANIFEST = "manifest.json"
 COLUMNS = ("scene", "point_set", "time_filter", "samples", "folder", "files", "sha256")
-"""What the manifest says of every stimulus, among other things."""
+"""Entries that the manifest has for every stimulus, among others."""
 
 
 def render_stimuli(options: StimuliOptions, bars: Bars) -> dict[str, Any]:
-    """Renders what is missing and writes the manifest.
+    """Renders missing stimuli and writes the manifest.
 
     Args:
         options: jobs, size and length.
-        bars: show how far it is.
+        bars: progress bars.
 
     Returns:
-        The manifest: a row a stimulus, with its folder, number of frames and their hash.
+        The manifest: one row a stimulus, with its folder, number of frames and their hash.
     """
     rows: list[dict[str, Any]] = []
     for job_file in options.jobs:
@@ -86,7 +86,7 @@ def write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
 
 
 def _film(files: Sequence[Path], rate_hz: float) -> dict[str, str]:
-    """Joins frames into a film that keeps every value, unless it is on disk; its name and hash."""
+    """Joins frames into a lossless film, unless it is on disk; returns its name and hash."""
     from renderer.film.sequence import write_lossless
 
     code = code_hash(write_lossless, read_frame)
@@ -102,7 +102,7 @@ def _film(files: Sequence[Path], rate_hz: float) -> dict[str, str]:
 
 
 def hash_of(files: Sequence[Path]) -> str:
-    """SHA-256 of files, one behind the other."""
+    """SHA-256 of the concatenation of files."""
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
@@ -113,24 +113,24 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """The manifest of a folder of stimuli.
 
     Raises:
-        InputError: there is none, it is not as it was written, or it cannot be read.
+        InputError: there is no manifest, it has changed since it was written, or it cannot be read.
     """
     try:
         found = Store(folder, MANIFEST, say=lambda line: None).read_json(MANIFEST, dict)
         if found is None:
-            raise ValueError("there is none as it was written")
+            raise ValueError("it is missing or damaged")
         whole = float(found["frame_rate_hz"]) > 0.0 and len(found["size_px"]) == 2
         for row in found["stimuli"]:
             whole = whole and all(name in row for name in COLUMNS) and row["samples"] > 0
         if not whole:
-            raise ValueError("it is not whole")
+            raise ValueError("it is incomplete")
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"stimuli: expected {folder / MANIFEST}, written by the command 'stimuli' ({error})") from None
     return found
 
 
 def read_frame(file: Path) -> NDArray[np.uint8]:
-    """A frame ``(h, w, 3)`` as it is shown; one of linear radiance is encoded.
+    """A frame ``(h, w, 3)`` encoded for display; linear radiance is encoded as sRGB.
 
     Raises:
         OSError: the file cannot be opened.
@@ -183,14 +183,14 @@ def check_frames(folder: Path, row: dict[str, Any]) -> list[Path]:
 
 
 def differences(folder: Path, display: DisplayModel, bars: Bars) -> pd.DataFrame:
-    """How many JOD every stimulus is from the one with the most samples of its scene, set and filter.
+    """Difference in JOD of every stimulus from that with the most samples of its scene, set and filter.
 
-    Scores are kept in ``jod.journal`` of the folder, by the hashes of both stimuli, the display and the metric.
+    Scores are kept in ``jod.journal`` in the folder, by the hashes of both stimuli, the display and the metric.
 
     Args:
-        folder: of the stimuli.
-        display: that the scores hold for.
-        bars: show how far it is.
+        folder: folder of the stimuli.
+        display: display that the scores assume.
+        bars: progress bars.
     """
     from analysis.metrics.perceptual import jod
 

@@ -11,24 +11,24 @@ from analysis.command.cli import InputError
 from analysis.perception.observers import COLUMNS
 
 CONDITIONS = ("scene", "point_set", "time_filter")
-"""What trials differ in besides the level."""
+"""Columns in which trials differ besides the level."""
 
 _RIGHT = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 _SIDES = ("left", "right")
 
 
 def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
-    """The trials that have an answer, and of which kind their observers are.
+    """The trials that have an answer, and the kind of their observers.
 
     Args:
-        table: as it was read; trials without ``correct`` have no answer.
-        name: of the file, for messages.
+        table: table from a file; trials without ``correct`` have no answer.
+        name: name of the file, for messages.
 
     Returns:
-        Trials with ``correct`` as booleans, ``samples`` as whole numbers, names as text.
+        Trials with ``correct`` as booleans, ``samples`` as integers, names as text.
 
     Raises:
-        InputError: columns are missing or hold what they cannot, kinds are mixed, or there is no answer.
+        InputError: a column is missing or has an invalid value, kinds are mixed, or there is no answer.
     """
     missing = [column for column in COLUMNS if column not in table.columns]
     if missing:
@@ -61,7 +61,7 @@ def _converted(table: pd.DataFrame, column: str, convert: Any, expected: str, na
 
 
 def _as_right(value: Any) -> bool:
-    """Whether an answer was right, as a boolean, as 0 or 1, or as text that says so."""
+    """Whether an answer was right, from a boolean, 0 or 1, or text such as yes or no."""
     if isinstance(value, str):
         return _RIGHT[value.strip().lower()]
     if value not in (0, 1):
@@ -77,7 +77,7 @@ def _as_level(value: Any) -> int:
 
 
 def _as_name(value: Any) -> str:
-    """A name that can be one of a file, too."""
+    """A name that is also valid as a file name."""
     if isinstance(value, (int, np.integer)):
         return str(value)
     if not isinstance(value, str) or not value.strip() or value.startswith(".") or any(c in value for c in "/\\\0"):
@@ -91,10 +91,10 @@ _NAME = _as_name, "a name without slashes that does not begin with a dot"
 
 
 def _check_sides(trials: pd.DataFrame, name: str) -> None:
-    """What is right must be so by the sides too, where both are given.
+    """Checks that ``correct`` agrees with the sides, if both are given.
 
     Raises:
-        InputError: a trial says otherwise.
+        InputError: a trial contradicts its sides.
     """
     given = trials["answer"].isin(_SIDES) & trials["differing_side"].isin(_SIDES)
     wrong = np.flatnonzero(given & ((trials["answer"] == trials["differing_side"]) != trials["correct"]))

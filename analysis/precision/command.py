@@ -1,8 +1,8 @@
-"""Measure what fewer bits cost: everything that a policy keeps, and textures, in formats down to 8 bits.
+"""Measure the cost of fewer bits: everything that a policy keeps, and textures, in formats down to 8 bits.
 
-Each run holds one thing in another format between the stages, or all of it, on the five inputs. Reported are the error
-over that of the policy as it is, and the first batch that it asks for otherwise. Arithmetic stays float32, but for runs
-in float64.
+Each run holds one kind of value, or all of them, in another format between the stages, on the five inputs. The report
+has the error over that of the unchanged policy, and the first batch that differs. Arithmetic stays float32, except in
+runs in float64.
 
 Examples: python scripts/precision.py --out out/precision
           python scripts/precision.py --inputs fly-by --policies tsar --kept colors variances --out out/two
@@ -34,8 +34,8 @@ def main() -> None:
 
 
 def study(options: PrecisionOptions) -> dict[str, Any]:
-    """Runs what is missing, writes everything to ``options.out`` and prints the tables. Returns what ``summary.json``
-    holds.
+    """Makes missing runs, writes everything to ``options.out`` and prints the tables. Returns the content of
+    ``summary.json``.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.

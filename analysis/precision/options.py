@@ -16,32 +16,31 @@ from tsar.config import TsarConfig, closed_choices, require
 @dataclass(frozen=True)
 @closed_choices()
 class PrecisionOptions:
-    """What a policy keeps from one stage to the next, and textures, in numbers of fewer bits. Runs that are on disk are
+    """The values that a policy keeps from one stage to the next, and textures, in fewer bits. Runs that are on disk are
     not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs."""
     policies: tuple[Literal["tsar", "thesis"], ...] = ("tsar", "thesis")
-    """Whose numbers."""
+    """Policies to study."""
     kept: tuple[str, ...] = ()
-    """Names of what is held in other formats, each alone; none for everything. A wrong name lists them."""
+    """Names of the kinds of values to change, each alone; all where none is named. An unknown name prints the list."""
     row: int = 7
     """Row of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as of the suitability study."""
+    """Sizes, as in the suitability study."""
     repetitions: int = 1
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
-    """Of all runs; batch and resolution come from the row, the seed from the repetition."""
+    """The pipeline of all runs; batch and resolution come from the row, the seed from the repetition."""
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
     tolerance: float = 0.01
-    """A format is safe where no run breaks an invariant and the error, in the mean of all runs, is greater by no more
-    than this share."""
+    """A format is safe if no run breaks an invariant and the mean error of all runs grows by at most this share."""
     markdown: bool = False
     """Print the table as Markdown."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
-    """Where the runs are made."""
+    """Where the runs are computed."""
     out: Path = Path("out/precision")
     """Folder for the results."""
     cache: References = REFERENCES

@@ -1,4 +1,4 @@
-"""Which runs the study of precision has: everything that a policy keeps, in every format, alone and together."""
+"""The runs of the study of precision: everything that a policy keeps, in every format, alone and together."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tsar.policies.stored import ALL
 
 TEXTURES = "textures"
 OWN = "as it is"
-"""The format that is the policy's own."""
+"""Stands for the policy's own formats."""
 COLORS = ("bfloat16", "float16", "unorm8")
 NUMBERS = ("bfloat16", "float16", "float8")
 DOUBLES = ("float32", "bfloat16", "float16")
@@ -42,8 +42,8 @@ KEPT: dict[str, dict[str, tuple[str, ...]]] = {
         TEXTURES: COLORS,
     },
 }
-"""What each policy keeps (:data:`tsar.policies.stored.FIELDS`), and the formats in which it is tried. Times and
-densities are float64 of their own, everything else float32."""
+"""The values that each policy keeps (:data:`tsar.policies.stored.FIELDS`), and the formats to try for them. By default
+times and densities are float64, and everything else is float32."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Run:
     """A case and its place in the study.
 
     Attributes:
-        policy, kept, form: whose numbers, which, and their format; :data:`OWN` for the run that others are compared to.
+        policy, kept, form: the policy, the kind of its values, and their format; :data:`OWN` for the unchanged policy.
         repetition: 0, 1, …
     """
 
@@ -66,7 +66,7 @@ def runs(options: PrecisionOptions) -> list[Run]:
     """Every run.
 
     Raises:
-        ConfigError: none of the policies keeps something that is asked for.
+        ConfigError: no policy keeps a kind of value that was asked for.
     """
     known = dict.fromkeys(name for policy in options.policies for name in KEPT[policy])
     for name in options.kept:
@@ -81,7 +81,7 @@ def runs(options: PrecisionOptions) -> list[Run]:
             scale=scale,
             phase=repetition / options.repetitions,
             start_s=options.start_s,
-            formats=(("samples", "float32"),),  # changes nothing; what is asked for is noted
+            formats=(("samples", "float32"),),  # changes nothing, but records the requested batches
         )
         found.append(Run(policy, OWN, OWN, repetition, whole))
         for kept, forms in KEPT[policy].items():

@@ -1,4 +1,4 @@
-"""From the results of the study of precision to its tables. The order in which runs were made does not matter."""
+"""Tables from the results of the study of precision. They do not depend on the order of the runs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ BITS = {"float64": 64, "float32": 32, "bfloat16": 16, "float16": 16, "float8": 8
 
 @dataclass(frozen=True)
 class Result:
-    """What is on disk of a run.
+    """A run as read from disk.
 
     Attributes:
         run: its place in the study.
         mse: mean over the reference times.
-        asked: a hash of each batch that it asked for, throw-away ones and warm-up included.
+        asked: a hash of each requested batch, including throw-away ones and the warm-up.
         broken: whether a cycle broke an invariant.
     """
 
@@ -33,7 +33,7 @@ class Result:
 
 
 def same_for(asked: Sequence[str], others: Sequence[str]) -> int:
-    """How many batches two runs ask for alike before the first that differs."""
+    """Number of equal batches that two runs request before the first that differs."""
     for number, (one, other) in enumerate(zip(asked, others, strict=False)):
         if one != other:
             return number
@@ -41,8 +41,8 @@ def same_for(asked: Sequence[str], others: Sequence[str]) -> int:
 
 
 def run_table(results: Iterable[Result]) -> pd.DataFrame:
-    """A line a run in another format: its error over that of the policy as it is, and how many batches the two ask for
-    alike. Runs whose counterpart is missing are left out."""
+    """A line for each run in another format: its error over that of the unchanged policy, and the number of batches
+    before their requests differ. Runs whose counterpart is missing are left out."""
     results = list(results)
     own = {_place(one.run): one for one in results if one.run.form == OWN}
     lines = []
@@ -71,8 +71,8 @@ def _place(run: Run) -> tuple[str, str, int]:
 
 
 def format_table(lines: pd.DataFrame, tolerance: float) -> pd.DataFrame:
-    """A line a policy, what it keeps, and a format: ``change`` is the geometric mean over all runs, ``least`` and
-    ``most`` are those of single ones; ``safe`` says that it is at most ``1 + tolerance``, and that no invariant
+    """A line for each policy, kind of value and format: ``change`` is the geometric mean over all runs, ``least`` and
+    ``most`` are those of single runs; ``safe`` means that ``change`` is at most ``1 + tolerance`` and no invariant
     broke."""
     found = []
     groups: Any = lines.groupby(["policy", "kept", "format"], sort=False) if len(lines) else ()
@@ -96,8 +96,8 @@ def format_table(lines: pd.DataFrame, tolerance: float) -> pd.DataFrame:
 
 
 def least_safe(formats: pd.DataFrame) -> pd.DataFrame:
-    """A line a policy and what it keeps alone: the safe format of fewest bits, and of several the one of least error;
-    empty where none of those tried is."""
+    """A line for each policy and kind of value: the safe format of fewest bits and, among several, of least error;
+    empty if none of the formats tried is safe."""
     found = []
     groups: Any = formats.groupby(["policy", "kept"], sort=False) if len(formats) else ()
     for (policy, kept), group in groups:
@@ -108,7 +108,7 @@ def least_safe(formats: pd.DataFrame) -> pd.DataFrame:
 
 
 def shown_tables(formats: pd.DataFrame, tolerance: float) -> list[Table]:
-    """The tables as people read them."""
+    """The tables as text."""
     rows = [
         [
             line["policy"],
@@ -138,6 +138,6 @@ def shown_tables(formats: pd.DataFrame, tolerance: float) -> list[Table]:
     ]
     title = f"The format of fewest bits whose error is greater by at most {100.0 * tolerance:g} %"
     return [
-        Table("Mean error over that of the policy as it is, and where a batch first differs", header, rows),
+        Table("Mean error over that of the unchanged policy, and the first batch that differs", header, rows),
         Table(title, ["policy", "kept", "format", "error"], safe),
     ]

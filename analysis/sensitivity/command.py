@@ -1,4 +1,5 @@
-"""Vary slopes, offsets and bias of the error estimate (figs 7.23–7.25): which are best, and how flat the optimum is.
+"""Vary slopes, offsets and bias of the error estimate (figs 7.23–7.25): the best values, and the flatness of the
+optimum.
 
 Examples: python scripts/sensitivity.py --scale quick --out out/sensitivity
           python scripts/sensitivity.py --inputs fast-crossing --spatial-slopes -3 -2 -1 --offsets --biases
@@ -15,7 +16,7 @@ from analysis.sensitivity.options import SensitivityOptions
 
 
 def main() -> None:
-    """Runs what is missing; prints what is best, and how flat it is."""
+    """Makes missing runs; prints the best settings, and the flatness of the optimum."""
     options = parse(SensitivityOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.command.console import show

@@ -24,14 +24,14 @@ class SensitivityOptions:
     row: int = 7
     """Row of table 7.2 that gives batch and resolution, 0 to 15; 7 is batch 128 at 512²."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """thesis: its resolution and batch. half: half the side, and a quarter of the samples, tiles and machine. quick: a
-    quarter of the side, against a reference half as often."""
+    """thesis: its resolution and batch. half: half the side, and a quarter of samples, tiles and machine speed.
+    quick: a quarter of the side, and half the rate of the reference."""
     spatial_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
     """Spatial slopes of the grid, steepest first."""
     temporal_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
     """Temporal slopes of the grid, steepest first."""
     offsets: tuple[float, ...] = (-4.0, -2.0, 0.0, 2.0, 4.0)
-    """Added to the spatial offset and, in runs of their own, to the temporal one."""
+    """Values added to the spatial offset and, in separate runs, to the temporal one."""
     biases: tuple[float, ...] = (-2.0, -1.0, 0.0, 1.0, 2.0)
     """Biases, octaves; positive towards space."""
     repetitions: int = 1
@@ -39,13 +39,13 @@ class SensitivityOptions:
     figure_input: str = "fast-crossing"
     """The input that is shown as pictures."""
     still_s: float = 0.65
-    """When the pictures are taken, seconds after the start."""
+    """Time of the pictures, seconds after the start."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The default setting, marked by an asterisk; batch and resolution come from the row, seed from the repetition."""
     ledger: Ledger = "thesis"
-    """How cost is counted; wall is refused, for it gives no result twice."""
+    """How cost is counted; wall is refused, because its results are not repeatable."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
-    """Where the runs are made."""
+    """Where the runs are computed."""
     out: Path = Path("out/sensitivity")
     """Folder for the results."""
     cache: References = REFERENCES

@@ -1,4 +1,4 @@
-"""Figures 7.23 to 7.25 of a sensitivity study, and what was measured as maps and lines; computes nothing."""
+"""Figures 7.23 to 7.25 of a sensitivity study, and its measurements as maps and lines; computes nothing."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def write_all(
     keys: Mapping[Setting | None, str],
     place: Place,
 ) -> list[Path]:
-    """Draws every figure there are results for.
+    """Draws every figure that has results.
 
     Args:
-        folder: where they go.
-        options: of the study.
+        folder: folder for the figures.
+        options: options of the study.
         lines: one per sweep, input and setting.
         settings: pairs of slopes.
-        keys: results of the input that is shown, by setting.
-        place: where they are.
+        keys: keys of the results of the input that is shown, by setting.
+        place: gives the folder of a result by its key.
 
     Returns:
         The files.
@@ -73,7 +73,7 @@ def write_all(
     files = []
     for name, figure in figures.items():
         file = folder / f"{name}.png"
-        # a figure of an earlier study must not stand beside the results of this one
+        # a figure of an earlier study must not stay beside the results of this one
         file.unlink(missing_ok=True)
         file.with_suffix(".svg").unlink(missing_ok=True)
         if figure is not None:
@@ -88,7 +88,7 @@ def _show(axis: Axes, path: Path) -> None:
 
 
 def reference_figure(paths: Sequence[Path], title: str) -> Figure | None:
-    """The reference (fig. 7.23): the same beside every run, so the first file there is."""
+    """The reference (fig. 7.23), from the first file that exists: all runs have the same one."""
     path = next((path for path in paths if path.exists()), None)
     if path is None:
         return None
@@ -109,10 +109,10 @@ def grid_figure(
     """Pictures by slope (figs 7.24, 7.25): sensitivity falls to the right in space and downwards in time.
 
     Args:
-        pictures: files by temporal and spatial slope; what is missing stays empty.
+        pictures: files by temporal and spatial slope; missing ones stay empty.
         default: the default pair, marked by an asterisk.
-        title: above the figure.
-        bounds: of the colours, refreshes per cycle, where they show that.
+        title: text above the figure.
+        bounds: bounds of the colour scale, refreshes per cycle; None for pictures without a scale.
     """
     if not any(path is not None and path.exists() for path in pictures.values()):
         return None
@@ -147,7 +147,7 @@ def grid_figure(
 
 
 def map_figure(lines: Lines) -> Figure | None:
-    """Error ratio over the slopes, a map per input; colours say how it compares with the default setting."""
+    """Error ratio over the slopes, a map per input; colours compare it with the default setting."""
     maps: dict[str, list[Mapping[str, Any]]] = {}
     for line in lines:
         if not np.isnan(line["mse"]):

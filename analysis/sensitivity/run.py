@@ -19,10 +19,10 @@ from analysis.study.farm import describe_failures, run_study
 
 
 def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
-    """Runs what is missing and writes everything to ``options.out``.
+    """Makes missing runs and writes everything to ``options.out``.
 
     Returns:
-        What is in ``summary.json``, and names of the results whose cycles broke an invariant.
+        The content of ``summary.json``, and names of the results whose cycles broke an invariant.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -37,7 +37,7 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
         for run in planned
         if run.case not in summaries
     }
-    for line in describe_failures(failed):  # at once: what follows may fail for the same reasons, such as a full disk
+    for line in describe_failures(failed):  # at once: later steps may fail for the same reason
         print(line, file=sys.stderr)
     results = {run.place: outcomes.times(run.case) for run in done}
     tables = {"settings": setting_table(results, options), "optima": optimum_table(results, options)}

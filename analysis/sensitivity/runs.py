@@ -1,4 +1,4 @@
-"""Which runs show how much the result depends on the error estimate's template and on the bias.
+"""The runs that measure the dependence of the result on the error estimate's template and on the bias.
 
 The slopes of the template are varied together, its offsets and the bias one at a time.
 
@@ -19,7 +19,7 @@ from tsar.config import TsarConfig
 
 @dataclass(frozen=True)
 class Setting:
-    """What is varied."""
+    """The varied parameters: slopes and offsets of the template, and the bias."""
 
     spatial_slope: float
     temporal_slope: float
@@ -49,11 +49,12 @@ AXES = {
     "temporal offset": ("temporal_offset",),
     "bias": ("bias",),
 }
-"""Sweeps, and what each varies."""
+"""Sweeps, and the parameters that each varies."""
 
 
 def sweeps(options: SensitivityOptions) -> dict[str, list[Setting]]:
-    """Settings of every sweep; of the slopes, rows of temporal ones, each with the steepest spatial one first."""
+    """Settings of every sweep; those of the slopes in rows of equal temporal slope, each with the steepest spatial one
+    first."""
     base = Setting.of(options.tsar)
     slopes = itertools.product(sorted(options.temporal_slopes), sorted(options.spatial_slopes))
     offsets = sorted(options.offsets)

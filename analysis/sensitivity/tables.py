@@ -1,4 +1,4 @@
-"""From the results of a sensitivity study to its tables: which settings are best, and how flat the optimum is."""
+"""Tables from the results of a sensitivity study: the best settings, and the flatness of the optimum."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 ALL = "all inputs"
-"""In place of an input: the geometric mean of the errors of all."""
+"""Stands in the column of inputs for the geometric mean of the errors of all inputs."""
 BEST = ("to_default", "edge", "low", "high", "held_out", "beyond_spread")
-"""Columns of the table of optima that say how good the best setting is; the others say how flat the sweep is."""
+"""Columns of the table of optima on the best setting; the others describe the flatness of the sweep."""
 _FLAT = 1e-9
 _DRAWS = 4000
 
 Line = dict[str, Any]
-"""Of a table, by column."""
+"""A line of a table, by column."""
 Results = Mapping[tuple[str, "Setting | None", int], "pd.DataFrame"]
 """Tables over the reference times by input, setting and repetition. Runs that failed are missing."""
 
@@ -64,7 +64,7 @@ def setting_table(results: Results, options: SensitivityOptions) -> list[Line]:
 
 
 def optimum_table(results: Results, options: SensitivityOptions) -> list[Line]:
-    """The best setting of every sweep and input, how much better than the default it is, and how flat the sweep is."""
+    """The best setting of every sweep and input, its gain over the default, and the flatness of the sweep."""
     default, lines = Setting.of(options.tsar), []
     names = (*options.inputs, ALL) if results else ()
     for (sweep, settings), name in itertools.product(sweeps(options).items(), names):
@@ -92,9 +92,9 @@ def _optimum(found: Floats, base: Floats, settings: Sequence[Setting], axes: tup
 def beyond_spread(found: Floats, base: Floats) -> Line:
     """Whether the best of settings ``(settings, repetitions)`` beats the default ``(repetitions,)`` beyond the spread.
 
-    ``held_out`` is the error, over the default's, of settings that were chosen on the other repetitions, because the
-    best of many is partly best by chance. Both it and the bootstrap interval have to lie below 1. With one repetition
-    nothing can be said.
+    ``held_out`` is the error, over that of the default, of settings that were chosen on the other repetitions, because
+    the best of many is partly best by chance. Both it and the bootstrap interval must lie below 1. One repetition
+    allows no conclusion.
     """
     count = len(base)
     if count == 1:
@@ -108,7 +108,7 @@ def beyond_spread(found: Floats, base: Floats) -> Line:
 
 
 def edge(point: Floats, points: Floats, axes: Sequence[str]) -> str:
-    """At which ends of what was varied a point lies; empty inside."""
+    """The ends of the varied ranges at which a point lies; empty if it lies inside."""
     names, words = [], {True: ("steepest", "flattest"), False: ("least", "greatest")}
     for axis, value, column in zip(axes, point, points.T, strict=True):
         low, high = column.min() + _FLAT, column.max() - _FLAT
@@ -118,11 +118,12 @@ def edge(point: Floats, points: Floats, axes: Sequence[str]) -> str:
 
 
 def bowl(points: Floats, mse: Floats) -> Line:
-    """Least-squares fit of ``ln mse`` by a quadratic of two slopes, and where on the grid it is least.
+    """Least-squares fit of ``ln mse`` by a quadratic in two slopes, and its minimum within the grid.
 
     Returns:
-        Second derivatives, root mean square of what is left, whether it is convex, and its minimum: the place where it
-        is convex and that lies within the grid, else the edge of the grid. Empty for less than a grid of 3 x 3.
+        Second derivatives, root mean square residual, whether the fit is convex, and its minimum: the stationary point
+        if the fit is convex and the point lies within the grid, else a point on the edge of the grid. Empty for less
+        than a grid of 3 x 3.
     """
     (x, y), centre = (points - points.mean(0)).T, points.mean(0)
     terms = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], 1)
@@ -138,7 +139,7 @@ def bowl(points: Floats, mse: Floats) -> Line:
         least = np.linalg.solve(second, -slope)
         if (least >= low - _FLAT).all() and (least <= high + _FLAT).all():
             return found | {"fit_spatial_slope": (least + centre)[0], "fit_temporal_slope": (least + centre)[1]}
-    # on an edge one coordinate is fixed and the rest is a parabola; where it is not convex its end is least
+    # on an edge one coordinate is fixed and the fit is a parabola; if that is not convex, its minimum is at an end
     candidates = []
     for fixed, value in itertools.product((0, 1), (low, high)):
         free, at = 1 - fixed, value[fixed]
@@ -152,7 +153,7 @@ def bowl(points: Floats, mse: Floats) -> Line:
 
 
 def shown_tables(optima: Sequence[Line]) -> list[Table]:
-    """The best setting of every sweep, and how flat the sweep is, for a terminal."""
+    """The best setting of every sweep, and the flatness of the sweep, for a terminal."""
     import pandas as pd
 
     from analysis.command.console import frame_table

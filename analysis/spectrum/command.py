@@ -1,7 +1,7 @@
-"""Measure what the error estimate rests on.
+"""Measure the assumptions of the error estimate.
 
-Power-spectrum slopes of frames, framelets and pictures (figs 1.3, 1.4), the ideal sample density of a tile
-(figs 5.3–5.5), and whether the streaming estimate points at it.
+These are the power-spectrum slopes of frames, framelets and pictures (figs 1.3, 1.4), the ideal sample density of a
+tile (figs 5.3–5.5), and the agreement of the streaming estimate with it.
 
 Examples: python scripts/spectrum.py --out out/spectrum
           python scripts/spectrum.py photograph.jpg render.exr --only slopes
@@ -14,7 +14,7 @@ from analysis.spectrum.options import SpectrumOptions
 
 
 def main() -> None:
-    """Parses, measures, prints what came out and where it is."""
+    """Parses, measures, prints the outcome and the place of the files."""
     options = parse(SpectrumOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.spectrum.run import run_study

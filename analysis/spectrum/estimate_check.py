@@ -1,6 +1,6 @@
-"""How well the streaming estimate of sample-rate error points at the ideal density: the check of the error estimator.
+"""Check of the error estimator: the agreement of its streaming estimate with the direction to the ideal density.
 
-The estimate φ sees a framelet at the current rates and the one before; the truth is the direction from those rates to
+The estimate φ uses a framelet at the current rates and the previous one. The truth is the direction from those rates to
 Θ*, which is found in a volume rendered at higher rates. Source: Stephens 2011, fig. 5.1 and sec. 5.1.2.2.
 """
 
@@ -40,11 +40,11 @@ _INTERVAL = (2.5, 97.5)
 def streaming_error(
     volume: Float[Tensor, "n t y x"], stride_space: int, stride_time: int, config: ErrorConfig, elements: int
 ) -> Float[Tensor, "n updates 2"]:
-    """``(φ_s, φ_t)`` of tiles, of so many elements each, refreshed at a lower rate, by the pipeline's own estimate.
+    """``(φ_s, φ_t)`` of tiles of ``elements`` elements each, refreshed at a lower rate, by the pipeline's own estimate.
 
-    Framelets of 16 x 16 samples are taken from the volume, several side by side where the stride is fine; their errors
-    are averaged, as are those of the parts of one. The first refresh has no past and gives no update. Samples lie half
-    a sample of the volume off the centres of their cells.
+    Framelets of 16 x 16 samples are taken from the volume, several side by side if the stride is fine. Their errors
+    are averaged, as are those of the parts of each. The first refresh has no history and gives no update. Samples lie
+    half a sample of the volume off the centres of their cells.
     """
     taken = volume[:, ::stride_time, stride_space // 2 :: stride_space, stride_space // 2 :: stride_space]
     tiles, frames, side = taken.shape[0], taken.shape[1], taken.shape[3]
@@ -66,7 +66,7 @@ def streaming_error(
 
 @dataclass(frozen=True)
 class Rates:
-    """Rates at which the estimate is tried on a volume: strides along its sides and its times."""
+    """Rates at which the estimate is evaluated on a volume: strides along its sides and its times."""
 
     space: tuple[int, ...]
     time: tuple[int, ...]
@@ -79,8 +79,8 @@ class Rates:
 
 @dataclass(frozen=True)
 class Tiles:
-    """What is kept of volumes: their norms, the rates tried, and the estimate at each, averaged over the updates and
-    of the last update alone."""
+    """Measurements of volumes: their norms, the rates, and the estimate at each rate, averaged over the updates and of
+    the last update alone."""
 
     norm: Float[Tensor, "n t s"]
     theta: Float[Tensor, "rates 2"]
@@ -96,7 +96,7 @@ class Tiles:
 def measure(
     volume: Float[Tensor, "n t samples"], rates: Rates, config: ErrorConfig, elements: int
 ) -> tuple[Tiles, Tensor]:
-    """Norms and estimates of volumes, each of so many elements of the field, and the power that the norms add up."""
+    """Norms and estimates of volumes of ``elements`` elements of the field each, and the power that the norms sum."""
     planes = raster(volume)
     power = octant_power(planes)
     updates = [streaming_error(planes, k, m, config, elements) for k in rates.space for m in rates.time]
@@ -107,15 +107,15 @@ def measure(
 
 @dataclass(frozen=True)
 class Example:
-    """One tile in full. Norm and rates in bins are turned to physical rates by ``unit``.
+    """One tile in full. ``unit`` converts norm and rates from bins to physical rates.
 
     Attributes:
         tiles: the tile's norm and estimates.
-        power: of the bands that do not outlast one cycle a span, by frequency in y and x: the first slice of the norm.
+        power: power of the bands up to one cycle a span, by frequency in y and x: the first slice of the norm.
         level, index: the tile.
         band: ``(f_s, f_t)``.
         unit: samples per pixel side and refreshes per second of one sample per tile side and span.
-        realizable: least and greatest rate of the configuration in those units, for space and time.
+        realizable: least and greatest rate of the configuration in those units, in space and time.
     """
 
     tiles: Tiles
@@ -127,7 +127,8 @@ class Example:
     realizable: tuple[tuple[float, float], tuple[float, float]]
 
     def summary(self) -> dict[str, Any]:
-        """The ideal density ``(2 f_s, 2 f_t)`` (eq. 5.4), and how the estimates on the grid of rates point at it."""
+        """The ideal density ``(2 f_s, 2 f_t)`` (eq. 5.4), and the agreement of the estimates on the grid of rates with
+        it."""
         bands = {tau: [int(f) for f in ideal_band(share_of_total(self.tiles.norm), tau)] for tau in _SHARES}
         return {
             "tile": {"level": self.level, "index": self.index},
@@ -149,7 +150,7 @@ class Example:
 
 
 def measure_example(options: SpectrumOptions, trace: Trace, task: Task) -> Example:
-    """Renders the tile of the options at its high rate; the estimate is tried at every rate the volume holds."""
+    """Renders the tile of the options at its high rate, and evaluates the estimate at every rate of the volume."""
     tsar, level = options.tsar, torch.tensor([options.tile_level])
     cell = torch.tensor([[int(place * 2**options.tile_level)] for place in options.tile_at])
     index = interleave(*cell) if options.tile_index is None else torch.tensor([options.tile_index])
@@ -174,7 +175,7 @@ def measure_example(options: SpectrumOptions, trace: Trace, task: Task) -> Examp
 
 
 def measure_input(options: SpectrumOptions, number: int, trace: Trace, duration_s: float, task: Task) -> Tiles:
-    """Tiles drawn at random at four times over an input."""
+    """Tiles of an input, drawn at random at four times."""
     rng = np.random.default_rng((options.tsar.seed, number))
     side, frames = options.agreement_samples, options.agreement_frames
     coarsest = side // FRAMELET_SIDE
@@ -200,8 +201,9 @@ def joined(tiles: Sequence[Tiles]) -> Tiles:
 def check_estimate(tiles: Mapping[str, Tiles], tau: float) -> dict[str, Any]:
     """The streaming estimate against the true direction.
 
-    For all tiles, for those that change over the span, for one update alone, for each input, and for other thresholds:
-    on the norm as a share of the tile's power, and as it is, for the template has an absolute level too.
+    The agreement is given for all tiles, for those that change over the span, for one update alone, for each input, and
+    for other thresholds: on the norm as a share of the tile's power, and on the norm itself, because the template also
+    has an absolute level.
     """
     every = joined(list(tiles.values()))
     share, phi = share_of_total(every.norm), every.phi.numpy()
@@ -233,33 +235,34 @@ def angle_deg(a: Floats, b: Floats) -> Floats:
 def _figures(phi: Floats, true: Floats) -> Floats:
     """Per pair: angle, within 45 degrees, in the same quadrant, same sign in space, same sign in time."""
     angle = angle_deg(phi, true)
-    same = phi * true >= 0  # a component that is already ideal lies on the border of both quadrants
+    same = phi * true >= 0  # a component that is already ideal lies on the border between two quadrants
     shares = np.stack((angle <= 45.0, same.all(-1), same[..., 0], same[..., 1]), axis=-1).astype(np.float64)
     return np.concatenate((angle[..., None], np.where(np.isnan(angle)[..., None], np.nan, shares)), axis=-1)
 
 
 _NAMES = ("angle_median_deg", "share_within_45_deg", "share_same_quadrant", "share_sign_space", "share_sign_time")
 ISOTROPIC = dict(zip(_NAMES, (90.0, 0.25, 0.25, 0.5, 0.5), strict=True))
-"""What directions drawn uniformly at random would score."""
+"""Figures of directions that are drawn uniformly at random."""
 
 
 def _summary(figures: Floats) -> Floats:
-    """Median angle and means of the shares over the pairs that have a direction; NaN where none has."""
+    """Median angle and means of the shares over the pairs that have a direction; NaN if none has."""
     known = figures[~np.isnan(figures[..., 0])]
     return np.array([np.median(known[:, 0]), *known[:, 1:].mean(0)]) if len(known) else np.full(len(_NAMES), np.nan)
 
 
 def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
-    """How the estimated directions agree with the true ones.
+    """Agreement of the estimated directions with the true ones.
 
     Args:
         phi, true: ``(tiles, rates, 2)``, components in space and time.
-        seed: of resampling.
+        seed: seed of resampling.
 
     Returns:
-        Each figure with its 95 % interval (bootstrap over tiles, for a tile's rates are not independent) and by chance:
-        estimates dealt to other tiles at the same rate, which keeps how often each sign occurs. Beside them quartiles
-        of the angle, tables of signs, correlations. Pairs whose true vector is zero are counted and left out.
+        Each figure with its 95 % interval (bootstrap over tiles, because the rates of a tile are not independent), and
+        its value by chance (``dealt``): with the estimates permuted among the tiles at the same rate, which preserves
+        the frequency of each sign. Also quartiles of the angle, tables of signs, and correlations. Pairs whose true
+        vector is zero are counted and left out.
     """
     rng = np.random.default_rng(seed)
     tiles = len(phi)
@@ -287,8 +290,8 @@ def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
 
 
 def _axis(phi: Floats, true: Floats) -> dict[str, Any]:
-    """Table of signs (rows: estimate asks for less, more; columns: truth asks for less, nothing, more), correlations;
-    NaN where one side is constant."""
+    """Table of signs (rows: the estimate asks for less, more; columns: the truth asks for less, nothing, more), and
+    correlations, which are NaN if one side is constant."""
     rows, signs = (phi <= 0, phi > 0), (-1, 0, 1)
     table = [[int((row & (np.sign(true) == sign)).sum()) for sign in signs] for row in rows]
     constant = np.ptp(phi) == 0 or np.ptp(true) == 0

@@ -29,7 +29,8 @@ def tile_volume(
     times_s: Sequence[float],
     task: Task,
 ) -> Float[Tensor, "n t samples"]:
-    """Renders tiles with ``side * side`` samples each at every time; a time is one batch and one step of the task."""
+    """Renders tiles with ``side * side`` samples each at every time; each time is one batch and one step of the
+    task."""
     position = sample_positions(level, index, side)
     volume = torch.empty(position.shape[0], len(times_s), side * side)
     for frame, time_s in enumerate(times_s):
@@ -47,22 +48,22 @@ def raster(volume: Float[Tensor, "n t samples"]) -> Float[Tensor, "n t y x"]:
 def octant_power(volume: Float[Tensor, "n t y x"], windowed: bool = True) -> Float[Tensor, "n ft fy fx"]:
     """Power of the 3-D Fourier transform ``F``, for frequencies 0 to N/2: ``F̄²(f) = Σ |F(±f_t, ±f_y, ±f_x)|²``.
 
-    Power sums to the (weighted) variance of the volume. The mean is taken off and a Hann window laid over all three
-    axes: neither a tile nor a span of time is periodic, and the jump between its ends would leak power that falls only
-    with the square of frequency into every band, as if the tile were full of detail. The window spreads a frequency
-    over its two neighbours and weighs what lies at the tile's border less.
+    The power sums to the (weighted) variance of the volume. The mean is subtracted and a Hann window is applied along
+    all three axes: neither a tile nor a span of time is periodic, and the jump between its ends would leak power into
+    every band, falling only with the square of frequency, as if the tile were full of detail. The window spreads a
+    frequency over its two neighbours and gives less weight to the border of the tile.
 
     Source: Stephens 2011, eq. 5.1.
 
-    Deviation: eq. 5.1 counts frequencies from 1 on all axes, and so leaves out whatever is constant along any of them:
-    what stands still, and every vertical or horizontal edge. Zero is kept here, but for the mean itself.
+    Deviation: eq. 5.1 counts frequencies from 1 on all axes, and so leaves out everything that is constant along one of
+    them: static content, and every vertical or horizontal edge. Frequency 0 is kept here, except for the mean itself.
     """
     axes = volume.shape[1:]
     hann = [torch.hann_window(n, dtype=volume.dtype) if windowed else torch.ones(n, dtype=volume.dtype) for n in axes]
     window = hann[0][:, None, None] * hann[1][:, None] * hann[2]
     mean = (volume * window).sum((1, 2, 3), keepdim=True) / window.sum()
     power = torch.fft.rfftn((volume - mean).mul_(window), dim=(1, 2, 3)).abs().square_()
-    power[..., 1:-1] *= 2.0  # a real signal's negative frequencies along x, which rfftn leaves out
+    power[..., 1:-1] *= 2.0  # negative frequencies of a real signal along x, which rfftn leaves out
     power = _fold(_fold(power, 1), 2).to(torch.float64)
     power[:, 0, 0, 0] = 0.0
     return power / (window.square().sum(dtype=torch.float64) * window.numel())
@@ -95,11 +96,11 @@ def share_of_total(norm: Float[Tensor, "n t s"]) -> Float[Tensor, "n t s"]:
 
 
 def octave_gain(norm: Float[Tensor, "n t s"]) -> Float[Tensor, "n t s"]:
-    """Magnitude of the norm's gradient on octave axes: what one more octave of either rate would bring,
+    """Magnitude of the norm's gradient on octave axes, which is the gain of one more octave of the rates:
     ``hypot(Norm_ps(2 s, t) - Norm_ps(s, t), Norm_ps(s, 2 t) - Norm_ps(s, t))``.
 
-    Differences are taken to the band twice as wide, or to the edge of what was measured. On octaves a threshold means
-    the same at every rate, size and length of the volume. Source: Stephens 2011, eq. 5.3.
+    Differences are taken to the band twice as wide, or to the edge of the volume's spectrum. On octave axes a threshold
+    means the same at every rate, size and length of the volume. Source: Stephens 2011, eq. 5.3.
     """
     doubled = [(2 * torch.arange(1, n + 1)).clamp(max=n) - 1 for n in norm.shape[1:]]
     return torch.hypot(norm[:, doubled[0]] - norm, norm[:, :, doubled[1]] - norm)
@@ -111,8 +112,8 @@ def ideal_band(norm: Float[Tensor, "n t s"], tau: float) -> tuple[Int64[Tensor, 
 
     Source: Stephens 2011, eq. 5.3–5.4.
 
-    Deviation: eq. 5.3 asks where the gradient's magnitude passes ``tau``, which is a curve, and below which it may also
-    lie in an empty band before the signal's power begins. Scale and ``tau`` are not printed.
+    Deviation: eq. 5.3 asks where the gradient's magnitude crosses ``tau``. That is a curve, and the magnitude may also
+    lie below ``tau`` in an empty band before the signal's power begins. Scale and ``tau`` are not printed.
     """
     worst = octave_gain(norm).flip(1, 2).cummax(1).values.cummax(2).values.flip(1, 2)
     t, s = (torch.arange(1, n + 1) for n in norm.shape[1:])

@@ -17,13 +17,13 @@ from tsar.config import TsarConfig, closed_choices, require
 Part = Literal["slopes", "ideal", "agreement"]
 
 FRAMELET_SIDE = 16
-_SEGMENTS = 4.0  # a sample, as the thesis' inputs have
+_SEGMENTS = 4.0  # segments a sample, as the thesis' inputs have
 
 
 @dataclass(frozen=True)
 @closed_choices()
 class SpectrumOptions:
-    """Power-spectrum slopes, ideal sample density, and how well the streaming estimate points at it.
+    """Power-spectrum slopes, ideal sample density, and the agreement of the streaming estimate with it.
 
     The size of the thesis' example is --only ideal --samples 1024 --frames 512; it needs about 16 GiB and 32 times the
     time of the default.
@@ -54,19 +54,19 @@ class SpectrumOptions:
     tile_level: int = 5
     """Ideal: quad level of the tile; at level L it is 1 / 2^L of the picture wide."""
     tile_at: tuple[float, float] = (0.955, 0.45)
-    """Ideal: a place in the tile, x and y in [0, 1) from the top left. The default: the car's rear edge."""
+    """Ideal: a place in the tile, x and y in [0, 1) from the top left; by default the car's rear edge."""
     tile_index: int | None = None
     """Ideal: Morton index of the tile, instead of its place."""
     tau: float = 0.01
-    """Greatest gain an octave of rate may still bring at the ideal density, as a share of the tile's power."""
+    """Greatest gain of a further octave of rate at the ideal density, as a share of the tile's power."""
     tiles_per_input: int = 40
     """Agreement: tiles of each input, over the picture and over four times."""
     agreement_level: int = 4
-    """Agreement: quad level of the tiles; the estimate is tried at this level and the two finer ones."""
+    """Agreement: quad level of the tiles; the estimate is evaluated at this level and the next two finer ones."""
     agreement_samples: int = 128
-    """Agreement: samples along a tile's side, an octave above the finest rate that is tried."""
+    """Agreement: samples along a tile's side, an octave above the finest rate of the estimate."""
     agreement_frames: int = 64
-    """Agreement: times over the span; the estimate is tried with every second, fourth and eighth."""
+    """Agreement: times over the span; the estimate uses every second, fourth and eighth of them."""
     threads: Threads = 0
     out: Path = Path("out/spectrum")
     """Folder for the results."""
@@ -96,7 +96,7 @@ class SpectrumOptions:
         require(0 < self.tau < 1, "tau", "a share in (0, 1)", self.tau)
 
     def does(self, part: Part) -> bool:
-        """Whether a part is wanted."""
+        """Whether a part is to be run."""
         return self.only in (None, part)
 
     def cycle_s(self) -> float:

@@ -1,4 +1,4 @@
-"""Spectra, ideal densities and how the estimate agrees with them as figures; computes only places on the paper."""
+"""Figures of spectra, ideal densities and the agreement of the estimate; computes only positions on the paper."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _plain(axis: Axes) -> None:
 
 
 def slope_figure(spectra: Sequence[Spectrum]) -> Figure:
-    """Slopes by group, a dot each (fig. 1.3)."""
+    """Slopes by group, one dot per spectrum (fig. 1.3)."""
     groups = list(dict.fromkeys(spectrum.group for spectrum in spectra))
     sources = list(dict.fromkeys(s.source for s in spectra if s.group.startswith(("frames", "framelets"))))
     ink = {source: _INKS[i % len(_INKS)] for i, source in enumerate(sources)}
@@ -213,7 +213,7 @@ def agreement_figure(tiles: Mapping[str, Tiles], found: Mapping[str, Any], tau: 
         axes[0].plot(median, place, "o", color=FRAMED)
         axes[0].plot(row["angle_median_deg"]["dealt"], place, "x", color="0.3")
     axes[0].plot([], [], "o", color=FRAMED, label="median (bar: quartiles)")
-    axes[0].plot([], [], "x", color="0.3", linestyle="", label="median, estimates dealt to other tiles")
+    axes[0].plot([], [], "x", color="0.3", linestyle="", label="median, estimates permuted among tiles")
     axes[0].axvline(90.0, color="0.5", linewidth=0.9, linestyle=":", label="median, random directions")
     axes[0].set_yticks(range(len(rows)), [name for name, _ in rows])
     axes[0].set_ylim(len(rows) - 0.5, -0.5)

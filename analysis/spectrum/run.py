@@ -1,4 +1,4 @@
-"""Runs the parts of ``scripts/spectrum.py`` and writes what they find."""
+"""Runs the parts of ``scripts/spectrum.py`` and writes their results."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from analysis.storage.files import write_json
 from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 
-_BYTES_PER_SAMPLE = 32  # of a tile's volume; 27 were measured, its transform and a windowed copy included
+_BYTES_PER_SAMPLE = 32  # of a volume; 27 were measured, including its transform and a windowed copy
 _BYTES_PER_PIXEL = 400
 _EXAMPLES = 4
 _FRAMES_SHOWN = 3
 
 
 def run_study(options: SpectrumOptions) -> dict[str, Any]:
-    """Runs the parts that are wanted and writes figures and ``summary.json`` to ``options.out``.
+    """Runs the requested parts and writes figures and ``summary.json`` to ``options.out``.
 
     Raises:
         InputError: a picture cannot be used, or a size does not fit into memory.

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 PHOTOGRAPHS = ("landscape_band.jpg", "sky.exr")
 _LEAST_SIDE = 32
-_ROUNDING = 1e-18  # a constant picture has 1e-28 at most, one pixel of 2048² that is off by 1/255 has 3e-11
+_ROUNDING = 1e-18  # a constant picture has at most 1e-28, and one with a single pixel of 2048² off by 1/255 has 3e-11
 _FIRST_BIN = 2
 _LAUNCH_SAMPLES = 1 << 18
 
@@ -34,11 +34,11 @@ class Spectrum:
     """Radial power of a picture or a set of framelets.
 
     Attributes:
-        name, group, source: what it is, the kind it is counted with, and the input or file it comes from.
+        name, group, source: its name, the group it is counted in, and its input or file.
         power: mean power of compressed luminance at 1, 2, … cycles per picture.
-        slope, offset: of the line through log10 power over log10 frequency.
+        slope, offset: slope and offset of the line through log10 power over log10 frequency.
         slope_linear: the same slope for linear luminance.
-        picture: what was measured, sRGB, or None.
+        picture: the measured picture, sRGB, or None.
     """
 
     name: str
@@ -63,8 +63,8 @@ def squares(plane: Floats) -> Floats:
 def radial_power(planes: Floats) -> Floats:
     """Mean power per frequency of square planes ``(n, side, side)`` at 1 … side / 2 cycles, over angles and planes.
 
-    The mean is subtracted and a Hann window applied to each plane. Without it, the jump between opposite borders would
-    add a cross along the axes, of slope -2 for any picture.
+    The mean is subtracted and a Hann window is applied to each plane. Without the window, the jump between opposite
+    borders would add a cross along the axes, of slope -2 for any picture.
     """
     side = planes.shape[1]
     hann = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(side) / side)
@@ -81,24 +81,24 @@ def radial_power(planes: Floats) -> Floats:
 def fit_slope(power: Floats) -> tuple[float, float]:
     """Slope and offset of the least-squares line through log10 power over log10 frequency; NaN where power is zero.
 
-    From the second bin on, for the window spreads into the first what is constant, to half the sampling rate. Bins
-    weigh the inverse of their frequency, so that every octave counts alike: half of all bins lie in the last one,
-    which is also the one that aliasing and pixel filters change.
+    The fit runs from the second bin, because the window spreads the constant part into the first, to half the sampling
+    rate. Bins are weighted by the inverse of their frequency, so that every octave has the same weight: half of all
+    bins lie in the last octave, which aliasing and pixel filters change most.
     """
     frequency = np.arange(1, len(power) + 1)
     used = slice(_FIRST_BIN - 1, None)
     if not (power[used] > 0).all():
         return np.nan, np.nan
-    weight = 1.0 / np.sqrt(frequency[used])  # polyfit squares it
+    weight = 1.0 / np.sqrt(frequency[used])  # polyfit squares the weights
     slope, offset = np.polyfit(np.log10(frequency[used]), np.log10(power[used]), 1, w=weight)
     return float(slope), float(offset)
 
 
 def spectrum_of(planes: Callable[[Floats], Floats], color: NDArray[np.float32], **names: Any) -> Spectrum:
-    """Spectrum of linear RGB ``(..., 3)``, whose luminance a function turns into square planes.
+    """Spectrum of linear RGB ``(..., 3)``; ``planes`` cuts its luminance into square planes.
 
-    The spectrum is that of compressed luminance: the error estimate uses it, it is close to what a display is sent, and
-    in linear luminance the sun alone would dominate a picture's spectrum.
+    The spectrum is that of compressed luminance: the error estimate uses it, it is close to display encoding, and in
+    linear luminance the sun alone would dominate the spectrum of a picture.
     """
     import torch
 
@@ -116,7 +116,7 @@ def picture_spectrum(path: Path, group: str) -> Spectrum:
     """Spectrum of a picture on disk, averaged over the squares it is cut into.
 
     Raises:
-        InputError: it cannot be read, is too small, or shows nothing.
+        InputError: the picture cannot be read, is too small, or is constant.
     """
     from scenes.loading import read_image
 
@@ -131,12 +131,12 @@ def picture_spectrum(path: Path, group: str) -> Spectrum:
     picture = shown(color[top : top + side, left : left + side])
     found = spectrum_of(squares, color, name=path.name, group=group, source=path.name, picture=picture)
     if np.isnan(found.slope) or found.power.max() < _ROUNDING:
-        raise InputError(f"{path}: expected a picture that shows something, got a constant one")
+        raise InputError(f"{path}: expected a picture that is not constant, got a constant one")
     return found
 
 
 def shown(color: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """sRGB of linear RGB, at most 512 pixels wide."""
+    """Linear RGB encoded as sRGB, at most 512 pixels wide."""
     import torch
 
     from renderer.film.files import encode_srgb
@@ -186,7 +186,7 @@ def _planes(framelets: Floats) -> Floats:
 
 
 def group_statistics(spectra: Iterable[Spectrum]) -> dict[str, Any]:
-    """Slopes of each group: how many, their mean, least and greatest, for both encodings."""
+    """Slopes of each group: their number, mean, least and greatest, for both encodings."""
     groups: dict[str, list[Spectrum]] = {}
     for spectrum in spectra:
         groups.setdefault(spectrum.group, []).append(spectrum)

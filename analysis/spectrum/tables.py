@@ -24,9 +24,9 @@ def tables(summary: dict[str, Any]) -> list[Table]:
     if check := summary.get("agreement"):
         sets = {"all": check["all"], "changing tiles": check["changing_tiles"], **check["inputs"]}
         sets = {**sets, "one update": check["one_update"]}
-        columns = ("tiles", "number", "angle, deg", "dealt", "within 45°", "dealt", "same quadrant", "dealt")
+        columns = ("tiles", "number", "angle, deg", "permuted", "within 45°", "permuted", "same quadrant", "permuted")
         rows = [(name, str(row["tiles"]), *_cells(row)) for name, row in sets.items() if row]
-        found.append(Table("Estimate against the direction to Θ* (dealt: estimates of other tiles)", columns, rows))
+        found.append(Table("Estimate against the direction to Θ* (permuted: estimates of other tiles)", columns, rows))
     return found
 
 

@@ -213,7 +213,7 @@ def test_a_stimulus_that_was_damaged_is_not_shown(client: Client, session: Sessi
 def test_a_port_that_is_taken_is_named(session: Session) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(InputError, match=f"port: expected one that is free, got {port}"):
+        with pytest.raises(InputError, match=f"port: expected a free one, got {port}"):
             with serving(session, port):
                 pass
 
