@@ -5,6 +5,7 @@ Workers of another cluster must see the same folders and run the same source cod
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import os
@@ -73,9 +74,11 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
     if options.scheduler:
         try:
             _require_port(options.scheduler)
+            asyncio.run(_greeted(options.scheduler))
             client = Client(options.scheduler, timeout=WAIT_S)
         except (OSError, ValueError, TimeoutError) as error:
-            raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({error})") from error
+            reason = str(error) or f"it accepts connections, but sends no greeting within {WAIT_S} s"
+            raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({reason})") from error
         with client:
             yield client
         return
@@ -107,6 +110,14 @@ def _require_port(address: str) -> None:
     if transport in ("tcp", "tls", "ws", "wss"):
         host, port = parse_host_port(place)
         socket.create_connection((host, port), CONNECT_S).close()
+
+
+async def _greeted(address: str) -> None:
+    """Raises OSError if what listens at an address does not speak Dask's protocol: a client would wait forever."""
+    from distributed.comm import connect
+
+    comm = await asyncio.wait_for(connect(address, timeout=WAIT_S), WAIT_S)
+    await comm.close()
 
 
 @contextlib.contextmanager

@@ -45,3 +45,13 @@ def test_a_closed_port_is_told_before_a_client_tries_for_long(
         pass
     told = str(caught.value)
     assert told.startswith(f"scheduler: nothing answers at '{address}' (") and "refused" in told and "\n" not in told
+
+
+def test_a_port_that_accepts_but_does_not_speak_the_protocol_is_refused(
+    port: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "WAIT_S", 0.3)
+    port.listen()
+    address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
+    with pytest.raises(InputError, match="sends no greeting"), cluster.connected(cluster.ClusterOptions(0, address)):
+        pass
