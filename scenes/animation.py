@@ -22,6 +22,9 @@ PoseFunction = Callable[[Times], Pose]
 
 UP = np.array([0.0, 0.0, 1.0])
 
+LEAD_S = 3.0
+"""Motion before the first moment and after the last, seconds: warm-up, latency and filters reach there."""
+
 _VERTICAL = 1e-9  # sine of the angle to the vertical below which the right of a picture is not told by it
 
 

@@ -45,10 +45,6 @@ class FrameletCache:
         self.dead = torch.ones(slots, dtype=torch.bool)
         self.slot_of_node = torch.full((node_number(self.level_max + 1, 0),), EMPTY, dtype=torch.int64)
 
-    @property
-    def occupied(self) -> Bool[Tensor, " slots"]:
-        return self.level != EMPTY
-
     def previous(
         self, level: Int64[Tensor, " n"], index: Int64[Tensor, " n"]
     ) -> tuple[Float[Tensor, "n state"], Bool[Tensor, " n"]]:

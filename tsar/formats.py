@@ -8,7 +8,7 @@ from torch import Tensor
 from tsar.checks import require
 from tsar.roots import square_root
 
-FORMATS = ("float64", "float32", "bfloat16", "float16", "float8", "unorm8")
+NUMBER_FORMATS = ("float64", "float32", "bfloat16", "float16", "float8", "unorm8")
 """``float8`` has five bits of exponent and two of mantissa; ``unorm8`` has 256 equal steps of the square root of values
 in [0, 1.5], for colours, which are clipped to that range."""
 UNORM_MAX = 1.5
@@ -28,9 +28,9 @@ def rounded(values: Tensor, form: str) -> Tensor:
     Finite values beyond the range of the format become its greatest value; infinities and NaN stay.
 
     Raises:
-        ConfigError: the format is not one of :data:`FORMATS`.
+        ConfigError: the format is not one of :data:`NUMBER_FORMATS`.
     """
-    require(form in FORMATS, "format", f"one of {', '.join(FORMATS)}", form)
+    require(form in NUMBER_FORMATS, "format", f"one of {', '.join(NUMBER_FORMATS)}", form)
     if form == "float64":
         return values.to(torch.float64)
     if form == "unorm8":

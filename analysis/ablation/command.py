@@ -10,10 +10,8 @@ Examples: python scripts/ablation.py --out out/ablation
 
 from __future__ import annotations
 
-import sys
-
 from analysis.ablation.options import AblationOptions
-from analysis.command.cli import parse, require_unbroken
+from analysis.command.cli import parse
 from analysis.command.extras import require_extra
 
 
@@ -24,12 +22,11 @@ def main() -> None:
     from analysis.ablation.run import study
     from analysis.ablation.shown import shown_tables
     from analysis.command.console import markdown, show
+    from analysis.study.written import end_study
 
     summary, tables = study(options)
     shown = shown_tables(tables)
     show(*([markdown(shown)] if options.markdown else shown))
-    written = f"written to {options.out}: summary.json, tables/, tables.md, moments.parquet, parts_row_*.png"
-    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
-    require_unbroken(summary["broken_invariants"])
-    if summary["failures"]:
-        sys.exit(1)
+    end_study(
+        summary, summary["broken_invariants"], options.out, "tables/, tables.md, moments.parquet, parts_row_*.png"
+    )

@@ -9,9 +9,10 @@ from typing import Literal
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
-from analysis.metrics.cost_model import Ledger
-from analysis.study.cases import INPUTS, ROWS
-from tsar.config import TsarConfig, closed_choices, require
+from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
+from analysis.study.asked import require_distinct, require_inputs, require_named, require_rows
+from analysis.study.cases import INPUTS
+from tsar.config import TsarConfig, closed_choices
 from tsar.policies import POLICIES, RIVALS
 
 
@@ -41,7 +42,7 @@ class AblationOptions:
     """How cost is counted; wall is refused, because its results are not repeatable."""
     framed_rate_hz: float = 8.0
     """Images a second that the framed renderer shows at every resolution, which sets the speed of the machine."""
-    trace_segments: float = 4.0
+    trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
@@ -54,14 +55,10 @@ class AblationOptions:
     cache: References = REFERENCES
 
     def __post_init__(self) -> None:
-        unknown = [one for one in self.inputs if one not in INPUTS]
-        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
-        for one in self.rivals:
-            POLICIES.require(one, "rivals")
-        for name in ("inputs", "rows"):
-            chosen = getattr(self, name)
-            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
-        require(all(0 <= row < len(ROWS) for row in self.rows), "rows", f"numbers from 0 to {len(ROWS) - 1}", self.rows)
+        require_inputs(self.inputs)
+        require_named(self, rivals=POLICIES)
+        require_distinct(self, "inputs", "rows")
+        require_rows("rows", self.rows)
         limits.within(
             self,
             repetitions=limits.REPETITIONS,

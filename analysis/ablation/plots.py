@@ -13,11 +13,10 @@ from matplotlib.ticker import FuncFormatter
 from analysis.ablation.parts import WHOLE
 from analysis.ablation.tables import ALL, by_input, where
 from analysis.metrics.budget import SHARES
-from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER
 
 _INKS = (FRAMED, OTHER, "#8a56ac", "#b8860b", "#2a9d8f")
 _SHARE_INKS = dict(zip(SHARES, ("#6b6b6b", FRAMED, ADAPTIVE, "#b8860b", OTHER), strict=True))
-_GRID = {"color": "0.88", "linewidth": 0.6}
 
 
 def figure(parts: pd.DataFrame, budget: pd.DataFrame, floor: pd.DataFrame, row: int) -> Figure:
@@ -34,7 +33,7 @@ def figure(parts: pd.DataFrame, budget: pd.DataFrame, floor: pd.DataFrame, row: 
 
 def _plain(axis: Axes, names: Sequence[str]) -> None:
     axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(True, axis="x", **_GRID)
+    axis.grid(True, axis="x", **GRID)
     axis.set_axisbelow(True)
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(len(names) - 0.5, -0.5)

@@ -13,13 +13,14 @@ from analysis.ablation.runs import Run, rivals_of, runs
 from analysis.ablation.shown import shown_tables
 from analysis.ablation.tables import Result, budget_table, floor_table, moment_table, part_table
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.console import markdown
 from analysis.page.figures import save
-from analysis.storage.files import atomic, write_json, write_table
+from analysis.storage.files import atomic, write_json
+from analysis.storage.results import SUMMARY
 from analysis.storage.summary import with_source
 from analysis.study.evaluation import broken
 from analysis.study.farm import run_study
 from analysis.study.outcomes import Outcomes
+from analysis.study.written import write_tables
 
 Tables = dict[str, pd.DataFrame]
 WRITTEN = ("tables/*.csv", "tables.md", "moments.parquet", "parts_row_*.png")
@@ -45,16 +46,13 @@ def study(options: AblationOptions) -> tuple[dict[str, Any], Tables]:
     tables = {"parts": part_table(moments), "budget": budget_table(moments), "floor": floor_table(moments)}
     out = options.out.resolve()
     with full_disk(out):
-        for name, table in tables.items():
-            write_table(out / "tables" / f"{name}.csv", table)
+        write_tables(out, tables, shown_tables(tables))
         with atomic(out / "moments.parquet") as file:
             moments.to_parquet(file)
-        with atomic(out / "tables.md") as file:
-            file.write_text(markdown(shown_tables(tables)), encoding="utf-8")
         for row in sorted(set(tables["parts"]["row"])) if len(tables["budget"]) else ():
             save(figure(tables["parts"], tables["budget"], tables["floor"], row), out / f"parts_row_{row}.png")
         summary = _summary(options, parts, planned, outcomes, list(done.values()), tables)
-        write_json(out / "summary.json", summary)
+        write_json(out / SUMMARY, summary)
     return summary, tables
 
 

@@ -14,10 +14,7 @@ from analysis.ablation.runs import Run
 from analysis.metrics.budget import SHARES
 from analysis.metrics.quality import Floats
 from analysis.metrics.rivals import BEST, best_of
-from analysis.study.cases import INPUTS
-
-ALL = "all inputs"
-"""Stands in the column of inputs for all inputs together."""
+from analysis.study.cases import ALL, INPUTS
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from analysis.command.console import Table
-from analysis.comparison.stored import SUMMARY
 from analysis.page.comparer import Comparer, Panel, Step, read_comparer
 from analysis.page.curves import Curve, Plot
 from analysis.page.figures import INKS
 from analysis.page.report import Report, flat
+from analysis.storage.results import SUMMARY
 
 _SAME_S = 1e-6  # closer times count as one
 _UNTOLD = ("out", "cache", "content", "config_hash")

@@ -16,8 +16,8 @@ from analysis.command.cli import InputError, bad_input, full_disk, require_memor
 from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
-from analysis.comparison.stored import FILES, SUMMARY, Recording, added_by, content_of, write_summary
-from analysis.storage.results import own_results
+from analysis.comparison.stored import FILES, Recording, added_by, content_of, write_summary
+from analysis.storage.results import SUMMARY, own_results
 
 if TYPE_CHECKING:
     from analysis.command.progress import Bars

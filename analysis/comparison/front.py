@@ -16,7 +16,6 @@ from typing import Any, Literal
 
 STORED = Path(__file__).with_name("front.json")
 PresetName = Literal["draft", "balanced", "accurate"]
-PRESETS: tuple[PresetName, ...] = ("draft", "balanced", "accurate")
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import xarray as xr
 
-from analysis.comparison.stored import SUMMARY
+from analysis.storage.records import DENSITIES_AND_ERRORS
+from analysis.storage.results import SUMMARY
 from tsar.morton import raster_to_morton
 
-_FIELDS = ("density_spatial", "density_temporal", "error_spatial", "error_temporal")
 _SCALARS = ("cost_s", "surplus", "conservation_residual", "nonfinite", "nonfinite_fields", "age_spread_s", "tile_count")
 
 
@@ -59,7 +59,7 @@ def _cycles(path: Path) -> xr.Dataset:
     table = file.read(["cycle", "sim_time_s", *scalars])
     cycle = table["cycle"].to_numpy()
     variables: dict[str, Any] = {name: ("cycle", table[name].to_numpy()) for name in scalars}
-    for name in _FIELDS:
+    for name in DENSITIES_AND_ERRORS:
         variables[name] = (("cycle", "row", "column"), _field(file, name, len(cycle)))
     return xr.Dataset(variables, {"cycle": cycle, "cycle_time_s": ("cycle", table["sim_time_s"].to_numpy())})
 

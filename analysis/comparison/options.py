@@ -13,6 +13,7 @@ from analysis.command.options import REFERENCES, Device, References, Threads, Un
 from analysis.metrics import METRICS
 from analysis.metrics.cost_model import (
     CAPACITY_DEFAULT,
+    SEGMENTS_DEFAULT,
     CostParameters,
     Ledger,
     adaptive_flops,
@@ -62,7 +63,7 @@ class RunOptions:
     """How cost is counted."""
     capacity: float = CAPACITY_DEFAULT
     """Speed of the simulated machine, FLOP/s. The default gives 8 framed images a second at 512²."""
-    trace_segments: float = 4.0
+    trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
     policy: str = DEFAULT_POLICY
     """Policy that decides what is sampled, by name."""

@@ -10,6 +10,7 @@ from analysis.command.cli import bad_input
 from analysis.command.start import first_imports
 from analysis.comparison.options import RunOptions
 from analysis.metrics import METRICS
+from analysis.storage.results import SUMMARY
 from tsar.choices import chosen
 from tsar.policies import POLICIES
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from scenes.canonical import Scene
     from tsar.types import StepRecord
 
-SUMMARY = "summary.json"
 FILES = ("steps.parquet", "error.png", "error.svg", "report.html", "comparison.mp4")
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from analysis.comparison.rivalry import Panels
 from analysis.metrics.quality import View
 from analysis.page.comparer import Panel, Step
-from analysis.page.pictures import Map, Pixels, Scale, enlarge, picture_bytes
+from analysis.page.pictures import ColorScale, Map, Pixels, enlarge, picture_bytes
 from analysis.page.video import (
     AGES,
     REFERENCE,
@@ -63,7 +63,7 @@ class Steps:
     most: int = STEPS_MAX
     exact: bool = False
     made: list[Step] = field(default_factory=list)
-    map_scales: dict[str, Scale] = field(default_factory=dict)
+    map_scales: dict[str, ColorScale] = field(default_factory=dict)
     _ages: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))
     _last: dict[str, tuple[Any, bytes]] = field(default_factory=dict)
 
@@ -129,7 +129,7 @@ class Filming:
         self.own, self.scales, self.side_px, self.stride = own, scales, side_of(side_px), stride
         self._reel = Reel(folder)
         self._frames: list[tuple[float, dict[str, Any]]] = []
-        self._scales: dict[str, Scale] = {}
+        self._scales: dict[str, ColorScale] = {}
         self._ages = np.zeros(256, np.int64)
         self._times_s: list[float] = []
         self._errors: dict[str, list[float]] = {}
@@ -155,7 +155,7 @@ class Filming:
         return ComparisonFilm(self.side_px, span_s, runs, self.own, list(first), row, height_px, self.map_scales)
 
     @property
-    def map_scales(self) -> dict[str, Scale]:
+    def map_scales(self) -> dict[str, ColorScale]:
         """Scales of the maps so far; that of ages is fitted to the data."""
         return {label: one.fitted(self._ages) if label == AGES else one for label, one in self._scales.items()}
 

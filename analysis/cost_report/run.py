@@ -24,7 +24,7 @@ from analysis.metrics.cost_model import (
 )
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json
-from analysis.storage.results import own_results
+from analysis.storage.results import SUMMARY, own_results
 
 if TYPE_CHECKING:
     from pyvista import PolyData
@@ -212,7 +212,7 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
     """
     with bad_input():
         own_results(options.out, _FILES)
-    (options.out / "summary.json").unlink(missing_ok=True)
+    (options.out / SUMMARY).unlink(missing_ok=True)
     measured = None
     if options.measure:
         ready = prepare(options.measurement)
@@ -230,7 +230,7 @@ def write_report(options: CostReportOptions) -> dict[str, Any]:
     summary = with_source(summarise(options, found), options, scene=scene, **machine)
     with full_disk(options.out):
         _draw(options, summary)
-        write_json(options.out / "summary.json", summary)
+        write_json(options.out / SUMMARY, summary)
     return summary
 
 

@@ -38,11 +38,11 @@ were counted, each priced as a segment of ``thesis``, and the modelled control s
 LEDGERS: tuple[Ledger, ...] = get_args(Ledger)
 MODELLED: tuple[Ledger, ...] = ("thesis", "printed", "summed")
 
-STAGES = ("selection", "tracing", "error", "response", "tiling", "reconstruction")
-"""Stages modelled, by the pipeline's names: *update* and *retiling* of the thesis are ``response`` and ``tiling``."""
-
 RAYS = ("primary_rays", "shadow_rays", "reflection_rays", "refraction_rays")
 """Counters that the ``work`` ledger prices."""
+
+SEGMENTS_DEFAULT = 4.0
+"""Ray segments of a sample, about as many as the thesis' inputs have."""
 
 CAPACITY_DEFAULT = 8.7e10
 """FLOP/s at which the framed renderer shows 8 images a second at 512² with 4 segments under ``thesis``, rounded:
@@ -144,7 +144,9 @@ def reconstruction_flops(p: CostParameters) -> Value:
 
 
 def stage_flops(p: CostParameters, ledger: Ledger = "thesis") -> dict[str, Value]:
-    """FLOPs per cycle of each stage in :data:`STAGES` (*per_entry* in the thesis).
+    """FLOPs per cycle of each stage, by the pipeline's names (*per_entry* in the thesis).
+
+    *update* and *retiling* of the thesis are ``response`` and ``tiling``.
 
     For ``work`` and ``wall``, which are measured, these are the values of ``thesis``.
     """

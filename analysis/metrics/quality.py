@@ -26,6 +26,10 @@ from tsar.types import ShownImage, StepRecord
 
 WHISKERS = 1.5
 """Greatest length of whiskers beyond the box, in interquartile ranges, in tables and figures."""
+DRAWS = 4000
+"""Bootstrap samples of an interval."""
+INTERVAL = (2.5, 97.5)
+"""Percentiles of the samples that bound an interval."""
 
 Floats = NDArray[np.float64]
 Payload = TypeVar("Payload")

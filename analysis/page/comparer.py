@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.page.curves import Curve, Plot
-from analysis.page.pictures import Scale, palette
+from analysis.page.pictures import ColorScale, palette
 
 SCRIPTS = tuple(Path(__file__).with_name(f"comparer_{name}.js") for name in ("errors", "pictures", "stage", "page"))
 ERROR_PALETTES = {"signed": "RdBu_r", "squared": "inferno", "flip": "magma"}
@@ -35,7 +35,7 @@ class Panel:
 
     label: str
     truth: str = ""
-    scale: Scale | None = None
+    scale: ColorScale | None = None
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def read_comparer(path: Path) -> Comparer:
         raise ValueError(f"{path}: expected pictures of version {_VERSION}, got {given.get('version')}")
     files = {int(number): base64.b64decode(data) for number, data in _PICTURE.findall(text)}
     panels = [
-        Panel(one["label"], one["truth"], Scale(**_tuples(one["scale"])) if one["scale"] else None)
+        Panel(one["label"], one["truth"], ColorScale(**_tuples(one["scale"])) if one["scale"] else None)
         for one in given["panels"]
     ]
     steps = [

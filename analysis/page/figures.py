@@ -28,7 +28,8 @@ INKS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4
 DASHES = ("", "7 3", "2 2", "8 3 2 3", "5 2 1 2 1 2", "12 3", "1 3")
 """Dash patterns beside the inks, in points or pixels."""
 ADAPTIVE, FRAMED, OTHER = INKS[:3]
-_GRID = {"color": "0.85", "linewidth": 0.6}
+GRID = {"color": "0.88", "linewidth": 0.6}
+"""Grid lines behind what is plotted."""
 _LINE_PX = 12  # pixels between labels, at the resolution of a figure
 
 
@@ -110,6 +111,6 @@ def new_figure(width: float, height: float, rows: int = 1, **kwargs) -> tuple[Fi
     axes = figure.subplots(rows, 1, squeeze=False, **kwargs)[:, 0]
     for axis in axes:
         axis.spines[["top", "right"]].set_visible(False)
-        axis.grid(True, **_GRID)
+        axis.grid(True, **GRID)
         axis.set_axisbelow(True)
     return figure, axes

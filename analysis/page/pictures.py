@@ -34,7 +34,7 @@ EDGE = (90, 130, 150)
 
 
 @dataclass(frozen=True)
-class Scale:
+class ColorScale:
     """The meaning of the bytes of a map, and their colours.
 
     Attributes:
@@ -54,11 +54,11 @@ class Scale:
     meaning: str = ""
 
     @classmethod
-    def of(cls, bounds: tuple[float, float], unit: str, palette: str, **more) -> Scale:
+    def of(cls, bounds: tuple[float, float], unit: str, palette: str, **more) -> ColorScale:
         """A scale whose palette spans its bounds."""
         return cls(bounds, unit, palette, bounds, **more)
 
-    def fitted(self, counts: NDArray[np.int64]) -> Scale:
+    def fitted(self, counts: NDArray[np.int64]) -> ColorScale:
         """The same scale with a palette that spans the middle 98 % of the values, rounded outwards to 1, 2 or 5 times a
         power of ten.
 
@@ -89,7 +89,7 @@ class Map:
     """A byte for each place, ``(rows, columns)``, and the scale of the bytes."""
 
     places: Pixels
-    scale: Scale
+    scale: ColorScale
 
     def pixels(self) -> Pixels:
         """Colours, ``(rows, columns, 3)``."""
@@ -175,7 +175,7 @@ def tiling_map(
     edge[:, 1:] |= tiles[:, 1:] != tiles[:, :-1]
     edge[1:, :] |= tiles[1:, :] != tiles[:-1, :]
     places[edge] = 0
-    scale = Scale.of(bounds, "refreshes per cycle", RATE_MAP, special=EDGE, meaning="edge of a tile")
+    scale = ColorScale.of(bounds, "refreshes per cycle", RATE_MAP, special=EDGE, meaning="edge of a tile")
     return Map(places, scale)
 
 
@@ -183,14 +183,14 @@ def density_map(density: Float[Tensor, " e"], bounds: tuple[float, float], unit:
     """A field in Morton order as a map in raster order, one byte an element."""
     side = math.isqrt(density.numel())
     raster = density[raster_to_morton(side)].reshape(side, side).numpy().astype(np.float64)
-    return Map(stored(raster, bounds), Scale.of(bounds, unit, name))
+    return Map(stored(raster, bounds), ColorScale.of(bounds, unit, name))
 
 
 def age_map(newest_s: Float[Tensor, "h w"], time_s: float, bounds_s: tuple[float, float]) -> Map:
     """Age of the newest samples at ``time_s``, milliseconds; ``NEVER`` where there are none."""
     bounds = 1e3 * bounds_s[0], 1e3 * bounds_s[1]
     age_ms = 1e3 * (time_s - newest_s.numpy().astype(np.float64))
-    return Map(stored(age_ms, bounds), Scale.of(bounds, "ms", AGE_MAP, meaning="not sampled yet"))
+    return Map(stored(age_ms, bounds), ColorScale.of(bounds, "ms", AGE_MAP, meaning="not sampled yet"))
 
 
 def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
@@ -206,7 +206,7 @@ def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
 
 
 def scale_strip(
-    width_px: int, height_px: int, scale: Scale, ink: tuple[int, int, int], paper: Pixels | tuple
+    width_px: int, height_px: int, scale: ColorScale, ink: tuple[int, int, int], paper: Pixels | tuple
 ) -> Pixels:
     """A colour scale with its ends and its unit, for the place below a map: a bar, and text below it."""
     picture = Image.new("RGB", (width_px, height_px), tuple(paper))

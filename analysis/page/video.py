@@ -15,9 +15,9 @@ from torch import Tensor
 from analysis.metrics.quality import View, encode
 from analysis.page.pictures import (
     RATE_MAP,
+    ColorScale,
     Map,
     Pixels,
-    Scale,
     age_map,
     density_map,
     enlarge,
@@ -100,7 +100,7 @@ def maps(view: View, own: str, scales: Scales) -> dict[str, Map]:
         if name == own:
             for label, one in display.maps.items():
                 places = stored(one.values.numpy().astype(np.float64), one.bounds)
-                found[label] = Map(places, Scale.of(one.bounds, one.unit, RATE_MAP))
+                found[label] = Map(places, ColorScale.of(one.bounds, one.unit, RATE_MAP))
             if display.sample_map is not None:
                 found[AGES] = age_map(display.sample_map.newest_s, view.time_s, scales.age_s)
     return found
@@ -124,7 +124,7 @@ class ComparisonFilm:
         labels: Sequence[str],
         row: int,
         height_px: int = 0,
-        scales: Mapping[str, Scale] | None = None,
+        scales: Mapping[str, ColorScale] | None = None,
     ) -> None:
         """Takes the width of a panel and, if it differs, its height, the time span of the error panel's axis, the runs
         whose errors are drawn, the labels of all panels except that of the errors, the number of panels in a row,

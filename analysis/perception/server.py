@@ -25,9 +25,9 @@ from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 
 from analysis.command.cli import InputError
+from analysis.command.cluster import LOOPBACK
 from analysis.perception.protocol import Session
 
-HOST = "127.0.0.1"
 BODY_MAX = 1 << 16
 """Most bytes of an answer."""
 CONNECTIONS_MAX = 64
@@ -179,11 +179,13 @@ def serving(session: Session, port: int = 0, break_every: int = 24) -> Iterator[
     """
     logging.getLogger("tornado").setLevel(logging.CRITICAL)  # no log: the terminal shows the progress
     try:
-        (listener,) = bind_sockets(port, HOST)
+        (listener,) = bind_sockets(port, LOOPBACK)
     except OSError as error:
         raise InputError(f"port: expected a free one, got {port} ({error.strerror})") from None
     port = listener.getsockname()[1]
-    hosts = frozenset(f"{name}{end}" for name in (HOST, "localhost") for end in [f":{port}", *([""] * (port == 80))])
+    hosts = frozenset(
+        f"{name}{end}" for name in (LOOPBACK, "localhost") for end in [f":{port}", *([""] * (port == 80))]
+    )
     loop, over = asyncio.new_event_loop(), asyncio.Event()
 
     async def serve(service: _Service) -> None:
@@ -208,7 +210,7 @@ def serving(session: Session, port: int = 0, break_every: int = 24) -> Iterator[
         thread = threading.Thread(target=lambda: loop.run_until_complete(serve(service)), daemon=True)
         thread.start()
         try:
-            yield f"http://{HOST}:{port}/"
+            yield f"http://{LOOPBACK}:{port}/"
         finally:
             loop.call_soon_threadsafe(over.set)
             thread.join()

@@ -11,10 +11,9 @@ Examples: python scripts/precision.py --out out/precision
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
-from analysis.command.cli import bad_input, parse, require_unbroken
+from analysis.command.cli import bad_input, parse
 from analysis.command.extras import require_extra
 from analysis.precision.options import PrecisionOptions
 
@@ -23,14 +22,10 @@ def main() -> None:
     """Runs what is missing; prints the tables."""
     options = parse(PrecisionOptions, __doc__ or "")
     require_extra("study", "perception")
-    from analysis.command.console import show
+    from analysis.study.written import end_study
 
     summary = study(options)
-    written = f"written to {options.out}: summary.json, tables/, tables.md"
-    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
-    require_unbroken(summary["broken_invariants"])
-    if summary["failures"]:
-        sys.exit(1)
+    end_study(summary, summary["broken_invariants"], options.out, "tables/, tables.md")
 
 
 def study(options: PrecisionOptions) -> dict[str, Any]:

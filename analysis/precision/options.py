@@ -9,8 +9,9 @@ from typing import Literal
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
-from analysis.study.cases import INPUTS, ROWS
-from tsar.config import TsarConfig, closed_choices, require
+from analysis.study.asked import require_distinct, require_inputs, require_rows
+from analysis.study.cases import INPUTS
+from tsar.config import TsarConfig, closed_choices
 
 
 @dataclass(frozen=True)
@@ -46,10 +47,7 @@ class PrecisionOptions:
     cache: References = REFERENCES
 
     def __post_init__(self) -> None:
-        unknown = [one for one in self.inputs if one not in INPUTS]
-        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
-        for name in ("inputs", "policies"):
-            chosen = getattr(self, name)
-            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
-        require(0 <= self.row < len(ROWS), "row", f"a number from 0 to {len(ROWS) - 1}", self.row)
+        require_inputs(self.inputs)
+        require_distinct(self, "inputs", "policies")
+        require_rows("row", [self.row])
         limits.within(self, repetitions=limits.REPETITIONS, start_s=limits.TIMES_S, tolerance=(0.0, 10.0))

@@ -8,9 +8,7 @@ Examples: python scripts/sensitivity.py --scale quick --out out/sensitivity
 
 from __future__ import annotations
 
-import sys
-
-from analysis.command.cli import parse, require_unbroken
+from analysis.command.cli import parse
 from analysis.command.extras import require_extra
 from analysis.sensitivity.options import SensitivityOptions
 
@@ -22,10 +20,8 @@ def main() -> None:
     from analysis.command.console import show
     from analysis.sensitivity.run import study
     from analysis.sensitivity.tables import shown_tables
+    from analysis.study.written import end_study
 
     summary, broken = study(options)
     show(*shown_tables(summary["optima"]))
-    written = f"written to {options.out}: summary.json, tables/, figures/"
-    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
-    require_unbroken(broken)
-    sys.exit(1 if summary["failures"] else 0)
+    end_study(summary, broken, options.out, "tables/, figures/")

@@ -10,7 +10,8 @@ from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import Ledger
-from analysis.study.cases import INPUTS, ROWS, SCALES
+from analysis.study.asked import require_distinct, require_inputs, require_rows
+from analysis.study.cases import INPUTS, SCALES
 from tsar.config import TsarConfig, closed_choices, require
 
 
@@ -51,13 +52,12 @@ class SensitivityOptions:
     cache: References = REFERENCES
 
     def __post_init__(self) -> None:
-        require(set(self.inputs) <= set(INPUTS), "inputs", f"names out of {', '.join(INPUTS)}", self.inputs)
-        for name in ("inputs", "spatial_slopes", "temporal_slopes"):
-            require(len(getattr(self, name)) > 0, name, "at least one", getattr(self, name))
-        for name in ("inputs", "spatial_slopes", "temporal_slopes", "offsets", "biases"):
+        require_inputs(self.inputs)
+        require_distinct(self, "inputs", "spatial_slopes", "temporal_slopes")
+        for name in ("offsets", "biases"):  # may be none
             chosen = getattr(self, name)
             require(len(chosen) == len(set(chosen)), name, "none twice", chosen)
-        require(0 <= self.row < len(ROWS), "row", f"a number from 0 to {len(ROWS) - 1}", self.row)
+        require_rows("row", [self.row])
         slopes, changes = (-60.0, 60.0), (-120.0, 120.0)
         limits.within(self, spatial_slopes=slopes, temporal_slopes=slopes, offsets=changes, biases=(-8.0, 8.0))
         limits.within(self, repetitions=limits.REPETITIONS)

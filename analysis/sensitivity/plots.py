@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator
 from PIL import Image
 
-from analysis.page.figures import ADAPTIVE, FRAMED, OTHER, save
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER, save
 from analysis.page.pictures import RATE_MAP, number
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ Lines = Sequence[Mapping[str, Any]]
 """Lines of the table of settings."""
 
 _INKS = (ADAPTIVE, FRAMED, OTHER, "#8d4fa8", "0.35")
-_GRID = {"color": "0.88", "linewidth": 0.6}
 _FACTORS = (1.1, 1.25, 1.5, 2.0, 4.0)
 """The colours of the maps end at one of these factors above and below the default."""
 _MAP = "RdBu_r"
@@ -210,7 +209,7 @@ def line_figure(lines: Lines) -> Figure | None:
         axis.axhline(1.0, color="0.0", linewidth=0.9)
         axis.set_yscale("log")
         axis.spines[["top", "right"]].set_visible(False)
-        axis.grid(True, **_GRID)
+        axis.grid(True, **GRID)
         axis.set_axisbelow(True)
         axis.set_xlabel(f"{kind}{', octaves' if kind == 'bias' else ', log2 of power'}")
         axis.set_xticks(sorted({line[column] for line in part}))

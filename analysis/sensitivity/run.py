@@ -12,10 +12,10 @@ from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.plots import write_all
 from analysis.sensitivity.runs import runs, sweeps
 from analysis.sensitivity.tables import optimum_table, setting_table
-from analysis.storage.files import write_table
 from analysis.storage.summary import write_summary
 from analysis.study.evaluation import broken
 from analysis.study.farm import describe_failures, run_study
+from analysis.study.written import write_tables
 
 
 def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
@@ -45,8 +45,7 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
     stills = {run.setting: outcomes.keys[run.case] for run in shown}
     head = {"runs": len(planned), "runs_done": len(done), "failures": failed, "ledger": options.ledger}
     with full_disk(out):
-        for name, lines in tables.items():
-            write_table(out / "tables" / f"{name}.csv", pd.DataFrame(lines))
+        write_tables(out, {name: pd.DataFrame(lines) for name, lines in tables.items()})
         write_all(out / "figures", options, tables["settings"], sweeps(options)["slopes"], stills, outcomes.place)
         seeds = list(range(options.repetitions))
         summary = write_summary(out, {**head, **tables}, options, device="cpu", seeds=seeds)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.metrics.quality import DRAWS
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.runs import AXES, Setting, sweeps
+from analysis.study.cases import ALL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,12 +22,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-ALL = "all inputs"
-"""Stands in the column of inputs for the geometric mean of the errors of all inputs."""
 BEST = ("to_default", "edge", "low", "high", "held_out", "beyond_spread")
 """Columns of the table of optima on the best setting; the others describe the flatness of the sweep."""
 _FLAT = 1e-9
-_DRAWS = 4000
 
 Line = dict[str, Any]
 """A line of a table, by column."""
@@ -100,7 +99,7 @@ def beyond_spread(found: Floats, base: Floats) -> Line:
     if count == 1:
         return {"low": np.nan, "high": np.nan, "held_out": np.nan, "beyond_spread": "unknown"}
     best = found[found.mean(1).argmin()]
-    drawn = np.random.default_rng(0).integers(0, count, (_DRAWS, count))
+    drawn = np.random.default_rng(0).integers(0, count, (DRAWS, count))
     low, high = np.percentile(best[drawn].mean(1) / base[drawn].mean(1), (2.5, 97.5))
     others = ((found.sum(1, keepdims=True) - found) / (count - 1)).argmin(0)
     held_out = found[others, np.arange(count)].mean() / base.mean()

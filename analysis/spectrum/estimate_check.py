@@ -18,6 +18,7 @@ from scipy.stats import rankdata
 from torch import Tensor
 
 from analysis.command.progress import Task
+from analysis.metrics.quality import INTERVAL
 from analysis.spectrum.ideal_density import ideal_band, octant_power, power_norm, raster, share_of_total, tile_volume
 from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
 from tsar.config import ErrorConfig
@@ -34,7 +35,6 @@ _SHARES = (0.003, 0.01, 0.03, 0.1)
 _VARIANCES = (1e-5, 1e-4, 1e-3)
 _RESAMPLES = 1000
 _SHUFFLES = 300
-_INTERVAL = (2.5, 97.5)
 
 
 def streaming_error(
@@ -270,8 +270,8 @@ def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
     value = _summary(figures)
     resampled = np.stack([_summary(figures[rng.integers(0, tiles, tiles)]) for _ in range(_RESAMPLES)])
     dealt = np.stack([_summary(_figures(phi[rng.permutation(tiles)], true)) for _ in range(_SHUFFLES)])
-    low, high = np.nanpercentile(resampled, _INTERVAL, axis=0)
-    chance_low, chance_high = np.percentile(dealt, _INTERVAL, axis=0)
+    low, high = np.nanpercentile(resampled, INTERVAL, axis=0)
+    chance_low, chance_high = np.percentile(dealt, INTERVAL, axis=0)
     found: dict[str, Any] = {
         name: {
             "value": value[i],

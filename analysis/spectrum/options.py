@@ -10,14 +10,13 @@ import tyro
 
 from analysis.command import limits
 from analysis.command.options import Threads, Unprefixed
-from analysis.metrics.cost_model import CAPACITY_DEFAULT, adaptive_flops, parameters_of
+from analysis.metrics.cost_model import CAPACITY_DEFAULT, SEGMENTS_DEFAULT, adaptive_flops, parameters_of
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 
 Part = Literal["slopes", "ideal", "agreement"]
 
 FRAMELET_SIDE = 16
-_SEGMENTS = 4.0  # segments a sample, as the thesis' inputs have
 
 
 @dataclass(frozen=True)
@@ -101,4 +100,4 @@ class SpectrumOptions:
 
     def cycle_s(self) -> float:
         """Seconds of a cycle at the simulated machine's default speed, by the thesis' ledger."""
-        return float(adaptive_flops(parameters_of(self.tsar, _SEGMENTS))) / CAPACITY_DEFAULT
+        return float(adaptive_flops(parameters_of(self.tsar, SEGMENTS_DEFAULT))) / CAPACITY_DEFAULT

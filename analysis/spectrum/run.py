@@ -20,7 +20,7 @@ from analysis.spectrum.spectra import (
     shown,
 )
 from analysis.storage.files import write_json
-from analysis.storage.results import own_results
+from analysis.storage.results import SUMMARY, own_results
 from analysis.storage.summary import with_source
 
 _BYTES_PER_SAMPLE = 32  # of a volume; 27 were measured, including its transform and a windowed copy
@@ -46,7 +46,7 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
     with bad_input():
         own_results(options.out, ("slopes.png", "spectra.png", "ideal_*.png", "agreement.png"))
         pictures = _pictures(options) if options.does("slopes") else []
-    (options.out / "summary.json").unlink(missing_ok=True)
+    (options.out / SUMMARY).unlink(missing_ok=True)
     found: dict[str, Any] = {}
     with bars() as shown_bars, full_disk(options.out):
         if options.does("slopes"):
@@ -59,7 +59,7 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
         source = {"scene": ", ".join(options.inputs), "seed": options.tsar.seed, "device": "cpu"}
         summary = with_source(found, options, **source)
         summary["config"]["resolved"] = derived
-        write_json(options.out / "summary.json", summary)
+        write_json(options.out / SUMMARY, summary)
     return summary
 
 

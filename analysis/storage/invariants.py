@@ -4,46 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 
 from analysis.command.cli import BrokenInvariants
-from analysis.storage.records import RecordLimits, checked_fields, read_limits
+from analysis.storage.records import DENSITIES_AND_ERRORS, RecordLimits, checked_fields
 from tsar.types import ShownImage, StepRecord
 
 _CONSERVATION = 1e-5
 _ROUNDING = 1e-6  # densities are stored as float32
-_MUST_BE_FINITE = ("density_spatial", "density_temporal", "error_spatial", "error_temporal")
-
-
-def check_invariants(path: Path) -> dict[str, Any]:
-    """Checks every cycle of a run from its records alone.
-
-    Args:
-        path: file of step records.
-
-    Returns:
-        ``cycles``; the greatest ``conservation_residual``, recorded or recomputed from the stored densities; cycles in
-        which densities were out of bounds, the tiling did not cover the image exactly once, the batch was not full, or
-        densities or errors were not finite (``nonfinite``); and ``ok``.
-    """
-    check = InvariantCheck(read_limits(path))
-    columns = ["conservation_residual", "surplus", "tile_level", "tile_index", "selected"]
-    columns += ["density_spatial", "density_temporal", "error_spatial", "error_temporal"]
-    for part in pq.ParquetFile(path).iter_batches(batch_size=16, columns=columns):
-        values = {name: part.column(name) for name in columns}
-        for row in range(part.num_rows):
-            item = {name: values[name][row] for name in columns}
-            fields = {name: item[name].values.to_numpy() for name in columns[2:]}
-            check.add_fields(fields, item["surplus"].as_py(), item["conservation_residual"].as_py())
-    return check.result()
 
 
 class InvariantCheck:
-    """What :func:`check_invariants` finds, from records as they come. Changes in place."""
+    """Checks every cycle of a run from its records, as they come. Changes in place."""
 
     _COUNTED = ("densities_out_of_bounds", "tiling_not_a_cover", "batch_not_full", "nonfinite")
 
@@ -65,7 +39,7 @@ class InvariantCheck:
         found["densities_out_of_bounds"] += not _within(fields, limits)
         found["tiling_not_a_cover"] += not covers_once(fields["tile_level"], fields["tile_index"])
         found["batch_not_full"] += not _full(fields, limits)
-        found["nonfinite"] += not all(np.isfinite(fields[name]).all() for name in _MUST_BE_FINITE)
+        found["nonfinite"] += not all(np.isfinite(fields[name]).all() for name in DENSITIES_AND_ERRORS)
 
     def result(self) -> dict[str, Any]:
         """Counts and ``ok``."""

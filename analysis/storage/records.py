@@ -16,7 +16,11 @@ from torch import Tensor
 from analysis.storage.files import PARTIAL, plain
 from tsar.types import StepRecord
 
-_META = b"tsar"
+META = b"tsar"
+"""Key of the limits in the metadata of a file."""
+
+DENSITIES_AND_ERRORS = ("density_spatial", "density_temporal", "error_spatial", "error_temporal")
+"""Columns that hold a field."""
 
 _FIELDS: dict[str, pa.DataType] = {
     "cycle": pa.int64(),
@@ -31,10 +35,7 @@ _FIELDS: dict[str, pa.DataType] = {
     "tile_level": pa.list_(pa.int8()),
     "tile_index": pa.list_(pa.int32()),
     "selected": pa.list_(pa.int32()),
-    "density_spatial": pa.list_(pa.float32()),
-    "density_temporal": pa.list_(pa.float32()),
-    "error_spatial": pa.list_(pa.float32()),
-    "error_temporal": pa.list_(pa.float32()),
+    **dict.fromkeys(DENSITIES_AND_ERRORS, pa.list_(pa.float32())),
 }
 
 
@@ -130,7 +131,7 @@ class StepWriter:
         columns = dict(_FIELDS)
         columns |= {name: pa.float64() for name in first if name.startswith("stage_")}
         columns |= {name: pa.int64() for name in first if name.startswith("count_")}
-        schema = pa.schema(columns, metadata={_META: json.dumps(plain(self._limits)).encode()})
+        schema = pa.schema(columns, metadata={META: json.dumps(plain(self._limits)).encode()})
         self._temporary.parent.mkdir(parents=True, exist_ok=True)
         return pq.ParquetWriter(self._temporary, schema, compression="zstd")
 
@@ -146,21 +147,6 @@ class StepWriter:
         finally:
             self._writer = None
             self._temporary.unlink(missing_ok=True)
-
-
-def read_limits(path: Path) -> RecordLimits:
-    """The limits stored with a file of step records.
-
-    Raises:
-        ValueError: the file holds none.
-    """
-    metadata = pq.read_schema(path).metadata or {}
-    if _META not in metadata:
-        raise ValueError(f"{path}: holds no step records")
-    found = json.loads(metadata[_META])
-    return RecordLimits(
-        found["batch_size"], found["budget"], tuple(found["density_spatial"]), tuple(found["density_temporal"])
-    )
 
 
 def density_quantiles(path: Path, percents: tuple[float, ...] = (5.0, 25.0, 50.0, 75.0, 95.0)) -> dict[str, np.ndarray]:

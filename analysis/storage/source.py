@@ -61,11 +61,6 @@ def hash_of_modules(root: Path, starts: Sequence[Path]) -> str:
     return digest.hexdigest()[:16]
 
 
-def modules_of(*makers: Any) -> tuple[set[Path], set[str]]:
-    """Files of the modules that :func:`code_hash` covers, and names of the libraries that they import."""
-    return _reached(*_found(makers))
-
-
 def _found(makers: Sequence[Any]) -> tuple[Path, list[Path]]:
     """The folder that all packages lie in, and the files of the modules that define the makers."""
     files = [Path(sys.modules[maker.__module__].__file__ or "").resolve() for maker in makers]

@@ -9,6 +9,7 @@ from typing import Any
 
 from analysis.storage.files import write_json
 from analysis.storage.provenance import provenance
+from analysis.storage.results import SUMMARY
 from analysis.storage.source import Brought
 
 
@@ -30,5 +31,5 @@ def write_summary(
 ) -> dict[str, Any]:
     """Writes ``summary.json``; arguments and what is returned as of :func:`with_source`."""
     summary = with_source(found, options, added, **extra)
-    write_json(folder / "summary.json", summary)
+    write_json(folder / SUMMARY, summary)
     return summary

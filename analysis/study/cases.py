@@ -11,6 +11,7 @@ from pathlib import Path
 
 from analysis.command import limits
 from analysis.metrics.cost_model import (
+    SEGMENTS_DEFAULT,
     CostParameters,
     Ledger,
     adaptive_flops,
@@ -27,6 +28,8 @@ from tsar.policies import POLICIES
 
 INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
 """The five test inputs by number."""
+ALL = "all inputs"
+"""Stands for them together in tables."""
 
 ROWS = (
     (32, 256), (32, 512), (32, 1024), (64, 256), (64, 512), (64, 1024), (128, 256), (128, 512), (128, 1024),
@@ -136,7 +139,7 @@ Tracing = tuple[tuple[str, bool | int | str], ...]
 TRACING = ("depth", "light_cells", "packets", "structure", "texels")
 """Names in :data:`Tracing`. ``depth``: of reflections; ``light_cells``: along each axis of a light that has an extent,
 0 for one random point of it; ``packets`` and ``structure`` as of :class:`renderer.trace.Renderer`; ``texels``: one of
-:data:`tsar.formats.FORMATS` that holds textures."""
+:data:`tsar.formats.NUMBER_FORMATS` that holds textures."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +181,7 @@ class Case:
     phase: float = 0.0
     ledger: Ledger = "thesis"
     framed_rate_hz: float = 8.0
-    trace_segments: float = 4.0
+    trace_segments: float = SEGMENTS_DEFAULT
     start_s: float = 0.0
     jod_span_s: tuple[float, float] | None = None
     display: DisplayModel = field(default_factory=DisplayModel)

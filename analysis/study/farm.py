@@ -17,7 +17,7 @@ from analysis.command.cluster import WAIT_S, ClusterOptions, connected
 from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
-from analysis.storage.results import own_results
+from analysis.storage.results import SUMMARY, own_results
 from analysis.study.cases import Animation, Case, Scale
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
         own_results(options.out, tuple(written))
         writable_folder(options.cache, "cache")
     out = options.out.resolve()
-    (out / "summary.json").unlink(missing_ok=True)  # one that is killed leaves no older summary
+    (out / SUMMARY).unlink(missing_ok=True)  # one that is killed leaves no older summary
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
     with full_disk(out), bars() as shown:
         place.results.mkdir(exist_ok=True)

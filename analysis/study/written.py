@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 import pandas as pd
 
-from analysis.command.cli import full_disk
+from analysis.command.cli import full_disk, require_unbroken
 from analysis.command.console import Table, markdown, show
 from analysis.storage.files import atomic, write_json, write_table
+from analysis.storage.results import SUMMARY
 from analysis.storage.summary import with_source
 from analysis.study.outcomes import Outcomes
 
@@ -27,6 +29,27 @@ class TableOptions(Protocol):
     def markdown(self) -> bool: ...
     @property
     def repetitions(self) -> int: ...
+
+
+def write_tables(out: Path, tables: Mapping[str, pd.DataFrame], shown: Sequence[Table] | None = None) -> None:
+    """Writes tables as CSV files by name, and those that people read as Markdown where there are any."""
+    for name, table in tables.items():
+        write_table(out / "tables" / f"{name}.csv", table)
+    if shown is not None:
+        with atomic(out / "tables.md") as file:
+            file.write_text(markdown(shown), encoding="utf-8")
+
+
+def end_study(summary: Mapping[str, Any], broken: Sequence[str], out: Path, files: str) -> None:
+    """Says how many runs there are and what was written beside ``summary.json``; status 1 where runs failed.
+
+    Raises:
+        BrokenInvariants: ``broken`` names results whose cycles broke an invariant.
+    """
+    show(f"{summary['runs_done']} of {summary['runs']} runs; written to {out}: {SUMMARY}, {files}")
+    require_unbroken(broken)
+    if summary["failures"]:
+        sys.exit(1)
 
 
 def write_study(
@@ -64,10 +87,7 @@ def write_study(
     }
     summary = with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
     with full_disk(out):
-        for name, table in tables.items():
-            write_table(out / "tables" / f"{name}.csv", table)
-        with atomic(out / "tables.md") as file:
-            file.write_text(markdown(shown), encoding="utf-8")
-        write_json(out / "summary.json", summary)
+        write_tables(out, tables, shown)
+        write_json(out / SUMMARY, summary)
     show(*([markdown(shown)] if options.markdown else shown))
     return summary

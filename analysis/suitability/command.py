@@ -7,9 +7,7 @@ Examples: python scripts/suitability.py --scale quick --out out/study-quick
 
 from __future__ import annotations
 
-import sys
-
-from analysis.command.cli import parse, require_unbroken
+from analysis.command.cli import parse
 from analysis.command.extras import require_extra
 from analysis.suitability.options import SuitabilityOptions
 
@@ -19,12 +17,10 @@ def main() -> None:
     options = parse(SuitabilityOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.command.console import show
+    from analysis.study.written import end_study
     from analysis.suitability.page import shown_tables
     from analysis.suitability.run import study
 
     summary, tables = study(options)
-    written = f"written to {options.out}: summary.json, tables/, figures/, report.html"
-    show(*shown_tables(tables), f"{summary['runs_done']} of {summary['runs']} runs; {written}")
-    require_unbroken(summary["broken_invariants"])
-    if summary["failures"]:
-        sys.exit(1)
+    show(*shown_tables(tables))
+    end_study(summary, summary["broken_invariants"], options.out, "tables/, figures/, report.html")

@@ -9,11 +9,12 @@ from typing import Literal
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
-from analysis.metrics.cost_model import Ledger
+from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.metrics.display_model import DisplayModel
+from analysis.study.asked import require_distinct, require_inputs, require_named, require_rows
 from analysis.study.cases import INPUTS, ROWS, SCALES
 from tsar.choices import SOLVERS
-from tsar.config import TsarConfig, closed_choices, require
+from tsar.config import TsarConfig, closed_choices
 from tsar.policies import POLICIES, RIVALS
 
 
@@ -47,7 +48,7 @@ class SuitabilityOptions:
     """How cost is counted; wall is refused, for it gives no result twice."""
     framed_rate_hz: float = 8.0
     """Images a second that the framed renderer shows at every resolution; the machine is as fast as that takes."""
-    trace_segments: float = 4.0
+    trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
@@ -67,18 +68,11 @@ class SuitabilityOptions:
     cache: References = REFERENCES
 
     def __post_init__(self) -> None:
-        unknown = [one for one in self.inputs if one not in INPUTS]
-        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
-        for name in ("policies", "rivals", "beside"):
-            for one in getattr(self, name):
-                POLICIES.require(one, name)
-        for one in self.solvers:
-            SOLVERS.require(one, "solvers")
-        for name in ("inputs", "rows", "policies"):
-            chosen = getattr(self, name)
-            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
-        for name, values in (("rows", self.rows), ("policy_row", (self.policy_row,))):
-            require(all(0 <= row < len(ROWS) for row in values), name, f"numbers from 0 to {len(ROWS) - 1}", values)
+        require_inputs(self.inputs)
+        require_named(self, policies=POLICIES, rivals=POLICIES, beside=POLICIES, solvers=SOLVERS)
+        require_distinct(self, "inputs", "rows", "policies")
+        require_rows("rows", self.rows)
+        require_rows("policy_row", [self.policy_row])
         limits.within(
             self,
             repetitions=limits.REPETITIONS,

@@ -11,14 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from analysis.metrics.quality import WHISKERS, percentile
-from analysis.page.figures import ADAPTIVE, FRAMED, save
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, save
 from analysis.study.cases import INPUTS, ROWS, Case
 from analysis.study.evaluation import Place
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.stills import finest, setting, write_strip
 from analysis.suitability.tables import Result, Results, ratios
 
-_GRID = {"color": "0.88", "linewidth": 0.6}
 _INK = {256: "#e8a33d", 512: "#c9570c", 1024: "#6d2077"}
 
 
@@ -58,7 +57,7 @@ def _axes(width: float, height: float, columns: int = 1, **kwargs: Any) -> tuple
     axes = list(figure.subplots(1, columns, squeeze=False, **kwargs)[0])
     for axis in axes:
         axis.spines[["top", "right"]].set_visible(False)
-        axis.grid(True, **_GRID)
+        axis.grid(True, **GRID)
         axis.set_axisbelow(True)
     return figure, axes
 

@@ -16,7 +16,7 @@ import pandas as pd
 from analysis.metrics.quality import Floats, percentile, ratio, suitable_percentile
 from analysis.metrics.rivals import BEST, best_of, best_shares, standing
 from analysis.study.cases import ROWS, is_framed
-from analysis.suitability.tables import METRICS, Result, Results
+from analysis.suitability.tables import SIGNS, Result, Results
 
 ALL = "all"
 """In place of a row: all of them together."""
@@ -44,7 +44,7 @@ class Group:
 
     def best(self, rivals: Iterable[str], metric: str) -> Floats:
         """The best of the rivals that ran."""
-        return best_of([self.values(name, metric) for name in rivals if name in self.results], METRICS[metric])
+        return best_of([self.values(name, metric) for name in rivals if name in self.results], SIGNS[metric])
 
 
 def groups_of(results: Results, rows: Mapping[int, int], names: Sequence[str]) -> list[Group]:
@@ -123,7 +123,7 @@ def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Seque
     for name in policies:
         others_than = [one for one in rivals if one != name]
         here = [group for group in groups if name in group.results and any(one in group.results for one in others_than)]
-        for metric, sign in METRICS.items() if here else ():
+        for metric, sign in SIGNS.items() if here else ():
             line: dict[str, Any] = {"policy": name, "metric": metric}
             for label, others in (("framed", ["framed"]), (BEST, others_than)):
                 own = np.concatenate([group.values(name, metric) for group in here])
@@ -138,7 +138,7 @@ def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Seque
 
 def _better_runs(groups: Sequence[Group], name: str, others: Sequence[str], metric: str) -> tuple[int, int]:
     """In how many runs the mean is better than every other's, and how many have a value."""
-    sign, means = METRICS[metric], dict[tuple[str, int], list[tuple[float, float]]]()
+    sign, means = SIGNS[metric], dict[tuple[str, int], list[tuple[float, float]]]()
     for group in groups:
         own = group.results[name].value(metric)
         values = [sign * group.results[one].value(metric) for one in others if one in group.results]

@@ -9,11 +9,13 @@ import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
 from analysis.storage.files import write_json, write_table
+from analysis.storage.results import SUMMARY
 from analysis.storage.summary import with_source
 from analysis.study.cases import ROWS, SCALES, Case
 from analysis.study.evaluation import broken
 from analysis.study.farm import run_study
 from analysis.study.outcomes import Outcomes
+from analysis.study.written import write_tables
 from analysis.suitability import plots
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.page import write_page
@@ -54,14 +56,13 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     results = Results([Result(run, done[run.case], outcomes.times(run.case)) for run in planned if run.case in done])
     tables, measured = tables_of(options, results), timing(done)
     with full_disk(out):
-        for name, table in tables.items():
-            write_table(out / "tables" / f"{name}.csv", table)
+        write_tables(out, tables)
         write_table(out / "timing.csv", measured)
         pictures = plots.write_all(out / "figures", options, results, outcomes.keys, outcomes.place)
         summary = _summary(options, planned, outcomes, measured, tables)
         summary["broken_invariants"] = broken(one.summary for one in results.all)
         write_page(out / "report.html", summary, tables, pictures)
-        write_json(out / "summary.json", summary)
+        write_json(out / SUMMARY, summary)
     return summary, tables
 
 

@@ -13,18 +13,14 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from analysis.metrics.quality import ratio, ratio_statistics, suitable_percentile
+from analysis.metrics.quality import DRAWS, INTERVAL, ratio, ratio_statistics, suitable_percentile
 from analysis.study.cases import INPUTS, ROWS, is_framed
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
 from analysis.suitability.runs import Run
 
 Floats = NDArray[np.float64]
 
-DRAWS = 4000
-"""Bootstrap samples."""
-INTERVAL = (2.5, 97.5)
-
-METRICS = {"mse": -1, "log_mse": -1, "flip": -1, "ssim": 1, "jod": 1}
+SIGNS = {"mse": -1, "log_mse": -1, "flip": -1, "ssim": 1, "jod": 1}
 """Metrics by name; 1 where more is better."""
 
 
@@ -92,7 +88,7 @@ def run_table(results: Results) -> pd.DataFrame:
             line |= {"quartile_low": statistics.quartile_low, "quartile_high": statistics.quartile_high}
             line |= {"suitable_percentile": statistics.suitable_percentile, "share_suitable": statistics.share_suitable}
             line |= {"outliers": statistics.outliers, "infinite": statistics.infinite}
-            for metric in METRICS:
+            for metric in SIGNS:
                 line |= {f"{metric}_thesis": ours.value(metric), f"{metric}_framed": framed.value(metric)}
             line |= {"cycles": ours.summary["cycles"], "cycle_s": ours.summary["cycle_s"]}
             line |= {"invariants_ok": ours.summary["invariants"]["ok"], "nonfinite": ours.summary["nonfinite_samples"]}
@@ -228,19 +224,19 @@ def disagreement_table(results: Results) -> pd.DataFrame:
     for name, row in itertools.product(results.inputs, results.rows):
         for ours, framed in results.pairs(name, row):
             votes = {
-                metric: sign * np.sign(ours.value(metric) - framed.value(metric)) for metric, sign in METRICS.items()
+                metric: sign * np.sign(ours.value(metric) - framed.value(metric)) for metric, sign in SIGNS.items()
             }
             given = {metric: vote for metric, vote in votes.items() if not np.isnan(vote) and vote != 0}
             if len(set(given.values())) > 1:
                 lines.append({"input": name, "row": row, "repetition": ours.run.repetition, **votes})
-    return pd.DataFrame(lines, columns=["input", "row", "repetition", *METRICS])
+    return pd.DataFrame(lines, columns=["input", "row", "repetition", *SIGNS])
 
 
 def vote_table(results: Results) -> pd.DataFrame:
     """In how many runs each metric says that ``thesis`` is better than the framed renderer."""
     runs = run_table(results)
     lines = []
-    for metric, sign in METRICS.items() if len(runs) else ():
+    for metric, sign in SIGNS.items() if len(runs) else ():
         gain = sign * (runs[f"{metric}_thesis"] - runs[f"{metric}_framed"]).to_numpy()
         known = ~np.isnan(gain)
         lines.append({"metric": metric, "thesis better": int((gain[known] > 0).sum()), "runs": int(known.sum())})
@@ -251,8 +247,8 @@ def rank_table(results: Results) -> pd.DataFrame:
     """Spearman's correlation between metrics of the ranks of all adaptive runs; 1 where they rank alike."""
     runs = run_table(results)
     lines = []
-    for one, other in itertools.combinations(METRICS, 2) if len(runs) else ():
-        values = [METRICS[name] * runs[f"{name}_thesis"].to_numpy() for name in (one, other)]
+    for one, other in itertools.combinations(SIGNS, 2) if len(runs) else ():
+        values = [SIGNS[name] * runs[f"{name}_thesis"].to_numpy() for name in (one, other)]
         known = ~np.isnan(values[0]) & ~np.isnan(values[1])
         found: Any = spearmanr(values[0][known], values[1][known])[0] if known.sum() > 2 else math.nan
         lines.append({"metric": one, "and": other, "rank correlation": float(found), "runs": int(known.sum())})

@@ -11,9 +11,7 @@ Examples: python scripts/trade.py --out out/trade
 
 from __future__ import annotations
 
-import sys
-
-from analysis.command.cli import parse, require_unbroken
+from analysis.command.cli import parse
 from analysis.command.extras import require_extra
 from analysis.trade.options import TradeOptions
 
@@ -23,6 +21,7 @@ def main() -> None:
     options = parse(TradeOptions, __doc__ or "")
     require_extra("study", "perception", *(["search"] if options.trials else []))
     from analysis.command.console import markdown, show
+    from analysis.study.written import end_study
     from analysis.trade.run import trade
     from analysis.trade.shown import shown_tables
 
@@ -31,8 +30,4 @@ def main() -> None:
     show(*([markdown(shown)] if options.markdown else shown))
     for setting, reason in summary["dropped"].items():
         show(f"left out at this scale: {setting}: {reason}")
-    written = f"written to {options.out}: trade.csv, summary.json, report.html, tables/, tables.md, figures"
-    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
-    require_unbroken(summary["broken_invariants"])
-    if summary["failures"]:
-        sys.exit(1)
+    end_study(summary, summary["broken_invariants"], options.out, "trade.csv, report.html, tables/, tables.md, figures")

@@ -104,8 +104,6 @@ KNOBS: dict[str, Knob] = {
 }  # fmt: skip
 """Every knob by its name. Numbers in framelets, elements and pixels are of the thesis' own size."""
 
-DEFAULTS: tuple[str, ...] = tuple(name for name in KNOBS if name != "policy")
-
 Changes = tuple[tuple[str, Value], ...]
 
 

@@ -9,10 +9,11 @@ from typing import Literal
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
-from analysis.metrics.cost_model import Ledger
+from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.metrics.display_model import DisplayModel
+from analysis.study.asked import require_distinct
 from analysis.study.cases import INPUTS
-from tsar.config import closed_choices, require
+from tsar.config import closed_choices
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class TradeOptions:
     ledger: Ledger = "work"
     """What the column cost_flops counts: by default the rays that were traced, each at the price of a segment, and the
     operations around them; wall is refused, for it gives no result twice."""
-    trace_segments: float = 4.0
+    trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample, for ledgers that do not count them."""
     jod_s: float = 0.5
     """Seconds in the middle of a run that ColorVideoVDP scores; 0 for no score."""
@@ -63,8 +64,7 @@ class TradeOptions:
     cache: References = REFERENCES
 
     def __post_init__(self) -> None:
-        chosen = self.inputs
-        require(0 < len(chosen) == len(set(chosen)), "inputs", "at least one, none twice", chosen)
+        require_distinct(self, "inputs")
         limits.within(
             self,
             seconds=(0.05, 60.0),

@@ -11,19 +11,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from analysis.metrics.front import knee, on_front
-from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER
 from analysis.trade.knobs import KNOBS, OWN, said
 from analysis.trade.runs import SEARCH
 from analysis.trade.tables import Relative, lines
 
-_GRID = {"color": "0.88", "linewidth": 0.6}
 _LABELS_APART = 0.15
 """Least distance of points that have their setting beside them: sum of both differences of natural logarithms."""
 
 
 def _plain(axis: Axes, xlabel: str, ylabel: str) -> None:
     axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(True, **_GRID)
+    axis.grid(True, **GRID)
     axis.set_axisbelow(True)
     axis.set_xscale("log")
     axis.set_yscale("log")

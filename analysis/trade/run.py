@@ -7,12 +7,13 @@ from typing import Any
 import pandas as pd
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.console import markdown
 from analysis.comparison.front import STORED
 from analysis.page.figures import save
-from analysis.storage.files import atomic, write_json, write_table
+from analysis.storage.files import write_json, write_table
+from analysis.storage.results import SUMMARY
 from analysis.storage.summary import with_source
 from analysis.study.evaluation import broken
+from analysis.study.written import write_tables
 from analysis.trade import plots
 from analysis.trade.knobs import KNOBS, chosen_knobs
 from analysis.trade.measuring import Measured, measure
@@ -45,17 +46,14 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
     out = options.out.resolve()
     with full_disk(out):
         write_table(out / "trade.csv", points)
-        for name, table in tables.items():
-            write_table(out / "tables" / f"{name}.csv", table)
-        with atomic(out / "tables.md") as file:
-            file.write_text(markdown(shown_tables(tables)), encoding="utf-8")
+        write_tables(out, tables, shown_tables(tables))
         pictures = _figures(options, points, front, tables["knobs"])
         stored = front_file(points, options)
         for path in (out / "front.json", *([STORED] if options.store else [])) if stored else ():
             write_json(path, stored)
         summary = _summary(options, measured, tables)
         write_page(out / "report.html", summary, tables, points, pictures, measured.outcomes.place)
-        write_json(out / "summary.json", summary)
+        write_json(out / SUMMARY, summary)
     return summary, tables
 
 

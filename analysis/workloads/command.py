@@ -10,10 +10,9 @@ Examples: python scripts/workloads.py --out out/workloads
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
-from analysis.command.cli import bad_input, full_disk, parse, require_unbroken
+from analysis.command.cli import bad_input, full_disk, parse
 from analysis.command.extras import require_extra
 from analysis.workloads.options import WorkloadOptions
 
@@ -22,14 +21,10 @@ def main() -> None:
     """Runs what is missing; prints the tables."""
     options = parse(WorkloadOptions, __doc__ or "")
     require_extra("study", "perception")
-    from analysis.command.console import show
+    from analysis.study.written import end_study
 
     summary = study(options)
-    written = f"written to {options.out}: summary.json, tables/, tables.md, map.png"
-    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}")
-    require_unbroken(summary["broken_invariants"])
-    if summary["failures"]:
-        sys.exit(1)
+    end_study(summary, summary["broken_invariants"], options.out, "tables/, tables.md, map.png")
 
 
 def study(options: WorkloadOptions) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Literal
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
+from analysis.study.asked import require_distinct, require_inputs, require_named
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 from tsar.policies import POLICIES, RIVALS
@@ -46,13 +47,9 @@ class WorkloadOptions:
     cache: References = REFERENCES
 
     def __post_init__(self) -> None:
-        unknown = [one for one in self.inputs if one not in INPUTS]
-        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
-        for one in self.policies:
-            POLICIES.require(one, "policies")
-        for name in ("inputs", "policies", "sample_flops", "image_hz", "sides_px"):
-            chosen = getattr(self, name)
-            require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
+        require_inputs(self.inputs)
+        require_named(self, policies=POLICIES)
+        require_distinct(self, "inputs", "policies", "sample_flops", "image_hz", "sides_px")
         for name, (least, most) in {"sample_flops": (1.0, 1e9), "image_hz": (0.5, 1000.0)}.items():
             ok = all(least <= one <= most for one in getattr(self, name))
             require(ok, name, f"numbers between {least:g} and {most:g}", getattr(self, name))

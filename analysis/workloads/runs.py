@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from analysis.metrics.cost_model import CostParameters, per_segment
+from analysis.metrics.cost_model import SEGMENTS_DEFAULT, CostParameters, per_segment
 from analysis.study.cases import ROWS, SCALES, Case, framed_config, is_framed
 from analysis.study.fitting import fitting
 from analysis.workloads.options import WorkloadOptions
@@ -17,7 +17,6 @@ UNPRICED = ("framed", "framed-1", "framed-super")
 """Policies that are charged for samples alone: on a machine that keeps the framed renderer's rate, what a sample costs
 changes nothing for them."""
 _BATCH, _SIDE = ROWS[7]
-_SEGMENTS = 4.0
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def _runs_at(
                 scale=scale,
                 phase=repetition / options.repetitions,
                 framed_rate_hz=workload.image_hz,
-                trace_segments=_SEGMENTS if policy in UNPRICED else segments,
+                trace_segments=SEGMENTS_DEFAULT if policy in UNPRICED else segments,
             ))  # fmt: skip
         except ConfigError:
             case = None

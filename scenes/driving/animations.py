@@ -12,14 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.animation import UP, Path, Pose, PoseFunction, Times, camera_to_world, look_at, sample_track
+from scenes.animation import LEAD_S, UP, Path, Pose, PoseFunction, Times, camera_to_world, look_at, sample_track
 from scenes.canonical import Integrator, PerspectiveCamera, RigidTrack, Scene
 from scenes.driving import car, sky, world
 from scenes.driving.wheel import RADIUS_M
 
 DURATION_S = 6.0
-LEAD_S = 3.0
-"""Motion before time zero, for warm-up and latency."""
 
 _CAMERA_INTERVAL_S = 1.0 / 240.0
 _LANE_M = -2.6  # the right-hand lane of the road along x

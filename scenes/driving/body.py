@@ -12,10 +12,11 @@ from scipy.interpolate import BSpline, PchipInterpolator
 
 from scenes.arithmetic import cos, exp, hypot, power, sin
 from scenes.driving.meshing import Array, Surface, from_faces, grid, join, mirrored_y, smooth_normals
+from scenes.driving.wheel import RADIUS_M
 
 FRONT_AXLE_M = 1.38
 REAR_AXLE_M = -1.34
-AXLE_HEIGHT_M = 0.335
+AXLE_HEIGHT_M = RADIUS_M
 HUB_OFFSET_M = 0.785
 ARCH_RADIUS_M = 0.392
 

@@ -56,6 +56,7 @@ from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.placing import lose_back
 from scenes.formats.losses import LossReport
+from scenes.models.phong_of_parts import EXPONENT_MAX
 
 PATH_MATERIALS = Matte | Glass | Metal | MetallicRough | Masked | Bumped | NormalMapped
 """What is drawn along paths as it is, beside plastic that takes from its base what its coat reflects."""
@@ -64,7 +65,6 @@ DEPTH_MAX = 8
 """Most bounces of mirrored and refracted rays."""
 
 _SMOOTH = 0.02  # alpha below which a mirror is drawn sharp
-_EXPONENT_MAX = 1.0e4
 
 
 class Approximation:
@@ -241,7 +241,7 @@ class Approximation:
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
             coat = 0.04 * coat if isinstance(material, Uber) else coat
         amount = float(np.clip(coat.mean(), 0.0, 1.0))
-        exponent = float(np.clip(2.0 / max(alpha, 1e-3) ** 2 - 2.0, 1.0, _EXPONENT_MAX))
+        exponent = float(np.clip(2.0 / max(alpha, 1e-3) ** 2 - 2.0, 1.0, EXPONENT_MAX))
         mirrored = amount if alpha <= 0.2 else 0.0
         what = f"Phong with a highlight of exponent {exponent:.3g}"
         self.report.add(where, f"{type(material).__name__.lower()} of alpha {alpha:.3g}", what)

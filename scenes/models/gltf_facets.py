@@ -62,7 +62,7 @@ class FacetMaterials:
             coat = extensions.get("KHR_materials_clearcoat", {})
             for name in sorted(name for name in coat if name.endswith("Texture")):
                 self.report.add(where, f"a picture of its clear coat ({name})")
-            metallic, rough = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in _PARTS)
+            metallic, rough = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in PARTS)
             beside, glow = pictures.get("metallicRoughnessTexture"), pictures.get("emissiveTexture")
             strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
             emission = np.asarray(given.get("emissiveFactor", (0.0, 0.0, 0.0)), np.float64) * strength
@@ -107,4 +107,4 @@ class FacetMaterials:
         return Masked(material, opacity, cutoff)
 
 
-_PARTS = ("metallic", "roughness")
+PARTS = ("metallic", "roughness")

@@ -22,7 +22,7 @@ from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
-from scenes.models.gltf_facets import ALONG_PATHS, FacetMaterials, lookups_beside
+from scenes.models.gltf_facets import ALONG_PATHS, PARTS, FacetMaterials, lookups_beside
 from scenes.models.gltf_textures import GltfTextures, Lookup, Uvs, lookup_of, multiplied
 from scenes.models.phong_of_parts import diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.vertex_colours import coloured
@@ -136,7 +136,7 @@ class GltfMaterials:
     def _rough(self, given: dict[str, Any], base: Texture, where: str, lookup: Lookup | None) -> Phong:
         """Metal and roughness by their factors times the blue and green channels of their texture."""
         parts = _rough(given)
-        metallic, roughness = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in _PARTS)
+        metallic, roughness = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in PARTS)
         beside = lookup_of(parts.get("metallicRoughnessTexture"))
         diffuse = None
         if beside is not None:
@@ -181,9 +181,6 @@ class GltfMaterials:
                 return material
             emission = emission * picture[0, 0]
         return glowing(material, rgb(np.maximum(emission, 0.0)), where, self.report)
-
-
-_PARTS = ("metallic", "roughness")
 
 
 def _rough(given: dict[str, Any]) -> dict[str, Any]:

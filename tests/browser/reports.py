@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from analysis.page.comparer import Comparer, Panel, Step
 from analysis.page.curves import Curve, Plot
-from analysis.page.pictures import Scale, picture_bytes
+from analysis.page.pictures import ColorScale, picture_bytes
 from analysis.page.report import Report, Table
 from tests.analysis.builders import png_bytes
 
@@ -17,7 +17,7 @@ LABELS = ["reference", "tsar", "framed", "age of samples"]
 STEPS, SIDE = 7, 64
 LOST, BROKEN = 2, 4
 """Steps at which the run framed has no picture, and one that does not decode."""
-SCALE = Scale.of((1.0, 1000.0), "ms", "viridis", special=(200, 0, 0), meaning="not sampled yet")
+SCALE = ColorScale.of((1.0, 1000.0), "ms", "viridis", special=(200, 0, 0), meaning="not sampled yet")
 
 
 @dataclass

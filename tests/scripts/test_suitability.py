@@ -17,7 +17,7 @@ import psutil
 import pytest
 
 from analysis.study.cases import POLICIES, Case
-from analysis.suitability.tables import METRICS
+from analysis.suitability.tables import SIGNS
 from tests.scripts.commands import ROOT, call_script, started_script
 
 SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-repetitions", "0")
@@ -79,7 +79,7 @@ def let_fail(policies: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None
     def finished(key: str, place: Any) -> dict[str, Any] | None:
         return None if key.startswith(tuple(f"{one}-chase".replace(" ", "-") for one in policies)) else SUMMARY
 
-    times = pd.DataFrame({"time_s": [0.0, 0.1], "refresh": [1, 2]} | {name: [0.5, 0.75] for name in METRICS})
+    times = pd.DataFrame({"time_s": [0.0, 0.1], "refresh": [1, 2]} | {name: [0.5, 0.75] for name in SIGNS})
     times = times.assign(flicker=0.0, causes_known=0.0, aliasing=0.0)
     monkeypatch.setattr("analysis.study.farm.run_cases", run_cases)
     for name, made in (("finished", finished), ("times_of", lambda *_: times)):

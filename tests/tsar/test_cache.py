@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles.batches import make_batch
-from tsar.cache import FrameletCache
+from tsar.cache import EMPTY, FrameletCache
 from tsar.config import TilingConfig, TsarConfig
 from tsar.tiling import uniform
 
@@ -29,7 +29,7 @@ def test_dead_framelets_go_first_then_the_oldest():
     cache = FrameletCache(CONFIG)
     slots = len(cache.level)
     order = [insert(cache, list(range(64)), float(t)) for t in range(slots // 64)]
-    assert bool(cache.occupied.all())
+    assert bool((cache.level != EMPTY).all())
     cache.dead[order[7]] = True
     assert torch.equal(insert(cache, list(range(64)), 100.0), order[7])
     assert torch.equal(insert(cache, list(range(64)), 101.0), order[0])
@@ -54,7 +54,8 @@ def test_against_a_list_of_framelets(seed):
             framelet["dead"] = bool(torch.rand((), generator=g) < 0.1) or framelet["dead"]
             cache.dead[framelet["slot"]] = framelet["dead"]
         times = sorted(f["time"] for f in kept)
-        assert sorted(cache.time_s[cache.occupied].tolist()) == times and len({f["slot"] for f in kept}) == len(kept)
+        assert sorted(cache.time_s[cache.level != EMPTY].tolist()) == times
+        assert len({f["slot"] for f in kept}) == len(kept)
     state, known = cache.previous(torch.full((16,), 2), torch.arange(16))
     for tile in range(16):
         # A tile whose newest framelet was evicted is forgotten with it, though an older one may remain.

@@ -8,14 +8,14 @@ import pytest
 import torch
 
 from tsar.checks import ConfigError
-from tsar.formats import FORMATS, UNORM_MAX, rounded
+from tsar.formats import NUMBER_FORMATS, UNORM_MAX, rounded
 
 VALUES = torch.cat((torch.zeros(1), torch.logspace(-6, 0.17, 2000)))
 ROUNDING = {"float32": 0.0, "bfloat16": 2.0**-8, "float16": 2.0**-11, "float8": 2.0**-3}
 """Half the distance from one number to the next, over the number."""
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", NUMBER_FORMATS)
 def test_a_format_holds_what_it_made(form: str) -> None:
     once = rounded(VALUES, form)
     assert torch.equal(rounded(once, form), once)
@@ -35,7 +35,7 @@ def test_colours_of_eight_bits_have_as_many_values_as_a_display() -> None:
     assert torch.allclose(found.sqrt().diff(), torch.tensor(math.sqrt(UNORM_MAX) / 255.0), rtol=1e-3)
 
 
-@pytest.mark.parametrize("form", [form for form in FORMATS if form != "unorm8"])
+@pytest.mark.parametrize("form", [form for form in NUMBER_FORMATS if form != "unorm8"])
 def test_what_is_beyond_a_format_becomes_its_greatest_and_infinity_stays(form: str) -> None:
     values = torch.tensor([3e38, -3e38, math.inf, -math.inf, math.nan])
     found = rounded(values, form)

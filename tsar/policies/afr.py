@@ -32,6 +32,7 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
+from tsar.filtering.samples import COLOR_MAX
 from tsar.policies import deep_buffer, tiles
 from tsar.policies.deep_buffer import DeepBuffer, Placed
 from tsar.policies.scatter import generator, pixel_colors, pull_push
@@ -41,10 +42,7 @@ from tsar.prediction import foretold
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
 from tsar.window import GRID
 
-LEAVES = 1024
 SAMPLES_KEPT_PER_PIXEL = 4
-COLOR_MAX = 1.5
-"""Radiance to which samples are clipped before they are averaged: a glint would spread over its neighbours."""
 _CROSSHAIR = torch.tensor([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 _MEMORY_CYCLES = 4.0
 _GOLDEN = 0.6180339887498949
@@ -99,7 +97,7 @@ class Afr(Policy[Sampled]):
 
     def start(self) -> Sampled:
         room = SAMPLES_KEPT_PER_PIXEL * self.config.pixels
-        return Sampled(tiles.initial(self._depth, LEAVES, 6, self.config.window), DeepBuffer.empty(room))
+        return Sampled(tiles.initial(self._depth, tiles.LEAVES, 6, self.config.window), DeepBuffer.empty(room))
 
     def request(self, state: Sampled, moment: Moment) -> tuple[Sampled, FrameletBatch]:
         """Crosshairs in successive tiles, and single samples at random positions for the remainder of the batch."""

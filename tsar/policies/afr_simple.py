@@ -22,11 +22,10 @@ from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
 from tsar.policies import tiles
 from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
-from tsar.policies.tiles import Tree
+from tsar.policies.tiles import LEAVES, Tree
 from tsar.policy import Moment, Picture, Policy, Price
 from tsar.types import FrameletBatch, SampleBatch
 
-LEAVES = 1024
 _MEMORY_CYCLES = 8.0
 
 

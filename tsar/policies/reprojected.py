@@ -24,12 +24,11 @@ from tsar.policies.surfaces import Surfaces
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.prediction import foretold
 from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
+from tsar.window import GRID
 
 _GOLDEN = 0.7548776662466927, 0.5698402909980532
 """Steps of the jitter along both axes: ``1/x`` and ``1/x²`` of the golden ratio in two dimensions, the root of
 ``x³ = x + 1``."""
-_GRID = 65536
-"""Sample positions are multiples of its reciprocal."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +184,7 @@ class Reprojected(Policy[Progress]):
         """Offset of a frame's samples from the centres of the pixels, in [-1/2, 1/2) pixels."""
         if self._accumulation is None:
             return 0.0, 0.0
-        pixel = _GRID // self.config.resolution_px
+        pixel = GRID // self.config.resolution_px
         x, y = (floor(((0.5 + number * step) % 1.0) * pixel) / pixel - 0.5 for step in _GOLDEN)
         return x, y
 

@@ -23,6 +23,7 @@ from tsar.morton import deinterleave, floor_log2, morton_to_raster
 from tsar.window import Window
 
 CHANGES_PER_CYCLE = 64
+LEAVES = 1024
 
 
 @dataclass(frozen=True)

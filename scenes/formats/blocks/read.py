@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.animation import Pose, Times, sample_track
+from scenes.animation import LEAD_S, Pose, Times, sample_track
 from scenes.arithmetic import product
 from scenes.canonical import (
     ConstantTexture,
@@ -50,9 +50,6 @@ from scenes.formats.blocks.text import Block, read_blocks
 from scenes.formats.blocks.transforms import aimed, facing, transform
 from scenes.loading import clamp_radiance, read_image
 from scenes.models import place_model
-
-LEAD_S = 3.0
-"""Motion before the first and after the last frame, seconds: filters and caches look back and ahead."""
 
 _KEYS_PER_FRAME = 4  # of a camera that turns
 _SHAPES = {"sphere": Sphere, "disk": Disk, "rectangle": Rectangle, "cube": Cube}

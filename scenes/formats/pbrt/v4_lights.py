@@ -24,7 +24,7 @@ from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives import lights
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.losses import LossReport
-from scenes.formats.pbrt.v4_materials import LUMINANCE, PbrtV4Surfaces
+from scenes.formats.pbrt.v4_materials import PBRT_LUMINANCE, PbrtV4Surfaces
 from scenes.formats.text.scene_files import SceneFiles
 
 Placed = Callable[[Any, tuple[float, float, float]], Rgb]
@@ -100,7 +100,7 @@ class V4Lights:
             height = image.shape[0]
             polar = (np.arange(height) + 0.5) / height * np.pi
             weight = np.maximum(cos(polar), 0.0) * sin(polar) * 2.0 * np.pi**2 / (height * image.shape[1])
-            total = float((product(image.astype(np.float64), LUMINANCE) * weight[:, None]).sum())
+            total = float((product(image.astype(np.float64), PBRT_LUMINANCE) * weight[:, None]).sum())
             if total > 0.0:
                 strength = rgb(np.array(strength) * light / total)
         return lights.environment_map(image, matrix, strength, path)

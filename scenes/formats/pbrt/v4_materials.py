@@ -37,7 +37,7 @@ from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
 
-LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
+PBRT_LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
 """Of linear Rec. 709."""
 
 _GLASSES = {"BK7": 1.5168, "BAF10": 1.67003, "FK51A": 1.48656, "LASF9": 1.85025, "F5": 1.60342, "SF5": 1.6727,
@@ -96,7 +96,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
 
     @staticmethod
     def _bright(color: Rgb) -> Rgb:
-        luminance = float(product(LUMINANCE, color))
+        luminance = float(product(PBRT_LUMINANCE, color))
         return rgb(np.array(color) / luminance) if luminance > 0.0 else color
 
     def _index(self, parameters: Parameters, name: str = "eta") -> float:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from analysis.comparison.choosing import choice_table, settled, what_came
-from analysis.comparison.front import PRESETS, Front, Place, stored_front
+from analysis.comparison.front import Front, Place, PresetName, stored_front
 from analysis.comparison.options import RunOptions
 from analysis.metrics.cost_model import MODELLED
 from tsar.config import ConfigError, TsarConfig
@@ -91,7 +91,7 @@ def test_the_stored_front_is_one() -> None:
     front = stored_front()
     costs, errors = ([getattr(place, name) for place in front.places] for name in ("cost", "error"))
     assert costs == sorted(costs) and errors == sorted(errors, reverse=True)
-    draft, balanced, accurate = (front.preset(name) for name in PRESETS)
+    draft, balanced, accurate = (front.preset(name) for name in get_args(PresetName))
     assert draft.cost <= balanced.cost <= accurate.cost and draft.mse >= balanced.mse >= accurate.mse
-    for name in PRESETS:
+    for name in get_args(PresetName):
         assert settled(RunOptions("fly-by", preset=name))[0].parts == front.preset(name).parts

@@ -12,9 +12,9 @@ import pytest
 import torch
 
 from analysis import METRICS, Result, compare, load
-from analysis.storage.records import read_limits
 from renderer import render
 from scenes.catalog import load as load_scene
+from tests.oracles.steps import read_limits
 from tsar import POLICIES, ConfigError
 from tsar.morton import raster_to_morton
 from tsar.policies.framed import Framed

@@ -24,9 +24,10 @@ from analysis.cost_report.refit import (
     power_law,
     refit,
 )
-from analysis.metrics.cost_model import STAGES, CostParameters
+from analysis.metrics.cost_model import CostParameters, stage_flops
 
 SETTINGS = MeasurementOptions()
+STAGES = tuple(stage_flops(CostParameters()))
 PRICE = {name: 1e-11 * (number + 1) for number, name in enumerate(("tracing", "cache", *STAGES))}
 MIB = 2.0**20
 

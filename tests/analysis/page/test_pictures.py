@@ -15,7 +15,7 @@ from PIL import Image
 from analysis.page.pictures import (
     AGE_MAP,
     NEVER,
-    Scale,
+    ColorScale,
     age_map,
     colour,
     density_map,
@@ -71,7 +71,7 @@ def test_colour_scale_is_logarithmic_and_clipped() -> None:
 
 def test_bytes_hold_values_to_two_percent_and_say_what_lacks() -> None:
     """Each byte has the colour of its value; 0 is what is not finite."""
-    scale = Scale.of((0.01, 100.0), "volts", RATE)
+    scale = ColorScale.of((0.01, 100.0), "volts", RATE)
     values = np.array([0.01, 0.3, 7.0, 100.0, 1e9, 0.0, np.inf])
     places = stored(values, scale.bounds)
     assert places.tolist()[::3] == [1, 255, 0] and places[4] == 255 and places[5] == 1
@@ -82,7 +82,7 @@ def test_bytes_hold_values_to_two_percent_and_say_what_lacks() -> None:
 
 
 def test_a_fitted_scale_spans_the_data_between_round_numbers() -> None:
-    scale = Scale.of((1.0, 1e5), "ms", AGE_MAP)
+    scale = ColorScale.of((1.0, 1e5), "ms", AGE_MAP)
     ages = np.exp(np.random.default_rng(0).uniform(np.log(23.0), np.log(710.0), 100_000))
     counts = np.bincount(stored(ages, scale.bounds), minlength=256)
     fitted = scale.fitted(counts)
@@ -181,7 +181,7 @@ def test_enlarge() -> None:
 
 @pytest.mark.parametrize("width", [96, 250])
 def test_a_scale_is_a_strip_of_its_own(width: int) -> None:
-    scale = Scale.of((1 / 64, 1.0), "refreshes per cycle", RATE)
+    scale = ColorScale.of((1 / 64, 1.0), "refreshes per cycle", RATE)
     shown = scale_strip(width, 24, scale, (235, 235, 235), (24, 24, 24))
     assert shown.shape == (24, width, 3) and (shown != 24).any()
     margin = max(4, width // 40)

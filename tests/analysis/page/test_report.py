@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from analysis.page.comparer import SCRIPTS, Comparer, Panel, Step, read_comparer, source
 from analysis.page.curves import Curve, Plot
-from analysis.page.pictures import Scale, picture_bytes
+from analysis.page.pictures import ColorScale, picture_bytes
 from analysis.page.report import STYLE, Report, Table, flat, render, write_report
 from tests.analysis.builders import png_bytes
 
@@ -57,7 +57,7 @@ def picture(value: int) -> bytes:
 
 
 def comparer(text: str) -> Comparer:
-    scale = Scale.of((1.0, 100.0), text, "inferno", meaning=text)
+    scale = ColorScale.of((1.0, 100.0), text, "inferno", meaning=text)
     panels = [Panel("reference"), Panel(text, truth="reference"), Panel("map", scale=scale)]
     steps = [Step(0.1 * i, {"reference": picture(9), text: picture(i), "map": None}) for i in range(2)]
     plots = [Plot(text, text, [Curve(text, [0.0, 0.1], [1e-3, float("nan")], 0)], level=1.0, marks_s=[0.05])]

@@ -14,9 +14,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.storage.invariants import InvariantCheck, check_invariants, covers_once
+from analysis.storage.invariants import InvariantCheck, covers_once
 from tests.analysis.builders import ELEMENTS, LIMITS, SPATIAL, TEMPORAL, good_record, random_tiling, tiling
 from tests.analysis.storage.test_records import write
+from tests.oracles.steps import check_invariants
 from tsar.morton import deinterleave
 from tsar.types import Errors, StepRecord
 

@@ -10,8 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 import torch
 
-from analysis.storage.records import StepWriter, density_quantiles, read_limits
+from analysis.storage.records import StepWriter, density_quantiles
 from tests.analysis.builders import ELEMENTS, LIMITS, good_record
+from tests.oracles.steps import read_limits
 from tsar.types import StepRecord
 
 

@@ -15,7 +15,7 @@ import pytest
 from analysis.comparison.experiment import run_experiment
 from analysis.metrics import METRICS
 from analysis.storage import source
-from analysis.storage.source import code_hash, hash_of_modules, modules_of, version_of
+from analysis.storage.source import code_hash, hash_of_modules, version_of
 from analysis.study.evaluation import evaluate
 from renderer.trace import Renderer
 from tsar.choices import NORMS, RECONSTRUCTIONS, SOLVERS
@@ -24,6 +24,13 @@ from tsar.policies import POLICIES
 
 ROOT = Path(__file__).resolve().parents[3]
 STUDY, RUN = "analysis/study/evaluation.py", "analysis/comparison/experiment.py"
+
+
+def modules_of(maker: type | Callable) -> tuple[set[Path], set[str]]:
+    """Files of the modules that the hash of a maker covers, and names of the libraries that they import."""
+    return source._reached(*source._found([maker]))
+
+
 ENTRIES = {"renderer/trace.py": Renderer, STUDY: evaluate, RUN: run_experiment}
 
 PACKAGES = ("tsar", "renderer", "scenes", "analysis", "scripts")

@@ -16,7 +16,7 @@ from renderer.stages.control import compiled_stages
 from tests.oracles import runs
 from tests.oracles.batches import make_batch
 from tests.renderer.stages.builders import small
-from tsar.cache import FrameletCache
+from tsar.cache import EMPTY, FrameletCache
 from tsar.clock import StageTimer
 from tsar.tiling import uniform
 from tsar.types import Errors, FrameletBatch
@@ -123,7 +123,7 @@ def test_a_batch_with_another_array_leaves_the_cache_alone(name: str) -> None:
     color = color[:, :255] if name == "color" else color
     with pytest.raises(ValueError, match=rf"^(batch\.)?{name}: expected"):
         stages.observe(batch, color, cache, CONFIG, StageTimer())
-    assert not cache.occupied.any()
+    assert (cache.level == EMPTY).all()
 
 
 @pytest.mark.parametrize("name", ["level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"])

@@ -14,7 +14,7 @@ from tests.oracles import pictures
 from tests.oracles.batches import make_batch
 from tests.oracles.reconstruction_slow import slow_reconstruct
 from tests.renderer.stages.builders import CONFIGS, CYCLE_S, moments, small
-from tsar.cache import FrameletCache
+from tsar.cache import EMPTY, FrameletCache
 from tsar.config import ReconstructionConfig, TilingConfig, TsarConfig
 from tsar.reconstruction import Reconstruction, reconstruct
 from tsar.tiling import build, uniform
@@ -57,10 +57,10 @@ def test_images_of_a_run_agree_with_the_reference(name: str) -> None:
     for moment in moments(config, 40, 2):
         ours, theirs = copy.deepcopy(moment.after.cache), copy.deepcopy(moment.after.cache)
         for cache in (ours, theirs):
-            cache.dead[cache.occupied] = False
+            cache.dead[cache.level != EMPTY] = False
         found, wanted = reconstructor.reconstruct(ours, config, CYCLE_S), reconstruct(theirs, config, CYCLE_S)
         assert_same(found, wanted, ours, theirs)
-        dead += int(theirs.dead[theirs.occupied].sum())
+        dead += int(theirs.dead[theirs.level != EMPTY].sum())
     assert dead > 0, "nothing was ever out of date"
 
 

@@ -1,0 +1,50 @@
+"""Checks of the options that several studies have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from analysis.study.cases import INPUTS, ROWS
+from tsar.config import require
+from tsar.named import Named
+
+
+def require_distinct(options: object, *names: str) -> None:
+    """Checks that each of the named fields holds something, and nothing twice.
+
+    Raises:
+        ConfigError: one does not.
+    """
+    for name in names:
+        chosen = getattr(options, name)
+        require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
+
+
+def require_inputs(inputs: Sequence[str]) -> None:
+    """Checks that all are built-in inputs.
+
+    Raises:
+        ConfigError: one is not.
+    """
+    unknown = [one for one in inputs if one not in INPUTS]
+    require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+
+
+def require_rows(name: str, rows: Sequence[int]) -> None:
+    """Checks numbers of rows of table 7.2, which the option ``name`` holds.
+
+    Raises:
+        ConfigError: one is not the number of a row.
+    """
+    require(all(0 <= row < len(ROWS) for row in rows), name, f"numbers from 0 to {len(ROWS) - 1}", rows)
+
+
+def require_named(options: object, **tables: Named) -> None:
+    """Checks that each of the named fields holds names of its table.
+
+    Raises:
+        ConfigError: one does not; the message has the known names and the nearest of them.
+    """
+    for field, table in tables.items():
+        for one in getattr(options, field):
+            table.require(one, field)
