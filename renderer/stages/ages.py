@@ -49,7 +49,7 @@ class DisplayPlan:
     cell_age: wp.uint64
     """float32: age of each cell, cycles."""
     cell_least: wp.uint64
-    """float32, per cell, and as much again to work in."""
+    """float32: least age within reach of each cell, and working memory of the same size."""
     row_sum: wp.uint64
     """float64: for each row of cells, the sums of ages over a box of pixels around each column."""
     row_integral: wp.uint64

@@ -1,11 +1,12 @@
-// Elementary functions of sixteen floats, exact to a few units in the last place; for vpow these count in the
+// Elementary functions of sixteen floats, accurate to a few units in the last place; for vpow, in the last place of the
 // logarithm of the result.
 #pragma once
 #include "lanes.h"
 
 namespace packets {
 
-// Twice the series of the inverse hyperbolic tangent on [sqrt(1/2), sqrt(2)], plus the exponent. For positive, normal numbers.
+// log2 of positive, normal numbers: twice the series of the inverse hyperbolic tangent on [sqrt(1/2), sqrt(2)], plus
+// the exponent.
 inline f16 vlog2(f16 x) {
     const i16 raw = __builtin_bit_cast(i16, x);
     const i16 exponent = (raw - 0x3f3504f3) >> 23;  // 0x3f3504f3 is sqrt(1/2)
@@ -15,7 +16,7 @@ inline f16 vlog2(f16 x) {
     return to_float(exponent) + s * series * 2.88539008f;  // 2 / ln 2
 }
 
-// Taylor series of exp(f ln 2) on [-1/2, 1/2], times a power of two; 0 below the least normal number.
+// 2^x: the Taylor series of exp(f ln 2) on [-1/2, 1/2], times a power of two; 0 below the least normal number.
 inline f16 vexp2(f16 x) {
     const f16 bounded = clamped(x, -126.0f, 127.0f), whole = vfloor(bounded + 0.5f),
               f = (bounded - whole) * 0.693147181f;

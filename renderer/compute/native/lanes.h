@@ -1,7 +1,8 @@
-// Sixteen (or eight, or four) floats that go through the same arithmetic side by side.
+// SIMD vectors of sixteen, eight or four lanes.
 //
-// Clang's vector types take the usual operators; a comparison gives a vector of 0 and -1, and `condition ? a : b` picks
-// lane by lane. The widths are fixed: a machine with narrower registers splits them, with the same results.
+// Clang's vector types take the usual operators; a comparison gives a vector of 0 and -1, and `condition ? a : b`
+// selects lane by lane. The widths are fixed: with narrower registers the compiler splits vectors, with the same
+// results.
 #pragma once
 
 namespace packets {
@@ -35,7 +36,7 @@ typedef bool b4 __attribute__((ext_vector_type(4)));
 typedef bool b8 __attribute__((ext_vector_type(8)));
 typedef bool b16 __attribute__((ext_vector_type(16)));
 
-// One bit a lane from a comparison, and back.
+// One bit per lane from a comparison, and the reverse.
 inline unsigned bits(i4 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b4)) & 15u; }
 inline unsigned bits(i8 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b8)); }
 inline unsigned bits(l8 c) { return __builtin_bit_cast(unsigned char, __builtin_convertvector(c, b8)); }
@@ -46,7 +47,7 @@ inline i16 lanes_of(unsigned mask) {
 
 inline int first_bit(unsigned mask) { return __builtin_ctz(mask); }
 
-// One instruction each on x86, unlike the builtins, which spend two more on NaN: here `b` is the answer then.
+// One instruction each on x86; the builtins take two more for NaN. Here the result is `b` if either is NaN.
 template <class F> inline F vmin(F a, F b) { return a < b ? a : b; }
 template <class F> inline F vmax(F a, F b) { return a > b ? a : b; }
 template <class F> inline F vabs(F a) { return __builtin_elementwise_abs(a); }
@@ -64,7 +65,7 @@ template <class F, class T> inline F load(const T* from) {
 }
 template <class F, class T> inline void store(T* to, F value) { __builtin_memcpy(to, &value, sizeof(F)); }
 
-// Over all lanes, by halves.
+// Reductions over all lanes, by halves.
 inline float least(f16 a) {
     f8 b = vmin((f8)a.lo, (f8)a.hi);
     auto c = vmin(b.lo, b.hi);
@@ -72,7 +73,7 @@ inline float least(f16 a) {
     return d.x < d.y ? d.x : d.y;
 }
 inline float greatest(f16 a) { return -least(-a); }
-// The least lane of each of eight, in half the steps that eight by themselves take.
+// The least lane of each of eight vectors, in half the steps of eight separate reductions.
 inline f8 least_of_each(const f16* a) {
     f8 halves[8], quarters[4], eighths[2];
     for (int i = 0; i < 8; ++i) halves[i] = vmin((f8)a[i].lo, (f8)a[i].hi);
@@ -100,14 +101,14 @@ inline float added(f16 a) {
     return (c.x + c.y) + (c.z + c.w);
 }
 
-// base[index] in every lane; every index must be one that may be read.
+// base[index] in every lane; every index must be readable.
 inline i16 gather(const int* base, i16 index) {
     i16 value;
     for (int lane = 0; lane < LANES; ++lane) value[lane] = base[index[lane]];
     return value;
 }
 
-// The 4 x 4 floats of each quarter turned over their diagonal; the fourth rows are left out.
+// Transposes the 4 x 4 floats of each quarter; the fourth rows are omitted.
 inline void transpose_quarters(const f16* row, f16* column) {
     const f16 a = __builtin_shufflevector(row[0], row[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
     const f16 b = __builtin_shufflevector(row[2], row[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
@@ -136,7 +137,7 @@ template <class F> inline Vec<F> cross(Vec<F> a, Vec<F> b) {
 inline Vec16 pick(i16 condition, Vec16 a, Vec16 b) {
     return {condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z};
 }
-// Sixteen vectors that follow one another.
+// Loads sixteen consecutive 3-vectors.
 inline Vec16 separated(const float* xyz) {
     const f16 p = load<f16>(xyz), q = load<f16>(xyz + 16), w = load<f16>(xyz + 32);
     const f16 pq_x = __builtin_shufflevector(p, q, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, -1, -1, -1, -1, -1);
@@ -146,7 +147,7 @@ inline Vec16 separated(const float* xyz) {
             __builtin_shufflevector(pq_y, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30),
             __builtin_shufflevector(pq_z, w, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31)};
 }
-// Puts sixteen vectors one after the other.
+// Stores sixteen consecutive 3-vectors.
 inline void store_joined(float* xyz, const Vec16& v) {
     const f16 p = __builtin_shufflevector(v.x, v.y, 0, 16, -1, 1, 17, -1, 2, 18, -1, 3, 19, -1, 4, 20, -1, 5);
     const f16 q = __builtin_shufflevector(v.x, v.y, 21, -1, 6, 22, -1, 7, 23, -1, 8, 24, -1, 9, 25, -1, 10, 26);
@@ -155,7 +156,7 @@ inline void store_joined(float* xyz, const Vec16& v) {
     store<f16>(xyz + 16, __builtin_shufflevector(q, v.z, 0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15));
     store<f16>(xyz + 32, __builtin_shufflevector(w, v.z, 26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31));
 }
-// Elements of an array of vectors at lane-wise places, each read together with the float that follows it.
+// Gathers 3-vectors of an array at lane-wise indices; each is read together with the float after it.
 inline Vec16 gather3(const float* base, i16 index) {
     f16 row[4], column[3];
     for (int i = 0; i < 4; ++i) {
@@ -169,7 +170,7 @@ inline Vec16 gather3(const float* base, i16 index) {
     return {column[0], column[1], column[2]};
 }
 inline f16 length(Vec16 a) { return vsqrt(dot(a, a)); }
-// The zero vector stays as it is, as in Warp.
+// The zero vector is unchanged, as in Warp.
 inline Vec16 unit(Vec16 a) {
     f16 size = length(a);
     return a * (size > 0.0f ? 1.0f / size : (f16)0.0f);

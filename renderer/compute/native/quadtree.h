@@ -1,12 +1,12 @@
-// The quadtree: numbers of its nodes, level after level from the coarsest, and cells on the Morton curve.
+// The quadtree: numbers of its nodes, level by level from the coarsest, and cells on the Morton curve.
 #pragma once
 
 namespace quadtree {
 
-// Nodes of all levels above one.
+// Number of the nodes of all levels above `level`.
 inline long long first_node(long long level) { return ((1ll << (2 * level)) - 1) / 3; }
 
-// Bits 0, 2, 4 and so on, side by side; of 16 at most.
+// Bits 0, 2, 4 and so on as a number of at most 16 bits.
 inline int every_second_bit(long long code) {
     unsigned bits = (unsigned)code & 0x55555555u;
     bits = (bits | bits >> 1) & 0x33333333u;

@@ -1,5 +1,5 @@
-// Work handed from one thread to another that waits for it: by one word of memory while the other is awake, for
-// waking a sleeping thread takes longer than some of this work.
+// Work passed from one thread to a waiting one, through one word of memory while that thread spins: waking a sleeping
+// thread takes longer than some of this work.
 #pragma once
 #include "ticks.h"
 
@@ -22,31 +22,32 @@ inline void pause() {
 #endif
 }
 
-// A helper's loop: runs what is posted, and parks when nothing has come for some time.
+// A helper's loop: it runs posted work, and parks when none has come for some time.
 inline void serve(long long* box, long long patience_us) {
     const long long patience = patience_us * ticks::per_microsecond();
     while (true) {
         const long long since = ticks::now();
         for (int turn = 0; load(box) != POSTED; ++turn) {
-            // `IDLE` to `PARKED` fails where work has come meanwhile; then it is done first.
+            // The swap from `IDLE` to `PARKED` fails if work has been posted meanwhile; then that is done first.
             const bool waits = ticks::now() - since <= patience && !__atomic_load_n(box + MAIL_REST, __ATOMIC_RELAXED);
             if (!waits && swap(box, IDLE, PARKED)) return;
             pause();
-            if (turn % 64 == 63) sched_yield();  // somebody else may need this core
+            if (turn % 64 == 63) sched_yield();  // another thread may need this core
         }
-        if (!swap(box, POSTED, RUNNING)) continue;  // it has been taken back
+        if (!swap(box, POSTED, RUNNING)) continue;  // the work has been taken back
         ((void (*)(void*, void*))box[MAIL_FUNCTION])((void*)box[MAIL_BOUNDS], (void*)box[MAIL_ARGUMENTS]);
         __atomic_store_n(box + MAIL_STATE, (long long)IDLE, __ATOMIC_RELEASE);
     }
 }
 
-// Hands a launch over. The answer is 1 where the helper is parked and must be woken.
+// Posts a launch. The answer is 1 if the helper is parked and must be woken.
 inline void post(long long* box, long long function, long long bounds, long long arguments) {
     box[MAIL_FUNCTION] = function, box[MAIL_BOUNDS] = bounds, box[MAIL_ARGUMENTS] = arguments;
     box[MAIL_ANSWER] = __atomic_exchange_n(box + MAIL_STATE, (long long)POSTED, __ATOMIC_ACQ_REL) == PARKED;
 }
 
-// Waits for the launch. The answer is 1 where the helper has not begun: it will not, and the work is the caller's.
+// Waits for the launch. The answer is 1 if the helper has not begun it: then it never will, and the caller does the
+// work.
 inline void join(long long* box) {
     while (true) {
         const long long state = load(box);

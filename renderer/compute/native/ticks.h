@@ -1,4 +1,4 @@
-// A clock that costs next to nothing: stages within one launch share its time in proportion to their ticks.
+// A clock with negligible cost: the time of a launch is divided among its stages in proportion to their ticks.
 #pragma once
 
 namespace ticks {
@@ -15,7 +15,7 @@ inline long long now() {
 #endif
 }
 
-// An estimate on x86, which does not say: it counts 2 to 4 billion ticks a second.
+// An estimate on x86, where the rate is unknown: 2 to 4 billion ticks per second.
 inline long long per_microsecond() {
 #if defined(__aarch64__)
     long long hertz;

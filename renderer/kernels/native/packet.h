@@ -1,18 +1,18 @@
-// Sixteen rays that keep together against the boxes and the triangles of one mesh.
+// Sixteen coherent rays against the boxes and the triangles of one mesh.
 #pragma once
 #include "single.h"
 
 namespace packets {
 
-// In paddings, by how much the rectangle of a triangle is wider: three roundings more than at a box.
+// Padding of a triangle's rectangle, in units of the padding of a box: it has three more roundings.
 constexpr float CORNER_SLACK = 5.0f;
-// Packets whose directions differ by more than this along an axis are walked ray by ray.
+// Packets whose directions differ by more than this along an axis are traversed ray by ray.
 constexpr float SPREAD_MAX = 0.25f;
-// Rays whose directions differ by more than this share of the longest part of one have no way in common.
+// Rays whose directions differ by more than this share of the longest component are incoherent.
 constexpr float SCATTERED = 1.0f;
 
-// Sixteen rays. A lane with a negative `t` in its hit is idle; unless it holds the ray of a busy one it may keep the
-// packet from being walked as one.
+// Sixteen rays. A lane with a negative `t` in its hit is idle; unless it has a copy of a busy lane's ray, it may
+// prevent the traversal as one packet.
 struct Packet {
     Vec16 origin, inverse;
     Vec16 low_origin, high_origin;  // moved by the padding, for lower and upper sides of boxes
@@ -20,9 +20,9 @@ struct Packet {
     int kx, ky, kz;
     bool backwards[3];
     float near_origin[3], far_origin[3], inverse_least[3], inverse_most[3];
-    // Where the rays pass a plane across their fastest axis, and how far they lean: a middle and half the difference.
+    // Intersections of the rays with a plane across their fastest axis, and their slopes: mean and half width.
     float plane, low[2], high[2], lean[2], lean_half[2];
-    bool together, scattered;  // worth walking as one, or without a way in common
+    bool together, scattered;  // coherent enough for traversal as one, and incoherent
     bool same_signs;
 
     Packet(const Vec16& from, const Vec16& along) : origin(from) {
@@ -35,7 +35,7 @@ struct Packet {
         float spread = 0.0f;
         for (int axis = 0; axis < 3; ++axis) spread = vmax(spread, -bound[3 + axis] - bound[axis]);
         const float longest = vmax(-bound[kz], -bound[3 + kz]);
-        // What is not finite would spoil the bounds of the others.
+        // A non-finite ray would spoil the bounds of the others.
         const f16 sum = from.x + from.y + from.z + along.x + along.y + along.z;
         scattered = !(spread <= SCATTERED * longest);
         together =
@@ -71,8 +71,8 @@ struct Packet {
         }
     }
 
-    // Which triangles of one or two blocks some ray may meet. Moved to the plane along every ray of the packet, corners
-    // span a rectangle; where it does not reach the rays there, none of them is within the triangle.
+    // Triangles of one or two blocks that some ray may hit. The projections of the corners onto the plane along all
+    // rays of the packet span a rectangle; if it does not overlap the rays' range there, no ray hits the triangle.
     template <class F> unsigned near_to(const Block* block) const {
         F left[2] = {(F)FAR, (F)FAR}, right[2] = {(F)-FAR, (F)-FAR};
         for (int k = 0; k < 3; ++k) {
@@ -85,7 +85,7 @@ struct Packet {
         return bits((left[0] <= high[0]) & (right[0] >= low[0]) & (left[1] <= high[1]) & (right[1] >= low[1]));
     }
 
-    // Which lanes pass a child's box before their `reach`.
+    // Lanes that pass a child's box before their `reach`.
     unsigned passing(const Node& node, int child, const f16& reach) const {
         f16 near = 0.0f, far = reach;
         for (int axis = 0; axis < 3; ++axis) {
@@ -103,9 +103,9 @@ struct PacketHit {
     i16 face;
 };
 
-// Which children some ray of the packet may pass, and a lower bound of where. Interval arithmetic over the packet tests
-// all eight boxes at once: Boulos, Wald and Shirley 2006, "Geometric and Arithmetic Culling Methods for Entire Ray
-// Packets".
+// Children that some ray of the packet may pass, and lower bounds of the distances. Interval arithmetic over the packet
+// tests all eight boxes at once: Boulos, Wald and Shirley 2006, "Geometric and Arithmetic Culling Methods for Entire
+// Ray Packets".
 inline unsigned children_met(const Node& node, const Packet& rays, const PacketHit& hit, float reach, f8& near) {
     near = 0.0f;
     if (rays.same_signs) {
@@ -129,7 +129,7 @@ inline unsigned children_met(const Node& node, const Packet& rays, const PacketH
 template <bool any>
 inline unsigned meet_leaf(const Block* leaf, unsigned triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
     unsigned changed = 0;
-    const i16 passing = lanes_of(lanes);  // others must not hit what they would not have met alone
+    const i16 passing = lanes_of(lanes);  // other lanes must not hit triangles that they would not have reached alone
     for (; triangles; triangles &= triangles - 1) {
         const int number = first_bit(triangles);
         const Block& block = leaf[number / BLOCK_WIDTH];

@@ -1,10 +1,10 @@
-// Rays from a list through one mesh.
+// Queries of rays in a list on one mesh.
 #pragma once
 #include "structures.h"
 
 namespace packets {
 
-// Traces rays `first` to `first + 15` of a list, as far as there are so many.
+// Traces the rays `first` to `first + 15` of a list, or up to its end.
 template <bool any, class Queries> inline void trace_packet(const Queries& list, int first) {
     const int blocks = list.blocks.shape[0] / (int)(sizeof(Block) / sizeof(float));
     const Tree tree(list.nodes.data, list.blocks.data, blocks * BLOCK_WIDTH);
@@ -17,7 +17,7 @@ template <bool any, class Queries> inline void trace_packet(const Queries& list,
         from.x[lane] = origin[0], from.y[lane] = origin[1], from.z[lane] = origin[2];
         along.x[lane] = direction[0], along.y[lane] = direction[1], along.z[lane] = direction[2];
         const float reach = list.reach.data[i];
-        hit.t[lane] = lane < used && reach >= 0.0f ? reach : -1.0f;  // NaN reaches nowhere
+        hit.t[lane] = lane < used && reach >= 0.0f ? reach : -1.0f;  // a ray with NaN is idle
     }
     hit.u = hit.v = 0.0f;
     hit.face = -1;
@@ -30,7 +30,7 @@ template <bool any, class Queries> inline void trace_packet(const Queries& list,
     }
 }
 
-// Traces one ray of a list through the first mesh of a scene, alone; adds what it took to `work`.
+// Traces one ray of a list through the first mesh of a scene, and adds its counts to `work`.
 template <class Scene, class Queries>
 inline void trace_single(const Scene& scene, const Queries& list, int i, bool nearest, long long* work) {
     RayHit hit;

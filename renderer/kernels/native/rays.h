@@ -1,23 +1,23 @@
-// Rays against one mesh: sixteen rays that keep together walk the tree as one packet, others walk it alone.
+// Rays against one mesh: sixteen coherent rays traverse the tree as one packet, others traverse it alone.
 //
-// Whether a ray meets a triangle, and where, is computed by the same operations either way, and of equally near faces
-// the one with the lower number counts. So a ray's hit does not depend on its company, nor on the order of traversal,
-// save where it runs so exactly within a triangle's plane that the distance of that triangle is nothing but rounding.
+// The intersection of a ray with a triangle is computed by the same operations either way, and of equally near faces
+// the one with the lower number counts. So the hit of a ray depends neither on the other rays nor on the order of
+// traversal, except for a ray so exactly in the plane of a triangle that its distance is pure rounding error.
 #pragma once
 #include "packet.h"
 
 namespace packets {
 
-// Rays that are on their way at a time through a tree like that.
+// Number of rays that are traversed in turns through a large tree.
 constexpr int TURNS = 2;
-// So few rays of a packet meet a leaf one by one.
+// Up to this many rays of a packet are tested against a leaf one by one.
 constexpr int FEW = 3;
 
-// Puts what one lane met into its place; `any` idles the lane.
+// Stores the hit of one lane; with `any` the lane becomes idle.
 template <bool any> inline void take(PacketHit& hit, int lane, const RayHit& met) {
     hit.t[lane] = any ? -1.0f : met.t, hit.u[lane] = met.u, hit.v[lane] = met.v, hit.face[lane] = met.face;
 }
-// What a lane met last.
+// The current hit of a lane.
 inline RayHit hit_of(const PacketHit& hit, int lane) { return {hit.t[lane], 0.0f, 0.0f, hit.face[lane]}; }
 inline Single single_of(const Vec16& from, const Vec16& along, int lane) {
     const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
@@ -25,7 +25,8 @@ inline Single single_of(const Vec16& from, const Vec16& along, int lane) {
     return Single(origin, direction);
 }
 
-// Few lanes of a packet against a leaf, each with four triangles at once. Returns those with a new hit; `any` idles them.
+// Tests a few lanes of a packet against a leaf, each with four triangles at once. Returns those with a new hit; with
+// `any` they become idle.
 template <bool any>
 inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
     unsigned changed = 0;
@@ -42,8 +43,8 @@ inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& 
     return changed;
 }
 
-// Lanes by themselves, in turns: while one waits for memory the others go on. Returns those that found a hit; `any`
-// idles them.
+// Traverses single lanes in turns: while one waits for memory the others continue. Returns those that found a hit; with
+// `any` they become idle.
 template <bool any>
 inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
     struct Walker {
@@ -80,7 +81,7 @@ inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& 
     return changed;
 }
 
-// Lanes one by one, from the root. Returns those that found a hit; `any` idles them.
+// Traverses lanes one by one from the root. Returns those that found a hit; with `any` they become idle.
 template <bool any>
 inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
     unsigned changed = 0;
@@ -95,7 +96,7 @@ inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& alo
     return changed;
 }
 
-// A packet against a leaf: by triangles that are near to it, or by rays where few of these come that far.
+// Tests a packet against a leaf: by the triangles near to it, or by single rays where few reach the leaf.
 template <bool any>
 inline unsigned visit_leaf(const Tree& tree, int child, const Packet& rays, unsigned lanes, PacketHit& hit) {
     const Block* leaf = tree.blocks + leaf_block(child);
@@ -109,7 +110,7 @@ inline unsigned visit_leaf(const Tree& tree, int child, const Packet& rays, unsi
                                                 : meet_leaf<any>(leaf, some, rays, lanes, hit);
 }
 
-// A packet from the root to the nearest hits. Returns the lanes that found one.
+// Traverses a packet from the root to the nearest hits. Returns the lanes that found one.
 inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hit) {
     struct Entry {
         float near;
@@ -124,7 +125,7 @@ inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hi
     while (size) {
         const Entry entry = stack[--size];
         if (entry.near > reach) continue;
-        // A leaf by each ray, and only as far as its own hit; who passes its box passes all boxes around it.
+        // A leaf is tested by each ray, up to its own hit; a ray that passes its box passes all boxes around it.
         const unsigned active = entry.child < 0 ? rays.passing(*entry.parent, entry.slot, hit.t) : ALL;
         if (!active) continue;
         if (entry.child >= 0) {
@@ -149,10 +150,11 @@ inline unsigned walk_nearest(const Tree& tree, const Packet& rays, PacketHit& hi
     return found;
 }
 
-// A packet from the root to any hits, which idle their lanes by a negative `hit.t`. Returns the lanes that found one.
+// Traverses a packet from the root to any hits, which make their lanes idle by a negative `hit.t`. Returns the lanes
+// that found one.
 //
-// No order is kept, for the first hit ends a ray, and most of the rays that are asked about have none. Without hits that
-// come nearer, a box is tested by each ray as soon as it is found.
+// Children are not ordered, because the first hit ends a ray, and most of these rays have none. As hits do not come
+// nearer, every ray tests a box as soon as it is found.
 inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
     struct Entry {
         int child;
@@ -184,12 +186,12 @@ inline unsigned walk_any(const Tree& tree, const Packet& rays, PacketHit& hit) {
     return found;
 }
 
-// The busy lanes of sixteen rays, together or one by one. Returns those that found a hit.
+// Traces the busy lanes of sixteen rays, together or one by one. Returns those that found a hit.
 template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, const Vec16& along, PacketHit& hit) {
     Packet rays(from, along);
     if (rays.together) return any ? walk_any(tree, rays, hit) : walk_nearest(tree, rays, hit);
     const unsigned busy = bits(hit.t >= 0.0f);
-    // What one of several rays has read the next one finds in the cache, unless they go apart.
+    // Coherent single rays find the data of the previous ray in the cache; incoherent ones do not.
     return tree.large && rays.scattered ? walk_by_turns<any>(tree, from, along, busy, hit)
                                         : walk_alone<any>(tree, from, along, busy, hit);
 }

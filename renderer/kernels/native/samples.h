@@ -1,4 +1,4 @@
-// Samples from the camera to their colours, sixteen at a time: the lanes of `camera.py` and `entry.py`.
+// Samples from the camera to their colours, sixteen at a time: `camera.py` and `entry.py` in lanes.
 #pragma once
 #include "quadtree.h"
 #include "shading.h"
@@ -8,10 +8,10 @@ namespace packets {
 using quadtree::column_of;
 using quadtree::row_of;
 
-constexpr int PACKET_PX = 4;  // side of the square of pixels whose samples make packets
+constexpr int PACKET_PX = 4;  // side of the square of pixels whose samples form packets
 static_assert(PACKET_PX * PACKET_PX == LANES);
 constexpr int PACKETS_A_BLOCK = BLOCK_PX * BLOCK_PX / LANES;
-constexpr int AT_ONCE = 16;  // packets that a thread takes
+constexpr int AT_ONCE = 16;  // packets that a thread takes at a time
 
 inline int blocks_across(int pixels) { return (pixels + BLOCK_PX - 1) / BLOCK_PX; }
 
@@ -29,7 +29,7 @@ inline void camera_rays(const Stage<Scene, View>& stage, f16 x, f16 y, Vec16& or
     direction = unit(direction);
 }
 
-// Mean of `samples` squared samples of a pixel, whole packets of them, by rows.
+// Mean of `samples` squared samples of a pixel, in whole packets, row by row.
 template <class Scene, class View>
 inline void render_pixel(const Stage<Scene, View>& stage, int column, int row, int samples, float across, float down,
                          float* color) {
@@ -50,8 +50,8 @@ inline void render_pixel(const Stage<Scene, View>& stage, int column, int row, i
     color[0] = added(total.x) * share, color[1] = added(total.y) * share, color[2] = added(total.z) * share;
 }
 
-// Renders a block of 4 x 4 pixels, `samples` squared samples each; blocks go along the Morton curve within
-// `BLOCK_PX` squared pixels, those by rows. Consecutive samples share a pixel as far as they can.
+// Renders a block of 4 x 4 pixels with `samples` squared samples each. Blocks follow the Morton curve within squares of
+// `BLOCK_PX` pixels, and the squares are ordered by rows. Consecutive samples share a pixel where possible.
 template <class Scene, class View, class Pixel>
 inline void render_block(const Scene& scene, const View& view, int block, int width, int height, int samples,
                          double time_s, Pixel* image) {
@@ -108,8 +108,8 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     }
 }
 
-// A batch: what is read of each sample, and where its answer goes. Times are read only where samples differ in them;
-// `footprint_scale`, and the three arrays of first hits, may be null.
+// A batch: inputs of each sample, and arrays for the results. Times are read only if samples differ in them;
+// `footprint_scale` and the three arrays of first hits may be null.
 struct Samples {
     int count;
     const float* position;
@@ -121,7 +121,7 @@ struct Samples {
     int* occluder;
 };
 
-// Puts the first `used` of sixteen vectors, or numbers, one after the other.
+// Stores the first `used` of sixteen vectors, or numbers, consecutively.
 inline void put_first(float* to, const Vec16& value, int used) {
     if (used == LANES) return store_joined(to, value);
     float all[3 * LANES];
@@ -133,7 +133,7 @@ inline void put_first(int* to, const i16& value, int used) {
     __builtin_memcpy(to, &value, sizeof(int) * used);
 }
 
-// Shades samples `first` to `first + 15`, as far as there are so many. Adds the shadow rays and reflections it took to
+// Shades the samples `first` to `first + 15`, or up to the last one. Adds the numbers of shadow and reflected rays to
 // `rays`.
 template <class Scene, class View>
 inline void shade_packet(const Scene& scene, const View& view, int first, const Samples& samples, long long* rays) {
@@ -168,7 +168,7 @@ inline void shade_packet(const Scene& scene, const View& view, int first, const 
     put_first(samples.occluder + first, hit.occluder, used);
 }
 
-// Calls `work(item)` for items below `count` that no other caller has taken; `taken` counts them for all callers.
+// Calls `work(item)` for items below `count` that no other caller has taken; `taken` is the shared counter.
 template <class Work> inline void share(int* taken, int count, int at_once, Work work) {
     for (int first; (first = __atomic_fetch_add(taken, at_once, __ATOMIC_RELAXED)) < count;)
         for (int item = first; item < first + at_once && item < count; ++item) work(item);

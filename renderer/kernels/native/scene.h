@@ -1,13 +1,13 @@
-// Sixteen rays against the instances of a scene: the lanes of what `intersect.py` does for one ray.
+// Sixteen rays against the instances of a scene: `intersect.py` in lanes.
 //
-// Scene, view and records are Warp's structs of `structs.py`; their generated names are not known here, so templates
-// take them.
+// Scene, view and records are Warp's structs of `structs.py`. Their generated names are unknown here, so they are
+// template parameters.
 #pragma once
 #include "rays.h"
 
 namespace packets {
 
-// Calls `work(value, mask)` for every distinct value among the lanes of a mask: what belongs to one instance or one
+// Calls `work(value, mask)` for every distinct value among the lanes of a mask, so that the data of an instance or a
 // material is read once for all lanes that share it.
 template <class Work> inline void each_distinct(i16 values, unsigned mask, Work work) {
     while (mask) {
@@ -32,14 +32,14 @@ template <class M> inline Vec16 transformed_by_transpose(const M& m, const Vec16
             m.data[0][2] * v.x + m.data[1][2] * v.y + m.data[2][2] * v.z};
 }
 
-// Idle lanes get the ray of a busy one, so that they do not spread the packet.
+// Idle lanes get the ray of a busy one, so that they do not widen the packet.
 inline Vec16 without_idle(const Vec16& v, unsigned busy) {
     const int lane = first_bit(busy);
     const i16 keep = lanes_of(busy);
     return pick(keep, v, {(f16)v.x[lane], (f16)v.y[lane], (f16)v.z[lane]});
 }
 
-// Where a track is at every lane's time.
+// Pose of a track at every lane's time.
 struct Pose {
     Vec16 translation, axis;  // `axis` and `w` are the quaternion
     f16 w;
@@ -47,7 +47,7 @@ struct Pose {
     Vec16 rotated(const Vec16& v, float turn) const {
         return v * (2.0f * w * w - 1.0f) + cross(axis, v) * (2.0f * turn * w) + axis * (2.0f * dot(axis, v));
     }
-    // The first lane's in every lane.
+    // The pose of the first lane in every lane.
     Pose of_first() const {
         return {{(f16)translation.x[0], (f16)translation.y[0], (f16)translation.z[0]},
                 {(f16)axis.x[0], (f16)axis.y[0], (f16)axis.z[0]},
@@ -57,12 +57,12 @@ struct Pose {
     Vec16 to_track(const Vec16& v) const { return rotated(v, -1.0f); }
 };
 
-// Sixteen samples' times, and the scene as it is at them.
+// The times of sixteen samples, and the scene at these times.
 template <class Scene, class View> struct Stage {
     const Scene& scene;
     const View& view;
     double time_s[LANES];
-    f16 footprint_scale;  // of each sample's footprint
+    f16 footprint_scale;  // factor of each sample's footprint
 
     Pose pose(int track) const {
         Pose pose;
@@ -79,7 +79,7 @@ template <class Scene, class View> struct Stage {
     }
 
   private:
-    // One lane, to the bit as camera.py interpolates.
+    // Interpolates one lane with the same bits as camera.py.
     void pose_at(int track, int lane, Pose& pose) const {
 #pragma clang fp contract(off)
         const auto& record = scene.tracks.data[track];
@@ -111,7 +111,7 @@ template <class Scene, class View> struct Stage {
     }
 };
 
-// Distances to unit shapes along unit directions, negative for none; see intersect.py.
+// Distances to unit shapes along unit directions, negative for a miss; see shapes.py.
 inline f16 sphere_distance(const Vec16& origin, const Vec16& direction) {
     const f16 b = dot(origin, direction);
     const Vec16 nearest = origin - direction * b;
@@ -152,7 +152,7 @@ struct Hit {
     i16 instance;  // negative for a miss
 };
 
-// Lanes of `busy` that meet an instance nearer than `hit.t`; their hits go into `hit`. Rays are in track space.
+// Lanes of `busy` that hit an instance nearer than `hit.t`; the hits are stored in `hit`. Rays are in track space.
 template <bool any, class Scene, class Record>
 inline unsigned meet_instance(const Scene& scene, const Record& record, const Vec16& origin, const Vec16& direction,
                               unsigned busy, PacketHit& hit) {
@@ -192,7 +192,7 @@ inline unsigned missing_sphere(const Vec16& from, const Vec16& direction, float 
     const f16 b = dot(from, direction), squared = dot(from, from);
     const Vec16 nearest = from - direction * b;
     const float limit = radius * radius;
-    // The slack covers what rounding takes from a far start.
+    // The slack covers the rounding error of a distant origin.
     const i16 past = (b > 0.0f) | (-b - radius > reach) | (dot(nearest, nearest) > limit + SPHERE_SLACK * squared);
     return bits((squared > limit) & past);
 }
@@ -208,8 +208,8 @@ inline unsigned meeting_box(const Vec16& origin, const Vec16& inverse, const Rec
     return bits(near <= far);
 }
 
-// World rays of unit direction against everything. Lanes of `busy` look as far as `hit.at.t`. With `any`, a lane ends
-// at its first hit. Returns the lanes that found one; the nearest is in `hit`.
+// Traces world rays of unit direction through the scene. Lanes of `busy` reach up to `hit.at.t`. With `any`, a lane
+// ends at its first hit. Returns the lanes that found a hit; the nearest is in `hit`.
 template <bool any, class Scene, class View>
 inline unsigned meet_scene(const Stage<Scene, View>& stage, const Vec16& origin, const Vec16& direction, unsigned busy,
                            Hit& hit) {

@@ -1,20 +1,20 @@
-// Radiance along sixteen rays: the lanes of `lights.py` and `shading.py`, which say why each step is as it is.
+// Radiance along sixteen rays: `lights.py` and `shading.py` in lanes; the reasons for the steps are given there.
 #pragma once
 #include "surface.h"
 #include "textures.h"
 
 namespace packets {
 
-// What camera rays meet first: the instance, -1 for none; the point in the space of its track, for none the direction
-// of the ray; and the instance in the way of the first light, LIT for none, UNLIT where the light is not asked.
+// First hits of camera rays: the instance, -1 for none; the point in the space of its track, or the direction of the
+// ray for a miss; and the instance that hides the first light, LIT for none, UNLIT without a shadow ray.
 struct FirstHit {
     Vec16 point;
     i16 instance, occluder;
 };
 
-// What the lights meet at each lane.
+// Material parameters at each lane.
 struct Reflection {
-    Vec16 emission, albedo, specular, mirror;  // `mirror` is what the mirrored ray is weighed with
+    Vec16 emission, albedo, specular, mirror;  // `mirror` is the weight of the mirrored ray
     f16 ambient, exponent;
     unsigned lit;  // lanes with a diffuse colour
 };
@@ -47,7 +47,7 @@ inline Reflection reflection_of(const Scene& scene, const Surface& surface, unsi
     return result;
 }
 
-// Radiance that the lights send towards the viewer; counts the shadow rays it took. `first` receives the occluder, unless
+// Radiance reflected from the lights towards the viewer; counts the shadow rays. `first` receives the occluder, unless
 // it is null.
 template <class Scene, class View>
 inline Vec16 direct_light(const Stage<Scene, View>& stage, const Surface& surface, const Reflection& material,
@@ -96,8 +96,8 @@ inline Vec16 mirror_direction(const Surface& surface, const Vec16& direction) {
     return unit(mirrored);
 }
 
-// Radiance along rays, and how many shadow rays and reflections it took; `first` receives what they meet first, unless
-// it is null.
+// Radiance along rays, and the numbers of shadow and reflected rays; `first` receives the first hits, unless it is
+// null.
 template <class Scene, class View>
 inline Vec16 radiance(const Stage<Scene, View>& stage, Vec16 start, Vec16 towards, unsigned busy, i16& shadow_rays,
                       i16& bounces, FirstHit* first) {

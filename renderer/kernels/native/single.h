@@ -1,30 +1,30 @@
-// One ray against one mesh, a node of eight boxes at a time.
+// One ray against one mesh, one node of eight boxes at a time.
 #pragma once
 #include "triangles.h"
 
 namespace packets {
 
 constexpr int STACK = 640;
-// A tree of more triangles is larger, at about 100 bytes each, than most second-level caches.
+// A tree of more triangles, at about 100 bytes each, exceeds most second-level caches.
 constexpr int LARGE = 40000;
 
 struct Tree {
     const Node* nodes;
     const Block* blocks;
-    bool large;  // for a second-level cache
+    bool large;  // larger than a second-level cache
 
     Tree(const void* first_node, const void* first_block, int triangles)
         : nodes((const Node*)first_node), blocks((const Block*)first_block), large(triangles > LARGE) {}
 };
 
-// One ray, ready to be walked.
+// One ray with the constants of its traversal.
 struct Single {
     float origin[3], inverse[3];
-    float inverse_far[3];                 // for sides that are left, rounded up
+    float inverse_far[3];                 // for the sides at which the ray leaves, rounded up
     float near_origin[3], far_origin[3];  // moved by the padding, outwards
     float shear[3];
     int kx, ky, kz;
-    int near_side[3], far_side[3];  // where a node holds the sides that are met first and last
+    int near_side[3], far_side[3];  // offsets in a node of the sides that the ray enters and leaves
 
     Single() = default;
     Single(const float* from, const float* along) {
@@ -54,7 +54,7 @@ struct RayHit {
     int face;
 };
 
-// Asks the caches for what is walked into later.
+// Prefetches a child that is visited later.
 inline void prefetch(const Tree& tree, int child) {
     const bool inner = child >= 0;
     const char* at = inner ? (const char*)(tree.nodes + child) : (const char*)(tree.blocks + leaf_block(child));
@@ -62,8 +62,8 @@ inline void prefetch(const Tree& tree, int child) {
     for (int line = 0; line < lines; ++line) __builtin_prefetch(at + 64 * line);
 }
 
-// One ray against one or two blocks at once. Keeps the nearest hit, of equally near ones the face with the lower number;
-// whether there is a new one.
+// Tests one ray against one or two blocks at once. Keeps the nearest hit, and of equally near ones the face with the
+// lower number. Returns whether there is a new hit.
 template <class F>
 inline bool meet_blocks(const Block* block, const Vec<f4>& from, const Vec<f4>& along, int kx, int ky, int kz,
                         RayHit& hit) {
@@ -87,7 +87,7 @@ inline bool meet_blocks(const Block* block, const Vec<f4>& from, const Vec<f4>& 
     return found;
 }
 
-// One ray against a leaf, or any number of triangles that follow one another.
+// Tests one ray against a leaf, or any number of consecutive triangles.
 inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, const Vec<f4>& shear, int kx, int ky,
                       int kz, RayHit& hit) {
     bool found = false;
@@ -97,17 +97,17 @@ inline bool meet_leaf(const Block* block, int triangles, const Vec<f4>& origin, 
     return found;
 }
 
-// Takes no notice of what a walk does; see structures.h for one that does.
+// Counts nothing; structures.h has the counterpart that does.
 struct Uncounted {
     void visit() {}
     void test(int) {}
 };
 
-// Where a ray is on its way through a tree.
+// State of a ray's traversal of a tree.
 struct Way {
-    RayHit hit;  // `t` holds how far to look
+    RayHit hit;  // `t` is the current reach
     float reach;
-    int size, current;  // of the stack; the node or leaf that is next
+    int size, current;  // size of the stack; next node or leaf
     bool found;
 
     explicit Way(const RayHit& none) : hit(none), reach(none.t * ROUNDING_UP), size(0), current(0), found(false) {}
@@ -118,7 +118,7 @@ struct Entry {
     int child;
 };
 
-// One node or leaf on. `any` ends at the first hit. Returns whether there is more.
+// Visits one node or leaf. `any` ends at the first hit. Returns whether the traversal continues.
 template <bool any, class Count>
 inline bool step(const Tree& tree, const Single& ray, Entry* stack, Way& way, Count& count) {
     if (way.current >= 0) {
@@ -139,7 +139,7 @@ inline bool step(const Tree& tree, const Single& ray, Entry* stack, Way& way, Co
                 way.current = node.child[lane];
                 return true;
             }
-            // The nearest is next, the others in any order.
+            // The nearest child is next; the others follow in any order.
             float least = near[lane];
             int next = node.child[lane];
             for (; met; met &= met - 1) {
@@ -171,7 +171,7 @@ inline bool step(const Tree& tree, const Single& ray, Entry* stack, Way& way, Co
     return true;
 }
 
-// One ray from the root.
+// Traverses the tree by one ray from the root.
 template <bool any, class Count> inline bool walk(const Tree& tree, const Single& ray, RayHit& hit, Count& count) {
     Entry stack[STACK];
     Way way(hit);

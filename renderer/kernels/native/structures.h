@@ -1,8 +1,8 @@
-// One ray through a mesh by the structure of one's choice, and what it took: for rays that do not keep together, and to
-// compare structures. All hold blocks of the same triangles and test them by the same operations, so all find the same.
+// One ray through a mesh by a choice of structures, with counts of the work: for incoherent rays, and to compare
+// structures. All hold blocks of the same triangles and test them by the same operations, so all find the same hits.
 //
-// A visit is a node whose boxes or plane the ray is tested against; a test is a triangle of a block. With eight boxes a
-// node and four triangles a block, a visit and a test cost less here than one by one.
+// A visit is a node whose boxes or plane are tested; a test is a triangle of a block. With eight boxes per node and
+// four triangles per block, a visit or a test costs less here than a single one would.
 #pragma once
 #include "rays.h"
 
@@ -14,12 +14,12 @@ struct Counted {
     void test(int triangles) { tests += triangles; }
 };
 
-// Of a kd-tree: a plane and where the two sides begin, or a leaf's blocks.
+// A node of a kd-tree: a plane and its two children, or the blocks of a leaf.
 struct KdNode {
     float split;
     int axis;   // or `KD_LEAF`
-    int first;  // the lower side, the upper one follows; the first block of a leaf
-    int count;  // triangles of a leaf
+    int first;  // lower child, which the upper one follows; or first block of a leaf
+    int count;  // number of triangles of a leaf
 };
 
 static_assert(sizeof(KdNode) == KD_FLOATS * sizeof(float));
@@ -29,8 +29,8 @@ struct KdTree {
     const Block* blocks;
 };
 
-// Walks the sides of each plane in the order in which the ray meets them. A plane's own thickness is that of the
-// padding: what lies within it is looked for on both sides, as boxes of a BVH overlap by as much.
+// Visits the sides of each plane in the order in which the ray meets them. A plane is as thick as the padding: within
+// it both sides are visited, as boxes of a BVH overlap by the same amount.
 template <bool any, class Count> inline bool walk(const KdTree& tree, const Single& ray, RayHit& hit, Count& count) {
     struct Entry {
         int node;
@@ -46,7 +46,7 @@ template <bool any, class Count> inline bool walk(const KdTree& tree, const Sing
         count.visit();
         if (node.axis != KD_LEAF) {
             const int axis = node.axis;
-            // Where the ray enters and leaves the thickness of the plane. A ray along the plane may have either sign.
+            // Distances at which the ray enters and leaves the thick plane. A ray along the plane may have either sign.
             const float a = (node.split - ray.near_origin[axis]) * ray.inverse[axis];
             const float b = (node.split - ray.far_origin[axis]) * ray.inverse[axis];
             const float enter = a < b ? a : b, leave = a < b ? b : a;
@@ -75,7 +75,7 @@ template <bool any, class Count> inline bool walk(const KdTree& tree, const Sing
     }
 }
 
-// Every triangle.
+// Tests every triangle.
 template <class Count>
 inline bool meet_all(const Block* blocks, int triangles, const Single& ray, RayHit& hit, Count& count) {
     const Vec<f4> from = {(f4)ray.origin[ray.kx], (f4)ray.origin[ray.ky], (f4)ray.origin[ray.kz]};
@@ -98,8 +98,8 @@ inline bool meet_mesh(const Scene& scene, const Record& mesh, const Single& ray,
     return meet_all(blocks, mesh.face_count, ray, hit, count);
 }
 
-// A ray before `reach` through a mesh in its unit space. Fills distance, weights of the first two corners and face; the
-// face is -1 for a miss. `totals` receives visits and tests, unless it is null.
+// Traces a ray up to `reach` through a mesh in its unit space. Stores distance, weights of the first two corners and
+// face; the face is -1 for a miss. The numbers of visits and tests are added to `totals`, unless it is null.
 template <bool any, class Scene, class V>
 inline bool single_ray(const Scene& scene, int mesh, const V& start, const V& towards, float reach, long long* totals,
                        RayHit& hit) {
@@ -118,7 +118,7 @@ inline bool single_ray(const Scene& scene, int mesh, const V& start, const V& to
     return found;
 }
 
-// The same for a caller in Python: distance, negative for none, weights of the first two corners, and the face's bits.
+// The same for Python: distance (negative for a miss), weights of the first two corners, and the bits of the face.
 template <bool any, class Scene>
 inline wp::vec4 meet_mesh_alone(const Scene& scene, int mesh, const wp::vec3& start, const wp::vec3& towards,
                                 float reach, long long* totals) {

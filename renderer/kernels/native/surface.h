@@ -1,4 +1,4 @@
-// The surface at the hits of sixteen rays: the lanes of `surface.py`, which says why each step is as it is.
+// The surface at the hits of sixteen rays: `surface.py` in lanes; the reasons for the steps are given there.
 #pragma once
 #include "functions.h"
 #include "scene.h"
@@ -19,20 +19,20 @@ struct Surface {
     i16 material;
 };
 
-// A value of each of a face's corners, lane by lane.
+// A value at each of a face's corners, lane by lane.
 struct Corners {
     Vec16 a, b, c;
 
     Vec16 weighted(f16 u, f16 v, f16 w) const { return a * u + b * v + c * w; }
 };
 
-// A value that all lanes of a mask share.
+// Stores a value that all lanes of a mask share.
 template <class V> inline void put(Vec16& into, const V& value, i16 lanes) {
     into.x = lanes ? (f16)value[0] : into.x, into.y = lanes ? (f16)value[1] : into.y;
     into.z = lanes ? (f16)value[2] : into.z;
 }
 
-// Neighbouring rays meet few faces, so what belongs to one is read once for all the lanes that met it.
+// Neighbouring rays hit few faces, so the data of a face is read once for all lanes that hit it.
 template <class Scene, class Mesh>
 inline LocalSurface mesh_surface(const Scene& scene, const Mesh& mesh, const PacketHit& hit, unsigned mask) {
     const auto* vertices = scene.vertices.data + mesh.first_vertex;
@@ -60,7 +60,7 @@ inline LocalSurface mesh_surface(const Scene& scene, const Mesh& mesh, const Pac
     local.position = place.weighted(hit.u, hit.v, w);
     local.tangent_u = place.b - place.a, local.tangent_v = place.c - place.a;
     local.geometric_normal = unit(cross(local.tangent_u, local.tangent_v));
-    const Vec16 between = normal.weighted(hit.u, hit.v, w);  // zero where the mesh has no normals
+    const Vec16 between = normal.weighted(hit.u, hit.v, w);  // zero if the mesh has no normals
     local.normal = pick(dot(between, between) > SMOOTH_LEAST, between, local.geometric_normal);
     local.u = ua * hit.u + ub * hit.v + uc * w, local.v = va * hit.u + vb * hit.v + vc * w;
     local.uv_area = vabs((ub - ua) * (vc - va) - (vb - va) * (uc - ua));
@@ -80,7 +80,7 @@ inline LocalSurface sphere_surface(const Vec16& point) {
     return local;
 }
 
-// A face of the unit cube at `side` of an axis, or the plane z = 0 (axis 2, side 1, not snapped).
+// A face of the cube [-1, 1]³ at `side` of an axis, or the plane z = 0 (axis 2, side 1, not projected onto the face).
 inline LocalSurface flat_surface(const Vec16& point, i16 axis, f16 side) {
     LocalSurface local;
     const i16 on_x = axis == 0, on_y = axis == 1;
@@ -110,14 +110,14 @@ inline LocalSurface local_surface(const Scene& scene, const Record& record, cons
     return flat_surface(point, (i16)2, (f16)1.0f);
 }
 
-// The surface of one instance at the lanes of a mask, in world space; `in_track` receives the point of the ray in track
-// space, unless it is null.
+// The surface of one instance at the lanes of a mask, in world space; `in_track` receives the hit point in track space,
+// unless it is null.
 template <class Scene, class View>
 inline Surface surface_of(const Stage<Scene, View>& stage, int instance, unsigned mask, PacketHit hit,
                           const Vec16& origin, const Vec16& direction, Vec16* in_track) {
     const Scene& scene = stage.scene;
     const auto& record = scene.instances.data[instance];
-    hit.face = lanes_of(mask) ? hit.face : (i16)0;  // other lanes may hold no face of this mesh
+    hit.face = lanes_of(mask) ? hit.face : (i16)0;  // other lanes may not hold a face of this mesh
     Vec16 point = origin + direction * hit.t;
     Pose pose;
     if (record.track) {

@@ -1,11 +1,11 @@
-// Texture lookup for sixteen points: the lanes of what `textures.py` does for one.
+// Texture lookup for sixteen points: `textures.py` in lanes.
 #pragma once
 #include "functions.h"
 #include "scene.h"
 
 namespace packets {
 
-// Texel indices inside 0 .. count - 1, or -1 where the texture is black.
+// Texel indices in 0 .. count - 1, or -1 where the texture is black.
 inline i16 wrapped(i16 index, i16 count, int wrap) {
     const i16 outside = (index < 0) | (index >= count);
     if (!bits(outside)) return index;
@@ -24,7 +24,7 @@ template <class Scene> inline Level level_of(const Scene& scene, int index) {
     return {(i16)record.first_texel, (i16)record.width, (i16)record.height};
 }
 
-// Neighbours look at few levels.
+// Neighbouring samples use few levels.
 template <class Scene> inline Level level_of(const Scene& scene, i16 index) {
     Level level = {};
     each_distinct(index, ALL, [&](int number, unsigned same) {
@@ -91,14 +91,14 @@ inline Vec16 image_lookup(const Scene& scene, const Record& record, f16 u, f16 v
     return color;
 }
 
-// Colour of one texture at the lanes of a mask; the other lanes hold anything.
+// Colour of one texture at the lanes of a mask; the other lanes are undefined.
 template <class Scene>
 inline Vec16 texture_color(const Scene& scene, int texture, f16 u, f16 v, f16 footprint_uv, unsigned mask) {
     const auto& record = scene.textures.data[texture];
     const Vec16 tint = spread(record.value);
     if (record.kind == TEXTURE_CONSTANT) return tint;
     if (record.kind == TEXTURE_IMAGE) {
-        // Lanes outside the mask may hold NaN, and texel indices are made of it.
+        // Lanes outside the mask may hold NaN, from which texel indices must not be computed.
         const i16 valid = lanes_of(mask);
         return tint * image_lookup(scene, record, valid ? u : (f16)0.0f, valid ? v : (f16)0.0f,
                                    valid ? footprint_uv : (f16)0.0f);

@@ -1,4 +1,4 @@
-// A tree of boxes with eight children a node, and its construction.
+// A tree of boxes with eight children per node, and its construction.
 //
 // Source: Wald, Benthin and Boulos 2008, "Getting Rid of Packets" (wide nodes); Wald 2007, "On fast Construction of
 // SAH-based Bounding Volume Hierarchies" (binned splits).
@@ -7,26 +7,26 @@
 
 namespace packets {
 
-constexpr int LEAF = 8;  // triangles of a leaf at most
+constexpr int LEAF = 8;  // maximum number of triangles of a leaf
 constexpr int EMPTY_CHILD = -2147483647 - 1;
-constexpr float NOTHING = __builtin_inff();  // an empty box reaches from here to its negative: no ray meets it
+constexpr float NOTHING = __builtin_inff();  // an empty box reaches from here to its negative, so no ray hits it
 
-// A leaf as a child of a node: its first block and how many triangles it has, one to eight.
+// A leaf as a child of a node: its first block and its number of triangles, one to eight.
 inline int leaf_child(int block, int triangles) { return ~(block * 8 + triangles - 1); }
 inline int leaf_block(int child) { return ~child >> 3; }
 inline int leaf_triangles(int child) { return (~child & 7) + 1; }
 
-// Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (< 0, see above) or
-// EMPTY_CHILD, whose box is inside out.
+// Boxes of the eight children, lane by lane. A child is a node (>= 0), a leaf (< 0, see above) or EMPTY_CHILD, whose
+// box is inverted.
 struct Node {
     float lower[3][WIDTH];
     float upper[3][WIDTH];
     int child[WIDTH];
-    int unused[WIDTH];  // whole cache lines
+    int unused[WIDTH];  // padding to whole cache lines
 };
 
 // One to four triangles: corner by corner, axis by axis, lane by lane. Unused lanes have face -1 and no extent. Blocks
-// are small, for a mesh of a million triangles is bound by what the caches hold.
+// are small, because the traversal of a mesh of a million triangles is limited by the caches.
 struct Block {
     float corner[3][3][BLOCK_WIDTH];
     int face[BLOCK_WIDTH];
@@ -51,7 +51,7 @@ struct Bounds {
     }
 };
 
-// A run of the sorted triangles.
+// A range of the sorted triangles.
 struct Range {
     int first, end, depth;
     Bounds box;
@@ -64,7 +64,7 @@ class TreeBuilder {
                 Block* blocks)
         : vertices(vertices), faces(faces), count(count), boxes(boxes), order(order), nodes(nodes), blocks(blocks) {}
 
-    // Builds the tree; node 0 is its root. Returns how many nodes and blocks were filled.
+    // Builds the tree; node 0 is its root. Stores the numbers of nodes and blocks.
     void build(int* node_count, int* block_count) {
         Range whole;
         whole.first = 0, whole.end = count, whole.depth = 0;
@@ -85,9 +85,10 @@ class TreeBuilder {
 
   private:
     static constexpr int BINS = 16;
-    // Where children are left over, leaves longer than this are split: a packet tests its triangles one by one.
+    // If a node has unused children, leaves with more triangles than this are split: a packet tests triangles one by
+    // one.
     static constexpr int SMALL = 4;
-    // Below this depth runs are halved, so that no mesh makes the tree so deep that a traversal's stack overflows.
+    // Below this depth ranges are halved, so that the stack of a traversal cannot overflow for any mesh.
     static constexpr int DEPTH_OF_HALVES = 48;
 
     const float* vertices;
@@ -108,7 +109,7 @@ class TreeBuilder {
         return box;
     }
 
-    // Splits a run into eight at most, fills the node with them, and goes down into those too long for a leaf.
+    // Splits a range into at most eight, fills the node with them, and recurses into those too long for a leaf.
     void fill(int index, const Range& range) {
         Range runs[WIDTH];
         int run_count = 1;
@@ -130,7 +131,8 @@ class TreeBuilder {
             if (runs[i].count() > LEAF) fill(next++, runs[i]);
     }
 
-    // Splits the run with the greatest surface of those longer than `longest` until there are eight; how many there are.
+    // Repeatedly splits the range of greatest surface area among those longer than `longest`, until there are eight.
+    // Returns their number.
     int open_runs(Range* runs, int run_count, int longest) {
         while (run_count < WIDTH) {
             int best = -1;
@@ -167,7 +169,7 @@ class TreeBuilder {
         int axis, bin;
     };
 
-    // The bin of a centre; the same expression decides costs and sides.
+    // The bin of a centre; the same expression determines costs and sides.
     static int bin_of(float center, float origin, float scale) {
         int bin = (int)((center - origin) * scale);
         return bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;

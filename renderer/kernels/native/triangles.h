@@ -1,14 +1,14 @@
-// Rays against triangles. A ray and a triangle are tested by the same operations in every company, so a hit does not
-// depend on what else is traced.
+// Rays against triangles. A ray and a triangle are always tested by the same operations, so a hit does not depend on
+// the other rays.
 #pragma once
 #include "tree.h"
 
 namespace packets {
 
-// How far a box test may be out after rounding, from above: Ize 2013, "Robust BVH Ray Traversal".
+// Upper bound of the relative rounding error of a box test: Ize 2013, "Robust BVH Ray Traversal".
 constexpr float ROUNDING_UP = 1.0000005f;
-// A triangle's corners are rounded when they are moved to the ray's origin. Boxes are wider by as much, so that a ray
-// that the test of a triangle would let pass is not lost at its box, however far away it starts.
+// The corners of a triangle are rounded when they are translated to the ray's origin. Boxes are padded by as much, so
+// that a ray that hits the triangle is not lost at its box, however distant its origin.
 constexpr float PADDING = 4.0e-7f;
 
 template <class F> inline F reciprocal(F x) { return 1.0f / (vabs(x) > TINY ? x : (F)TINY); }
@@ -16,11 +16,11 @@ inline float reciprocal(float x) { return 1.0f / (x > TINY || x < -TINY ? x : TI
 
 // Ray against triangle after Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection": in a frame whose z
 // axis is the ray, the triangle is hit where the origin lies on the same side of all its edges. The two triangles at an
-// edge see the same two products with opposite signs, so one of them is hit; contraction to fused operations would
+// edge compute the same two products with opposite signs, so one of them is hit. Contraction to fused operations would
 // break that, hence the pragma.
 //
-// Corners are relative to the ray's origin, their axes turned so that z is the one along which the ray is fastest.
-// `t`, `u`, `v` are valid where the result is true; u and v weigh corners a and b.
+// Corners are relative to the ray's origin, with their axes permuted so that z is the greatest component of the
+// direction. `t`, `u`, `v` are valid where the result is true; u and v are the weights of corners a and b.
 template <class F>
 inline typename IntOf<F>::type meets_triangle(const Vec<F>& a, const Vec<F>& b, const Vec<F>& c, const Vec<F>& shear,
                                               F& t, F& u, F& v) {
@@ -40,13 +40,13 @@ inline typename IntOf<F>::type meets_triangle(const Vec<F>& a, const Vec<F>& b, 
     return inside & (t >= 0.0f);
 }
 
-// The axis along which a direction is longest.
+// The axis of a direction's greatest component.
 inline int fastest_axis(float x, float y, float z) {
     x = __builtin_fabsf(x), y = __builtin_fabsf(y), z = __builtin_fabsf(z);
     return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
 }
 
-// A coordinate of the corners of four triangles, or of the eight of two blocks.
+// A coordinate of a corner of four triangles, or of the eight of two blocks.
 template <class F> inline F corners_of(const Block* block, int corner, int axis);
 template <> inline f4 corners_of<f4>(const Block* block, int corner, int axis) {
     return load<f4>(block->corner[corner][axis]);

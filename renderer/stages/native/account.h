@@ -1,16 +1,16 @@
-// Sums for the record of a cycle; definition in `tsar/accounting.py`.
+// Sums for the record of a cycle, as defined in `tsar/accounting.py`.
 #pragma once
 
 namespace account {
 
-// Values that are not finite: x - x is 0 for finite numbers only.
+// Whether a value is not finite: x - x is 0 only for finite numbers.
 template <class V> inline int is_infinite(V value) { return value - value != 0; }
 
-// Combined density over the field, the spread of ages among elements of fast refresh, and how many values of the four
-// fields are not finite.
+// Combined density over the field, spread of ages in elements of fast refresh, and number of non-finite values of the
+// four fields.
 inline void sum(int elements, double fast, const double* spatial, const double* temporal, const float* error_spatial,
                 const float* error_temporal, const double* newest_s, const int* part_of_element, double* result) {
-    double lane[8] = {};  // eight sums side by side fill a vector; their order is fixed
+    double lane[8] = {};  // eight partial sums fill a vector; their order is fixed
     double oldest = __builtin_inf(), newest = -__builtin_inf();
     for (int i = 0; i < elements; i += 8)
         for (int k = 0; k < 8; ++k) lane[k] += spatial[i + k] * temporal[i + k];

@@ -1,5 +1,5 @@
-// How old the newest samples are, and which framelets may still be seen. *Cells* are tiles of the finest level, raster
-// order. Definitions in `tsar/reconstruction.py`.
+// Ages of the newest samples, and framelets that may be visible. *Cells* are tiles of the finest level in raster order.
+// Definitions are in `tsar/reconstruction.py`.
 #pragma once
 #include "quadtree.h"
 
@@ -10,7 +10,7 @@ using quadtree::column_of;
 using quadtree::first_node;
 using quadtree::row_of;
 
-// Newest time of every node, and then of every node or one above it, with the level that it comes from.
+// Newest time of every node, and then of every node and its ancestors, with its level.
 template <class Plan>
 inline void newest_of_nodes(const Plan& plan, int slots, const long long* level, const long long* index,
                             const double* time_s) {
@@ -35,7 +35,7 @@ inline void newest_of_nodes(const Plan& plan, int slots, const long long* level,
     }
 }
 
-// Newest time and its level over every cell. Returns the newest of all, 0 where there is none.
+// Newest time and its level over every cell. Returns the newest of all, 0 if there is none.
 template <class Plan>
 inline double map_newest(const Plan& plan, int slots, const long long* level, const long long* index,
                          const double* time_s, double* newest_s, long long* newest_level) {
@@ -60,12 +60,12 @@ inline void smooth_rows(const Plan& plan, double reference, double cycle_s, cons
     float* age = (float*)plan.cell_age;
     for (int i = 0; i < side * side; ++i)
         age[i] = (float)wp::max((newest_s[i] - reference) / cycle_s, (double)-AGE_MOST);
-    double* __restrict__ upto = (double*)plan.row_integral;  // the integral up to each pixel, borders repeated
+    double* __restrict__ upto = (double*)plan.row_integral;  // sum up to each pixel, with borders repeated
     for (int row = 0; row < side; ++row) {
         double sum = 0.0, here = 0.0;
         int at = 0;
         for (int cell = -1; cell <= side; ++cell) {
-            // Whole numbers of steps, which float64 adds without rounding, in any order.
+            // Integers, which float64 adds without rounding, in any order.
             here = __builtin_rint((double)age[row * side + wp::min(wp::max(cell, 0), side - 1)] * (double)AGE_STEPS);
             const int pixels = cell < 0 ? half : cell < side ? width : half + 1;
             for (int i = 0; i < pixels; ++i) upto[at + i] = sum + here * i;
@@ -76,7 +76,7 @@ inline void smooth_rows(const Plan& plan, double reference, double cycle_s, cons
     }
 }
 
-// The least age of the cells that smoothing and margins reach from each.
+// The least age of the cells within reach of smoothing and margins from each cell.
 template <class Plan> inline const float* least_ages(const Plan& plan) {
     const int side = 1 << plan.level_high;
     const float* age = (const float*)plan.cell_age;
@@ -95,7 +95,8 @@ template <class Plan> inline const float* least_ages(const Plan& plan) {
     return least;
 }
 
-// Slots not older than everything that smoothing and their margins reach; the others cannot be seen. Returns how many.
+// Lists the slots that are not older than all cells within reach of smoothing and their margins; the others cannot be
+// visible. Returns their number.
 template <class Plan>
 inline int list_candidates(const Plan& plan, double reference, double cycle_s, int slots, const long long* level,
                            const long long* index, const double* time_s) {
@@ -112,7 +113,7 @@ inline int list_candidates(const Plan& plan, double reference, double cycle_s, i
         float low = 0.0f;
         for (int y = top; y < top + cells; ++y)
             for (int x = left; x < left + cells; ++x) low = wp::min(low, least[y * side + x]);
-        // One step of the rounding of ages to spare.
+        // Tolerance: one rounding step of ages.
         if (own[i] >= low - 2e-5f - 1e-6f * wp::abs(low)) out[count++] = i;
     }
     return count;

@@ -1,5 +1,5 @@
 // Bands of rows, each small enough for the second-level cache, from the threshold of ages to finished pixels.
-// Definitions in `tsar/reconstruction.py`.
+// Definitions are in `tsar/reconstruction.py`.
 #pragma once
 #include "lanes.h"
 #include "quadtree.h"
@@ -8,12 +8,12 @@ namespace display {
 
 using namespace given;
 
-// Thresholds of the rows from `top` to before `bottom`, and empty sums.
+// Sets the thresholds of the rows from `top` to before `bottom`, and clears the sums.
 template <class Plan>
 inline void begin_band(const Plan& plan, int top, int bottom, float* __restrict__ planes, double* __restrict__ box,
                        float* __restrict__ ages) {
     const int side = 1 << plan.level_high, n = plan.resolution;
-    const int shift = 31 - __builtin_clz(n >> plan.level_high), width = 1 << shift;  // of a cell, pixels
+    const int shift = 31 - __builtin_clz(n >> plan.level_high), width = 1 << shift;  // width of a cell, pixels
     const double* rows = (const double*)plan.row_sum;
     const float support = 2 * plan.half + 1, scale = AGE_STEPS * support * support;
     for (int x = 0; x < n; ++x) box[x] = 0.0;
@@ -35,7 +35,7 @@ inline void begin_band(const Plan& plan, int top, int bottom, float* __restrict_
     __builtin_memset(planes + plane, 0, (PLANES - 1) * sizeof(float) * plane);
 }
 
-// First pixel of a tile along an axis, x being 0.
+// First pixel of a tile along an axis; 0 is x.
 template <class Plan> inline int corner(const Plan& plan, int level, long long index, int axis) {
     return quadtree::every_second_bit(index >> axis) * (plan.resolution >> level);
 }
@@ -54,7 +54,7 @@ inline bool passes(const Plan& plan, int level, int x, int y, float age, int top
     return false;
 }
 
-// Sums to colours. Returns whether some pixel has none.
+// Converts sums to colours. Returns whether any pixel has none.
 template <class Plan>
 inline bool finish_band(const Plan& plan, int top, int bottom, const float* planes, float* image) {
     const long long plane = (long long)plan.band * plan.resolution, count = (long long)(bottom - top) * plan.resolution;
@@ -70,7 +70,7 @@ inline bool finish_band(const Plan& plan, int top, int bottom, const float* plan
     return holes;
 }
 
-// Flags the framelets that passed nowhere. Returns the area of the others, in units of the image.
+// Flags the framelets that were visible nowhere. Returns the total area of the others, in units of the image.
 template <class Plan> inline double bury(const Plan& plan, int slots, const long long* level, unsigned char* dead) {
     const int* seen = (const int*)plan.seen;
     double pixels = 0.0;

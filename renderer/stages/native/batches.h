@@ -1,6 +1,6 @@
-// A batch of samples taken into the estimates and surfels (tsar/filtering/batches.py and samples.py, whose bits these
-// are). Only pixels that samples touch are looked at. First threads take tiles, and then rows of the image three times:
-// each time all must be done before the next.
+// The update of estimates and surfels by a batch of samples, with the same bits as tsar/filtering/batches.py and
+// samples.py. Only pixels with samples are visited. Threads first share tiles, and then rows of the image in three
+// passes; each must be complete before the next.
 #pragma once
 #include "changes.h"
 #include "quadtree.h"
@@ -30,23 +30,24 @@ struct Traced {
     long long tiles;
 };
 
-// Of each sample: its pixel, -1 outside the image, its semivariance, and its surface's place and step on the image.
+// Data of each sample: its pixel (-1 outside the image), its semivariance, and the position and displacement of its
+// surface on the image.
 struct Samples {
     int* at;
     float *semivariance, *x, *y, *step_x, *step_y;
 };
 
-// All that a batch is taken in from and to.
+// Inputs and outputs of the update by a batch.
 struct Batch {
     Traced traced;
     Planes planes;
     Change change;
     Samples samples;
-    surfels::Poses now, earlier;  // the rows of the second are null where there are none
+    surfels::Poses now, earlier;  // the rows of the second are null if there are none
     Moment moment;
 };
 
-// Half the mean squared difference of each sample from its neighbours in the tile.
+// Semivariance: half the mean squared difference of each sample from its neighbours in the tile.
 inline void semivariances(const float* color, float* found) {
     static_assert(TILE == 8);
     float value[3][SAMPLES], raster[SAMPLES];
@@ -60,7 +61,7 @@ inline void semivariances(const float* color, float* found) {
         return 0.5f * ((red * red + green * green + blue * blue) / 3.0f);
     };
     const f8 none = 0.0f, beside = {1, 2, 2, 2, 2, 2, 2, 1};
-    // lane i: the difference from the one after, and from the one before
+    // lane i: difference from the next sample, and from the previous one
     const auto after = [](f8 a) { return __builtin_shufflevector(a, a, 1, 2, 3, 4, 5, 6, 7, 7) - a; };
     f8 above = none;
     for (int row = 0; row < TILE; ++row) {
@@ -114,8 +115,8 @@ template <class Plan> inline void locate(const Plan& plan, const Batch& b, int f
     }
 }
 
-// Sums the samples up by the pixels of some rows, and returns how many pixels these are. `slot` says for each pixel of
-// the image where its sums are, -1 for nowhere; so it is before and after.
+// Sums the samples by the pixels of some rows, and returns the number of pixels. `slot` is the index of each pixel's
+// sums, -1 for none; it is -1 everywhere before and after the update.
 template <class Plan> inline long long gather(const Plan& plan, const Batch& b, int first, int last) {
     const int start = first * plan.side, end = last * plan.side;
     int* const slot = (int*)plan.slot;
@@ -147,18 +148,18 @@ template <class Plan> inline long long gather(const Plan& plan, const Batch& b, 
     return next - start;
 }
 
-// Rows of the image that one thread takes a batch into, whole elements; the pixels that were hit are counted.
+// Rows of the image that one thread updates, in whole elements; `pixels` counts the pixels with samples.
 struct Part {
     long long first, last, pixels;
     float* sums;  // room for nine rows
 };
 
-// Counts and bounds of the roughness of three rows of pixels, one more at both ends.
+// Counts, and lower and upper bounds of the roughness, of a row of pixels with one more pixel at both ends.
 struct Row {
     float* sums[3];
 };
 
-// What samples say of a row, nothing where there are none; returns whether there are any. The border repeats.
+// Counts and bounds of the samples in a row, 0 without samples; returns whether there are any. The border is repeated.
 template <class Plan> inline bool spread_row(const Plan& plan, int row, const Row& to) {
     const int side = plan.side, *slot = (const int*)plan.slot + row * side;
     const Pixel* const pixel = (const Pixel*)plan.pixel;
@@ -176,7 +177,7 @@ template <class Plan> inline bool spread_row(const Plan& plan, int row, const Ro
     return any;
 }
 
-// Roughness of some rows around the pixels that were hit, from the sums in 3 x 3 pixels.
+// Roughness of some rows around the pixels with samples, from sums over 3 x 3 pixels.
 template <class Plan> inline void roughen(const Plan& plan, const Part& own, float* roughness) {
     const int side = plan.side, wide = side + 16;
     Row rows[3];
@@ -209,7 +210,7 @@ template <class Plan> inline void roughen(const Plan& plan, const Part& own, flo
 
 inline float most_of(float x, float y) { return larger(__builtin_fabsf(x), __builtin_fabsf(y)); }
 
-// Estimate and surfel of a pixel with its samples taken in.
+// Updates the estimate and the surfel of a pixel by its samples.
 template <class Plan> inline void update(const Plan& plan, const Batch& b, const Pixel& p, float rate) {
     const Planes& planes = b.planes;
     const Samples& s = b.samples;
@@ -251,7 +252,7 @@ template <class Plan> inline void update(const Plan& plan, const Batch& b, const
     planes.instance[at] = b.traced.instance[p.newest];
 }
 
-// What is learnt of the roughness and of change in the rows of a part.
+// Updates roughness and change in the rows of a part.
 template <class Plan> inline void learn(const Plan& plan, const Batch& b, const Part& own) {
     roughen(plan, own, b.planes.roughness);
     const Pixel* const pixel = (const Pixel*)plan.pixel + own.first * plan.side;
@@ -259,7 +260,7 @@ template <class Plan> inline void learn(const Plan& plan, const Batch& b, const 
                  b.change, own.first, own.last);
 }
 
-// Takes the samples of a part's pixels in, and leaves `slot` as it was.
+// Updates the pixels of a part by their samples, and resets `slot`.
 template <class Plan> inline void take_in(const Plan& plan, const Batch& b, const Part& own) {
     const int side = plan.side;
     const Pixel* const pixel = (const Pixel*)plan.pixel + own.first * side;

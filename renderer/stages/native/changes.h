@@ -1,4 +1,4 @@
-// What residuals say of how fast elements change (tsar/filtering/change.py, whose bits these are).
+// The rate of change of elements from residuals, with the same bits as tsar/filtering/change.py.
 #pragma once
 #include "taking.h"
 
@@ -8,7 +8,7 @@ namespace batches {
 
 constexpr int EDGE = given::ELEMENT_PX, ELEMENTS_MAX = 4096;
 
-// By elements: as it was, and as it will be.
+// Change of the elements, before and after the batch.
 struct Change {
     const float *excess, *span_s;
     const double* seen_s;
@@ -17,7 +17,7 @@ struct Change {
     float *rate, *own;
 };
 
-// What the samples of a pixel say together, and its roughness before.
+// Sums over the samples of a pixel, and its roughness before.
 struct Pixel {
     double time_s;
     int at, newest;
@@ -35,7 +35,7 @@ inline float encoded(float value) { return __builtin_sqrtf(clipped(value)); }
 inline float larger(float a, float b) { return a > b ? a : b; }
 inline float smaller(float a, float b) { return a < b ? a : b; }
 
-// An element in which a pixel was hit.
+// Updates an element that contains pixels with samples.
 inline void observe_element(int side, int element, const Moment& moment, const int* slot, const Pixel* pixel,
                             const surfels::Planes& planes, const Change& change) {
     const int elements = side / EDGE, count = side * side;
@@ -67,7 +67,7 @@ inline void observe_element(int side, int element, const Moment& moment, const i
     change.new_seen_s[element] = moment.now_s;
 }
 
-// The elements of some rows of pixels, `hit` of which samples fell on.
+// Updates the elements of some rows of pixels; `hit` are the pixels with samples.
 inline void observe_rows(int side, const Moment& moment, const int* slot, const Pixel* pixel, const Pixel* hit,
                          long long hits, const surfels::Planes& planes, const Change& change, long long first_row,
                          long long last_row) {
@@ -75,7 +75,7 @@ inline void observe_rows(int side, const Moment& moment, const int* slot, const 
     for (long long i = first; i < last; ++i) {
         change.new_excess[i] = change.excess[i], change.new_span_s[i] = change.span_s[i];
         change.new_seen_s[i] = change.seen_s[i];
-        change.rate[i] = 0.0f;  // 1 in elements that have been looked at
+        change.rate[i] = 0.0f;  // 1 in elements that have been updated
     }
     for (long long i = 0; i < hits; ++i) {
         const int element = hit[i].at / side / EDGE * (int)elements + hit[i].at % side / EDGE;
@@ -87,10 +87,10 @@ inline void observe_rows(int side, const Moment& moment, const int* slot, const 
         change.own[i] = larger(change.new_excess[i], 0.0f) / larger(change.new_span_s[i], given::SPAN_MIN_S);
 }
 
-// Rates of the elements in some rows of pixels, from what all elements say of themselves.
+// Rates of the elements in some rows of pixels, from the own rates of all elements.
 inline void rate_rows(int side, const Moment& moment, const Change& change, long long first_row, long long last_row) {
     const int elements = side / EDGE;
-    float near[ELEMENTS_MAX + 4] = {}, far[ELEMENTS_MAX + 4] = {};  // the greatest of 3 and 5 rows, 0 at both ends
+    float near[ELEMENTS_MAX + 4] = {}, far[ELEMENTS_MAX + 4] = {};  // maxima over 3 and 5 rows, 0 at both ends
     for (int row = (int)first_row / EDGE; row < last_row / EDGE; ++row) {
         const float* own = change.own + row * elements;
         float* rate = change.rate + row * elements;

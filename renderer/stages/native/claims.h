@@ -1,4 +1,4 @@
-// The bookkeeping of the cache: which slots a batch takes, and what was in them. Definition: `tsar/cache.py`.
+// The bookkeeping of the cache: slots that a batch takes, and the states that they held. Definition: `tsar/cache.py`.
 #pragma once
 #include "quadtree.h"
 #include "ranking.h"
@@ -7,20 +7,20 @@ namespace claims {
 
 using quadtree::first_node;
 
-// Ages to choose victims by: of the dead slots where they are enough, else of the live ones. Returns how many dead slots
-// go beside those chosen by age: all, or none.
+// Ages by which slots are chosen for replacement: those of the dead slots if they suffice, else of the live ones.
+// Returns the number of dead slots that are replaced in addition to those chosen by age: all, or none.
 template <class Cache> inline int rank_slots(const Cache& cache, int wanted, double* age) {
     const double* time_s = (const double*)cache.time_s;
     const unsigned char* dead = (const unsigned char*)cache.dead;
     int all_dead = 0;
     for (int i = 0; i < cache.slots; ++i) all_dead += dead[i] != 0;
     const bool among_dead = all_dead >= wanted;
-    // What is not ranked is newer than everything.
+    // Slots that are not ranked count as the newest.
     for (int i = 0; i < cache.slots; ++i) age[i] = (dead[i] != 0) == among_dead ? -time_s[i] : -__builtin_inf();
     return among_dead ? 0 : all_dead;
 }
 
-// Slots to be overwritten, ascending.
+// Lists the slots to overwrite, in ascending order.
 template <class Cache>
 inline void list_victims(const Cache& cache, const ranking::Key* key, ranking::Key threshold, int ties, bool with_dead,
                          long long* slot) {
@@ -31,7 +31,7 @@ inline void list_victims(const Cache& cache, const ranking::Key* key, ranking::K
     }
 }
 
-// Hands slots over to the tiles of a batch, and finds the wavelet state of each tile's last framelet.
+// Assigns slots to the tiles of a batch, and finds the wavelet state of each tile's last framelet.
 template <class Cache, class Memory>
 inline void sign_over(const Cache& cache, const Memory& memory, int count, const long long* level,
                       const long long* index, const double* time_s) {
@@ -55,7 +55,7 @@ inline void sign_over(const Cache& cache, const Memory& memory, int count, const
         taken[slots[row]] = 0;
         if (cached_level[slots[row]] < 0) continue;
         const long long node = first_node(cached_level[slots[row]]) + cached_index[slots[row]];
-        if (newest[node] == slots[row]) newest[node] = -1;  // else a newer framelet of the tile has taken it
+        if (newest[node] == slots[row]) newest[node] = -1;  // else a newer framelet of the tile has replaced it
     }
     for (int row = 0; row < count; ++row) {
         cached_level[slots[row]] = level[row];

@@ -1,4 +1,5 @@
-// A cached framelet to pixels of a band of rows, sixteen side by side. Definitions in `tsar/reconstruction.py`.
+// Expansion of a cached framelet to pixels of a band of rows, sixteen at a time. Definitions are in
+// `tsar/reconstruction.py`.
 #pragma once
 #include "lanes.h"
 
@@ -6,7 +7,7 @@ namespace display {
 
 using namespace packets;
 
-// Of the pixels of a level's tiles along an axis, margin included: see `DisplayPlan`.
+// Tables for the pixels of a level's tiles along an axis, including the margin: see `DisplayPlan`.
 struct Axis {
     const int *left, *right;
     const float *share_left, *share_right, *weight;
@@ -21,15 +22,15 @@ struct Axis {
     }
 };
 
-// One colour of sixteen samples on the Morton curve, which are a square of 4 x 4, to the rows of that square.
+// Stores one channel of sixteen samples on the Morton curve, a square of 4 x 4, by the rows of that square.
 inline void put_square(f16 morton, float* to, int stride) {
     const f16 rows = __builtin_shufflevector(morton, morton, 0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15);
     store<f4>(to, rows.lo.lo), store<f4>(to + stride, rows.lo.hi);
     store<f4>(to + 2 * stride, rows.hi.lo), store<f4>(to + 3 * stride, rows.hi.hi);
 }
 
-// Rows of samples from the Morton curve, colours side by side, to rows of red, green and blue: those of squares of 4 x 4
-// that hold the rows asked for.
+// Converts samples on the Morton curve with interleaved colours to rows of red, green and blue, for the squares of 4 x
+// 4 that contain the requested rows.
 inline void unpack_squares(const float* color, const int* order, int side, int first, int last, float* rows) {
     for (int y = first & ~3; y <= last; y += 4)
         for (int x = 0; x < side; x += 4) {
@@ -40,8 +41,8 @@ inline void unpack_squares(const float* color, const int* order, int side, int f
         }
 }
 
-// The same sample by sample, for tiles of any size. A pixel of a finer tile is the mean of a square of samples, which is
-// a run on the Morton curve.
+// The same sample by sample, for tiles of any size. A pixel of a finer tile is the mean of a square of samples, which
+// are consecutive on the Morton curve.
 inline void unpack_samples(const float* color, const int* order, int side, int samples, int first, int last,
                            float* rows) {
     const int stride = side / samples, each = stride * stride;
@@ -57,8 +58,9 @@ inline void unpack_samples(const float* color, const int* order, int side, int s
     }
 }
 
-// A row of samples to a row of pixels. Pixels outside the outermost samples have those alone; between samples lie
-// `spacing` pixels, a power of two, and pixels of one phase have the same shares of their two neighbours.
+// Interpolates a row of samples to a row of pixels. Pixels beyond the outermost samples take those alone. The distance
+// between samples is `spacing` pixels, a power of two, and pixels of one phase have the same weights of their two
+// neighbours.
 inline void interpolate(const float* from, int samples, int spacing, const Axis& axis, float* to) {
     const int edge = axis.margin + spacing / 2;
     const float *p = axis.share_left + edge, *q = axis.share_right + edge;
@@ -74,7 +76,7 @@ inline void interpolate(const float* from, int samples, int spacing, const Axis&
             store<f4>(to + phase, load<f4>(p + phase) * from[i] + load<f4>(q + phase) * from[i + 1]);
 }
 
-// Rows of a framelet's samples, as many as the band from `top` to before `bottom` needs, interpolated to pixels; per row
+// Interpolates the rows of a framelet's samples that the band from `top` to before `bottom` needs to pixels; per row
 // red, green, blue. `y` is the tile's first row of pixels; `samples` is working memory.
 template <class Plan>
 inline void expand_rows(const Plan& plan, int slot, int level, int y, int top, int bottom, const float* color,
@@ -85,7 +87,7 @@ inline void expand_rows(const Plan& plan, int slot, int level, int y, int top, i
     const int first = axis.left[top > begin ? top - begin : 0], last = axis.right[last_pixel - 1];
     const int count = axis.width < side ? axis.width : side, spacing = axis.width / count;
     const int* order = (const int*)plan.order;
-    float* unpacked = spacing == 1 ? rows : samples;  // a row of samples is a row of pixels where they are as wide
+    float* unpacked = spacing == 1 ? rows : samples;  // a row of samples is a row of pixels if the spacing is one pixel
     color += 3ll * side * side * slot;
     if (count == side && side % 4 == 0)
         unpack_squares(color, order, side, first, last, unpacked);
@@ -96,10 +98,11 @@ inline void expand_rows(const Plan& plan, int slot, int level, int y, int top, i
         interpolate(samples + (long long)line * side, side, spacing, axis, rows + (long long)line * axis.reach);
 }
 
-// Adds a framelet to the band's sums: cycles by which it is newer than the threshold, and `SHIFT_CYCLES` more.
+// Adds a framelet to the band's sums, weighted by the cycles by which it is newer than the threshold, plus
+// `SHIFT_CYCLES`.
 //
-// Sixteen pixels at a time; those past the tile or the image get no weight, but they are read and written: there must be
-// room for them behind all arrays, and numbers in the rows.
+// Processes sixteen pixels at a time. Those beyond the tile or the image get no weight, but they are read and written:
+// all arrays need padding for them, with finite numbers in the rows.
 template <class Plan>
 inline void blend_rows(const Plan& plan, int level, int x, int y, float age, int top, int bottom, const float* rows,
                        float* planes) {

@@ -1,9 +1,9 @@
-// Framelets: where their samples lie, and from their colours to signed errors, sixteen samples side by side: compressed
-// luminance, streaming Haar transform, levelwise norms, signed errors on the field. Definitions in `tsar/error.py`,
+// Framelets: positions of their samples, and signed errors from their colours, sixteen samples at a time: compressed
+// luminance, streaming Haar transform, levelwise norms, signed errors on the field. Definitions are in `tsar/error.py`,
 // `tsar/estimators.py` and `tsar/haar.py`.
 //
-// The first-level cache holds all that lies between; colours and wavelet state go straight into the framelet cache.
-// A framelet has 4^k samples on the Morton curve, so four neighbours of any octave follow one another.
+// Intermediate results fit into the first-level cache; colours and wavelet state are written directly to the framelet
+// cache. A framelet has 4^k samples on the Morton curve, so four neighbours of any octave are consecutive.
 #pragma once
 #include "functions.h"
 #include "lanes.h"
@@ -14,11 +14,11 @@ namespace framelets {
 using namespace packets;
 
 constexpr int POSITIONS_MAX = SAMPLES_MAX / 4;
-constexpr int OCTAVE_POSITIONS_MAX = (SAMPLES_MAX - 1) / 3;  // of all octaves together
-constexpr int SPARE = 15;                                    // what a last block of sixteen writes beyond
+constexpr int OCTAVE_POSITIONS_MAX = (SAMPLES_MAX - 1) / 3;  // total over all octaves
+constexpr int SPARE = 15;  // elements that a last block of sixteen writes beyond the end
 
-// sqrt(y / (1 + y)) as y / sqrt(y (1 + y)): the root's reciprocal by Newton's method, from a first guess good to 3.5 %
-// that halves the exponent; three steps reach the last digit. From 1e18 on the answer is 1.
+// sqrt(y / (1 + y)) as y / sqrt(y (1 + y)). The reciprocal root is found by Newton's method from an initial guess that
+// halves the exponent and is accurate to 3.5 %; three steps reach the last digit. From 1e18 on the result is 1.
 inline f16 compressed(f16 y) {
     y = clamped(y, 0.0f, 1.0e18f);
     const f16 z = y * (1.0f + y), half = 0.5f * z;
@@ -27,7 +27,8 @@ inline f16 compressed(f16 y) {
     return y * root;
 }
 
-// Luminance of sixteen samples, which are copied too; lanes of `good` go out where a sample is not finite or too great.
+// Luminance of sixteen samples, which are also copied; lanes of `good` are cleared where a sample is not finite or too
+// great.
 inline f16 luminance_of(const float* rgb, float* copy, float most, i16& good) {
     const f16 p = load<f16>(rgb), q = load<f16>(rgb + 16), w = load<f16>(rgb + 32);
     store(copy, p), store(copy + 16, q), store(copy + 32, w);
@@ -36,7 +37,7 @@ inline f16 luminance_of(const float* rgb, float* copy, float most, i16& good) {
     return LUMINANCE_RED * color.x + LUMINANCE_GREEN * color.y + LUMINANCE_BLUE * color.z;
 }
 
-// The four below each of several positions.
+// The four children of each of several positions.
 template <class F> struct Four {
     F a, b, c, d;
 };
@@ -59,7 +60,7 @@ template <> inline Four<f4> fours<f4>(const float* in) {
 }
 template <> inline Four<float> fours<float>(const float* in) { return {in[0], in[1], in[2], in[3]}; }
 
-// Calls `body` for all of `count` positions, a power of four: with a vector of sixteen, or of four, or one number.
+// Calls `body` for all of `count` positions, a power of four: with vectors of sixteen or four, or with one number.
 template <class Body> inline void by_lanes(int count, Body body) {
     if (count >= 16)
         for (int i = 0; i < count; i += 16) body(i, f16());
@@ -69,8 +70,8 @@ template <class Body> inline void by_lanes(int count, Body body) {
         body(0, 0.0f);
 }
 
-// One octave at some positions: the spatial transform, and along time the mean with an earlier update and the change
-// since; without a past there is none.
+// One octave at some positions: the spatial transform, and along time the mean with an earlier update and the
+// difference from it; without a past the difference is 0.
 template <class F, class Plan>
 inline void transform_some(const Plan& plan, const Four<F>& in, const float* past, float* kept, int count, float* field,
                            float* power_s, float* power_t) {
@@ -89,8 +90,8 @@ inline void transform_some(const Plan& plan, const Four<F>& in, const float* pas
     store(power_t, plan.linf ? vmax(vmax(t0, t1), t2) : t0 + t1 + t2);
 }
 
-// All octaves: the state to keep, and powers at the positions of each, octaves one after the other, fine to coarse.
-// Returns how many octaves have a past, the finest ones.
+// All octaves: stores the new state, and the powers at the positions of each octave, fine to coarse. Returns the number
+// of octaves that have a past, counted from the finest.
 template <class Plan>
 inline int transform(const Plan& plan, const float* luminance, const float* past, float* kept, float* power_s,
                      float* power_t) {
@@ -101,7 +102,7 @@ inline int transform(const Plan& plan, const float* luminance, const float* past
     for (int octave = 0, begin = 0; octave < plan.octaves; ++octave) {
         const int count = positions >> (2 * octave), width = 4 * count, others = ((1 << octave) - 1) * width;
         const bool has_past = updates >= (2 << octave) - 1;
-        const float* before = has_past ? past + others : nullptr;  // the oldest of the octave's fields
+        const float* before = has_past ? past + others : nullptr;  // oldest field of the octave
         float* field = fields[octave & 1];
         by_lanes(count, [&](int i, auto lanes) {
             transform_some(plan, fours<decltype(lanes)>(in + 4 * i), before ? before + i : nullptr, kept + i, count,
@@ -119,16 +120,16 @@ inline int transform(const Plan& plan, const float* luminance, const float* past
     return known;
 }
 
-// Signal against template: a contrast, or a difference of logarithms.
+// Error of the signal against the template: a contrast, or a difference of logarithms.
 template <class Plan> inline f16 compared(const Plan& plan, f16 signal, f16 tolerated) {
     if (!plan.difference) return (signal - tolerated) / (signal + tolerated);
     const f16 octaves = vlog2(vmax(signal, (f16)__FLT_MIN__)) - vlog2(tolerated);
     return clamped(octaves * (1.0f / OCTAVES_OF_FULL_ERROR), -1.0f, 1.0f);
 }
 
-// Signed errors in equal parts of a tile from the powers of its finest octaves, at least one. From coarse to fine: the
-// norm of each octave in as many parts as it has positions for, compared, and the greatest kept; or summed and compared
-// at the end.
+// Signed errors in equal parts of a tile from the powers of its finest octaves, at least one. From coarse to fine, the
+// norm of each octave is computed in as many parts as it has positions for. Either it is compared and the greatest
+// error is kept, or the norms are summed and compared at the end.
 template <class Plan>
 inline void compare(const Plan& plan, const float* power, int octaves, const float* tolerated, int parts, float* phi) {
     const int positions = plan.samples / 4;
@@ -165,7 +166,7 @@ inline void compare(const Plan& plan, const float* power, int octaves, const flo
         store(phi + i, compared(plan, load<f16>(phi + i), (f16)tolerated_sum));
 }
 
-// Signed errors from powers, into the elements that the tile covers.
+// Stores the signed errors from powers in the elements that the tile covers.
 template <class Plan>
 inline void scatter(const Plan& plan, const float* power, int octaves, int axis, float* out, int elements) {
     const int positions = plan.samples / 4;
@@ -181,9 +182,9 @@ inline void scatter(const Plan& plan, const float* power, int octaves, int axis,
             for (int k = 0; k < repeat; k += 4) store(out + i * repeat + k, (f4)phi[i]);
 }
 
-// One framelet. Its past state must not be where the new one goes.
+// Processes one framelet. Its past state must not overlap the new one.
 //
-// Returns whether all samples are finite and in range; otherwise nothing but the colours has been written.
+// Returns whether all samples are finite and in range; otherwise only the colours have been written.
 template <class Plan>
 inline bool observe(const Plan& plan, const float* color, const float* past, float* kept_color, float* kept_state,
                     float* errors_s, float* errors_t, int elements) {
@@ -198,7 +199,8 @@ inline bool observe(const Plan& plan, const float* color, const float* past, flo
     return true;
 }
 
-// Positions of the samples of a tile: its corner and the offsets `centre`, in tile widths, turned into image widths.
+// Positions of the samples of a tile: its corner plus the offsets `centre`, which are in tile widths, converted to
+// image widths.
 inline void place(long long level, long long index, int samples, const float* centre, float* position) {
     const float x = (float)quadtree::column_of(index), y = (float)quadtree::row_of(index);
     const f4 corner = {x, y, x, y};
@@ -207,12 +209,12 @@ inline void place(long long level, long long index, int samples, const float* ce
     for (int i = 0; i < 2 * samples; i += 16) store(position + i, (corners + load<f16>(centre + i)) * width);
 }
 
-// Asks the caches for what is read, or written, later.
+// Prefetches memory that is read, or written, later.
 template <bool WRITTEN = false> inline void fetch_ahead(const void* from, long long bytes) {
     for (long long at = 0; at < bytes; at += 64) __builtin_prefetch((const char*)from + at, WRITTEN);
 }
 
-// Fields of zeros, and all framelets pending.
+// Clears the fields of errors, and marks all framelets as pending.
 template <class Plan>
 inline void start(const Plan& plan, int count, unsigned char* pending, float* errors_s, float* errors_t) {
     const long long bytes = sizeof(float) << (2 * plan.field_level);
@@ -221,16 +223,17 @@ inline void start(const Plan& plan, int count, unsigned char* pending, float* er
     __builtin_memset(pending, 1, count);
 }
 
-// What threads that share a batch have in common: how many rows are taken, and how many were left as they are.
+// State of the threads that share a batch: number of rows taken, and number of rows left pending.
 struct Progress {
     int taken, left;
 };
 constexpr int ROWS_AT_ONCE = 8;
 
-// Rows of a batch that no other thread has taken. Those marked in `pending` are done, unless a sample is not finite
-// or out of range: these stay marked and are counted.
+// Processes rows of a batch that no other thread has taken. Those marked in `pending` are processed, unless a sample is
+// not finite or out of range: these stay marked and are counted.
 //
-// The cache is larger than the processor's: a row's past and its slot are asked for while the row before is computed.
+// The framelet cache exceeds the processor's caches: a row's past and its slot are prefetched while the row before is
+// computed.
 template <class Plan, class Cache>
 inline void observe_rows(const Plan& plan, const Cache& cache, int count, const long long* level,
                          const long long* index, const float* color, const long long* slot, const float* const* past,

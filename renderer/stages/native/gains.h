@@ -1,5 +1,6 @@
-// What sampling a tile gains, and the best disjoint tiles of the quadtree at a price (tsar/filtering/tiles.py, whose
-// bits these are). Levels lie one after the other, coarsest first; each has four times the tiles of the one before.
+// Gains of tiles, and the best disjoint tiles of the quadtree at a price, with the same bits as
+// tsar/filtering/tiles.py. Levels are stored one after the other, coarsest first; each has four times the tiles of the
+// one before.
 #pragma once
 #include "lanes.h"
 
@@ -21,7 +22,7 @@ typedef long long l16 __attribute__((ext_vector_type(16)));
 static_assert(given::ELEMENT_PX == 4);
 constexpr int LEVELS_MAX = 8, TILE_MAX_PX = 64;
 
-// What is known of pixels; the rate is by elements. `step` is null where nothing moves.
+// Inputs by pixels; the rate is by elements. `step` is null if nothing moves.
 struct Planes {
     const float *variance, *roughness, *rate, *step;
     const long long* instance;
@@ -31,7 +32,7 @@ struct Span {
     float cycle_s, reach_px, life_min_s, life_max_s;
 };
 
-// Sixteen pixels that lie side by side.
+// Sixteen adjacent pixels.
 struct Sixteen {
     f16 p, roughness, rate, longest_s;
 };
@@ -66,7 +67,7 @@ inline f16 of_pixels(const Sixteen& s, float spacing, float life_min_s) {
     return gained * vmin(vmax(gained / s.rate, (f16)life_min_s), s.longest_s);
 }
 
-// Sums of two by two.
+// Sums over 2 x 2 values.
 inline f8 halved(f16 above, f16 below) {
     const auto even = [](f16 a) { return __builtin_shufflevector(a, a, 0, 2, 4, 6, 8, 10, 12, 14); };
     const auto odd = [](f16 a) { return __builtin_shufflevector(a, a, 1, 3, 5, 7, 9, 11, 13, 15); };
@@ -80,7 +81,8 @@ inline void halve(const float* from, int side, float* to) {
     }
 }
 
-// Gains of all tiles in rows of the coarsest. `coarsest` is how many there are along a side, `spacing` theirs.
+// Gains of all tiles within some rows of the coarsest. `coarsest` is the number of these along a side, `spacing` their
+// spacing.
 inline void of_tiles(const Planes& planes, const Span& span, int side, int coarsest, int levels, float spacing,
                      int first, int last, double* gain) {
     const int wide = side / coarsest, half = wide / 2;
@@ -113,10 +115,10 @@ inline void of_tiles(const Planes& planes, const Span& span, int side, int coars
     }
 }
 
-// The tiles of all levels, at a price.
+// The tiles of all levels and their price.
 struct Market {
     const double* gain;
-    const double* most;  // of a tile and those within it
+    const double* most;  // greatest gain among a tile and those within it
     int levels;
     int start[LEVELS_MAX], side[LEVELS_MAX];
     double price;
@@ -126,7 +128,7 @@ struct Worth {
     int count;
 };
 
-// What the best tiles of one or within it gain beyond their price, and how many they are.
+// Profit and number of the best tiles: the tile itself or tiles within it.
 inline Worth worth(const Market& m, int level, int row, int column) {
     const int i = m.start[level] + row * m.side[level] + column;
     if (!(m.most[i] > m.price)) return {0.0, 0};
@@ -149,11 +151,11 @@ inline bool more_than(const Market& m, int limit) {
     return false;
 }
 
-// Marks the best tiles of one or within it.
+// Marks the best tiles: the tile itself or tiles within it.
 inline void mark(const Market& m, int level, int row, int column, unsigned char* taken) {
     const int i = m.start[level] + row * m.side[level] + column;
     if (!(m.most[i] > m.price)) return;
-    // that of one tile alone is its own
+    // the best of a finest tile is itself
     if (level + 1 == m.levels) {
         taken[i] = 1;
         return;
@@ -168,7 +170,7 @@ inline void mark(const Market& m, int level, int row, int column, unsigned char*
     for (int k = 0; k < 4; ++k) mark(m, level + 1, 2 * row + k / 2, 2 * column + k % 2, taken);
 }
 
-// The best tiles, `limit` of them at most; returns how many. `most` has room for all levels.
+// Finds the best tiles, at most `limit`, and returns their number. `most` has room for all levels.
 inline int best(const double* gain, int levels, int coarsest, int limit, double* most, unsigned char* taken) {
     Market m{gain, most, levels};
     int all = 0;

@@ -1,8 +1,8 @@
-// Estimates as a picture, over a pyramid of means (tsar/filtering/display.py, whose bits these are).
+// The picture of the estimates, over a pyramid of means, with the same bits as tsar/filtering/display.py.
 //
-// A level holds five planes: red, green, blue, variance, roughness. The picture and what variance remains replace
-// colours and variance on the way down. Of the finest level only the variance is made; the rest is read and written
-// where it belongs. Threads take rows of it.
+// A level has five planes: red, green, blue, variance, roughness. On the way down, the picture and its remaining
+// variance replace colours and variance. For the finest level only the variance is stored; the rest is read and written
+// in place. Threads share its rows.
 #pragma once
 #include "lanes.h"
 
@@ -15,18 +15,18 @@ struct Fine {
     float* variance;
 };
 
-// Of the picture: colours pixel by pixel, and what variance remains.
+// Results: colours pixel by pixel, and the remaining variance.
 struct Shown {
     float *color, *remaining;
 };
 
-// What variance is made of; `position` is null where nothing is reprojected.
+// Inputs of the variance; `position` is null without reprojection.
 struct Estimated {
     const float *aged, *inverse, *roughness, *rate, *position;
 };
 
-// What a picture is made from and of; `levels` begin with the second finest. The picture is the upper left part of planes
-// of `side` pixels, whose other pixels are left alone.
+// Inputs and outputs of a picture; `levels` begin with the second finest. The picture is the upper left part of planes
+// of `side` pixels; the other pixels are not touched.
 struct Picture {
     Fine fine;
     Estimated estimated;
@@ -38,7 +38,7 @@ struct Picture {
 inline float larger(float a, float b) { return a > b ? a : b; }
 inline float smaller(float a, float b) { return a < b ? a : b; }
 
-// Variance of the pixels of a row, some seconds later, with what lies beside its pixel.
+// Variance of the pixels of a row after `seconds`, including that of surfels beside their pixels.
 inline void vary(const Estimated& of, float seconds, int side, int width, int row, float* variance) {
     const int start = row * side, count = side * side;
     const float *aged = of.aged + start, *inverse = of.inverse + start, *roughness = of.roughness + start;
@@ -59,9 +59,9 @@ inline float mean4(const float* a, const float* b, int column) {
     return (((a[2 * column] + a[2 * column + 1]) + b[2 * column]) + b[2 * column + 1]) / 4.0f;
 }
 
-// A row of the coarser level, over `rows` of two finer ones of the picture. `between` is half the distance of the finer
-// level's pixels, by which roughness becomes variance; `spare` has room for four rows of it. Beyond the picture there is
-// no weight, and the roughness of its border.
+// A row of the coarser level, from `rows` (one or two) finer rows of the picture. `between` is half the distance
+// between pixels of the finer level, the factor from roughness to variance; `spare` has room for four rows. Beyond the
+// picture the weight is 0 and the roughness is that of the border.
 inline void up(const Fine& fine, int side, int width, int rows, float between, int row, float* spare, float* coarse) {
     const int half = side / 2, quarter = half * half, count = side * side, start = 2 * row * side;
     const int columns = (width + 1) / 2;
@@ -88,7 +88,7 @@ inline void up(const Fine& fine, int side, int width, int rows, float between, i
     for (int i = 0; i < columns; ++i) to[3 * quarter + i] = 1.0f / to[3 * quarter + i];
 }
 
-// A row of twice the length, linear, the ends repeated.
+// A row of twice the length by linear interpolation, with the ends repeated.
 inline void enlarge(const float* __restrict from, int half, float* __restrict to) {
     to[0] = 0.75f * from[0] + 0.25f * from[0];
     for (int i = 1; i < half; ++i) {
@@ -98,8 +98,8 @@ inline void enlarge(const float* __restrict from, int half, float* __restrict to
     to[2 * half - 1] = 0.75f * from[half - 1] + 0.25f * from[half - 1];
 }
 
-// Two rows of the finer level, of a picture `width` and `height` there, from one of the coarser and its neighbours.
-// `spare` has room for sixteen of them. Without `shown` what is found replaces the finer level.
+// Two rows of the finer level, at which the picture has `width` and `height`, from one row of the coarser level and its
+// neighbours. `spare` has room for sixteen rows. Without `shown` the result replaces the finer level.
 inline void down(const float* coarse, int side, int width, int height, float between, int row, float* spare,
                  const Fine& fine, const Shown* shown) {
     const int half = side / 2, count = side * side, quarter = half * half, rows = (height + 1) / 2;
@@ -147,14 +147,15 @@ inline void show(const Picture& picture, int side, int first, int last, float* s
         down(picture.levels, side, width, height, 0.5f, row, spare, picture.fine, &picture.shown);
 }
 
-// The coarser levels, from the second finest on, whose planes are given; the picture is `width` and `height` there.
+// Computes and smooths the levels from the second finest on, whose planes are given; the picture has `width` and
+// `height` there.
 inline void smooth(float* levels, int side, int width, int height, float* spare) {
     const auto planes = [](float* level, int wide) {
         return Fine{level, level + 4 * wide * wide, level + 3 * wide * wide};
     };
     float* level = levels;
     int number = 1;
-    // of a level whose pixels are so many of the second finest
+    // size of a level whose pixels span `pixels` of the second finest
     const auto part = [](int length, int pixels) { return (length + pixels - 1) / pixels; };
     for (int wide = side, pixels = 1; wide > 1; wide /= 2, pixels *= 2, ++number) {
         float* const next = level + given::LEVEL_PLANES * wide * wide;

@@ -1,28 +1,28 @@
-// The greatest of many, without sorting: what selection, cache and tiling have in common.
+// The greatest of many values without sorting, for selection, cache and tiling.
 #pragma once
 
 namespace ranking {
 
 typedef unsigned long long Key;
 
-// Unsigned keys that order as the float64 values do; no NaN among them.
+// Unsigned keys in the order of the float64 values, which must not be NaN.
 inline void rank_keys(const double* value, int count, Key* key) {
     for (int i = 0; i < count; ++i) {
-        const double plain = value[i] + 0.0;  // -0 counts as 0
+        const double plain = value[i] + 0.0;  // turns -0 into 0
         const Key bits = __builtin_bit_cast(Key, plain);
-        // Negative numbers order by their bits the wrong way round, and belong below the positive ones.
+        // The bits of negative numbers are in reverse order, and belong below those of positive ones.
         key[i] = bits ^ ((bits >> 63) ? ~0ull : 1ull << 63);
     }
 }
 
-// A bound that the `wanted` greatest keys reach, and of the others only those equal to the least of them: keys above the
-// bound are all taken. 0 where there are not so many keys.
+// A bound such that the `wanted` greatest keys are at least it, and other keys at most equal to it, so that all keys
+// above it are taken. 0 if there are fewer keys.
 inline Key kth_greatest(const Key* key, int count, int wanted) {
     if (count < wanted) return 0;
     Key all = ~0ull, any = 0;
     for (int i = 0; i < count; ++i) all &= key[i], any |= key[i];
     if (all == any) return all;
-    const int top = 63 - __builtin_clzll(all ^ any);  // above it all keys are alike
+    const int top = 63 - __builtin_clzll(all ^ any);  // above it the bits of all keys are equal
     Key found = top == 63 ? 0 : all >> (top + 1) << (top + 1);
     for (int bit = top; bit >= 0; --bit) {
         const Key trial = found | (1ull << bit);
@@ -34,14 +34,14 @@ inline Key kth_greatest(const Key* key, int count, int wanted) {
     return found;
 }
 
-// How many values exceed a bound.
+// Number of values above a bound.
 template <class V> inline int count_above(const V* value, int count, V bound) {
     int above = 0;
     for (int i = 0; i < count; ++i) above += value[i] > bound;
     return above;
 }
 
-// Whether a key is among those wanted: above the threshold, or one of the first `ties` at it, which it then uses up.
+// Whether a key is taken: it is above the threshold, or among the first `ties` at it, whose count is then reduced.
 inline bool is_taken(Key key, Key threshold, int& ties) { return key > threshold || (key == threshold && ties-- > 0); }
 
 }  // namespace ranking

@@ -1,7 +1,7 @@
-// The control decision for the solver `waterfill`, eight elements side by side; definitions in `tsar/response`.
+// The control decision for the solver `waterfill`, eight elements at a time; definitions are in `tsar/response`.
 //
-// Only elements that can move take part: those with an error that does not point out of the box from its wall. They are
-// gathered into columns, a quantity each, and every pass runs over these. Sums have eight partial sums, whatever the
+// Only elements that can move take part: those with an error that does not point out of the box at its wall. They are
+// gathered into columns, one per quantity, and every pass runs over these. Sums have eight partial sums on every
 // machine, so their rounding is the same everywhere.
 #pragma once
 #include "lanes.h"
@@ -28,7 +28,7 @@ inline d8 where(l8 condition, d8 a, d8 b) { return condition ? a : b; }
 
 constexpr double INF = __builtin_inf();
 
-// Room for all elements, and for what a last block of eight writes beyond them.
+// Columns for all elements, with padding for the last block of eight.
 struct Columns {
     double *a_s, *a_t, *m_s, *m_t, *k_min, *k_max, *want, *most;
     int* element;
@@ -45,8 +45,9 @@ struct Levels {
     double ask, free;
 };
 
-// Elements that can move: normalised densities, and the error without what points out of the box from its wall, for
-// the decision slides along it. Returns how many; the last block is filled up with elements that stay.
+// Gathers the elements that can move: normalised densities, and the error without components that point out of the box
+// at its wall, so that the decision moves along the wall. Returns their number; the last block is padded with elements
+// that do not move.
 template <class Plan>
 inline int gather(const Plan& plan, const double* s, const double* t, const float* phi_s, const float* phi_t,
                   const Columns& c) {
@@ -84,14 +85,14 @@ template <class Plan> inline void constrain(const Plan& plan, int count, const C
         const d8 a_s = load(c.a_s + i), a_t = load(c.a_t + i), f_s = load(c.m_s + i), f_t = load(c.m_t + i);
         const d8 length = vsqrt(f_s * f_s + f_t * f_t), unit = where(length > 0.0, length, 1.0);
         const d8 m_s = f_s / unit, m_t = f_t / unit;
-        // Distance to the wall that the ray meets first (eq. 6.13 corrected).
+        // Distance to the first wall that the ray meets (eq. 6.13, corrected).
         const d8 to_s = where(m_s == 0.0, INF, (where(m_s > 0.0, 1.0, low_s) - a_s) / m_s);
         const d8 to_t = where(m_t == 0.0, INF, (where(m_t > 0.0, 1.0, low_t) - a_t) / m_t);
         const d8 nearest = vmin(vmax(to_s, (d8)0.0), vmax(to_t, (d8)0.0));
         const d8 k_max = where(length > 0.0, nearest, 0.0), k_min = vmin(k_max, plan.gain * length);
         const d8 slope = a_s * m_t + a_t * m_s, product = m_s * m_t;
         const d8 want = k_min * (slope + product * k_min);
-        // Errors of opposite sign: the area has an extremum along the ray, and that is as far as it helps to go.
+        // For errors of opposite signs the area has an extremum along the ray, beyond which the change decreases.
         const d8 extremum = -slope / where(product < 0.0, 2.0 * product, 1.0);
         const l8 inside = (product < 0.0) & (extremum > 0.0) & (extremum < k_max) & (k_min < 2.0 * extremum);
         const d8 k = where(inside, extremum, k_max), furthest = k * (slope + product * k);
@@ -101,11 +102,11 @@ template <class Plan> inline void constrain(const Plan& plan, int count, const C
     }
 }
 
-// Factor on the desired change of those who ask (`sign` 1) or free (-1), so that together they get `target`: the sum of
-// min(level * desired, bound) is concave, so Newton's steps from below rise to the exact level and stop as soon as no
-// further element fills up.
+// Factor of the desired change of the elements that ask (`sign` 1) or free (-1), for which their changes sum to
+// `target`. The sum of min(level * desired, bound) is concave, so Newton's steps from below rise to the exact level,
+// and end as soon as no further element reaches its bound.
 inline double water_level(int count, const Columns& c, double sign, double target, double total, double vessels) {
-    if (target == total) return 1.0;  // not by way of sums, which round
+    if (target == total) return 1.0;  // exact, unlike sums, which are rounded
     if (target <= 0.0) return 0.0;
     if (target >= vessels) return INF;
     double level = target / total;
@@ -131,7 +132,8 @@ inline double water_level(int count, const Columns& c, double sign, double targe
     return level;
 }
 
-// Factors on the desired change of those who ask and of those who free density; infinite: all go to their bound.
+// Factors of the desired change of the elements that ask for density and of those that free it; infinite if all go to
+// their bounds.
 template <class Plan> inline Levels water_levels(const Plan& plan, int count, const Columns& c, double surplus) {
     d8 sums[4] = {0.0, 0.0, 0.0, 0.0};
     for (int i = 0; i < count; i += 8) {
@@ -152,8 +154,8 @@ template <class Plan> inline Levels water_levels(const Plan& plan, int count, co
     return {water_level(count, c, 1.0, given, ask, ask_most), water_level(count, c, -1.0, freed, free, free_most)};
 }
 
-// New densities, over the normalised old ones in the columns (sec. 6.4). Where one of two is to be taken both are
-// computed; NaN and infinity, from 0 / 0 and a / 0, are not taken.
+// New densities, which replace the normalised old ones in the columns (sec. 6.4). Both branches of a selection are
+// computed; NaN and infinity, from 0 / 0 and a / 0, are never selected.
 template <bool BIASED, class Plan> inline void mix(const Plan& plan, int count, const Columns& c, Levels level) {
     const double low_s = plan.spatial_min, low_t = plan.temporal_min;
     for (int i = 0; i < count; i += 8) {
@@ -161,7 +163,7 @@ template <bool BIASED, class Plan> inline void mix(const Plan& plan, int count, 
         const d8 want = load(c.want + i), most = load(c.most + i);
         const d8 up = vmin(level.ask * want, most), down = vmax(level.free * want, most);
         const d8 granted = where(want > 0.0, up, where(want < 0.0, down, 0.0));
-        // Smallest root of product k² + slope k - granted without cancellation.
+        // Smallest root of product k² + slope k - granted = 0, without cancellation.
         const d8 product = m_s * m_t, slope = a_s * m_t + a_t * m_s;
         const d8 root = vsqrt(vmax(slope * slope + 4.0 * product * granted, (d8)0.0));
         const d8 q = -0.5 * (slope + where(slope < 0.0, -root, root));
@@ -170,7 +172,8 @@ template <bool BIASED, class Plan> inline void mix(const Plan& plan, int count, 
                               where((q != 0.0) & (second >= 0.0), second, INF));
         const d8 root_k = vmin(where(least < INF, least, 0.0), load(c.k_max + i));
         const d8 k = where(granted == 0.0, 0.0, root_k);
-        // Opposite errors and no more granted than desired: the ratio of the axes is that of the desired point.
+        // Errors of opposite signs and no more granted than desired: the ratio of the axes is that of the desired
+        // point.
         const d8 k_min = load(c.k_min + i), size = __builtin_elementwise_abs(granted);
         const l8 redistribute = (product < 0.0) & (size <= __builtin_elementwise_abs(want));
         d8 b_s = a_s + k * m_s, b_t = a_t + k * m_t;
@@ -190,7 +193,7 @@ template <bool BIASED, class Plan> inline void mix(const Plan& plan, int count, 
     }
 }
 
-// The fields after the decision; elements that stay keep their bits. Returns the combined density freed.
+// The fields after the decision; elements that do not move keep their bits. Returns the freed combined density.
 template <class Plan>
 inline double write(const Plan& plan, int count, const Columns& c, const double* s, const double* t, double* s_after,
                     double* t_after) {

@@ -1,4 +1,4 @@
-// Passes over the field and over the tiles for the selection; definition in `tsar/selection.py`.
+// Passes over the field and over the tiles for the selection, as defined in `tsar/selection.py`.
 #pragma once
 #include "framelets.h"
 #include "ranking.h"
@@ -9,14 +9,13 @@ typedef double d2 __attribute__((ext_vector_type(2)));
 typedef double d4 __attribute__((ext_vector_type(4)));
 typedef packets::d8 d8;
 
-// Sums of the four first and the four last: neighbours first, as everywhere up the quadtree.
+// Sums of the first four and the last four lanes, of neighbours first, as at all levels of the quadtree.
 inline d2 sums_of_four(d8 v) {
     const d4 pairs = v.even + v.odd;
     return pairs.even + pairs.odd;
 }
 
-// Adds up sums of equal nodes that come one after the other, by fours: the sum of a node is made when its last child
-// arrives.
+// Sums over successive nodes of equal size, four at a time: the sum of a node is completed by its last child.
 struct Pyramid {
     double waiting[16][4];
     int arrived = 0;
@@ -31,7 +30,7 @@ struct Pyramid {
     }
 };
 
-// Credit of the elements of one tile, which has a power of four of them. Returns their mean.
+// Updates the credit of one tile's elements, whose number is a power of four. Returns the mean.
 inline double gather_tile(int count, const double* past, const double* rate, double* now) {
     if (count < 16) {
         for (int i = 0; i < count; ++i) now[i] = past[i] + rate[i];
@@ -54,7 +53,7 @@ inline double gather_tile(int count, const double* past, const double* rate, dou
     return sum / count;
 }
 
-// Credit of every element, and its mean over every tile.
+// Updates the credit of every element, and computes its mean over every tile.
 inline void gather_credit(int tiles, int field_level, const long long* level, const long long* index,
                           const double* temporal, const double* history, double* overdue, double* credit) {
     for (int tile = 0; tile < tiles; ++tile) {
@@ -64,7 +63,7 @@ inline void gather_credit(int tiles, int field_level, const long long* level, co
     }
 }
 
-// Tiles above the threshold, and the `ties` first of those at it; a refresh is taken off their credit.
+// Selects the tiles above the threshold and the first `ties` of those at it, and subtracts a refresh from their credit.
 template <class Due>
 inline void refresh_due(int tiles, int field_level, const long long* level, const long long* index,
                         const double* overdue, const ranking::Key* key, ranking::Key threshold, int ties,
@@ -80,7 +79,7 @@ inline void refresh_due(int tiles, int field_level, const long long* level, cons
     }
 }
 
-// The tiles of a batch, and the positions of its samples.
+// Stores the tiles of a batch and the positions of its samples.
 template <class Plan, class Due>
 inline void place_framelets(const Plan& plan, const long long* level, const long long* index, const Due& due) {
     const long long* chosen = (const long long*)due.selected;

@@ -1,4 +1,4 @@
-// How far the shadows that samples met have moved (tsar/filtering/shadows.py, whose bits these are).
+// The motion of the shadows that samples hit, with the same bits as tsar/filtering/shadows.py.
 #pragma once
 #include "surfels.h"
 
@@ -10,7 +10,7 @@ struct Vec {
     double x, y, z;
 };
 
-// Of a batch; speeds are by elements, `across` along a side.
+// Inputs of a batch; speeds are by elements, of which `across` lie along a side.
 struct Batch {
     const float* before;
     float* after;
@@ -20,7 +20,7 @@ struct Batch {
     const float* point;
     const int* occluder;
     long long samples;
-    const long long* track;  // of each instance
+    const long long* track;  // track of each instance
     surfels::Poses now, earlier;
     long long perspective;
     double cycle_s;
@@ -36,7 +36,7 @@ inline Vec turned(const double* m, const Vec& p, const Vec& offset) {
             m[6] * p.x + m[7] * p.y + m[8] * p.z + offset.z};
 }
 
-// By cofactors.
+// Inverse of a 3 x 3 matrix from cofactors.
 inline void invert(const double* m, double* inverse) {
     const Vec rows[3] = {{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}};
     const Vec columns[3] = {cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])};
@@ -48,7 +48,8 @@ inline void invert(const double* m, double* inverse) {
     }
 }
 
-// The greater distance of both axes on the image, as a share of its side; 0 where there is none.
+// The greater distance along both axes of the image, as a share of its side; 0 if either lies behind the camera or the
+// distance is not finite.
 inline double apart(const Batch& b, const Vec& first, const Vec& second) {
     const double one = b.perspective ? -first.z : 1.0, other = b.perspective ? -second.z : 1.0;
     if (!(one > 0.0 && other > 0.0)) return 0.0;

@@ -1,5 +1,5 @@
-// Surfels: where the poses of a time show what was hit earlier, and which of them each pixel takes (tsar/filtering/
-// motion.py, whose bits these are).
+// Surfels: projection of earlier hits at the poses of a time, and the choice of a surfel for each pixel, with the same
+// bits as tsar/filtering/motion.py.
 #pragma once
 #include "lanes.h"
 
@@ -26,23 +26,23 @@ constexpr double INF = __builtin_inf();
 constexpr Key NONE = 0x7fffffffffffffffll;
 constexpr int ROW = given::POSE_NUMBERS;  // of an instance
 
-// What takes each instance to the camera, and last of all what takes directions there.
+// Matrices and offsets from each instance to the camera; the last is for directions.
 struct Poses {
     const double* rows;
     int count;
     double tan_x, tan_y;
 };
 
-// Eight surfels that lie side by side, on the image; those that are not seen are anywhere.
+// Eight adjacent surfels on the image; positions of those that are not visible are undefined.
 struct Eight {
     d8 x, y, depth;
-    l8 inside, seen;  // whether there is a position, and whether it is on the image
+    l8 inside, seen;  // whether there is a position, and whether it lies on the image
 };
 
 template <class Plan> inline Eight project8(const Plan& plan, const Poses& poses, l8 number, d8 x, d8 y, d8 z) {
     const l8 infinite = number < 0, row = (infinite | (number >= poses.count)) ? (l8)(poses.count - 1) : number;
     d8 right = 0.0, up = 0.0, depth = 0.0;
-    // most often all are of one instance
+    // mostly all belong to one instance
     for (unsigned left = 255u; left;) {
         const long long chosen = row[packets::first_bit(left)];
         const double* m = poses.rows + ROW * chosen;
@@ -71,7 +71,7 @@ inline Eight project8(const Plan& plan, const Poses& poses, const long long* ins
     return project8(plan, poses, load<l8>(instance + start), component(0), component(1), component(2));
 }
 
-// Eight surfels that serve pixels of rows `low` to `high`, some of them in other bands.
+// Eight surfels that reach pixels of the rows `low` to `high`, some of them in other bands.
 struct Crossing {
     int start, low, high;
 };
@@ -79,18 +79,18 @@ struct Crossing {
 // Rows of the image that one thread works on.
 struct Band {
     long long first, last;
-    Key* least;          // the best rank of each pixel, and of two more on every side
-    Crossing* crossing;  // room for an eighth of its pixels
+    Key* least;          // best rank of each pixel, with two more on every side
+    Crossing* crossing;  // room for one per eight of its pixels
     long long crossings;
 };
 
-// Variance by change of estimates, and how fast elements change.
+// Variance of estimates from change, and rates of change of the elements.
 struct Ageing {
     const float *aged, *rate;
     float seconds;
 };
 
-// Of eight pixels that lie side by side.
+// Variance from change of eight adjacent pixels at the new time.
 inline f8 later8(const Ageing& by, int side, int start) {
     const int edge = given::ELEMENT_PX;
     const float* q = by.rate + start / side / edge * (side / edge) + start % side / edge;
@@ -103,7 +103,7 @@ struct Uncertain {
     const float *aged, *inverse, *roughness;
 };
 
-// The rank of surfels in pixels whose centres are `away` from them; the number breaks ties. It fits into 32 bits.
+// The rank of surfels in pixels whose centres are at the distance `away`; the index breaks ties. It fits into 32 bits.
 static_assert(2ll * given::DEPTHS * given::SCORES < 1ll << 31);
 inline i8 rank(i8 near, f8 variance, f8 beside_cost, f8 away) {
     const f8 cost = (variance + beside_cost * away) * given::SCORE_SCALE;
@@ -111,14 +111,14 @@ inline i8 rank(i8 near, f8 variance, f8 beside_cost, f8 away) {
     return (away > 0.5f ? 2 * given::DEPTHS - 1 - near : near) * given::SCORES + score;
 }
 
-// Offers eight surfels to the four pixels around each of them, those of the band.
+// Offers eight surfels to those of the four pixels around each that belong to the band.
 template <class Plan>
 inline void offer8(const Plan& plan, const Eight& e, const Uncertain& of, int start, const Band& band) {
     const int stride = plan.side + 4, rows = (int)(band.last - band.first);
     const d8 left = e.seen ? vfloor(e.x - 0.5) : (d8)-2.0, top = e.seen ? vfloor(e.y - 0.5) : (d8)-2.0;
     const i8 column = __builtin_convertvector(left, i8) + 2,
              row = __builtin_convertvector(top, i8) - (int)band.first + 2;
-    // what is of no use to the band goes beside its pixels
+    // offers outside the band go into the margin
     const i8 within = row < 0 ? (i8)0 : row > rows + 2 ? (i8)(rows + 2) : row;
     const i8 first = __builtin_convertvector(e.seen, i8) ? within * stride + column : (i8)0;
     const i8 near = __builtin_bit_cast(i8, __builtin_convertvector(e.depth, f8)) >> given::DEPTH_SHIFT;
@@ -145,7 +145,7 @@ inline void offer8(const Plan& plan, const Eight& e, const Uncertain& of, int st
         }
 }
 
-// Eight places and steps, one surfel after the other.
+// Stores eight positions and displacements, one surfel after the other.
 inline void store_motion(float* to, f8 x, f8 y, f8 step_x, f8 step_y) {
     const f16 place = __builtin_shufflevector(x, y, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
     const f16 step = __builtin_shufflevector(step_x, step_y, 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
@@ -184,7 +184,7 @@ inline void offer_own(const Plan& plan, const Poses& poses, const long long* ins
     }
 }
 
-// Offers to a band those of the other bands that reach into it; then the best of all surfels are known.
+// Offers the surfels of other bands that reach into a band to it; then the best of all surfels are known.
 template <class Plan>
 inline void choose(const Plan& plan, const Poses& poses, const long long* instance, const float* point,
                    const Uncertain& of, const Band* bands, int count, int number) {

@@ -1,5 +1,4 @@
-// Which surfels pixels keep of those they chose, and estimates and surfels that go with them (tsar/filtering/motion.py,
-// whose bits these are).
+// The surfels that pixels keep of those chosen, with their estimates, with the same bits as tsar/filtering/motion.py.
 #pragma once
 #include "surfels.h"
 
@@ -7,15 +6,15 @@
 
 namespace surfels {
 
-constexpr int PIXELS = 4096;  // of which one plane after the other is taken
+constexpr int PIXELS = 4096;  // number of pixels that are processed plane by plane
 
-// Which of eight pixels keep what they took: not where most of their neighbours took what is in front.
+// Which of eight pixels keep their surfels: not those most of whose neighbours took a surfel in front.
 template <class Plan> inline void keep8(const Plan& plan, int at) {
     const int side = plan.side, wide = side + 2 * given::FRAME;
     const double* front = (const double*)plan.front + (at / side + 1) * wide + given::FRAME + at % side;
     int* source = (int*)plan.source + at;
     const d8 bound = load<d8>(front) / (double)given::NEARER;
-    // one of any three neighbours is among six of eight
+    // six of eight neighbours include one of any three
     if (!packets::bits((load<d8>(front - 1) < bound) | (load<d8>(front + 1) < bound) |
                        (load<d8>(front - wide) < bound)))
         return;
@@ -25,11 +24,11 @@ template <class Plan> inline void keep8(const Plan& plan, int at) {
     store(source, __builtin_convertvector(nearer >= given::NEARER_COUNT, i8) ? (i8)-1 : load<i8>(source));
 }
 
-// What pixels take, of any plane.
+// Sources of the pixels, for any plane.
 struct Taking {
     int first, last;
-    int source[PIXELS];                  // itself for a pixel that takes nothing
-    unsigned char straight[PIXELS / 8];  // of each eight pixels, whether they take eight that follow one another
+    int source[PIXELS];                  // the pixel itself if it takes nothing
+    unsigned char straight[PIXELS / 8];  // for each eight pixels, whether they take eight consecutive ones
     int none[PIXELS], nones;             // pixels that take nothing
 };
 
@@ -69,7 +68,7 @@ struct Before {
     const long long* instance;
     const float *point, *position;
 };
-// Of estimates and surfels, to be written.
+// Planes of estimates and surfels to be written.
 struct Planes {
     float *color, *aged, *inverse;
     double* time_s;
@@ -78,7 +77,8 @@ struct Planes {
     float *point, *position, *step;
 };
 
-// What the pixels of a band keep of estimates and surfels. `planes` holds the addresses of Before, then those of Planes.
+// Copies the estimates and surfels that the pixels of a band keep. `planes` holds the addresses of Before, then those
+// of Planes.
 template <class Plan> inline void take_rows(const Plan& plan, const long long* planes, const Band& band) {
     Before b;
     Planes a;

@@ -1,4 +1,4 @@
-// Passes over the field and over the quadtree for the tiling; definition in `tsar/tiling.py`.
+// Passes over the field and over the quadtree for the tiling, as defined in `tsar/tiling.py`.
 #pragma once
 #include "lanes.h"
 #include "quadtree.h"
@@ -9,7 +9,7 @@ namespace tiling {
 using packets::d8;
 using quadtree::first_node;
 
-// Sums of the four children of each of `count` nodes; children lie one after the other.
+// Sums of the four children of each of `count` nodes; children are consecutive.
 inline void sum_children(const double* below, double* sums, int count) {
     int i = 0;
     for (; i + 8 <= count; i += 8) {
@@ -29,8 +29,8 @@ inline void sum_children(const double* below, double* sums, int count) {
     for (; i < count; ++i) sums[i] = ((below[4 * i] + below[4 * i + 1]) + below[4 * i + 2]) + below[4 * i + 3];
 }
 
-// Whether all values of a field are densities, not negative, infinite or NaN. A field has a multiple of eight
-// elements.
+// Whether all values of a field are densities, not negative, infinite or NaN. The number of elements is a multiple of
+// eight.
 inline bool all_densities(const double* value, int count) {
     decltype(d8() < d8()) bad = 0;
     for (int i = 0; i < count; i += 8) {
@@ -43,7 +43,7 @@ inline bool all_densities(const double* value, int count) {
     return !any;
 }
 
-// Integrals over all nodes above the elements.
+// Computes the integrals over all nodes above the elements.
 inline void sum_nodes(int field_level, int level_low, const double* density, double* sums) {
     for (int level = field_level - 1; level >= level_low; --level) {
         double* here = sums + first_node(level);
@@ -52,7 +52,7 @@ inline void sum_nodes(int field_level, int level_low, const double* density, dou
     }
 }
 
-// Nodes above the threshold, and the `ties` first of those at it in the order for equals.
+// Marks the nodes above the threshold, and the first `ties` of those at it in the order for equal nodes.
 inline void mark_splits(int count, const ranking::Key* key, const long long* order, ranking::Key threshold, int ties,
                         unsigned char* split) {
     for (int i = 0; i < count; ++i) split[i] = key[i] > threshold;
@@ -60,11 +60,11 @@ inline void mark_splits(int count, const ranking::Key* key, const long long* ord
         if (key[order[i]] == threshold) split[order[i]] = 1, --ties;
 }
 
-// The undivided nodes in Morton order. Returns how many.
+// Lists the nodes that are not split, in Morton order. Returns their number.
 inline int emit_tiles(int level_low, int level_high, const unsigned char* split, long long* level, long long* index) {
     const long long base = first_node(level_low);
     int tiles = 0;
-    // Along the curve: from each place the coarsest node that begins there, one level down while it is split.
+    // Along the curve, take the coarsest node that begins at each place, and descend while it is split.
     for (long long place = 0; place < 1ll << (2 * level_high);) {
         const int up = place ? __builtin_ctzll(place) / 2 : level_high;
         int here = wp::max(level_low, level_high - up);
