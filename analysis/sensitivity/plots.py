@@ -50,7 +50,7 @@ def write_all(
         lines: one per sweep, input and setting.
         settings: pairs of slopes.
         keys: keys of the results of the input that is shown, by setting.
-        place: gives the folder of a result by its key.
+        place: gives the files of a result by its key.
 
     Returns:
         The files.

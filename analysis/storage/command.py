@@ -1,4 +1,4 @@
-"""Tell whether two folders of results hold the same: every number, table and picture, but no measured seconds.
+"""Tell whether two folders of results are the same: every number, table and picture, except measured seconds.
 
 Example: python scripts/same.py out/before out/after
 """
@@ -27,11 +27,11 @@ class SameOptions:
     second: Annotated[Path, tyro.conf.Positional]
     """Folder of results."""
     ignore: tuple[str, ...] = ()
-    """Names of files, of entries of JSON files and of columns to leave out."""
+    """Names of files, entries of JSON files and columns to leave out."""
 
 
 def main() -> None:
-    """Compares, prints every difference, and ends with 1 where there is one."""
+    """Compares, prints every difference, and ends with status 1 if there is one."""
     options = parse(SameOptions, __doc__ or "")
     with bad_input():
         difference = compare_folders(options.first, options.second, options.ignore)

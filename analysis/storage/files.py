@@ -1,4 +1,4 @@
-"""Files that are written atomically: a reader never sees half of one."""
+"""Atomic writing of files: a reader never sees a partial file."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PARTIAL = ".partial"
-"""Ending of the name a file has while it is being written."""
+"""Ending of a file's temporary name while it is being written."""
 
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
-    """A temporary name beside ``path``, moved there when the block ends well and removed when it does not.
+    """A temporary name beside ``path``, which is renamed to ``path`` if the block succeeds and removed if it fails.
 
-    The folder is created. When the block has ended, content and name are on the disk, not only in memory.
+    The folder is created. After the block, content and name are on the disk, not only in memory.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    # the ending stays last: writers choose the format by it
+    # the original ending stays last, because writers choose the format by it
     temporary = path.with_name(f"{path.stem}{PARTIAL}{path.suffix}")
     try:
         yield temporary
-        # in this order: after a power cut the name must not stand for an empty file
+        # in this order, so that after a power cut no name refers to an empty file
         sync(temporary)
         os.replace(temporary, path)
         sync(path.parent)
@@ -41,7 +41,7 @@ def atomic(path: Path) -> Iterator[Path]:
 
 
 def sync(path: Path) -> None:
-    """Has the system put the content of a file, or the names in a folder, on the disk before this returns."""
+    """Flushes the content of a file, or the names in a folder, to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -58,7 +58,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def plain(value: Any) -> Any:
-    """A value of types that JSON has: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null."""
+    """A value in types of JSON: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null."""
     if is_dataclass(value) and not isinstance(value, type):
         return plain(asdict(value))
     if isinstance(value, Mapping):

@@ -26,12 +26,12 @@ class InvariantCheck:
         self._found: dict[str, Any] = {"cycles": 0, "conservation_residual": 0.0, **dict.fromkeys(self._COUNTED, 0)}
 
     def add(self, record: StepRecord) -> None:
-        """Checks one cycle; densities are rounded to float32 as they are in a file."""
+        """Checks one cycle; densities are rounded to float32, as in a file."""
         fields = checked_fields(record)
         self.add_fields(fields, record.surplus, record.conservation_residual)
 
     def add_fields(self, fields: dict[str, np.ndarray], surplus: float, recorded: float) -> None:
-        """Checks one cycle from its arrays, the surplus, and the residual that the pipeline found."""
+        """Checks one cycle from its arrays, the surplus, and the residual that the pipeline recorded."""
         found, limits = self._found, self._limits
         worst = max(_or_infinite(_residual(fields, surplus, limits)), _or_infinite(recorded))
         found["cycles"] += 1
@@ -45,16 +45,15 @@ class InvariantCheck:
         """Counts and ``ok``."""
         counts = (self._found[name] for name in self._COUNTED)
         kept = self._found["conservation_residual"] <= _CONSERVATION and not any(counts)
-        ok = kept and self._found["cycles"] > 0  # nothing held where nothing ran
+        ok = kept and self._found["cycles"] > 0  # a run without cycles does not pass
         return {**self._found, "ok": bool(ok)}
 
 
 def unbroken(cycles: Iterable[tuple[StepRecord | None, ShownImage]]) -> Iterator[StepRecord]:
-    """Records of cycles as they come, checked by what the pipeline itself counted: measurements of time go on
-    undisturbed.
+    """Records of cycles as they arrive, checked by the pipeline's own counts, which does not disturb time measurements.
 
     Raises:
-        BrokenInvariants: density is lost or gained, or a density or an error is not finite.
+        BrokenInvariants: density is not conserved, or a density or an error is not finite.
     """
     for record, _ in cycles:
         if record is None:
@@ -72,7 +71,7 @@ def _residual(fields: dict[str, np.ndarray], surplus: float, limits: RecordLimit
 
 
 def _or_infinite(residual: float) -> float:
-    """NaN would lose every comparison and so pass for the least."""
+    """Infinity in place of NaN, which would fail every comparison and so pass as the least residual."""
     return math.inf if math.isnan(residual) else residual
 
 
@@ -86,7 +85,8 @@ def _within(fields: dict[str, np.ndarray], limits: RecordLimits) -> bool:
 
 
 def covers_once(level: np.ndarray, index: np.ndarray) -> bool:
-    """Whether tiles are disjoint intervals of the Morton curve that fill it: in order, each begins where one ends."""
+    """Whether tiles are disjoint intervals that fill the Morton curve: in order, each begins where the last one
+    ends."""
     if level.size == 0:
         return False
     shift = 2 * (int(level.max()) - level.astype(np.int64))

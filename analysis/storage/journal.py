@@ -1,4 +1,4 @@
-"""Rows that are appended to a file one by one, each with its own checksum."""
+"""A file to which rows are appended one by one, each with its own checksum."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from analysis.storage.files import plain, sync
 _CHECK_BYTES = 8
 _LINE_CHECK = 2 * _CHECK_BYTES
 _POLL_S = 0.005
-"""How often a process that waits for its turn asks again, seconds: about as long as an append takes."""
+"""Seconds between attempts of a process that waits for its turn: about as long as an append takes."""
 
 
 def warn(line: str) -> None:
@@ -26,10 +26,10 @@ def warn(line: str) -> None:
 
 
 class Journal:
-    """Rows that are appended to a file, each on the disk before it counts; a row is a dictionary that JSON can hold.
+    """Rows that are appended to a file, each on the disk before it counts; a row is a dictionary of JSON values.
 
-    Every line begins with its own checksum: a line that was cut off or has changed is detected and ignored.
-    Several processes may append to one journal.
+    Every line begins with its checksum: a truncated or changed line is detected and ignored. Several processes may
+    append to one journal.
     """
 
     def __init__(self, path: Path) -> None:
@@ -39,7 +39,7 @@ class Journal:
         self._file: tuple[int, int] | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """All rows, oldest first; those that others have appended since are among them."""
+        """All rows, oldest first, including those that other processes have appended since."""
         try:
             with self.path.open("rb") as file:
                 found = os.fstat(file.fileno())
@@ -50,7 +50,7 @@ class Journal:
         except FileNotFoundError:
             self._rows, self._read, self._file = [], 0, None
             return []
-        # a line without an end is being written, or was cut off
+        # a line without an end is being written, or was truncated
         whole = fresh[: fresh.rfind(b"\n") + 1]
         for line in whole.split(b"\n"):
             row = _row(line)
@@ -70,7 +70,7 @@ class Journal:
         with self.path.open("a+b") as file:
             lock_descriptor(file.fileno(), poll_interval=_POLL_S)
             if file.seek(0, os.SEEK_END) and _last_byte(file) != b"\n":
-                line = b"\n" + line  # behind one that was cut off
+                line = b"\n" + line  # after a truncated line
             file.write(line)
             file.flush()
             os.fsync(file.fileno())

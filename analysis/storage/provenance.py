@@ -1,4 +1,4 @@
-"""Where a result comes from: commit, configuration, versions, machine, and what others brought."""
+"""Provenance of a result: commit, configuration, versions, machine, and additions of other packages."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from analysis.storage.source import Brought
 _ROOT = Path(__file__).resolve().parents[2]
 _CPU_INFO = Path("/proc/cpuinfo")
 _WHERE = ("out", "cache")
-"""Fields of a configuration that say where results are written, and so decide none."""
+"""Fields of a configuration that say where results are written, and do not affect results."""
 
 
 def provenance(config: Any, added: Sequence[Brought] = (), **extra: Any) -> dict[str, Any]:
-    """Where a run comes from.
+    """The provenance of a run.
 
     Args:
         config: resolved configuration; its hash identifies the run, and leaves out where results are written.
-        added: what the run used that is not the project's own.
+        added: additions of other packages that the run used.
         extra: further entries, such as scene, seed and device.
 
     Returns:
-        ``commit`` and ``uncommitted_changes`` are None outside a checkout and where git is not installed.
+        The entries by name. ``commit`` and ``uncommitted_changes`` are None outside a checkout and without git.
     """
     kept = {name: value for name, value in plain(config).items() if name not in _WHERE}
     versions: dict[str, str | None] = {}
@@ -55,7 +55,7 @@ def provenance(config: Any, added: Sequence[Brought] = (), **extra: Any) -> dict
 
 
 def cpu_model() -> str:
-    """Name of the processor as the system tells it."""
+    """Name of the processor as the operating system reports it."""
     try:
         with _CPU_INFO.open() as lines:
             for line in lines:
@@ -67,7 +67,7 @@ def cpu_model() -> str:
 
 
 def _git(*arguments: str) -> str | None:
-    """Output of a git command; None outside a checkout of the project, or where git fails."""
+    """Output of a git command; None outside a checkout of the project, or if git fails."""
     if not (_ROOT / ".git").exists():  # a checkout of another project may lie above an installed package
         return None
     try:

@@ -41,12 +41,12 @@ _FIELDS: dict[str, pa.DataType] = {
 
 @dataclass(frozen=True)
 class RecordLimits:
-    """What every cycle of a run must keep to; stored beside the records, so that they can be checked alone.
+    """Limits that every cycle of a run must keep; stored with the records, so that a file can be checked alone.
 
     Attributes:
         batch_size: framelets per cycle.
         budget: samples per cycle.
-        density_spatial, density_temporal: least and greatest density.
+        density_spatial, density_temporal: least and greatest density, samples per element and refreshes per cycle.
     """
 
     batch_size: int
@@ -60,7 +60,7 @@ def _flat(tensor: Tensor, dtype: type) -> np.ndarray:
 
 
 def checked_fields(record: StepRecord) -> dict[str, np.ndarray]:
-    """The arrays of a record that its invariants are checked on, as they are stored."""
+    """The arrays of a record on which its invariants are checked, as they are stored."""
     return {
         "tile_level": _flat(record.tiling.level, np.int8),
         "tile_index": _flat(record.tiling.index, np.int32),
@@ -136,7 +136,7 @@ class StepWriter:
         return pq.ParquetWriter(self._temporary, schema, compression="zstd")
 
     def close(self, keep: bool = True) -> None:
-        """Ends the file; without ``keep``, or where that fails, nothing of it stays on disk."""
+        """Ends the file; without ``keep``, or if ending it fails, no file stays on disk."""
         try:
             if keep:
                 self._flush()
@@ -150,7 +150,8 @@ class StepWriter:
 
 
 def density_quantiles(path: Path, percents: tuple[float, ...] = (5.0, 25.0, 50.0, 75.0, 95.0)) -> dict[str, np.ndarray]:
-    """Densities over time: ``sim_time_s`` (cycles,) and quantiles over the elements (cycles, percents) of both."""
+    """Densities over time: ``sim_time_s`` (cycles,), and quantiles of both densities over the elements (cycles,
+    percents)."""
     names = ("density_spatial", "density_temporal")
     found: dict[str, list] = {"sim_time_s": [], **{name: [] for name in names}}
     for part in pq.ParquetFile(path).iter_batches(batch_size=32, columns=list(found)):
@@ -162,10 +163,10 @@ def density_quantiles(path: Path, percents: tuple[float, ...] = (5.0, 25.0, 50.0
 
 
 def stage_seconds(path: Path, most: int = 120) -> tuple[list[float], dict[str, np.ndarray]]:
-    """Wall seconds of the stages of a cycle over time: medians over runs of cycles, so many at most.
+    """Wall seconds of the stages of a cycle over time, as medians over at most ``most`` groups of consecutive cycles.
 
     Returns:
-        Time of the first cycle of each run of cycles, and by stage its medians.
+        Time of the first cycle of each group, seconds, and the medians of each stage.
     """
     file = pq.ParquetFile(path)
     names = [name for name in file.schema_arrow.names if name.startswith("stage_")]

@@ -1,8 +1,8 @@
 """Reference images at a high rate in space and time, rendered once and kept on disk.
 
 A reference is named by a hash of everything that decides its content. It is written image by image, each with its
-checksum and the count of its values that were not finite: an interrupted rendering goes on where it stopped, and what
-is damaged is noticed and rendered again.
+checksum and the number of its non-finite values. An interrupted rendering continues where it stopped, and damaged
+images are detected and rendered again.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ class ReferenceSpec:
     """Everything that decides the content of a reference.
 
     Attributes:
-        scene: name and phase of the scene, for people.
+        scene: name and phase of the scene, for messages.
         scene_hash: :func:`content_hash` of the scene.
         renderer_hash: :func:`renderer_hash` of the renderer.
         start_s: time of the first image, seconds.
         rate_hz: images per second.
         count: number of images.
         width_px, height_px: size of the images.
-        samples_per_axis: the average of a grid of this many samples squared is one pixel.
+        samples_per_axis: side of the grid of samples whose average is a pixel.
     """
 
     scene: str
@@ -83,7 +83,7 @@ def content_hash(value: Any) -> str:
     known: dict[int, bytes] = {}
 
     def leaf(item: Any) -> bytes:
-        # meshes and textures are shared by many instances: each is hashed once
+        # many instances share meshes and textures: each is hashed once
         if id(item) not in known:
             part = hashlib.sha256(f"{item.dtype}{item.shape}".encode())
             part.update(np.ascontiguousarray(item).tobytes())
@@ -124,10 +124,10 @@ class Reference:
     """Reference images on disk.
 
     Attributes:
-        spec: what they are.
-        images: ``(count, height, width, 3)`` float16 linear RGB, mapped into memory as it is read.
-        nonfinite: values of the rendering that were not finite; they are stored as 0.
-        rendered: images rendered now rather than found on disk.
+        spec: everything that decides their content.
+        images: ``(count, height, width, 3)`` float16 linear RGB, memory-mapped.
+        nonfinite: number of non-finite values in the rendering, which are stored as 0.
+        rendered: number of images that were rendered now, not found on disk.
     """
 
     spec: ReferenceSpec
@@ -137,7 +137,7 @@ class Reference:
 
 
 def as_stored(image: ArrayLike) -> NDArray[np.float16]:
-    """Linear radiance as a reference holds it: float16, not below 0, and 0 where it is not finite."""
+    """Linear radiance as stored in a reference: float16, at least 0, and 0 where it is not finite."""
     finite = np.nan_to_num(np.asarray(image), nan=0.0, posinf=0.0, neginf=0.0)
     return np.clip(finite, 0.0, _HALF_MAX).astype("<f2")
 
@@ -147,15 +147,15 @@ Render = Callable[[float], Tensor]
 
 
 def obtain(cache: Path, spec: ReferenceSpec, render: Render, task: Task | None = None) -> Reference:
-    """The reference from disk, where every image is checked; what is missing or damaged is rendered now.
+    """The reference from disk, with every image checked; missing and damaged images are rendered now.
 
-    Two processes that want the same reference do not both render it: the second waits.
+    If two processes want the same reference, the second waits while the first renders it.
 
     Args:
         cache: folder of references.
-        spec: what is wanted.
+        spec: everything that decides the reference.
         render: called for each image that is not on disk.
-        task: of which a step is an image.
+        task: progress, one step an image.
 
     Raises:
         ValueError: the disk has no room for it, or the renderer returns another shape.
@@ -179,9 +179,9 @@ def obtain(cache: Path, spec: ReferenceSpec, render: Render, task: Task | None =
 
 
 class _Images:
-    """The images of a reference in a file, and the journal that says which of them are there.
+    """The images of a reference in a file, and the journal that lists those that have been written.
 
-    The file has its full length from the beginning. An image counts where the journal has a row with its checksum.
+    The file has its full length from the beginning. An image counts if the journal has a row with its checksum.
     """
 
     def __init__(self, cache: Path, spec: ReferenceSpec) -> None:
@@ -193,7 +193,7 @@ class _Images:
         self._header, self._image_bytes = header.getvalue(), spec.bytes // spec.count
 
     def checked(self, say: Callable[[str], None]) -> dict[int, int]:
-        """Values that were not finite, of each image that is on disk as it was rendered. Says what is damaged."""
+        """Number of non-finite values of each image that is intact on disk. Reports damaged images."""
         rows: dict[int, dict[str, Any]] = {}
         for row in self._journal.rows():
             if "image" in row:
@@ -221,7 +221,7 @@ class _Images:
 
     @contextmanager
     def opened(self, fresh: bool) -> Iterator[BinaryIO]:
-        """The file, to write images to; a fresh one has room for them all."""
+        """The file for writing images; a fresh one has space for all images."""
         if fresh:
             self._allocate()
             self._journal.append({"key": self._spec.key, **dataclasses.asdict(self._spec)})
@@ -229,13 +229,13 @@ class _Images:
             yield file
 
     def write(self, file: BinaryIO, number: int, rendered: Tensor) -> int:
-        """Puts an image on the disk; returns how many of its values were not finite."""
+        """Writes an image to the disk; returns the number of its non-finite values."""
         image = np.asarray(rendered.cpu())
         if image.shape != self._spec.shape[1:]:
             raise ValueError(f"reference: expected images {self._spec.shape[1:]}, got {image.shape}")
         nonfinite = int((~np.isfinite(image)).sum())
         content = as_stored(image).tobytes()
-        # not through mapped memory: a full disk would end the process there
+        # not through mapped memory, where a full disk would kill the process
         file.seek(self._offset(number))
         file.write(content)
         file.flush()
@@ -251,15 +251,15 @@ class _Images:
         return file.read(self._image_bytes)
 
     def _digest(self, number: int, content: bytes) -> str:
-        # an image of another reference, or in another place of this one, is no image of this place
+        # the key and the number, so that an image of another reference or at another number has another digest
         digest = hashlib.sha256(f"{self._spec.key} {number} ".encode())
         digest.update(content)
         return digest.hexdigest()
 
     def _allocate(self) -> None:
-        """Makes the file with all its room on the disk."""
+        """Creates the file and allocates all of its space on the disk."""
         need = self._spec.bytes + len(self._header)
-        self.path.unlink(missing_ok=True)  # its blocks count as free
+        self.path.unlink(missing_ok=True)  # its blocks count as free space space
         free = shutil.disk_usage(self.path.parent).free
         if need > free:
             where = self.path.parent

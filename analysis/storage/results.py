@@ -1,4 +1,4 @@
-"""Folders that commands write results to: one process at a time, and nothing of the user's is replaced."""
+"""Folders for the results of commands: one process at a time writes, and no file of the user is replaced."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from analysis.storage.journal import Journal
 from analysis.storage.store import JOURNAL, Store
 
 SUMMARY = "summary.json"
-"""What a command writes last."""
+"""The file that a command writes last."""
 
 
 def own_results(folder: Path, names: Iterable[str]) -> None:
-    """Creates a folder for the results of a command and takes it for this process, and the names for commands.
+    """Creates a folder for the results of a command, locks it for this process, and reserves names for commands.
 
     Args:
-        folder: which the user named as ``out``.
-        names: of all files that the command may write, replace or delete there, relative to the folder and with
-            forward slashes; each may be a pattern. Names that a command took belong to commands from then on, so that
-            what a killed one left behind may be replaced. Files that a :class:`~analysis.storage.store.Store` makes
-            need not be named, nor the SVG that stands beside each PNG of a figure.
+        folder: the folder that the user named as ``out``.
+        names: names of all files that the command may write, replace or delete there, relative to the folder and with
+            forward slashes; each may be a pattern. A reserved name belongs to commands from then on, so that files of
+            a killed command may be replaced. Files that a :class:`~analysis.storage.store.Store` makes need not be
+            named, nor the SVG beside each PNG of a figure.
 
     Raises:
-        ValueError: the folder cannot be created or written, another process writes there, or a file that no command
-            made has one of the names.
+        ValueError: the folder cannot be created or written, another process writes there, or one of the names belongs
+            to a file that no command made.
     """
     own_folder(folder, "out")
     names = tuple(names)
@@ -46,7 +46,7 @@ def own_results(folder: Path, names: Iterable[str]) -> None:
 
 
 def _foreign(folder: Path, wanted: Iterable[str], taken: set[str]) -> Iterator[Path]:
-    """Files of the wanted names that no command made."""
+    """Files with one of the wanted names that no command made."""
     listed = Store(folder, "").listed()
     for pattern in wanted:
         for file in folder.glob(pattern):
@@ -57,7 +57,7 @@ def _foreign(folder: Path, wanted: Iterable[str], taken: set[str]) -> Iterator[P
 
 
 def _is_summary(file: Path) -> bool:
-    """Whether a file is the summary of a command, of a version that took no names."""
+    """Whether a file is the summary of a command of a version that reserved no names."""
     try:
         found = json.loads(file.read_bytes())
     except (OSError, ValueError, RecursionError):

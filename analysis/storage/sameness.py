@@ -1,4 +1,4 @@
-"""Whether two folders of results hold the same: every number, table and picture, but no measured seconds."""
+"""Comparison of two folders of results: every number, table and picture, except measured seconds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MEASURED = (
     *("provenance", "start", "machine", "stage_wall_s", "wall", "wall_s"),
     *("samples_per_s", "created", "peak_memory_bytes"),
 )
-"""Entries of JSON files that differ between two equal runs: where, when and how fast they were made."""
+"""Entries of JSON files that differ between two equal runs: place, date and speed of the run."""
 
 _PICTURES = (".png", ".ppm", ".exr")
 _NOT_COMPARED = (".html", ".log", ".lock", ".journal")
@@ -26,12 +26,12 @@ _TIMES = "timing.csv"
 
 @dataclass
 class Difference:
-    """What differs between two folders. Grows in place.
+    """The differences between two folders. Grows in place.
 
     Attributes:
-        compared: files that both folders hold and that were compared.
+        compared: number of files that are in both folders and were compared.
         found: a line for each difference, with the file and the place in it.
-        left_out: files that hold measured seconds among their contents, and so were not compared.
+        left_out: files that contain measured seconds, and so were not compared.
     """
 
     compared: int = 0
@@ -40,14 +40,14 @@ class Difference:
 
 
 def compare_folders(first: Path, second: Path, ignore: tuple[str, ...] = ()) -> Difference:
-    """Compares all files of two folders by what they hold.
+    """Compares all files of two folders by their content.
 
     Args:
         first, second: folders that the same command wrote.
-        ignore: names of files or of entries of JSON files and tables that are left out, beside :data:`MEASURED`.
+        ignore: names of files, and of entries of JSON files and tables, that are left out beside :data:`MEASURED`.
 
     Raises:
-        ValueError: one of them is not a folder, or both hold no file.
+        ValueError: one of them is not a folder, or neither contains a file.
     """
     for folder in (first, second):
         if not folder.is_dir():
@@ -113,7 +113,7 @@ def _of_tables(first: Path, second: Path, ignore: set[str]) -> Iterator[str]:
     import pyarrow.parquet as pq
 
     a, b = pq.read_table(first), pq.read_table(second)
-    # measured seconds of a stage have a column each
+    # the measured seconds of each stage have a column
     kept = [name for name in a.column_names if name not in ignore and not name.startswith("stage_")]
     for name in kept:
         if name not in b.column_names:
@@ -124,7 +124,7 @@ def _of_tables(first: Path, second: Path, ignore: set[str]) -> Iterator[str]:
 
 
 def _same_column(a: pa.Array, b: pa.Array) -> bool:
-    """Whether all values are equal, lists one by one; NaN equals NaN."""
+    """Whether all values are equal, with lists compared item by item; NaN equals NaN."""
     import pyarrow as pa
 
     if a.equals(b) or a.type != b.type or len(a) != len(b):

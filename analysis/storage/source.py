@@ -1,7 +1,7 @@
 """The code that made a result: a hash of all files and versions that decide it, found by following imports.
 
-A stored result is used again where this hash is the same. No list of files has to be kept: what a module imports
-belongs to it, wherever it lies, and so does what lies beside it and is no Python, such as C++ headers and assets.
+A stored result is reused if this hash is the same. No list of files has to be kept: the hash covers everything that a
+module imports, wherever it lies, and all files beside it that are not Python, such as C++ headers and assets.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from tsar.named import Named
 _PACKAGES = ("tsar", "renderer", "scenes", "analysis")
 
 _NO_DATA = (".pyc", ".md", ".html", ".js")
-"""Endings of files beside the code that decide no result: pages only show them."""
+"""Endings of files beside the code that affect no result: pages only show them."""
 
 _PLACE = re.compile(r"[a-z_]\w*(\.\w+)+:\w+")
-"""A place in a table of names, as ``module:attribute``: it is imported when it is asked for."""
+"""An entry in a table of names, as ``module:attribute``, which is imported at its first use."""
 
 _DISTRIBUTIONS = {"warp": "warp-lang", "PIL": "pillow", "pycvvdp": "cvvdp", "flip_evaluator": "flip-evaluator"}
-"""Names under which packages are installed, where they are not those that they are imported by."""
+"""Distribution names of packages that differ from their import names."""
 
 
 def code_hash(*makers: Any) -> str:
-    """Hash of the code that classes or functions are made of.
+    """Hash of the code of classes or functions.
 
-    It covers the modules that define them, all modules of the same checkout that those import, directly or not, files
-    other than Python in and below the folders of those modules, and versions of Python and of all libraries that any
-    of the modules import.
+    It covers the modules that define them, all modules of the same checkout that these import directly or indirectly,
+    all files other than Python in and below the folders of these modules, and the versions of Python and of all
+    libraries that any of the modules imports.
 
     Args:
         makers: classes and functions, all of one checkout.
@@ -49,7 +49,7 @@ def code_hash(*makers: Any) -> str:
 
 
 def hash_of_modules(root: Path, starts: Sequence[Path]) -> str:
-    """As :func:`code_hash`, from the folder that packages lie in and the files of modules in them."""
+    """As :func:`code_hash`, from the folder of the packages and the files of modules in them."""
     modules, libraries = _reached(root, starts)
     digest = hashlib.sha256()
     for path in sorted({*modules, *_data(modules)}):
@@ -62,19 +62,19 @@ def hash_of_modules(root: Path, starts: Sequence[Path]) -> str:
 
 
 def _found(makers: Sequence[Any]) -> tuple[Path, list[Path]]:
-    """The folder that all packages lie in, and the files of the modules that define the makers."""
+    """The folder of all packages, and the files of the modules that define the makers."""
     files = [Path(sys.modules[maker.__module__].__file__ or "").resolve() for maker in makers]
     return files[0].parents[makers[0].__module__.count(".")], files
 
 
 @dataclass(frozen=True)
 class Brought:
-    """An entry of a table that is not the project's own.
+    """A table entry that another package or program added.
 
     Attributes:
-        kind, name: what it is, and under which name it stands in its table.
-        module, distribution, version: where it comes from; see :class:`tsar.named.Origin`.
-        content: hash of the files of its package, or of its module where that lies in none; None where it has no file.
+        kind, name: its kind, and its name in the table.
+        module, distribution, version: its origin; see :class:`tsar.named.Origin`.
+        content: hash of the files of its package, or of its module if that is in no package; None without a file.
     """
 
     kind: str
@@ -86,7 +86,8 @@ class Brought:
 
 
 def brought(*chosen: tuple[Named[Any], str]) -> list[Brought]:
-    """Of entries by their tables and names those that are not the project's own: no hash of its code covers them."""
+    """Those of the chosen entries that were added from elsewhere, which the hash of the project's code does not
+    cover."""
     found = []
     for table, name in chosen:
         if not table.is_own(name):
@@ -97,7 +98,7 @@ def brought(*chosen: tuple[Named[Any], str]) -> list[Brought]:
 
 
 def _content(module: str) -> str | None:
-    """Hash of all files of the package that a module lies in, or of its own file."""
+    """Hash of all files of the package of a module, or of its own file if it is in no package."""
     top = module.partition(".")[0]
     spec = None if top == "__main__" else importlib.util.find_spec(top)
     if spec is not None and spec.submodule_search_locations:
@@ -114,7 +115,7 @@ def _content(module: str) -> str | None:
 
 @cache
 def version_of(library: str) -> str | None:
-    """Version of an installed library by the name it is imported by; None where it is not installed."""
+    """Version of an installed library by its import name; None if it is not installed."""
     try:
         return importlib.metadata.version(_DISTRIBUTIONS.get(library, library))
     except importlib.metadata.PackageNotFoundError:
@@ -122,11 +123,11 @@ def version_of(library: str) -> str | None:
 
 
 def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
-    """Modules that can be reached by imports, and names of libraries that they import."""
+    """Modules that are reached by imports, and names of the libraries that they import."""
     modules, libraries, waiting = set[Path](), set[str](), list(starts)
-    # installed packages lie beside those of others
+    # installed packages lie beside other packages
     own = {*_PACKAGES, *(path.relative_to(root).with_suffix("").parts[0] for path in starts)}
-    module = cache(lambda name: _module(root, name))  # most names stand in many files
+    module = cache(lambda name: _module(root, name))  # most names occur in many files
     while waiting:
         path = waiting.pop()
         if path in modules:
@@ -145,9 +146,10 @@ def _reached(root: Path, starts: Sequence[Path]) -> tuple[set[Path], set[str]]:
 
 
 def _module(root: Path, name: str) -> list[Path]:
-    """Files of a dotted name below the root: its module or, of a name within one, that; and the packages above it.
+    """Files of a dotted name below the root: its module, or the module that defines it, and the packages above it.
 
-    Of a name that a package itself defines, all of the package: it may fetch that from anywhere below it.
+    For a name that a package itself defines these are all files of the package, because it may take the name from any
+    module in it.
     """
     folder, found = root, list[Path]()
     for part in name.split("."):
@@ -163,13 +165,13 @@ def _module(root: Path, name: str) -> list[Path]:
 
 @lru_cache(maxsize=4096)
 def _imports(content: bytes, package: tuple[str, ...]) -> tuple[str, ...]:
-    """Dotted names of what a module of a package imports, wherever in it that stands but for type checkers."""
+    """Dotted names of all imports of a module of a package, anywhere in it except those for type checkers alone."""
     return tuple(_names(ast.parse(content), package))
 
 
 @lru_cache(maxsize=4096)
 def _places(content: bytes) -> tuple[str, ...]:
-    """Dotted names of modules whose entries a table of names holds by their place."""
+    """Dotted names of modules to which the tables of names refer."""
     texts = (node.value for node in ast.walk(ast.parse(content)) if isinstance(node, ast.Constant))
     return tuple(text.replace(":", ".") for text in texts if isinstance(text, str) and _PLACE.fullmatch(text))
 
@@ -190,7 +192,7 @@ def _names(tree: ast.AST, package: tuple[str, ...]) -> Iterator[str]:
 
 
 def _data(modules: set[Path]) -> Iterator[Path]:
-    """Files beside and below modules that are no Python."""
+    """Files beside and below modules that are not Python."""
     folders = {module.parent for module in modules}
     for folder in folders:
         if folders.isdisjoint(folder.parents):

@@ -1,13 +1,13 @@
-"""Files that commands made: each is listed with its checksum before it counts, and checked when it is read.
+"""Files made by commands: each is listed with its checksum before it counts, and checked when it is read.
 
-A :class:`Store` is a folder and a key, the hash of everything that decides what its files hold. The folder's list,
-``files.journal``, names every file that was ever made there, with its key, its checksum and facts about it, such as how
-many of its values were not finite. A file counts only where the list has it under the store's key and its content is
-what the list says. A file that is missing, cut off or of another key counts as missing. So does one whose content is no
-longer what was written, which is reported in a line on standard error. A process may be killed at any moment: files
-that count are complete, the others are made again.
+A :class:`Store` is a folder and a key, the hash of everything that decides the content of its files. The folder's list,
+``files.journal``, names every file that was ever made there, with its key, its checksum and facts about it, such as the
+number of its non-finite values. A file counts only if the list has it under the store's key and its content matches the
+checksum. A file that is missing, truncated or of another key counts as missing. So does a file whose content has
+changed, which is reported in a line on standard error. A process may be killed at any moment: files that count are
+complete, and the others are made again.
 
-A command that keeps files asks, makes what is missing, and reads what was checked::
+A command that keeps files looks for them, makes missing ones, and reads checked ones::
 
     store = Store(options.out, config_hash)
     for number, name in enumerate(names):
@@ -17,11 +17,11 @@ A command that keeps files asks, makes what is missing, and reads what was check
                 found.facts["nonfinite"] = write_image(found.path, picture(number))
         nonfinite += found.facts["nonfinite"]
 
-``find`` checks the file and gives its entry, ``read`` gives the checked bytes and ``read_json`` the checked value of a
-JSON file. ``listed`` names the files that commands made in the folder: only those may be deleted, by ``discard``.
+``find`` checks the file and returns its entry, ``read`` returns the checked bytes, and ``read_json`` the checked value
+of a JSON file. ``listed`` names the files that commands made in the folder: ``discard`` deletes only those.
 
-JSON from elsewhere is read by :func:`read_json` of this module: invalid JSON, and valid JSON of another form, are
-errors of one line.
+:func:`read_json` of this module reads JSON from elsewhere: invalid JSON, and valid JSON of another form, give an error
+of one line.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class Entry:
 
     Attributes:
         name: path within the folder, with forward slashes.
-        key: of the store that made it.
-        sha256: of its content.
-        facts: about it.
+        key: key of the store that made it.
+        sha256: SHA-256 of its content.
+        facts: further values, by name.
     """
 
     name: str
@@ -69,12 +69,12 @@ class _Files:
         self._entries: dict[str, list[Entry]] = {}
 
     def entries(self) -> dict[str, list[Entry]]:
-        """Of every file, oldest first."""
+        """The entries of every file, oldest first."""
         rows = self.journal.rows()
         if rows is not self._rows:
             self._rows, self._indexed, self._entries = rows, 0, {}
         for row in rows[self._indexed :]:
-            if "name" not in row:  # what commands may call their files; see analysis.storage.results
+            if "name" not in row:  # reserved names; see analysis.storage.results
                 continue
             if row.get("discarded"):
                 self._entries.pop(row["name"], None)
@@ -87,22 +87,22 @@ class _Files:
 
 @dataclass
 class Making:
-    """A file that is being made: its temporary path, and facts about it. Changes in place."""
+    """A file in the making: its temporary path, and facts about it. Changes in place."""
 
     path: Path
     facts: dict[str, Any] = field(default_factory=dict)
 
 
 class Store:
-    """The files of one key in a folder. Processes that may make the same file at once need a lock of their own."""
+    """The files of one key in a folder. Processes that may make the same file at the same time need a further lock."""
 
     def __init__(self, folder: Path, key: str, say: Callable[[str], None] = warn) -> None:
         """Opens a folder, which need not exist.
 
         Args:
-            folder: where the files lie.
-            key: hash of everything that decides what they hold.
-            say: told of files that are damaged.
+            folder: folder of the files.
+            key: hash of everything that decides their content.
+            say: called with a line about each damaged file.
         """
         self.folder, self.key, self._say = folder, key, say
         self._files = _Files(Journal(folder / JOURNAL))
@@ -116,39 +116,38 @@ class Store:
 
     @contextmanager
     def make(self, name: str) -> Iterator[Making]:
-        """Makes a file, or replaces it: the block writes it to ``path`` of what it is handed and may add facts.
+        """Makes or replaces a file: the block writes it to the ``path`` of the yielded object, and may add facts.
 
-        The file appears under its name, and counts, when the block ends well; otherwise all is as before.
+        If the block succeeds, the file appears under its name and counts; otherwise nothing changes.
         """
         with atomic(self.folder / name) as temporary:
             making = Making(temporary)
             yield making
-            # listed first: killed here, the file is missing and made again, never someone else's
+            # listed first: if the process is killed here, the file counts as missing, never as someone else's
             entry = Entry(name, self.key, _digest(temporary), making.facts)
             self._files.journal.append(asdict(entry))
 
     def add(self, name: str, **facts: Any) -> None:
-        """Lists a file that is at its place already, whole and on the disk as :func:`~analysis.storage.files.atomic`
-        leaves it.
+        """Lists a file that is already in its place, complete and on the disk, as left by
+        :func:`~analysis.storage.files.atomic`.
 
-        What was there before is lost if the process is killed before this; :meth:`make` is for files that count one by
-        one.
+        An earlier file of that name is lost if the process is killed before this call; :meth:`make` avoids that.
         """
         self._files.journal.append(asdict(Entry(name, self.key, _digest(self.folder / name), facts)))
 
     def write_json(self, name: str, value: Any, **facts: Any) -> None:
-        """Makes a JSON file; infinities and NaN as in :func:`analysis.storage.files.plain`."""
+        """Makes a JSON file, with infinities and NaN as in :func:`analysis.storage.files.plain`."""
         text = json.dumps(plain(value), indent=1, allow_nan=False)
         with self.make(name) as making:
             making.path.write_text(text + "\n", encoding="utf-8")
             making.facts |= facts
 
     def find(self, name: str) -> Entry | None:
-        """The entry of a file that is on disk as it was made under this key, or None."""
+        """The entry of a file that is intact on disk under this key, or None."""
         return self._checked(name, _digest)
 
     def read(self, name: str) -> bytes | None:
-        """The content of a file that is on disk as it was made under this key, or None."""
+        """The content of a file that is intact on disk under this key, or None."""
         content = b""
 
         def digest(path: Path) -> str:
@@ -159,7 +158,7 @@ class Store:
         return None if self._checked(name, digest) is None else content
 
     def read_json(self, name: str, expected: Any) -> Any:
-        """The value of a JSON file that is on disk as it was made under this key, or None.
+        """The value of a JSON file that is intact on disk under this key, or None.
 
         Raises:
             ValueError: the value is not what was expected; see :func:`read_json`.
@@ -168,20 +167,20 @@ class Store:
         return None if content is None else parse_json(content, expected, str(self.folder / name))
 
     def listed(self) -> set[str]:
-        """Names of the files that were made in the folder, under any key, and not discarded since."""
+        """Names of the files that were made in the folder under any key and have not been discarded."""
         return set(self._files.entries())
 
     def require_own(self, names: Iterable[str]) -> None:
-        """Raises ValueError where a file that is not on the list has one of the names: making it would destroy that."""
+        """Raises ValueError if one of the names belongs to a file that is not on the list and would be overwritten."""
         listed = self.listed()
         for name in names:
             if name not in listed and (self.folder / name).exists():
                 raise ValueError(f"{self.folder / name}: expected no file that this command did not make; move it")
 
     def discard(self, names: Iterable[str]) -> list[str]:
-        """Deletes those of the files that are on the list and hold what was written; returns which were.
+        """Deletes those of the files that are on the list and unchanged; returns their names.
 
-        One that was changed since stays, is named, and is no longer on the list.
+        A file that was changed since stays, is named in a line, and is removed from the list.
         """
         gone = []
         for name in sorted(self.listed().intersection(names)):
@@ -195,7 +194,8 @@ class Store:
         return gone
 
     def discard_outdated(self, pattern: str) -> list[str]:
-        """Deletes files whose names are of a pattern and that other keys alone made; returns which, says how many."""
+        """Deletes files that match a pattern and that only other keys made; returns their names and reports their
+        number."""
         keys = {name: {entry.key for entry in entries} for name, entries in self._files.entries().items()}
         gone = self.discard(name for name, found in keys.items() if self.key not in found and fnmatch(name, pattern))
         if gone:
@@ -203,7 +203,7 @@ class Store:
         return gone
 
     def _checked(self, name: str, digest_of: Callable[[Path], str]) -> Entry | None:
-        """The newest entry of this key whose content is on disk. Where no key wrote what is there, says so."""
+        """The newest entry of this key whose content is on disk. Reports a file whose content no key wrote."""
         entries = self._files.entries().get(name, [])
         if not any(entry.key == self.key for entry in entries):
             return None
@@ -229,19 +229,19 @@ def read_json(path: Path, expected: Any) -> Any:
     """The value of a JSON file.
 
     Args:
-        path: of the file.
-        expected: a type, such as ``list[float]``; or a dictionary from keys that must be there to what is expected of
-            each, where other keys may be there too; or a list that holds what is expected of every item.
+        path: path of the file.
+        expected: a type, such as ``list[float]``; or a dictionary from required keys to the expectation for each
+            value, with further keys allowed; or a list with the expectation for every item.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no JSON, or not what was expected; the message names the file and the place.
+        ValueError: the file is not JSON, or not as expected; the message names the file and the place.
     """
     return parse_json(path.read_bytes(), expected, str(path))
 
 
 def parse_json(content: bytes, expected: Any, where: str) -> Any:
-    """The value of a JSON text; arguments and errors as of :func:`read_json`, ``where`` names the text."""
+    """The value of a JSON text; arguments and errors as in :func:`read_json`, and ``where`` names the text."""
     try:
         value = json.loads(content)
     except (ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""The file that every command ends with: what it found, its options, and where they come from."""
+"""The file that every command writes last: its results, its options, and their provenance."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from analysis.storage.source import Brought
 
 
 def with_source(found: Mapping[str, Any], options: Any, added: Sequence[Brought] = (), **extra: Any) -> dict[str, Any]:
-    """What was found, with the options as ``config`` and where it comes from as ``provenance``.
+    """The results, with the options as ``config`` and the provenance as ``provenance``.
 
     Args:
         found: entries of the summary.
         options: a record of options.
-        added: what was used that is not the project's own.
+        added: additions of other packages that were used.
         extra: further entries of the provenance, such as scene, seed and device.
     """
     config = dataclasses.asdict(options)
@@ -29,7 +29,7 @@ def with_source(found: Mapping[str, Any], options: Any, added: Sequence[Brought]
 def write_summary(
     folder: Path, found: Mapping[str, Any], options: Any, added: Sequence[Brought] = (), **extra: Any
 ) -> dict[str, Any]:
-    """Writes ``summary.json``; arguments and what is returned as of :func:`with_source`."""
+    """Writes ``summary.json``; arguments and return value as in :func:`with_source`."""
     summary = with_source(found, options, added, **extra)
     write_json(folder / SUMMARY, summary)
     return summary

@@ -1,4 +1,4 @@
-"""The error of what a display shows, divided at every reference time by where it lies."""
+"""Division of the error of a run at every reference time."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from tsar.types import Trace, Viewpoint
 class Budgeting:
     """A viewer that divides the error of one run. Changes in place.
 
-    What came into sight, and where the light changed, is found between the time that an image shows and ``before_s``
-    earlier.
+    Surfaces that came into sight, and places where the light changed, are found between the time that an image shows
+    and ``before_s`` earlier.
 
     Attributes:
-        rows: a line a reference time, entries as of :func:`analysis.metrics.budget.budget`, and ``late_s``, the age of
-            the time that the image shows.
+        rows: a line for each reference time: the entries of :func:`analysis.metrics.budget.budget`, and ``late_s``, the
+            age of the time that the image shows, seconds.
     """
 
     def __init__(
@@ -34,13 +34,13 @@ class Budgeting:
         picture: Callable[[float], Float[Tensor, "side side 3"]],
         before_s: float,
     ) -> None:
-        """Takes what the truth is asked for.
+        """Takes the sources of the truth.
 
         Args:
-            name: of the run.
+            name: name of the run.
             side: pixels along its picture's side.
-            trace, view: tell first hits, and poses at a time.
-            picture: the truth at a time, linear.
+            trace, view: give first hits, and poses at a time.
+            picture: gives the truth at a time, linear.
             before_s: see the class.
         """
         self.rows: list[dict[str, float]] = []
@@ -59,7 +59,7 @@ class Budgeting:
 
 
 def averaged(image: Float[Tensor, "h h 3"], side: int) -> Float[Tensor, "side side 3"]:
-    """A square picture with ``side`` pixels along its side, each the mean of those that it covers."""
+    """A square picture with ``side`` pixels along its side, each the mean of the pixels that it covers."""
     factor = image.shape[0] // side
     if factor == 1:
         return image

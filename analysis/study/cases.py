@@ -40,18 +40,18 @@ ROWS = (
 
 @dataclass(frozen=True)
 class Scale:
-    """How large a study is.
+    """The size of a study.
 
-    ``divisor`` scales down everything that is counted in pixels or samples: the side of the image and of the
-    fields by it, batch, cache, tiles and the machine's speed by its square. A row is then the same row seen through a
-    smaller window: samples per pixel, cycles per framed image and the tiling stay as they are.
+    ``divisor`` scales down everything that is counted in pixels or samples: it divides the side of the image and of the
+    fields, and its square divides batch, cache, tiles and the machine's speed. A row is then the same row seen through
+    a smaller window: samples per pixel, cycles per framed image and the tiling do not change.
 
     Attributes:
-        divisor: 1 is the thesis' own size, a power of two.
-        seconds: simulated time measured.
+        divisor: a power of two; 1 is the thesis' own size.
+        seconds: measured simulated time, seconds.
         reference_rate_hz: reference images per second.
         reference_samples_per_axis: samples along a pixel's side of the finest output resolution.
-        stride: reference images from one to the next at which FLIP, SSIM and the causes are taken.
+        stride: interval, in reference images, at which FLIP, SSIM and the causes are taken.
     """
 
     divisor: int
@@ -62,12 +62,13 @@ class Scale:
 
     @property
     def reference_px(self) -> int:
-        """Side of the reference: of the finest row. Coarser rows see it averaged (Stephens 2011, sec. 7.2.3)."""
+        """Side of the reference, which is that of the finest row. Coarser rows use its average (Stephens 2011, sec.
+        7.2.3)."""
         return max(side for _, side in ROWS) // self.divisor
 
     @property
     def errors_alone(self) -> Scale:
-        """The same, with FLIP, SSIM and the causes taken at the first reference image only."""
+        """The same scale, with FLIP, SSIM and the causes taken at the first reference image only."""
         return dataclasses.replace(self, stride=1 << 30)
 
     def config(self, row: int, base: TsarConfig) -> TsarConfig:
@@ -100,17 +101,17 @@ class Scale:
 
 
 def is_framed(policy: str) -> bool:
-    """Whether a policy makes whole frames, for which nothing but the resolution decides."""
+    """Whether a policy makes whole frames, which depend on the resolution alone."""
     return policy == "framed" or policy.startswith("framed-")
 
 
 def framed_config(side_px: int) -> TsarConfig:
-    """What a framed renderer reads of a configuration is the resolution; the rest is the same for all that share it."""
+    """A configuration for a framed renderer, which reads only the resolution; the rest is fixed."""
     return TsarConfig(batch_size=16, resolution_px=side_px, tiling=TilingConfig(tile_count_max=16))
 
 
 ADAPTIVE_STAGES = ("thesis", "oracle")
-"""Policies whose stages are priced as table 7.1 prices them: whether their cycles fit is known before they are made."""
+"""Policies whose stages have the prices of table 7.1, so that the length of their cycles is known before a run."""
 
 SCALES: dict[str, Scale] = {
     "thesis": Scale(1, seconds=2.0, reference_rate_hz=60.0, reference_samples_per_axis=2, stride=6),
@@ -121,12 +122,12 @@ SCALES: dict[str, Scale] = {
 
 @dataclass(frozen=True)
 class Animation:
-    """What is rendered: a scene in motion.
+    """A scene in motion.
 
     Attributes:
-        input: a scene by its name, or a file.
-        phase: of the animation.
-        camera_path: motion of the camera of a file that has none.
+        input: name of a scene, or a file.
+        phase: phase of the animation.
+        camera_path: camera motion for a file without one.
     """
 
     input: str
@@ -135,7 +136,7 @@ class Animation:
 
 
 Tracing = tuple[tuple[str, bool | int | str], ...]
-"""How a run is traced where that differs from its scene and from the renderer's own, by name in alphabetical order."""
+"""Settings of tracing that differ from the scene and from the renderer's defaults, by name in alphabetical order."""
 TRACING = ("depth", "light_cells", "packets", "structure", "texels")
 """Names in :data:`Tracing`. ``depth``: of reflections; ``light_cells``: along each axis of a light that has an extent,
 0 for one random point of it; ``packets`` and ``structure`` as of :class:`renderer.trace.Renderer`; ``texels``: one of
@@ -148,30 +149,30 @@ class Case:
     """One policy on one input at one setting: everything that decides its result.
 
     Attributes:
-        input: built-in input, another scene by its name, or a file.
-        phase: of the animation.
-        policy: who decides what is sampled.
+        input: name of a built-in input or another scene, or a file.
+        phase: phase of the animation.
+        policy: name of the policy that decides what is sampled.
         tsar: configuration; framed renderers read its resolution.
-        scale: sizes of the study it belongs to.
+        scale: sizes of the study to which the case belongs.
         ledger: how cost is counted.
         framed_rate_hz: images a second of the framed renderer with one sample a pixel; sets the machine's speed.
         trace_segments: ray segments per sample in the cost model.
-        start_s: where in the animation the measurement starts.
-        jod_span_s: part of the run, from and to, seconds after its start, that ColorVideoVDP scores, which costs more a
-            second than all the rest; None for no score.
-        display: the display it is scored for.
+        start_s: animation time at which the measurement starts, seconds.
+        jod_span_s: beginning and end, in seconds after the start, of the part of the run that ColorVideoVDP scores,
+            which costs more a second than all the rest; None for no score.
+        display: the display that the score assumes.
         stills_s: times whose pictures are kept, seconds after the start.
-        parts: options of the policy ``tsar`` that differ from its own, by name in alphabetical order
+        parts: options of the policy ``tsar`` that differ from its defaults, by name in alphabetical order
             (:class:`tsar.filtering.records.FilterOptions`).
-        budget_s: the error is divided by where it lies (:mod:`analysis.metrics.budget`), with surfaces and lights
-            compared over so many seconds; None for no such division.
-        camera_path: motion of the camera of a file that has none.
-        tracing: how it is traced; the reference is always traced as the scene says.
-        formats: of numbers that the policy keeps, where they are not its own, by name in alphabetical order
-            (:class:`tsar.policies.stored.Stored`). With any, what each cycle asks for is noted.
+        budget_s: seconds over which surfaces and lights are compared to divide the error
+            (:mod:`analysis.metrics.budget`); None for no such division.
+        camera_path: camera motion for a file without one.
+        tracing: settings of tracing; the reference is always traced as the scene says.
+        formats: formats of values that the policy keeps, if they differ from its own, by name in alphabetical order
+            (:class:`tsar.policies.stored.Stored`). With any, the requests of each cycle are recorded.
         display_px: side of the display, on which pictures of another size are shown enlarged; 0 for that of the
-            pictures. With a display no causes are told apart.
-        samples_per_s: samples a second of every policy, whatever they cost; None where the machine sets the pace.
+            pictures. With a display the causes of the error are not measured.
+        samples_per_s: samples a second of every policy, whatever they cost; None if the machine sets the pace.
     """
 
     input: str
@@ -201,7 +202,7 @@ class Case:
         _require_input(self.input)
         require({name for name, _ in self.tracing} <= set(TRACING), "tracing", ", ".join(TRACING), self.tracing)
         POLICIES.require(self.policy)
-        require(self.ledger != "wall", "ledger", "one that gives the same result again (not wall)", self.ledger)
+        require(self.ledger != "wall", "ledger", "one with repeatable results (not wall)", self.ledger)
         require(0 < self.framed_rate_hz < 1e6, "framed_rate_hz", "a positive rate", self.framed_rate_hz)
         pace = self.samples_per_s
         require(pace is None or 0.0 < pace < 1e15, "samples_per_s", "a positive number", pace)
@@ -211,7 +212,7 @@ class Case:
             limits.require_pace("framed_rate_hz", self.framed_rate_hz, *pace)
         span = self.jod_span_s
         ok = span is None or 0 <= span[0] < span[1] <= self.scale.seconds
-        require(ok, "jod_span_s", f"from and to within the {self.scale.seconds:g} s of a run", span)
+        require(ok, "jod_span_s", f"a beginning and an end within the {self.scale.seconds:g} s of a run", span)
         require(not self.tsar.width_px, "width_px", "none in a study, whose pictures are squares", self.tsar.width_px)
         require(self.scale.reference_px % self.tsar.resolution_px == 0, "resolution_px", "a divisor of the reference's",
                 self.tsar.resolution_px)  # fmt: skip
@@ -221,7 +222,7 @@ class Case:
 
     @property
     def animation(self) -> Animation:
-        """What is rendered."""
+        """The scene and its motion."""
         return Animation(self.input, self.phase, self.camera_path)
 
     @property
@@ -231,8 +232,8 @@ class Case:
 
     @property
     def cost(self) -> CostParameters:
-        """Parameters of the cost model. A pixel is charged the age support of the full size, which a small one covers
-        in fewer pixels."""
+        """Parameters of the cost model. A pixel is charged for the age support of the full size, which covers fewer
+        pixels at a smaller size."""
         own = parameters_of(self.tsar, self.trace_segments)
         return dataclasses.replace(own, recon_age_support=own.recon_age_support * self.scale.divisor)
 
@@ -243,7 +244,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For people: policy and changes, input, batch, resolution, seed and phase."""
+        """Name for messages: policy and changes, input, batch, resolution, seed and phase."""
         c = self.tsar
         batch = "" if is_framed(self.policy) else f"-b{c.batch_size}"
         changes = (f"-{name}-{_short(value)}" for name, value in (*self.parts, *self.tracing, *self.formats))
@@ -252,8 +253,9 @@ class Case:
         return text.replace(" ", "-")
 
     def key(self, source: str) -> str:
-        """Name of its files: for people first, then a hash of all that decides it and of the source code."""
-        # the source does not cover what was added to a table
+        """Name of its files: a readable part, and a hash of everything that decides the result, with the source
+        code."""
+        # the source does not cover additions to a table
         added = brought((POLICIES, self.policy), *chosen(self.tsar))
         content = (_content(self.animation),) if _is_file(self.input) else ()
         text = json.dumps([plain(self), source, *plain(added), *content], sort_keys=True)
@@ -281,7 +283,7 @@ def _require_input(input: str) -> None:
 
 @lru_cache(maxsize=16)
 def _content(animation: Animation) -> str:
-    """Hash of the scene of a file, which the source does not cover."""
+    """Hash of a scene from a file, which the source does not cover."""
     from analysis.storage.reference import content_hash
     from scenes import catalog
 

@@ -1,6 +1,6 @@
-"""What displays show, measured at every reference time: the one engine that compares runs with a reference.
+"""Errors of the images on all displays at every reference time: the one engine that compares runs with a reference.
 
-All runs advance together; two images of each are held at a time, however long the runs are.
+All runs advance together, and two images of each are held at a time, however long the runs are.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from analysis.page.pictures import Pixels
 from tsar.policies.resampling import widened
 from tsar.types import ShownImage
 
-_MOTION_S = 0.1  # motion is judged over this long
+_MOTION_S = 0.1  # seconds over which motion is judged
 
 
 Viewer = Callable[[View], None]
@@ -29,14 +29,15 @@ Viewer = Callable[[View], None]
 
 @dataclass(frozen=True)
 class Measuring:
-    """What is measured beside both mean squared errors.
+    """The measurements beside both mean squared errors.
 
     Attributes:
-        metrics: names of image metrics, each taken every ``stride`` reference times.
-        stride: reference times from one to the next at which they are taken.
-        causes: whether the causes of the error are told apart, at the same times, and its flicker at all.
+        metrics: names of image metrics, each taken at every ``stride``-th reference time.
+        stride: interval, in reference times, at which they are taken.
+        causes: whether the causes of the error are measured at the same times, and its flicker at all times.
         framelet_side: samples along a framelet's side, for the causes.
-        kept: numbers of reference times, from and to, whose encoded images are kept for metrics of sequences.
+        kept: indices of the first and the end of the reference times whose encoded images are kept for metrics of
+            sequences.
     """
 
     metrics: tuple[str, ...] = ()
@@ -48,14 +49,15 @@ class Measuring:
 
 @dataclass
 class Seen:
-    """What one display showed, measured. Changes in place.
+    """The measurements of one display. Changes in place.
 
     Attributes:
-        rows: a line a reference time: ``time_s``, ``mse``, ``log_mse``, how many images had been shown, and metrics.
-        refresh_s: display times of the images that have been shown.
-        nonfinite: values of all images shown that were not finite.
+        rows: a line for each reference time: ``time_s``, ``mse``, ``log_mse``, the number of images shown so far, and
+            metrics.
+        refresh_s: display times of the images that have been shown, seconds.
+        nonfinite: number of non-finite values in all images shown.
         splits: causes of the error.
-        frames: encoded images of the display and of the reference that were kept.
+        frames: kept encoded images of the display and of the reference.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -66,16 +68,16 @@ class Seen:
 
     @property
     def images(self) -> int:
-        """How many images have been shown."""
+        """Number of images that have been shown."""
         return len(self.refresh_s)
 
     def column(self, name: str) -> Floats:
-        """One value a reference time; NaN where it was not measured."""
+        """A column, one value for each reference time; NaN where it was not measured."""
         return np.array([row.get(name, np.nan) for row in self.rows], np.float64)
 
     def regions(self) -> dict[str, dict[str, float]]:
-        """Mean over the times of each cause in each region, as a part of the whole error, and the region's share; times
-        count by the pixels whose truth is known."""
+        """Mean over time of each cause in each region, as a part of the whole error, and of the region's share; times
+        are weighted by the number of pixels whose truth is known."""
         weight = [found.known for found in self.splits]
         if not sum(weight):
             return {}
@@ -91,10 +93,10 @@ class Seen:
 
 
 def enlarged(images: Iterable[Shown], side: int) -> Iterator[Shown]:
-    """Pictures as a square display of ``side`` pixels shows them: enlarged bilinearly where they are smaller.
+    """Pictures on a square display of ``side`` pixels, enlarged bilinearly if they are smaller.
 
     Raises:
-        ValueError: the side is no multiple of theirs.
+        ValueError: the side is not a multiple of that of the pictures.
     """
     for record, shown in images:
         own = shown.image.shape[0]
@@ -114,17 +116,17 @@ def watch(
     measuring: Measuring,
     viewers: Sequence[Viewer] = (),
 ) -> dict[str, Seen]:
-    """Holds what each display shows at every reference time and measures it.
+    """Measures the image on each display at every reference time.
 
     Args:
         runs: streams of images by name.
         truths: reference images.
-        times_s: reference times.
-        measuring: what is measured.
-        viewers: each is told what all displays show at every reference time.
+        times_s: reference times, seconds.
+        measuring: the measurements.
+        viewers: each is called at every reference time with the images on all displays.
 
     Raises:
-        ValueError: nothing is shown yet at the first time.
+        ValueError: no image is shown yet at the first time.
     """
     holds = {name: Hold(run) for name, run in runs.items()}
     watchers = {name: _Watcher(truths, times_s, measuring, hold) for name, hold in holds.items()}
@@ -151,7 +153,7 @@ class _Watcher:
         self._step = max(1, round(_MOTION_S * rate_hz))
 
     def measure(self, number: int, display: ShownImage, truth: Tensor, wanted: Tensor) -> float:
-        """One reference time: the image shown, its linear and its encoded truth. Returns the mean squared error."""
+        """Measures one reference time: the image shown, the linear and the encoded reference. Returns the MSE."""
         seen, asked = self.seen, self._measuring
         errors, shown = pixel_errors(display.image, truth, wanted)
         row = {"time_s": float(self._times_s[number]), "mse": errors.mse, "log_mse": errors.log_mse}

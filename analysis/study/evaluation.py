@@ -1,7 +1,7 @@
-"""Runs one case of a study and puts its result on disk.
+"""Runs one case of a study and writes its result to disk.
 
-A result is a table over the reference times (Parquet), stills, and what was measured of the whole run (JSON), which is
-written last. The case is done where all of them are as they were written. Nothing in them depends on the number of
+A result is a table over the reference times (Parquet), stills, and the measurements of the whole run (JSON), which are
+written last. The case is done if all of these files are intact. Nothing in them depends on the number of
 threads, processes or machines, except the entry ``machine`` of the JSON file: measured seconds and memory.
 """
 
@@ -43,12 +43,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """Where results and references are kept, and how many threads trace.
+    """Folders of results and references, and the number of threads.
 
     Attributes:
         results: folder of results, one for all studies of a kind.
         references: folder of references, shared with all other runs.
-        threads: for tracing and reconstruction; everything else runs on one.
+        threads: threads for tracing and reconstruction; everything else runs on one.
     """
 
     results: Path
@@ -64,7 +64,7 @@ class Place:
         return self.results / "stills" / f"{key}-{number}-{what}.png"
 
     def store(self, key: str) -> Store:
-        """Where the files of a result are checked."""
+        """The store that checks the files of a result."""
         return _store(self.results).under(key)
 
 
@@ -84,10 +84,10 @@ def source_of_results() -> str:
 
 
 def finished(key: str, place: Place) -> dict[str, Any] | None:
-    """The summary of a result whose files are all on disk as they were written, or None. Names those that are damaged.
+    """The summary of a result whose files are all intact on disk, or None. Reports damaged files.
 
     Raises:
-        ValueError: the summary is none of a result.
+        ValueError: the file is not the summary of a result.
     """
     store, files = place.store(key), place.files(key)
     found = store.read_json(files["summary"].name, {"key": str, "case": dict, "stills": list[str]})
@@ -96,10 +96,10 @@ def finished(key: str, place: Place) -> dict[str, Any] | None:
 
 
 def times_of(key: str, place: Place) -> pd.DataFrame:
-    """The table over the reference times of a result that is finished.
+    """The table of a finished result over the reference times.
 
     Raises:
-        ValueError: it is not on disk as it was written.
+        ValueError: the table is not intact on disk.
     """
     file = place.files(key)["times"]
     content = place.store(key).read(file.name)
@@ -109,23 +109,24 @@ def times_of(key: str, place: Place) -> pd.DataFrame:
 
 
 def broken(found: Iterable[Mapping[str, Any] | None]) -> list[str]:
-    """Names of the results, of some summaries, whose cycles broke an invariant; only adaptive runs have any."""
+    """Names of those results whose cycles broke an invariant, from their summaries; only adaptive runs have
+    invariants."""
     return [one["key"] for one in found if one and not one.get("invariants", {"ok": True})["ok"]]
 
 
 def evaluate(case: Case, key: str, place: Place) -> str:
-    """Runs a case unless its result is on disk; two processes that want the same do not both run it.
+    """Runs a case unless its result is on disk; of two processes that want it, only one runs it.
 
     Args:
-        case: what to run.
-        key: the name of its result, which tells the source that is meant to make it.
-        place: where it goes.
+        case: the case.
+        key: the name of its result, which includes the hash of the source that is meant to make it.
+        place: destination of the result.
 
     Returns:
         The key.
 
     Raises:
-        ValueError: this process runs another source than the one that asked.
+        ValueError: this process runs another source than the process that asked.
     """
     if key != case.key(source_of_results()):
         raise ValueError(f"{case.name}: expected source {key}, this worker runs another one")
@@ -220,13 +221,13 @@ def _cycles(totals: Totals, case: Case) -> dict[str, Any]:
 
 
 def _scored(case: Case) -> tuple[int, int]:
-    """Numbers of the reference times, from and to, that a metric of sequences scores."""
+    """Indices of the first and the end of the reference times that a metric of sequences scores."""
     low, high = (round(at * case.scale.reference_rate_hz) for at in case.jod_span_s or (0.0, 0.0))
     return low, high
 
 
 class _Stills:
-    """Hands on the pictures of some times, by the number of the still."""
+    """Passes on the pictures of some times, with the number of the still."""
 
     def __init__(self, case: Case, count: int, keep: Callable[[int, dict[str, Pixels]], None]) -> None:
         rate_hz = case.scale.reference_rate_hz

@@ -1,7 +1,7 @@
-"""Many cases over many processes or machines, each durable before it counts.
+"""Runs many cases on many processes or machines; each result is durable before it counts.
 
-Cases are independent, so they go through Dask: a cluster on this machine by default, or any other by its address,
-whose workers see the same folders and run the same source.
+Cases are independent, so Dask distributes them: by default on a cluster on this machine, or on any other by its
+address, whose workers see the same folders and run the same source.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class StudyOptions(Protocol):
-    """What the options of every study have."""
+    """Options that every study has."""
 
     @property
     def out(self) -> Path: ...
@@ -42,12 +42,12 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
     """Takes over the folder of a study and runs its cases, with a bar.
 
     Args:
-        options: of the study.
-        cases: what to run.
-        written: names and patterns of what the study will write, within its folder.
+        options: options of the study.
+        cases: the cases.
+        written: names and patterns of the files that the study will write, relative to its folder.
 
     Raises:
-        InputError: a folder cannot be had, or nothing answers at the scheduler's address.
+        InputError: a folder cannot be created or locked, or nothing answers at the scheduler's address.
     """
     from analysis.study.evaluation import Place
     from analysis.study.outcomes import Outcomes
@@ -56,7 +56,7 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
         own_results(options.out, tuple(written))
         writable_folder(options.cache, "cache")
     out = options.out.resolve()
-    (out / SUMMARY).unlink(missing_ok=True)  # one that is killed leaves no older summary
+    (out / SUMMARY).unlink(missing_ok=True)  # so that a killed study leaves no older summary
     place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
     with full_disk(out), bars() as shown:
         place.results.mkdir(exist_ok=True)
@@ -69,10 +69,10 @@ def run_cases(
     """Runs every case whose result is not on disk yet; a case that fails does not stop the others.
 
     Args:
-        cases: what to run; one that occurs twice is run once.
-        place: where results and references go; on a cluster, folders that all of its machines see.
+        cases: the cases; one that occurs twice is run once.
+        place: destination of results and references; on a cluster, folders that all of its machines see.
         options: the cluster.
-        task: of which a step is a case.
+        task: progress, one step a case.
 
     Returns:
         The key of every case's result, and the reason of every failure.
@@ -94,7 +94,7 @@ def run_cases(
                     failures[case] = reason
                 task.advance()
     except KeyboardInterrupt:
-        if not options.scheduler:  # its workers cannot do it any more
+        if not options.scheduler:  # the workers cannot remove it once they are gone
             for left in place.results.rglob(f"*{PARTIAL}*"):
                 left.unlink(missing_ok=True)
         raise
@@ -102,9 +102,9 @@ def run_cases(
 
 
 def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Case, str | None]]:
-    """Cases as they end, each with the reason why it failed, or None.
+    """Cases as they end, each with the reason for its failure, or None.
 
-    A scheduler that is gone, or that has had no worker for a while, fails all that are left.
+    If the scheduler is gone, or has had no worker for a while, all remaining cases fail.
     """
     from distributed import wait
 
@@ -128,7 +128,7 @@ def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Cas
 
 
 def _failure(future: Future) -> str | None:
-    """Why a case has no result, or None where it has one."""
+    """The reason why a case has no result, or None if it has one."""
     if future.status == "finished":
         return None
     if future.status == "error":
@@ -145,7 +145,7 @@ def _has_workers(client: Client) -> bool:
 
 
 def describe_failures(failures: Mapping[str, str]) -> list[str]:
-    """A line for each reason, with the name of the first run that failed for it and how many others did."""
+    """A line for each reason, with the name of the first run that failed for it and the number of others."""
     by_reason: dict[str, list[str]] = {}
     for name, reason in failures.items():
         by_reason.setdefault(reason, []).append(name)
@@ -158,8 +158,8 @@ def describe_failures(failures: Mapping[str, str]) -> list[str]:
 def _keep_freed_memory() -> None:
     """Makes a worker keep the memory that it frees, in one heap for all of its threads.
 
-    A worker allocates and frees hundreds of images a second. By default glibc returns each to the system, and a third
-    of a worker's time goes into allocating them again. With another C library this does nothing.
+    A worker allocates and frees hundreds of images a second. By default glibc returns each to the system, and
+    allocating them again takes a third of the worker's time. With another C library this function does nothing.
     """
     arena_max, mmap_threshold, trim_threshold = -8, -3, -1
     try:
@@ -171,7 +171,7 @@ def _keep_freed_memory() -> None:
 
 
 def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Place) -> dict[Future, Case]:
-    """Futures of the cases, each behind that of its reference, in an order in which the references come early."""
+    """Futures of the cases, each after that of its reference, in an order that puts the references early."""
     references = {_reference_of(case): None for case in missing}
     behind = {wanted: client.submit(_prepare, *wanted, place, pure=False) for wanted in references}
     return {

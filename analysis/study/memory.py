@@ -1,4 +1,4 @@
-"""The most memory that a process held while a block ran, where the system tells it."""
+"""The peak memory of a process while a block ran, if the system reports it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from pathlib import Path
 
 _STATUS, _FORGET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 _RESIDENT_PEAK = "5"
-"""What tells Linux to begin a new peak. Source: man proc_pid_clear_refs(5)."""
+"""The value that makes Linux begin a new peak. Source: man proc_pid_clear_refs(5)."""
 
 
 class PeakMemory:
-    """A block that tells afterwards the most memory resident while it ran.
+    """A block that records the peak of resident memory while it runs.
 
-    What the process had freed before is handed back to the system first, and counts no more.
+    Memory that the process had freed before is returned to the system first, and does not count.
 
     Attributes:
-        bytes: the peak; where the system cannot begin a new one, that since the process began.
-        grown: what of it came on top of what the process held when the block began.
+        bytes: the peak; if the system cannot begin a new one, the peak since the process began.
+        grown: the peak minus the memory that the process held when the block began, bytes.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class PeakMemory:
             ctypes.CDLL("libc.so.6").malloc_trim(0)
             _FORGET.write_text(_RESIDENT_PEAK)
             self._before = _status("VmRSS")
-        except (OSError, AttributeError):  # not Linux, another C library, or not allowed
+        except (OSError, AttributeError):  # not Linux, another C library, or no permission
             self._before = 0
         return self
 
@@ -39,14 +39,14 @@ class PeakMemory:
 
 
 def _peak() -> int:
-    """The most bytes that were resident since the last new peak, or since the process began."""
+    """Peak of resident bytes since the last new peak, or since the process began."""
     if _STATUS.exists():
         return _status("VmHWM")
     if sys.platform == "win32":
         import psutil
 
         return psutil.Process().memory_info().peak_wset
-    import resource  # psutil tells no peak on POSIX
+    import resource  # psutil has no peak on POSIX
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024  # macOS counts bytes, others KiB

@@ -1,4 +1,4 @@
-"""What became of the cases of a study."""
+"""The outcomes of the cases of a study."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Outcomes:
     """Cases that were run, and their results on disk. Changes in place.
 
     Attributes:
-        place: where the results are.
-        keys: of the results.
-        failures: reasons, by case.
+        place: folder of the results.
+        keys: keys of the results, by case.
+        failures: reasons for failures, by case.
     """
 
     place: Place
@@ -28,7 +28,7 @@ class Outcomes:
     failures: dict[Case, str] = field(default_factory=dict)
 
     def keep(self, keys: dict[Case, str], failures: dict[Case, str]) -> None:
-        """Takes in more cases."""
+        """Adds the outcomes of more cases."""
         self.keys |= keys
         self.failures |= failures
 
@@ -37,7 +37,7 @@ class Outcomes:
         return finished(self.keys[case], self.place)
 
     def summaries(self) -> dict[Case, dict[str, Any]]:
-        """Of all cases that ended well, in order."""
+        """Summaries of all cases that succeeded, in order."""
         return {case: found for case in self.keys if (found := self.summary(case)) is not None}
 
     def times(self, case: Case) -> pd.DataFrame:
@@ -46,10 +46,11 @@ class Outcomes:
 
     @property
     def reasons(self) -> dict[str, str]:
-        """Why cases failed, by the key of the result."""
+        """Reasons for failures, by the key of the result."""
         return {self.keys[case]: reason for case, reason in self.failures.items()}
 
     def tell(self) -> None:
-        """Prints why cases failed: at once, as what follows may fail for the same reasons, such as a full disk."""
+        """Prints the reasons for failures at once, because later steps may fail for the same reasons, such as a full
+        disk."""
         for line in describe_failures(self.reasons):
             print(line, file=sys.stderr)

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 @dataclass
 class Meter:
-    """A renderer that counts: work by kind, calls, seconds, and samples that are not finite. Changes in place.
+    """A renderer that counts work by kind, calls, seconds, and non-finite samples. Changes in place.
 
     Attributes:
-        asked: of each batch, a hash of where its samples lie; None where that is not noted.
+        asked: a hash of the sample positions of each batch; None if they are not recorded.
     """
 
     trace: Trace
@@ -57,10 +57,9 @@ class Meter:
 
 
 class Totals:
-    """Sums over the cycles of a run that lie within the span, and invariants of those that are recorded. Changes in
-    place.
+    """Sums over the cycles of a run within the measured span, and invariants of the recorded cycles. Changes in place.
 
-    Warm-up is left out of the sums, not of the invariants.
+    The warm-up is left out of the sums, but not of the invariants.
 
     Attributes:
         recorded: whether the policy records its cycles.
@@ -77,7 +76,7 @@ class Totals:
         self.counters: Counter[str] = Counter()
 
     def count(self, spent: Spent) -> None:
-        """Takes in what one cycle took."""
+        """Adds the cost of one cycle."""
         if spent.cycle < 0:
             self.warmup_cycles += 1
             return
@@ -87,7 +86,7 @@ class Totals:
         self.counters.update(spent.counters)
 
     def add(self, record: StepRecord) -> None:
-        """Takes in the record of one cycle."""
+        """Adds the record of one cycle."""
         self._check.add(record)
         self.recorded = True
         if record.cycle < 0:
@@ -100,23 +99,23 @@ class Totals:
 
     @property
     def saturation(self) -> float:
-        """Share of the elements that a decision moved, over all cycles, that it drove to a bound; NaN where none
+        """Of the elements that decisions moved, over all cycles, the share that they drove to a bound; NaN if none
         moved."""
         return self.saturated / self.moved if self.moved else float("nan")
 
     def of_a_cycle(self, p: CostParameters) -> CostParameters:
-        """Parameters of the cost model with what the mean cycle drew."""
+        """Parameters of the cost model with the overdraw of the mean cycle."""
         if not self.cycles:
             return p
         return measured_parameters(p, {name: count / self.cycles for name, count in self.counters.items()})
 
     def seconds_of(self, span_s: float) -> float:
-        """Wall seconds of the cycles that so many simulated seconds have; NaN where there was none."""
+        """Wall seconds of the cycles in ``span_s`` simulated seconds; NaN if there was no cycle."""
         return sum(self.stage_s.values()) / self.simulated_s * span_s if self.simulated_s else float("nan")
 
     @property
     def invariants(self) -> dict[str, Any]:
-        """What :meth:`analysis.storage.invariants.InvariantCheck.result` found."""
+        """The result of :meth:`analysis.storage.invariants.InvariantCheck.result`."""
         return self._check.result()
 
 
@@ -129,8 +128,8 @@ class Machine:
         ledger: how cost is counted.
         capacity: its speed, FLOP/s.
         cost: parameters of the cost model.
-        samples_per_s: the pace of a machine that is as fast as each policy needs it to be; None for one of the speed
-            above.
+        samples_per_s: samples a second of a machine that is as fast as each policy needs; None for a machine of speed
+            ``capacity``.
     """
 
     ledger: Ledger
@@ -139,7 +138,7 @@ class Machine:
     samples_per_s: float | None = None
 
     def clock(self, price: Price) -> Callable[[Mapping[str, int], float], float]:
-        """``(counters, wall_s) -> seconds`` of a cycle of a policy."""
+        """Function ``(counters, wall_s) -> seconds`` that gives the simulated duration of a cycle of a policy."""
         if self.samples_per_s is None:
             return cycle_seconds(self.ledger, self.capacity, self.cost, price)
         paced_s = price.samples / self.samples_per_s
@@ -151,11 +150,11 @@ class PolicyRun:
     """A policy at work. Its stream is consumed once.
 
     Attributes:
-        price: of a cycle.
+        price: price of a cycle.
         latency_cycles: cycles between sampling and display.
-        meter: what it asked of the renderer.
-        totals: of its cycles.
-        images: records, where it makes any, and images.
+        meter: the counting renderer that it uses.
+        totals: sums over its cycles.
+        images: stream of records, if it makes any, and images.
     """
 
     price: Price
@@ -166,7 +165,8 @@ class PolicyRun:
 
     @property
     def nonfinite_samples(self) -> int:
-        """Samples that were not finite: of the cycles within the span where the policy records them, else of all."""
+        """Number of non-finite samples: of the cycles within the span if the policy records cycles, else of all
+        cycles."""
         return self.totals.nonfinite if self.totals.recorded else self.meter.nonfinite
 
 
@@ -183,23 +183,24 @@ def begin(
     parts: Mapping[str, bool | int | float] | None = None,
     formats: Mapping[str, str] | None = None,
 ) -> PolicyRun:
-    """A run of a policy, not started yet.
+    """A run of a policy, not yet started.
 
     Args:
-        name: of the policy.
-        config: of the run.
-        renderer_of: a renderer that filters textures for so many samples along a pixel's side.
-        machine: what it runs on.
-        span_s: animation time to cover.
-        truth: for policies that may look at it.
-        stages: what runs the stages around tracing.
-        threads: that share them.
-        on_record: told of every recorded cycle.
-        parts: options of the policy ``tsar`` that differ from its own; None for its own.
-        formats: of numbers that the policy keeps, where they are not its own; with any, what it asks for is noted.
+        name: name of the policy.
+        config: configuration of the run.
+        renderer_of: makes a renderer that filters textures for a given number of samples along a pixel's side.
+        machine: the simulated machine.
+        span_s: beginning and end of the animation time to cover, seconds.
+        truth: the truth, for policies that may use it.
+        stages: implementation of the stages around tracing.
+        threads: threads that share these stages.
+        on_record: called with the record of every recorded cycle.
+        parts: options of the policy ``tsar`` that differ from its defaults; None for the defaults.
+        formats: formats of values that the policy keeps, if they differ from its own; with any, its requests are
+            recorded.
 
     Raises:
-        ConfigError: no policy has that name, its cycles do not fit into the span, or it keeps no such numbers.
+        ConfigError: no policy has that name, its cycles do not fit into the span, or it keeps no such values.
     """
     from renderer.stages.control import stages as stages_of
 

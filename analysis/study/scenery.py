@@ -1,4 +1,4 @@
-"""Renderers of the scenes of a study, and their references; a process keeps those that it made."""
+"""Renderers of the scenes of a study, and their references; a process caches them."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def _scene(animation: Animation, tracing: Tracing = ()) -> Scene:
 
 @lru_cache(maxsize=_KEPT)
 def renderer(animation: Animation, footprint_px: float, threads: int, tracing: Tracing = ()) -> Renderer:
-    """A renderer on the CPU that filters textures for so many pixels along the image's side.
+    """A renderer on the CPU that filters textures for ``footprint_px`` pixels along the image's side.
 
     Raises:
-        ConfigError, SceneError: the scene cannot be had.
-        ValueError: it cannot be traced that way.
+        ConfigError, SceneError: the scene cannot be loaded.
+        ValueError: the scene cannot be traced with these settings.
     """
     from renderer.trace import Renderer
 
@@ -59,11 +59,11 @@ def render_reference(animation: Animation, start_s: float, scale: Scale, folder:
     """The reference of an animation, from disk or rendered now.
 
     Args:
-        animation: what is rendered.
-        start_s: time of its first image, seconds.
-        scale: its sizes.
-        folder: of references.
-        threads: that trace.
+        animation: the scene and its motion.
+        start_s: time of the first image, seconds.
+        scale: sizes of the reference.
+        folder: folder of references.
+        threads: threads for tracing.
     """
     with one_thread():
         made_by = renderer(animation, scale.reference_px, threads)

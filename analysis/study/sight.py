@@ -1,4 +1,4 @@
-"""What of a picture was in sight before, and what of that the first light reached then: from first hits alone."""
+"""Pixels whose surface was out of sight before, and pixels whose light changed, from first hits alone."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tsar.tiling import uniform
 from tsar.types import FrameletBatch, Hits, Trace, Viewpoint
 
 SAME_DEPTH = 1.0 / 32.0
-"""Depths that differ by less than this share may be of one surface."""
+"""Relative difference of depth below which two hits may lie on one surface."""
 _FRAMELET_SIDE = 16
 
 
@@ -23,37 +23,37 @@ def first_hits(trace: Trace, side: int, time_s: float) -> Hits:
     """First hits at the centres of a picture's pixels.
 
     Args:
-        trace: a renderer that tells them.
+        trace: a renderer that returns first hits.
         side: pixels along the picture's side, a power of two, at least 16.
         time_s: animation time, seconds.
 
     Returns:
-        Of one row, pixels in raster order.
+        Hits with one row, pixels in raster order.
 
     Raises:
-        ValueError: the renderer tells no hits.
+        ValueError: the renderer returns no hits.
     """
     tiling = uniform((side // _FRAMELET_SIDE).bit_length() - 1)
     position = sample_positions(tiling.level, tiling.index, _FRAMELET_SIDE)
     hits = trace(FrameletBatch(tiling.level, tiling.index, position, time_s, hits=True)).hits
     if hits is None:
-        raise ValueError("first hits: expected a renderer that tells them")
+        raise ValueError("first hits: expected a renderer that returns them")
     order = raster_to_morton(side)
     instance, occluder = (one.reshape(-1)[order][None] for one in (hits.instance, hits.occluder))
     return Hits(instance, hits.point.reshape(-1, 3)[order][None], occluder)
 
 
 def places(now: Hits, before: Hits, view_before: Viewpoint) -> Places:
-    """Pixels whose surface came into sight, and pixels whose surface the first light reached then or now, not both.
+    """Pixels whose surface came into sight, and pixels whose surface the first light reaches at one of the times only.
 
-    What a pixel's centre meets now is sought among the four pixels whose centres were nearest to it then. It was in
-    sight if some of them show its instance and its depth lies between theirs, or beyond by less than 1/32. Its light is
-    the same if some of these was lit as it is. Both kinds of places grow by a pixel on all sides, for a pixel's colour
-    comes from more than its centre.
+    The surface at a pixel's centre is looked up at the earlier time in the four pixels whose centres were nearest to
+    it. It was in sight if some of them show its instance and its depth lies in the range of theirs, widened by 1/32.
+    Its light is unchanged if some of these pixels was lit as it is now. Both sets are dilated by one pixel on all
+    sides, because the colour of a pixel depends on more than its centre.
 
     Args:
         now, before: first hits at the centres of all pixels, raster order.
-        view_before: camera and poses at the time of ``before``; no panorama.
+        view_before: camera and poses at the time of ``before``; panoramas are not supported.
     """
     count = now.instance.numel()
     side = round(count**0.5)
@@ -77,7 +77,7 @@ def places(now: Hits, before: Hits, view_before: Viewpoint) -> Places:
 
 
 def _around(place: Float64[Tensor, "pixels 2"], side: int) -> list[Int64[Tensor, " pixels"]]:
-    """Numbers of the four pixels whose centres are nearest, those at the border twice."""
+    """Indices of the four pixels with the nearest centres; pixels at the border are repeated."""
     corner = (place * side - 0.5).floor().to(torch.int64)
     cells = [(corner + torch.tensor([right, down])).clamp(0, side - 1) for down in (0, 1) for right in (0, 1)]
     return [cell[:, 1] * side + cell[:, 0] for cell in cells]

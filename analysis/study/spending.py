@@ -1,4 +1,4 @@
-"""What a run spent: operations by every ledger that is no clock, counted work, and how late its pictures are."""
+"""Cost of a run: operations by every ledger except ``wall``, counted work, and the latency of its pictures."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from analysis.study.runs import PolicyRun
 from tsar.policy import Price
 
 _ENLARGED = 9.0
-"""Operations a pixel of the display to enlarge a picture: each of three channels weighs two values along each axis."""
+"""Operations a display pixel to enlarge a picture: each of three channels blends two values along each axis."""
 
 
 def cycle_flops(cost: CostParameters, price: Price, counters: Mapping[str, float]) -> dict[str, float]:
     """FLOPs of a cycle under every modelled ledger, and under ``work`` where its rays were counted.
 
     Args:
-        cost: parameters of the model, with what the mean cycle drew.
-        price: of a cycle of the policy.
-        counters: work of the mean cycle by name; empty where none was counted.
+        cost: parameters of the model, with the overdraw of the mean cycle.
+        price: price of a cycle of the policy.
+        counters: work of the mean cycle by name; empty if none was counted.
     """
     found = {ledger: float(policy_flops(cost, price, ledger)) for ledger in MODELLED}
     if counters:
-        # means of counts are not whole, which the price does not mind
+        # means of counts are not integers, but the price accepts them
         found["work"] = work_flops(cost, counters) + float(control_flops(cost, price))  # type: ignore[arg-type]
     return found
 
 
 def spent(made: PolicyRun, case: Case) -> dict[str, Any]:
-    """Of the measured span of a run that has been consumed.
+    """The cost of the measured span of a run whose stream has been consumed.
 
     Returns:
         ``flops`` by ledger, and ``counters``, over the whole span; ``cycles``; ``cycle_s``, the mean simulated time of
-        a cycle; ``latency_s`` from the beginning of a cycle to the display of its picture. Empty where no cycle began
+        a cycle; and ``latency_s``, from the beginning of a cycle to the display of its picture. Empty if no cycle began
         within the span.
     """
     totals, span_s = made.totals, case.scale.seconds

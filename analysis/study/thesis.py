@@ -1,4 +1,4 @@
-"""Results printed in the dissertation, to stand beside ours. Source: Stephens 2011, table 7.2 and sec. 7.2.5."""
+"""Results printed in the dissertation, for comparison with ours. Source: Stephens 2011, table 7.2 and sec. 7.2.5."""
 
 from __future__ import annotations
 
@@ -16,4 +16,4 @@ SHARES = {
     "runs suitable 90 % of the time": 0.46,
     "runs suitable half of the time": 0.67,
 }
-"""Over all ratio values, and over the 80 runs."""
+"""Shares of all ratio values, and of the 80 runs."""

@@ -1,4 +1,4 @@
-"""What a study whose results are tables writes and prints."""
+"""Output of a study whose results are tables."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WRITTEN = ("tables/*.csv", "tables.md")
 
 
 class TableOptions(Protocol):
-    """What is read of the options of a study that ends in tables."""
+    """Options that a study with tables must have."""
 
     @property
     def out(self) -> Path: ...
@@ -60,18 +60,18 @@ def write_study(
     broken: Sequence[str],
     **more: Any,
 ) -> dict[str, Any]:
-    """Writes the tables of a study and its ``summary.json``, and prints what people read.
+    """Writes the tables of a study and its ``summary.json``, and prints the tables as text.
 
     Args:
-        options: of the study.
-        outcomes: of its cases.
-        tables: by name.
-        shown: the tables as people read them.
-        broken: results whose cycles broke an invariant and should not have.
-        more: what else the summary holds.
+        options: options of the study.
+        outcomes: outcomes of its cases.
+        tables: tables by name.
+        shown: the tables as text.
+        broken: names of results whose cycles broke an invariant unexpectedly.
+        more: further entries of the summary.
 
     Returns:
-        What ``summary.json`` holds.
+        The content of ``summary.json``.
 
     Raises:
         InputError: the folder cannot be written to.

@@ -28,41 +28,42 @@ class SuitabilityOptions:
     rows: tuple[int, ...] = tuple(range(len(ROWS)))
     """Rows of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """thesis: its resolutions and batches. half: half the side, a quarter of the samples, tiles and machine. quick: a
-    quarter of the side, against a reference half as often. All last 2 s."""
+    """thesis: its resolutions and batches. half: half the side, and a quarter of samples, tiles and machine speed.
+    quick: a quarter of the side, and half the rate of the reference. All runs last 2 s."""
     repetitions: int = 3
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
     policies: tuple[str, ...] = ("thesis",)
-    """Policies that are judged at every row: beside framed, and beside the best of the rivals at each moment."""
+    """Policies that are compared at every row with framed, and with the best of the rivals at each moment."""
     rivals: tuple[str, ...] = RIVALS
-    """Their rivals, at every row; framed is one of them in any case."""
+    """Rivals of these policies at every row; framed is always one of them."""
     beside: tuple[str, ...] = ("oracle",)
-    """Policies that stand beside all of these at one row only, --policy-row."""
+    """Further policies, which are run at one row only, --policy-row."""
     solvers: tuple[str, ...] = ("trivial",)
-    """Solvers of thesis that are compared beside the chosen one, at --policy-row."""
+    """Further transport solvers of thesis, which are compared with the chosen one at --policy-row."""
     policy_row: int = 7
-    """Row of table 7.2, 0 to 15, at which --beside and --solvers stand."""
+    """Row of table 7.2, 0 to 15, at which --beside and --solvers are run."""
     ledger: Ledger = "thesis"
-    """How cost is counted; wall is refused, for it gives no result twice."""
+    """How cost is counted; wall is refused, because its results are not repeatable."""
     framed_rate_hz: float = 8.0
-    """Images a second that the framed renderer shows at every resolution; the machine is as fast as that takes."""
+    """Images a second that the framed renderer shows at every resolution, which sets the speed of the machine."""
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
     """Where in the animation the measurement starts, seconds."""
     stride: int = 6
-    """Reference images from one to the next at which FLIP, SSIM and the causes of the error are taken, which cost more
-    than the runs themselves at thesis scale."""
+    """Interval, in reference images, at which FLIP, SSIM and the causes of the error are taken. At thesis scale they
+    cost more than the runs themselves."""
     jod_repetitions: int = 1
     """Repetitions that ColorVideoVDP scores."""
     jod_span_s: tuple[float, float] = (0.4, 0.9)
-    """Part of each that it scores, seconds after the start; a second of it costs more than the run."""
+    """Beginning and end of the part of each run that ColorVideoVDP scores, seconds after the start; scoring a second
+    costs more than the run."""
     display: DisplayModel = field(default_factory=DisplayModel)
-    """The display it scores for."""
+    """The display that ColorVideoVDP assumes."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
-    """Where the runs are made."""
+    """Where the runs are computed."""
     out: Path = Path("out/suitability")
     """Folder for the results."""
     cache: References = REFERENCES

@@ -1,4 +1,4 @@
-"""The suitability study for people: tables to look at first, and a page."""
+"""The suitability study as text and as a page."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Tables = Mapping[str, pd.DataFrame]
 
 
 def shown_tables(tables: Tables) -> list[Table]:
-    """The tables that people look at first, as text."""
+    """The main tables, as text."""
     percentiles = tables["table_7_2"]
     names = [name for name in percentiles.columns if f"{name} thesis" in percentiles.columns]
     rows = [
@@ -43,7 +43,7 @@ def shown_tables(tables: Tables) -> list[Table]:
 
 
 def _rivalry(tables: Tables) -> list[Table]:
-    """Policies beside the framed renderer and the best rival; of the rivals, all rows together."""
+    """Policies beside the framed renderer and the best rival; for the rivals, all rows together."""
     rivals = tables["rivals"]
     if len(rivals) and ALL in set(rivals["row"]):
         rivals = rivals.query("row == @ALL")
@@ -56,7 +56,7 @@ def _rivalry(tables: Tables) -> list[Table]:
 
 
 def _beside(rows: pd.DataFrame, title: str) -> Table:
-    """With short names of columns: these tables are wide."""
+    """A table with short names of columns, because these tables are wide."""
     short = {name: name.replace("framed: ", "F ").replace(f"{BEST}: ", "B ") for name in rows.columns}
     return frame_table(rows.rename(columns=short), title, ".3f")
 

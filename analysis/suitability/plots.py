@@ -24,7 +24,7 @@ _INK = {256: "#e8a33d", 512: "#c9570c", 1024: "#6d2077"}
 def write_all(
     folder: Path, options: SuitabilityOptions, results: Results, keys: Mapping[Case, str], place: Place
 ) -> dict[str, Path]:
-    """Draws every figure there are results for; returns captions and files in the order of the thesis."""
+    """Draws every figure that has results; returns captions and files in the order of the thesis."""
     made: dict[str, Path] = {}
 
     def keep(name: str, caption: str, figure: Figure | None) -> None:
@@ -67,13 +67,13 @@ def _positive(values: Any) -> Any:
 
 
 def _refreshes(axis: Any, framed: Result) -> None:
-    """Vertical lines at the reference times from which on another image is shown."""
+    """Draws vertical lines at the reference times at which the shown image changes."""
     changes = framed.times["time_s"][framed.times["refresh"].diff() > 0]
     axis.vlines(changes, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")
 
 
 def behaviour(results: Results) -> Figure | None:
-    """Three refreshes of a framed renderer: least at a refresh (a, c), growing to the next (b)."""
+    """Three refreshes of a framed renderer: the error is least at a refresh (a, c) and grows until the next (b)."""
     name = "approach" if "approach" in results.inputs else next(iter(results.inputs), "")
     framed = finest(results, "framed", name)
     changes = np.flatnonzero(framed.times["refresh"].diff() > 0) if framed else np.array([])
@@ -99,7 +99,7 @@ def behaviour(results: Results) -> Figure | None:
 
 
 def framed_errors(results: Results) -> Figure | None:
-    """Inputs 3 and 1, as in the thesis."""
+    """Error of framed runs of inputs 3 and 1, as in the thesis."""
     chosen = [name for name in (INPUTS[3], INPUTS[1]) if name in results.inputs]
     runs = [run for run in (finest(results, "framed", name) for name in chosen) if run is not None]
     if not runs:
@@ -121,7 +121,7 @@ def _suits(results: Results, name: str) -> bool:
 
 
 def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
-    """A box per row of table 7.2, over the ratios of all repetitions; a column per input."""
+    """A box for each row of table 7.2 over the ratios of all repetitions, and a column for each input."""
     if not names:
         return None
     figure, axes = _axes(max(5.0, 3.1 * len(names)), 4.2, len(names), sharey=True)
@@ -169,7 +169,7 @@ def _patch(color: str, label: str) -> Any:
 
 
 def errors(results: Results, name: str) -> Figure | None:
-    """Error over time: framed runs bold, adaptive runs thin, a column per resolution."""
+    """Error over time: bold lines for framed runs, thin lines for adaptive runs, and a column for each resolution."""
     first = results.repetitions[0]
     found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
     sides = sorted({one.run.side_px for one in found if one.run.label == "thesis"})
@@ -201,7 +201,8 @@ def _shade(place: int, count: int) -> Any:
 
 
 def ratio_over_time(results: Results, row: int) -> Figure | None:
-    """One run of the first input: median dotted, quartiles dashed, the bound of outliers solid."""
+    """One run of the first input, with lines for the median (dotted), the quartiles (dashed) and the bound of outliers
+    (solid)."""
     row = 8 if 8 in results.rows else (row if row in results.rows else results.rows[0]) if results.rows else row
     pairs = results.pairs(results.inputs[0], row) if results.inputs else []
     if not pairs:

@@ -1,6 +1,6 @@
-"""Policies beside the framed renderer and beside the best of their rivals, at every row of a suitability study.
+"""Policies beside the framed renderer and the best of their rivals, at every row of a suitability study.
 
-A run here is an input at a row, all repetitions together, as in table 7.2.
+Here a run is an input at a row with all repetitions together, as in table 7.2.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from analysis.study.cases import ROWS, is_framed
 from analysis.suitability.tables import SIGNS, Result, Results
 
 ALL = "all"
-"""In place of a row: all of them together."""
+"""Stands in the column of rows for all rows together."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """Results that share what is to be seen: an input, a row and a repetition.
+    """Results of one input, row and repetition, which share the reference.
 
     Attributes:
-        input, row: of table 7.2.
-        results: by policy; those that failed are missing.
+        input, row: input and row of table 7.2.
+        results: results by policy; failed ones are missing.
     """
 
     input: str
@@ -36,24 +36,24 @@ class Group:
     results: Mapping[str, Result]
 
     def values(self, name: str, metric: str) -> Floats:
-        """A metric at the reference times; the score of a sequence has one value."""
+        """Values of a metric at the reference times; the score of a sequence is a single value."""
         one = self.results[name]
         if metric in one.times:
             return one.times[metric].to_numpy()
         return np.array([one.value(metric)])
 
     def best(self, rivals: Iterable[str], metric: str) -> Floats:
-        """The best of the rivals that ran."""
+        """The best value among the rivals that ran."""
         return best_of([self.values(name, metric) for name in rivals if name in self.results], SIGNS[metric])
 
 
 def groups_of(results: Results, rows: Mapping[int, int], names: Sequence[str]) -> list[Group]:
-    """Results of some policies, where the framed renderer has one.
+    """Groups of the results of some policies, if the framed renderer has a result.
 
     Args:
-        results: of the study.
+        results: results of the study.
         rows: side of the image by row, pixels.
-        names: of the policies.
+        names: names of the policies.
     """
     found = []
     for row, side in rows.items():
@@ -74,12 +74,12 @@ def _by_row(groups: Sequence[Group]) -> Iterator[tuple[int | str, list[Group]]]:
 
 
 def rival_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
-    """A line a row and policy: error beside the framed renderer's and beside the best rival's.
+    """A line for each row and policy: its error compared with that of the framed renderer and of the best rival.
 
-    ``at most`` is the share of moments at which the error is at most the other's, ``median`` the median of the ratio,
-    ``always`` and ``90 %`` in how many runs it is at most the other's always, and at 90 % of the time by the greatest
-    suitable percentile. ``worst`` is the greatest median of a run. A policy that is a rival is compared with the best
-    of all, itself included, so it is at most that where it is the best.
+    ``at most`` is the share of moments at which the error is at most the other's, and ``median`` the median of the
+    ratio. ``always`` and ``90 %`` count the runs in which it is at most the other's at all times, and at 90 % of the
+    time by the greatest suitable percentile. ``worst`` is the greatest median of a run. A policy that is itself a rival
+    is compared with the best of all rivals, including itself.
     """
     lines = []
     for row, found in _by_row(groups):
@@ -97,7 +97,7 @@ def rival_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequen
 
 
 def _beside(groups: Sequence[Group], name: str, others: Sequence[str]) -> dict[str, float]:
-    """Error of a policy over the least of some others'."""
+    """Statistics of the error of a policy over the least error of the others."""
     of_run: dict[tuple[str, int], list[Floats]] = {}
     for group in groups:
         ratios = ratio(group.values(name, "mse"), group.best(others, "mse"))
@@ -115,9 +115,9 @@ def _beside(groups: Sequence[Group], name: str, others: Sequence[str]) -> dict[s
 
 
 def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
-    """Policies by every metric, all rows together: share of moments, and runs in which the mean is better.
+    """Policies by every metric, all rows together: share of moments, and number of runs in which the mean is better.
 
-    Scores of sequences have no moments: each is one.
+    The score of a sequence counts as one moment.
     """
     lines = []
     for name in policies:
@@ -137,7 +137,7 @@ def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Seque
 
 
 def _better_runs(groups: Sequence[Group], name: str, others: Sequence[str], metric: str) -> tuple[int, int]:
-    """In how many runs the mean is better than every other's, and how many have a value."""
+    """Number of runs in which the mean is better than that of every other, and number of runs with a value."""
     sign, means = SIGNS[metric], dict[tuple[str, int], list[tuple[float, float]]]()
     for group in groups:
         own = group.results[name].value(metric)
@@ -150,7 +150,7 @@ def _better_runs(groups: Sequence[Group], name: str, others: Sequence[str], metr
 
 
 def lead_table(groups: Sequence[Group], rivals: Sequence[str]) -> pd.DataFrame:
-    """A line a row: share of the moments at which each rival has the lowest error of all; equals count each."""
+    """A line for each row: share of the moments at which each rival has the lowest error; equal ones all count."""
     lines = []
     for row, found in _by_row(groups):
         shares = []

@@ -39,10 +39,10 @@ Tables = dict[str, pd.DataFrame]
 
 
 def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
-    """Runs what is missing and writes everything to ``options.out``.
+    """Makes missing runs and writes everything to ``options.out``.
 
     Returns:
-        What is in ``summary.json``, and the tables.
+        The content of ``summary.json``, and the tables.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -67,7 +67,7 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
 
 
 def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
-    """Every table by name. Nothing in them depends on machine, order or time."""
+    """Every table by name. Tables do not depend on the machine, the order of runs, or measured time."""
     divisor = SCALES[options.scale].divisor
     side = ROWS[options.policy_row][1] // divisor
     rivals = tuple(dict.fromkeys(("framed", *options.rivals)))
@@ -91,7 +91,7 @@ def tables_of(options: SuitabilityOptions, results: Results) -> Tables:
 
 
 def timing(done: dict[Case, dict[str, Any]]) -> pd.DataFrame:
-    """Measured seconds and memory of every run, which no table of results holds."""
+    """Measured seconds and memory of every run, which are in no table of results."""
     sizes = [{"run": case.name, "batch": case.tsar.batch_size, "pixels": case.tsar.resolution_px**2} for case in done]
     return pd.DataFrame([{**size, **found["machine"]} for size, found in zip(sizes, done.values(), strict=True)])
 

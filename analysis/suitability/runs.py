@@ -1,4 +1,4 @@
-"""Which runs the suitability study has: five inputs, sixteen settings, repeated over seeds and phases.
+"""The runs of the suitability study: five inputs at sixteen settings, repeated over seeds and phases.
 
 Source: Stephens 2011, sec. 7.2.5.
 """
@@ -20,8 +20,8 @@ class Run:
     """A case and its place in the study.
 
     Attributes:
-        label: who decides what is sampled: a policy, or ``thesis`` and a solver.
-        row: of table 7.2; None for a framed renderer, which serves all rows of its resolution.
+        label: name of the policy, or ``thesis`` and a solver.
+        row: row of table 7.2; None for a framed renderer, whose run serves all rows of its resolution.
         side_px: output resolution.
         repetition: 0, 1, …
     """
@@ -34,11 +34,11 @@ class Run:
 
 
 STILLS = (0.35, 0.85)
-"""Where in the run pictures are kept, as shares of its length."""
+"""Times at which pictures are kept, as shares of the length of a run."""
 
 
 def runs(options: SuitabilityOptions) -> list[Run]:
-    """Every run, framed ones once per resolution."""
+    """Every run, with framed ones once per resolution."""
     found = []
     for repetition, name in itertools.product(range(options.repetitions), options.inputs):
         found += _runs_of(options, name, repetition)

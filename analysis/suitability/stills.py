@@ -1,4 +1,4 @@
-"""What the displays of a suitability study show at one time, side by side, and what a run is called in figures."""
+"""Images on the displays of a suitability study at one time, side by side, and names of runs in figures."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from analysis.suitability.tables import Result, Results
 
 _BATCHES = (32, 128, 256, 512, 1024)
 LOOKS_AHEAD = "oracle"
-"""The policy that sees the truth; no renderer can be as good."""
+"""The policy that sees the truth, which no renderer can do."""
 
 
 def setting(run: Run) -> str:
-    """Batch and resolution that a run had, and those of the row of table 7.2 where the study is scaled down."""
+    """Batch and resolution of a run, and those of its row of table 7.2 if the study is scaled down."""
     ran = f"{run.side_px}²" if is_framed(run.case.policy) else f"batch {run.case.tsar.batch_size}, {run.side_px}²"
     if run.case.scale.divisor == 1 or run.row is None:
         return ran
@@ -31,15 +31,15 @@ def setting(run: Run) -> str:
 
 
 def finest(results: Results, label: str, name: str) -> Result | None:
-    """The run of an input at the finest resolution, first repetition; None where there is none."""
+    """The run of an input at the finest resolution, first repetition; None if there is none."""
     found = [one for one in results.all if (one.run.label, one.run.case.input) == (label, name)]
     found = [one for one in found if one.run.repetition == results.repetitions[0]]
     return max(found, key=lambda one: one.run.side_px, default=None)
 
 
 def best(results: Results, name: str, side_px: int) -> Result | None:
-    """The run of an input, first repetition, with the least mean squared error over its times among all that are
-    neither framed nor the oracle's; at one resolution, for errors at two do not compare."""
+    """The run of an input, first repetition, with the least mean squared error over time among all policies except
+    framed ones and the oracle; at one resolution, because errors at different resolutions are not comparable."""
     found = [one for one in results.all if (one.run.case.input, one.run.side_px) == (name, side_px)]
     found = [one for one in found if one.run.repetition == results.repetitions[0]]
     found = [one for one in found if not is_framed(one.run.case.policy) and one.run.case.policy != LOOKS_AHEAD]
@@ -47,8 +47,8 @@ def best(results: Results, name: str, side_px: int) -> Result | None:
 
 
 def shown(results: Results, name: str) -> list[tuple[str, Result]]:
-    """Runs whose pictures stand side by side, with titles: the framed renderer, ``thesis`` of growing batch, each at
-    its finest resolution, and the policy of least error at the resolution of the framed one."""
+    """Runs whose pictures are shown side by side, with titles: the framed renderer, ``thesis`` with growing batch, each
+    at its finest resolution, and the policy of least error at the resolution of the framed one."""
     framed = finest(results, "framed", name)
     if framed is None:
         return []
@@ -71,7 +71,7 @@ def shown(results: Results, name: str) -> list[tuple[str, Result]]:
 def write_strip(
     path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Place
 ) -> Path | None:
-    """Draws the reference and what :func:`shown` chooses at one time; None where no picture is on disk."""
+    """Draws the reference and the runs of :func:`shown` at one time; None if no picture is on disk."""
     # the fast vehicle is gone by the second
     number = 0 if name == INPUTS[4] else len(STILLS) - 1
     chosen = shown(results, name)

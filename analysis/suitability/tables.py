@@ -1,4 +1,4 @@
-"""From the results of a suitability study to its tables. The order in which runs were made does not matter."""
+"""Tables from the results of a suitability study. They do not depend on the order of the runs."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from analysis.suitability.runs import Run
 Floats = NDArray[np.float64]
 
 SIGNS = {"mse": -1, "log_mse": -1, "flip": -1, "ssim": 1, "jod": 1}
-"""Metrics by name; 1 where more is better."""
+"""Metrics by name: 1 if higher is better, -1 if lower is better."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What is on disk of a run.
+    """A run as read from disk.
 
     Attributes:
-        run: what was run.
-        summary: of the whole run.
+        run: the case and its place in the study.
+        summary: measurements of the whole run.
         times: table over the reference times.
     """
 
@@ -39,7 +39,7 @@ class Result:
     times: pd.DataFrame
 
     def value(self, metric: str) -> float:
-        """A metric of the whole run: the mean over the times, or the score of the sequence."""
+        """A metric of the whole run: the mean over time, or the score of the sequence."""
         if metric == "jod":
             score = self.summary["jod"]
             return math.nan if score is None else float(score)
@@ -47,7 +47,7 @@ class Result:
 
 
 class Results:
-    """Results by what they are of. Runs that failed are missing."""
+    """Results by their place in the study. Failed runs are missing."""
 
     def __init__(self, results: Sequence[Result]) -> None:
         self.all = sorted(results, key=lambda one: (one.run.label, one.run.case.name))
@@ -78,7 +78,7 @@ def ratios(pair: tuple[Result, Result]) -> Floats:
 
 
 def run_table(results: Results) -> pd.DataFrame:
-    """One line per adaptive run: statistics of its ratio, metrics of both renderers, checks."""
+    """One line for each adaptive run: statistics of its ratio, metrics of both renderers, checks."""
     lines = []
     for name, row in itertools.product(results.inputs, results.rows):
         for ours, framed in results.pairs(name, row):
@@ -97,7 +97,8 @@ def run_table(results: Results) -> pd.DataFrame:
 
 
 def percentile_table(results: Results) -> pd.DataFrame:
-    """Table 7.2: greatest suitable percentile per row and input, over all repetitions together, and the thesis'."""
+    """Table 7.2: greatest suitable percentile for each row and input, over all repetitions together, and the
+    thesis'."""
     lines = []
     for row in results.rows:
         line: dict[str, Any] = {"row": row, "batch": ROWS[row][0], "side": ROWS[row][1]}
@@ -122,9 +123,9 @@ def _shares(percentiles: Floats, suitable: Floats, counts: Floats) -> Floats:
 def share_table(results: Results, seed: int = 0) -> pd.DataFrame:
     """The thesis' summary beside ours, with bootstrap intervals.
 
-    Repetitions, each a seed and a phase, are drawn with replacement for each input; all rows of an input share them,
-    for they share what is to be seen. A run of the table is the repetitions drawn for its row, taken together. With
-    one repetition there is nothing to draw from and the interval is empty.
+    Repetitions, each a seed and a phase, are drawn with replacement for each input. All rows of an input share them,
+    because they share the reference. A run of the table is the drawn repetitions of its row, taken together. With one
+    repetition there is nothing to draw from, and the interval is empty.
     """
     draws = np.random.default_rng(seed).integers(0, 1 << 30, (DRAWS, len(results.inputs)))
     ours, boot = [], []
@@ -162,7 +163,7 @@ def _of_run(row: list[Floats], choice: tuple[int, ...]) -> tuple[float, int, int
 
 
 def policy_table(results: Results, row: int, side_px: int, seed: int = 0) -> pd.DataFrame:
-    """Every policy at one row: error, score, and share of what an oracle gains over the framed renderer.
+    """Every policy at one row: error, score, and share of the oracle's gain over the framed renderer.
 
     ``share = (E_framed - E) / (E_framed - E_oracle)`` of errors averaged over time and repetitions; 1 is the oracle.
     """
@@ -219,7 +220,7 @@ def _oracle_share(
 
 
 def disagreement_table(results: Results) -> pd.DataFrame:
-    """Runs on which metrics disagree about which renderer is better, one line each; +1 is better for ``thesis``."""
+    """Runs in which metrics disagree about the better renderer, one line each; +1 means that ``thesis`` is better."""
     lines = []
     for name, row in itertools.product(results.inputs, results.rows):
         for ours, framed in results.pairs(name, row):
@@ -233,7 +234,7 @@ def disagreement_table(results: Results) -> pd.DataFrame:
 
 
 def vote_table(results: Results) -> pd.DataFrame:
-    """In how many runs each metric says that ``thesis`` is better than the framed renderer."""
+    """Number of runs in which ``thesis`` is better than the framed renderer, by each metric."""
     runs = run_table(results)
     lines = []
     for metric, sign in SIGNS.items() if len(runs) else ():
@@ -244,7 +245,7 @@ def vote_table(results: Results) -> pd.DataFrame:
 
 
 def rank_table(results: Results) -> pd.DataFrame:
-    """Spearman's correlation between metrics of the ranks of all adaptive runs; 1 where they rank alike."""
+    """Spearman's rank correlation between metrics over all adaptive runs; 1 for equal ranks."""
     runs = run_table(results)
     lines = []
     for one, other in itertools.combinations(SIGNS, 2) if len(runs) else ():
@@ -256,7 +257,8 @@ def rank_table(results: Results) -> pd.DataFrame:
 
 
 def cause_table(results: Results, row: int, side_px: int) -> pd.DataFrame:
-    """Causes of the error of every policy at one row, means over the times at which the truth of all ages is known."""
+    """Causes of the error of every policy at one row, as means over the times at which the truth of all ages is
+    known."""
     lines = []
     for name in results.inputs:
         for one in results.all:
@@ -270,7 +272,7 @@ def cause_table(results: Results, row: int, side_px: int) -> pd.DataFrame:
 
 
 def region_table(results: Results, row: int, side_px: int) -> pd.DataFrame:
-    """Causes of the error of every policy at one row by region of the picture, as parts of the whole error."""
+    """Causes of the error of every policy at one row, by region of the picture, as parts of the whole error."""
     lines = []
     for one in results.all:
         if one.run.side_px == side_px and one.run.row in (row, None):

@@ -1,4 +1,4 @@
-"""Savings of structures over triangles: tests per ray against triangle count, and the two images of the report."""
+"""Savings by acceleration structures: tests per ray against triangle count, and the two images of the report."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ REPORTED = {
     "report-one": {"triangle_tests": 18.5e9, "one_process_s": 5210.0, "twenty_processes_s": 320.0},
     "report-two": {"triangle_tests": 16.0e9, "one_process_s": 8240.0, "twenty_processes_s": 610.0},
 }
-"""What the report says of its images."""
+"""Figures of the report for its images."""
 
 STRUCTURES = ("brute", "kdtree", "bvh")
-_BRUTE_TESTS = 4e8  # in a turn; brute force traces as few rays as keep to it
+_BRUTE_TESTS = 4e8  # triangle tests in a turn, which limit the rays of brute force
 _SIDE_PX = 256
 
 
 def knot_of(triangles: int) -> Mesh:
-    """A knotted tube of about so many triangles, moved into ``[-1, 1]³``."""
+    """A knotted tube of about ``triangles`` triangles, scaled into ``[-1, 1]³``."""
     around = max(4, round((triangles / 31.0) ** 0.5))
     tube = report.knotted_tube(around, max(4, round(triangles / (2 * around))))
     low, high = tube.vertices.min(axis=0), tube.vertices.max(axis=0)
@@ -49,14 +49,14 @@ def camera_rays() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 def random_rays(count: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Rays that start anywhere in the mesh's box, in any direction."""
+    """Rays from random points in the mesh's bounding box in random directions."""
     rng = np.random.default_rng(seed)
     direction = rng.standard_normal((count, 3))
     return rng.uniform(-1.0, 1.0, (count, 3)).astype(np.float32), direction.astype(np.float32)
 
 
 def measure(triangles: int, options: AcceleratorOptions, task: Task) -> list[dict[str, Any]]:
-    """Rows of the table for one mesh: a structure and a kind of rays each.
+    """Rows of the table for one mesh, one for each structure and kind of rays.
 
     Raises:
         RuntimeError: structures disagree about a hit.
@@ -100,7 +100,7 @@ def measure(triangles: int, options: AcceleratorOptions, task: Task) -> list[dic
 
 
 def render_report_image(name: str, options: AcceleratorOptions, bars: Bars) -> tuple[Tensor, dict[str, Any]]:
-    """One of the report's images with 32 samples a pixel, and the rays and tests it took beside the report's."""
+    """One of the report's images with 32 samples a pixel, and its numbers of rays and tests beside the report's."""
     from renderer.frames import render_image, tile_count
     from renderer.sampling.plan import SamplePlan
     from renderer.trace import Renderer
@@ -135,7 +135,7 @@ def render_report_image(name: str, options: AcceleratorOptions, bars: Bars) -> t
 
 
 def lines(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """What rendered images took, beside what the report says of them."""
+    """Lines on the cost of rendered images, beside the figures of the report."""
     return [
         f"{name}: {each['size_px'][0]} x {each['size_px'][1]}, {each['polygons']:,} polygons, {each['wall_s']:.1f} s, "
         f"{each['rays'] / 1e6:.1f} M rays, {each['triangle_tests'] / 1e9:.2f} G triangle tests "

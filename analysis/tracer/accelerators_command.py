@@ -1,4 +1,4 @@
-"""Compare brute force, kd-tree and tree of boxes by what a ray takes, or render the ray-tracer report's two images.
+"""Compare brute force, kd-tree and tree of boxes by the cost of a ray, or render the ray-tracer report's two images.
 
 Examples: python scripts/accelerators.py --out out/accelerators
           python scripts/accelerators.py --image report-one report-two --out out/report
@@ -12,7 +12,7 @@ from analysis.tracer.options import AcceleratorOptions
 
 
 def main() -> None:
-    """Parses, measures or renders, prints a table or what each image took."""
+    """Parses, measures or renders, prints a table or the cost of each image."""
     options = parse(AcceleratorOptions, __doc__ or "")
     import pandas as pd
 

@@ -56,7 +56,7 @@ def render_effect(name: str, plan: SamplePlan, options: GalleryOptions, task: Ta
 
 
 def write_sheet(path: Path, pictures: Sequence[NDArray[np.uint8]], captions: Sequence[str]) -> None:
-    """All pictures on one sheet, each with its caption below."""
+    """Writes all pictures on one sheet, each with its caption below."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -83,7 +83,7 @@ def names(options: GalleryOptions) -> tuple[str, ...]:
     """Effects to show.
 
     Raises:
-        ValueError: one is not known.
+        ValueError: an effect is unknown.
     """
     for name in options.effects:
         require(name in effects.EFFECTS, "effects", f"one of {', '.join(effects.EFFECTS)}", name)
@@ -91,11 +91,11 @@ def names(options: GalleryOptions) -> tuple[str, ...]:
 
 
 def sample_plan(options: GalleryOptions) -> SamplePlan:
-    """How pixels are sampled.
+    """The sampling of the pixels.
 
     Raises:
-        ValueError: for a number of samples that the point set cannot have, an effect that is not known, or pictures
-            that memory does not hold.
+        ValueError: the point set cannot have this number of samples, an effect is unknown, or the pictures do not fit
+            into memory.
     """
     names(options)
     from renderer.sampling.plan import SamplePlan
@@ -106,7 +106,7 @@ def sample_plan(options: GalleryOptions) -> SamplePlan:
 
 
 def effect_table(found: Mapping[str, Mapping[str, Any]]) -> Table:
-    """What each picture took."""
+    """A table of the cost of each picture."""
     rows = [
         (
             name,

@@ -11,7 +11,7 @@ from analysis.tracer.options import GalleryOptions
 
 
 def main() -> None:
-    """Parses, renders, prints what each picture took."""
+    """Parses, renders, prints the cost of each picture."""
     options = parse(GalleryOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.tracer.gallery import effect_table

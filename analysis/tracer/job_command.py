@@ -12,7 +12,7 @@ from analysis.tracer.options import JobOptions
 
 
 def main() -> None:
-    """Parses, renders what is missing, prints how much that was."""
+    """Parses, renders missing frames, prints their number."""
     options = parse(JobOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.tracer.run import job

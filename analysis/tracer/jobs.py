@@ -1,4 +1,4 @@
-"""Batch jobs: a block file's sequence, rendered in every combination of sampling that a job file names."""
+"""Batch jobs: the sequence of a block file, rendered in every combination of sampling settings in a job file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from scenes.formats.blocks.settings import Settings
 
 @dataclass(frozen=True)
 class Work:
-    """A job, ready to run: what to render and how."""
+    """A job that is ready to run: its scene, frames and combinations."""
 
     job: Job
     scene: Scene
@@ -33,7 +33,7 @@ def prepare(options: JobOptions) -> Work:
     """Reads the job and its scene.
 
     Raises:
-        SceneError: something in them cannot be used.
+        SceneError: the job or its scene is invalid.
     """
     job = read_job(options.job)
     name = options.scene or job.name.lower().replace("_", "").replace(" ", "")
@@ -53,12 +53,12 @@ def prepare(options: JobOptions) -> Work:
 
 
 def run_job(work: Work, options: JobOptions, bars: Bars) -> list[dict[str, Any]]:
-    """Renders what is not on disk yet; a row per combination.
+    """Renders frames that are not on disk yet; returns a row for each combination.
 
     Args:
         work: from :func:`prepare`.
-        options: of the job.
-        bars: show how far it is.
+        options: options of the job.
+        bars: progress bars.
     """
     from analysis.tracer.stills import render_stills
     from renderer.frames import pictures

@@ -32,7 +32,7 @@ class GalleryOptions:
     samples: int = 64
     """Samples per pixel; a cube for the point set stratified."""
     point_set: str = "hammersley"
-    """Where in the pixel and when in the shutter's time they lie."""
+    """Point set that places the samples in the pixel and in the shutter's time."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
     seed: Seed = 0
@@ -55,17 +55,17 @@ class AcceleratorOptions:
     out: Path = Path("out/accelerators")
     """Folder for table.csv, tests.png, the images and summary.json."""
     triangles: tuple[int, ...] = (100, 1_000, 10_080, 100_000, 1_000_000)
-    """Triangles of the meshes, about."""
+    """Approximate numbers of triangles of the meshes."""
     repetitions: int = 5
-    """Turns of each structure; medians count."""
+    """Turns of each structure; the medians are reported."""
     image: tuple[Literal["report-one", "report-two"], ...] = ()
     """Images of the report to render, instead of the table."""
     scale: float = 1.0
-    """Of the images' sides; 1 is the report's size."""
+    """Scale of the images' sides; 1 is the report's size."""
     structure: Literal["kdtree", "bvh"] = "kdtree"
-    """Over the triangles of the images."""
+    """Structure over the triangles of the images."""
     seed: int = 0
-    """Of rays and samples."""
+    """Seed of rays and samples."""
     threads: Threads = 0
 
     def __post_init__(self) -> None:
@@ -80,11 +80,11 @@ class PointSetOptions:
     out: Path = Path("out/pointsets")
     """Folder for tables, figures and summary.json."""
     levels: tuple[int, ...] = LEVELS
-    """Numbers of points, cubes."""
+    """Numbers of points, which must be cubes."""
     cases: int = 2048
-    """Integrands of each kind that an error is the mean over."""
+    """Number of integrands of each kind over which an error is averaged."""
     sets_of_each: int = 4
-    """Point sets of each kind, from as many seeds."""
+    """Number of point sets of each kind, each with its own seed."""
     frame_px: int = 160
     """Side of the pictures of motion blur, pixels; 0 leaves them out."""
     seed: Seed = 0
@@ -111,22 +111,22 @@ class TileOptions:
     samples: int = 32
     """Samples per pixel; a cube for the point set stratified."""
     point_set: str = "hammersley"
-    """Where in the pixel and when in the shutter's time they lie."""
+    """Point set that places the samples in the pixel and in the shutter's time."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
     time_s: float = 0.0
     """Animation time at which the frame begins, seconds."""
     seed: Seed = 0
     chunk_tiles: int = 16
-    """Tiles of 16 x 16 pixels that a worker is handed at once."""
+    """Tiles of 16 x 16 pixels in one task of a worker."""
     farm: ClusterOptions = field(default_factory=ClusterOptions)
     """Where tiles are rendered."""
     study: tuple[int, ...] = ()
-    """Numbers of local workers to time instead, each the same picture; such as 1 2 4."""
+    """Numbers of local workers to time instead on the same picture, such as 1 2 4."""
     repetitions: int = 3
-    """Turns of each number in a study; medians count."""
+    """Turns of each number in a study; the medians are reported."""
     out: Path = Path("out/tiles")
-    """Folder for the picture, summary.json, and the chunks that an interrupted rendering goes on from."""
+    """Folder for the picture, summary.json, and the chunks from which an interrupted rendering continues."""
 
     def __post_init__(self) -> None:
         POINT_SETS.require(self.point_set, "point_set")
@@ -151,27 +151,27 @@ class JobOptions:
     job: Annotated[Path, tyro.conf.Positional]
     """Job file: seven lines, as in figure 12 of the motion-blur perception thesis."""
     scene: str = ""
-    """A block file, or the built-in planescene or spheresscene; by default the one the job's name names."""
+    """A block file, or the built-in planescene or spheresscene; by default the scene in the job's name."""
     width_px: int = 0
-    """Width and height of a frame, pixels; 0 takes the file's."""
+    """Width and height of a frame, pixels; 0 takes those of the file."""
     first_frame: int = 0
     """First frame of the sequence to render."""
     frames: int = 0
-    """How many; 0 takes all that follow."""
+    """Number of frames; 0 takes all from the first frame on."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture; the thesis has a Gaussian."""
     sigma_px: float = 0.5
-    """Of the Gaussian, pixels."""
+    """Standard deviation of the Gaussian, pixels."""
     box_share: float = 0.5
-    """The middle part of the shutter's time that the box filter spans; the thesis has 0.5."""
+    """Share of the shutter time, in its middle, that the box filter spans; the thesis has 0.5."""
     format: Literal["png", "exr"] = "png"
-    """Of the frames."""
+    """Format of the frames."""
     seed: int = 0
-    """Of point sets and shifts."""
+    """Seed of point sets and shifts."""
     threads: Threads = 0
     out: Path = Path("out/job")
-    """Folder for a folder of frames per combination, and summary.json; frames that an interrupted run of the same job
-    left there are kept."""
+    """Folder for summary.json and a folder of frames for each combination; frames that an interrupted run of the same
+    job left there are kept."""
 
     def __post_init__(self) -> None:
         limits.within(

@@ -1,4 +1,4 @@
-"""Figures of accelerators and of point sets; computes nothing.
+"""Figures of acceleration structures and of point sets; computes nothing.
 
 Those of point sets follow figures 4, 5, 7 and 9 of the motion-blur perception thesis.
 """
@@ -20,7 +20,8 @@ _LABEL = {"brute": "brute force", "kdtree": "kd-tree", "bvh": "tree of boxes"}
 
 
 def tests_figure(rows: pd.DataFrame) -> Figure:
-    """Two panels: triangle tests and node visits per ray; full lines for camera rays, broken ones for random rays."""
+    """Two panels: triangle tests and node visits per ray, with solid lines for camera rays and dashed ones for random
+    rays."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     for axis, column, label in zip(
         figure.subplots(1, 2), ("tests_per_ray", "visits_per_ray"), ("triangle tests", "node visits"), strict=True
@@ -39,7 +40,7 @@ def tests_figure(rows: pd.DataFrame) -> Figure:
 
 
 def projections_figure(sets: Mapping[str, NDArray[np.float64]]) -> Figure:
-    """Points on the pixel, the time of each left out (figure 4)."""
+    """Points on the pixel, without their times (figure 4)."""
     figure = Figure(figsize=(2.1 * len(sets), 2.4), layout="constrained")
     for axis, (name, points) in zip(np.atleast_1d(figure.subplots(1, len(sets))), sets.items(), strict=True):
         axis.plot(points[:, 0], points[:, 1], "k.", ms=3)
@@ -48,7 +49,7 @@ def projections_figure(sets: Mapping[str, NDArray[np.float64]]) -> Figure:
 
 
 def frames_figure(frames: Mapping[tuple[str, int], NDArray[np.uint8]]) -> Figure:
-    """Motion blur by set and number of samples (figure 5)."""
+    """Motion blur by point set and number of samples (figure 5)."""
     sets, levels = list(dict.fromkeys(key[0] for key in frames)), list(dict.fromkeys(key[1] for key in frames))
     figure = Figure(figsize=(2.6 * len(sets), 2.6 * len(levels)), layout="constrained")
     axes = figure.subplots(len(levels), len(sets), squeeze=False)
@@ -63,7 +64,7 @@ def frames_figure(frames: Mapping[tuple[str, int], NDArray[np.uint8]]) -> Figure
 
 
 def warp_figure(points: NDArray[np.float64], warped: NDArray[np.float64]) -> Figure:
-    """A set before and after the Gaussian warp, pixels from the centre (figure 7)."""
+    """A point set before and after the Gaussian warp, in pixels from the centre (figure 7)."""
     figure = Figure(figsize=(7.0, 3.5), layout="constrained")
     for axis, places, title in zip(
         figure.subplots(1, 2), (points - 0.5, warped), ("unmodified", "Gaussian-warped"), strict=True
@@ -74,7 +75,7 @@ def warp_figure(points: NDArray[np.float64], warped: NDArray[np.float64]) -> Fig
 
 
 def time_figure(rows: Mapping[str, NDArray[np.float64]]) -> Figure:
-    """Even times and what the time filters make of them (figure 9)."""
+    """Evenly spaced times, before and after the warps of the time filters (figure 9)."""
     figure = Figure(figsize=(7.0, 2.0), layout="constrained")
     axis = figure.subplots()
     for number, (name, times) in enumerate(rows.items()):
@@ -85,7 +86,7 @@ def time_figure(rows: Mapping[str, NDArray[np.float64]]) -> Figure:
 
 
 def convergence_figure(errors: pd.DataFrame, sets: Sequence[str], kinds: Sequence[str]) -> Figure:
-    """Mean squared error against the number of points, a panel an integrand."""
+    """Mean squared error against the number of points, with a panel for each integrand."""
     figure = Figure(figsize=(4.0 * len(kinds), 3.6), layout="constrained")
     for axis, kind in zip(np.atleast_1d(figure.subplots(1, len(kinds))), kinds, strict=True):
         for style, name in enumerate(sets):

@@ -1,4 +1,4 @@
-"""How evenly point sets lie, and how fast what they sample converges."""
+"""Evenness of point sets, and convergence of integrals sampled with them."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def evenness(points: Points) -> dict[str, float]:
     """Measures of one set of ``n`` points ``(u, v, t)``.
 
     Returns:
-        ``discrepancy`` and those of its projections: the L2 star discrepancy (scipy's, its root); ``distance``: least
-        distance round the torus over that of the densest packing; ``distance_uv``: the same of the projection on the
-        pixel, over that of the hexagonal packing; ``cells``: share of the cells of a cubic grid of ``n`` that hold
-        exactly one; ``strata``: share of ``n`` even intervals that do, mean over the axes.
+        ``discrepancy`` and those of its projections: the L2 star discrepancy (the root of scipy's value); ``distance``:
+        least distance round the torus over that of the densest packing; ``distance_uv``: the same for the projection on
+        the pixel, over that of the hexagonal packing; ``cells``: share of the ``n`` cells of a cubic grid that contain
+        exactly one point; ``strata``: share of ``n`` equal intervals that do, mean over the axes.
     """
     from renderer.sampling.point_sets import packing_distance
 
@@ -54,7 +54,7 @@ def _discrepancy(points: Float[NDArray[np.float64], "n d"]) -> float:
 
 
 def _least_distance(points: Float[NDArray[np.float64], "n d"]) -> float:
-    """Least distance round the torus; that of a lone point to its own image."""
+    """Least distance round the torus; for a single point the distance to its own image."""
     if len(points) == 1:
         return 1.0
     apart = np.abs(points[:, None] - points[None])
@@ -71,7 +71,7 @@ def half_space_volume(
 
     Source: Barrow and Smith 1979, "Spline notation applied to a volume problem".
     """
-    # a negative component is turned round by x -> 1 - x
+    # x -> 1 - x makes a negative component positive
     dimensions = normal.shape[1]
     shifted, size = offset - np.minimum(normal, 0.0).sum(axis=1), np.abs(normal)
     total = np.zeros(len(normal))
@@ -83,15 +83,15 @@ def half_space_volume(
 
 @dataclass(frozen=True)
 class Integrands:
-    """Integrands of one kind over the unit cube, a row each, and their integrals."""
+    """Integrands of one kind over the unit cube, one row each, and their integrals."""
 
     values: Callable[[Float[NDArray[np.float64], "cases n 3"]], Float[NDArray[np.float64], "cases n"]]
     integral: Float[NDArray[np.float64], " cases"]
 
 
 def integrands(kind: str, cases: int, rng: np.random.Generator) -> Integrands:
-    """Edges at any angle and place that cross the pixel, still or moving by up to two pixels while the shutter is open;
-    or products of sines of any phase."""
+    """Edges at random angles and places that cross the pixel, static or moving by up to two pixels while the shutter is
+    open; or products of sines of random phase."""
     if kind == "smooth":
         phase = rng.random((cases, 1, 3))
         waves = lambda points: (1.0 + 0.5 * np.sin(2.0 * np.pi * (points + phase))).prod(axis=-1)  # noqa: E731
@@ -107,14 +107,14 @@ def integrands(kind: str, cases: int, rng: np.random.Generator) -> Integrands:
 
 
 def squared_error(points: Points, found: Integrands, shifts: Float[NDArray[np.float64], "cases 3"]) -> float:
-    """Mean squared error over the integrands, each with the points shifted by an amount of its own."""
+    """Mean squared error over the integrands, each with its own shift of the points."""
     moved = points[None] + shifts[:, None]
     moved -= np.floor(moved)
     return float(((found.values(moved).mean(axis=1) - found.integral) ** 2).mean())
 
 
 def measure(options: PointSetOptions, task: Task) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Tables of evenness, and of errors by integrand; a row a set and level."""
+    """Tables of evenness, and of errors by integrand, with a row for each set and level."""
     from renderer.sampling.point_sets import point_set
 
     even, errors = [], []
@@ -133,7 +133,7 @@ def measure(options: PointSetOptions, task: Task) -> tuple[pd.DataFrame, pd.Data
 
 
 def mean_errors(errors: pd.DataFrame, points: int) -> pd.DataFrame:
-    """Mean squared errors at one number of points, a column an integrand."""
+    """Mean squared errors at one number of points, with a column for each integrand."""
     some = errors.query("points == @points")
     return some.pivot(index="set", columns="integrand", values="mse").loc[list(SETS)].reset_index()
 

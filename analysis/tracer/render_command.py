@@ -16,7 +16,7 @@ from analysis.tracer.render_options import RenderOptions
 
 
 def main() -> None:
-    """Parses, renders, prints what was written where."""
+    """Parses, renders, prints the names of the files."""
     options = parse(RenderOptions, __doc__ or "")
     from analysis.command.console import show
     from analysis.tracer.run import explained, opened, render

@@ -26,68 +26,68 @@ class RenderOptions:
     """A still, or a sequence of stills at a constant rate, of a scene or a model."""
 
     scene: Annotated[str, tyro.conf.Positional]
-    """Built-in scene, by name or number; a scene file; or a model (OBJ, PLY, STL, GLB, glTF), which a camera in front
-    sees as a whole."""
+    """Built-in scene, by name or number; a scene file; or a model (OBJ, PLY, STL, GLB, glTF), by default seen as a
+    whole from the front."""
     size: str = ""
     """Width and height, pixels, such as 800x600; by default those of the scene's film."""
     width_px: int = 0
-    """Width, pixels, instead; the field of view spans the shorter side."""
+    """Width, pixels, in place of size; the field of view spans the shorter side."""
     height_px: int = 0
-    """Height, pixels, instead."""
+    """Height, pixels, in place of size."""
     crop: tuple[int, int, int, int] | None = None
-    """Part of the picture that is made: left column, upper row, width and height, pixels."""
+    """Part of the picture to render: left column, upper row, width and height, pixels."""
     camera: tuple[float, float, float, float, float, float] | None = None
-    """A camera at rest instead of the scene's: where it stands and what it looks at, in the scene's coordinates."""
+    """A static camera in place of the scene's: its position and its target, in the scene's coordinates."""
     fov_deg: float | None = None
-    """Field of view along the shorter side, degrees; by default the scene's."""
+    """Field of view along the shorter side, degrees; by default that of the scene."""
     environment: Path | None = None
-    """Picture (.hdr, .exr, …) of all directions that lights the scene, in place of sky, sun and ambient light."""
+    """Environment map (.hdr, .exr, …) that lights the scene, in place of sky, sun and ambient light."""
     up: Literal["y", "z"] | None = None
     """Upward axis of the world, for the camera and the environment; by default y for OBJ and glTF, z for PLY and STL,
-    and in a scene that of its camera."""
+    and that of the camera for a scene."""
     integrator: Literal["whitted", "path"] = "whitted"
-    """What light is followed: direct light, mirrors and glass; or along paths between all surfaces, which takes many
-    samples and draws more materials of files."""
+    """Transport of light: direct light, mirrors and glass; or paths between all surfaces, which needs many samples and
+    supports more materials of files."""
     bounces: int | None = None
     """Greatest number of bounces, -1 for no limit; by default that of the scene."""
     smooth_deg: float = 0.0
-    """Edges of meshes without normals that turn by at most this are smooth, degrees; 0 keeps faces flat."""
+    """Greatest angle at which an edge of a mesh without normals is smooth, degrees; 0 keeps faces flat."""
     samples_per_axis: int = 2
     """Samples along a pixel's side, all at the frame's time."""
     samples: int = 0
-    """Instead of that regular grid, this many samples of a point set per pixel, spread over the time the shutter is
-    open as well."""
+    """Samples of a point set per pixel, in place of the regular grid; they also spread over the time the shutter is
+    open."""
     point_set: str = "hammersley"
-    """The point set; stratified takes cubes of samples only."""
+    """The point set; stratified needs a cube as the number of samples."""
     rounds: int = 0
-    """Take the samples of a still in this many rounds of that point set: an interrupted still goes on where it was, and
-    its error is known. 0 for 16 where an error or layers are asked for, else none."""
+    """Take the samples of a still in this many rounds of the point set, so that an interrupted still continues where it
+    was and its error is known. 0 takes 16 if an error target or layers are asked for, else none."""
     error_target: float = 0.0
-    """Give a tile no more rounds once its root mean square error, in encoded colour from 0 to 1, is at most this; 0
-    gives every tile all samples."""
+    """Root mean square error, in encoded colour from 0 to 1, at which a tile gets no further rounds; 0 gives every tile
+    all samples."""
     layers: bool = False
-    """Write depth, normal, albedo, instance, motion, sample count and variance as layers of the EXR files as well."""
+    """Also write depth, normal, albedo, instance, motion, sample count and variance as layers of the EXR files."""
     shift: Literal["white", "blue"] = "white"
-    """How far each pixel shifts it: independently of its neighbours, or by spatiotemporal blue noise."""
+    """Shift of the point set from pixel to pixel: independent, or by spatiotemporal blue noise."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
-    """Reconstruction filter over the picture, of point sets."""
+    """Reconstruction filter over the picture, for point sets."""
     time_filter: Literal["box", "triangle"] = "box"
-    """Reconstruction filter over the time the shutter is open, of point sets."""
+    """Reconstruction filter over the time the shutter is open, for point sets."""
     seed: Seed = 0
     time_s: float = 0.0
     """Animation time of the first frame, seconds."""
     frames: int = 1
-    """How many frames."""
+    """Number of frames."""
     fps: float = 30.0
     """Frames per second of animation time."""
     format: Literal["png", "exr", "ppm", "mp4"] = "png"
-    """Of the stills (EXR is linear, the others are sRGB); mp4 writes PNG stills and joins them into film.mp4."""
+    """Format of the stills (EXR is linear, the others are sRGB); mp4 writes PNG stills and joins them into film.mp4."""
     phase: float = 0.0
     """Phase of the animation, a fraction of a wheel's turn."""
     device: Device = "cpu"
     threads: Threads = 0
     explain: bool = False
-    """Print what the scene requires of the kernels, and why, instead of rendering."""
+    """Print the kernel features that the scene requires, with reasons, instead of rendering."""
     out: Path = Path("out/render")
     """Folder for the results; frames that an interrupted run of the same job left there are kept."""
 
@@ -118,7 +118,7 @@ class RenderOptions:
         require(not self.size or len(self.sides_px) == 2, "size", "such as 800x600", self.size)
         limits.within(self, sides_px=limits.SIDES_PX)
         two = self.size and (self.width_px or self.height_px)
-        require(not two, "size", "none beside width_px and height_px", self.size)
+        require(not two, "size", "none together with width_px and height_px", self.size)
 
         require(not self.layers or self.format == "exr", "layers", "the format exr", self.format)
         if self.in_rounds:
@@ -129,18 +129,18 @@ class RenderOptions:
 
     @property
     def in_rounds(self) -> int:
-        """Rounds of a still; 0 where its samples are taken at once."""
+        """Rounds of a still; 0 if its samples are taken at once."""
         return self.rounds or (16 if self.error_target or self.layers else 0)
 
     @property
     def sides_px(self) -> tuple[int, ...]:
-        """Width and height of ``size``; empty where it is none."""
+        """Width and height of ``size``; empty if it is not valid."""
         parts = self.size.lower().split("x")
         return tuple(int(part) for part in parts) if all(part.isdecimal() for part in parts) else ()
 
     @property
     def look(self) -> Look:
-        """How the scene is looked at and lit."""
+        """Camera and lighting of the scene."""
         from scenes.catalog import Look
 
         return Look(
@@ -151,7 +151,7 @@ class RenderOptions:
         """Width and height of the picture, given those of the scene's film.
 
         Raises:
-            ConfigError: the crop does not lie in it.
+            ConfigError: the crop does not lie within the picture.
         """
         width, height = self.sides_px or (self.width_px or film_px[0], self.height_px or film_px[1])
         if self.crop is not None:
@@ -172,5 +172,5 @@ class RenderOptions:
 
     @property
     def job(self) -> dict[str, Any]:
-        """What decides the content of the stills, beside the content of the scene and the code."""
+        """Options that decide the content of the stills, beside the scene and the code."""
         return {name: value for name, value in dataclasses.asdict(self).items() if name not in _NOT_OF_THE_STILLS}

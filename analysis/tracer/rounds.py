@@ -1,4 +1,4 @@
-"""Stills that are made in rounds: kept after each, so that an interrupted still goes on; with layers beside them."""
+"""Stills rendered in rounds, which are stored after each so that an interrupted still continues; and their layers."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _FIELDS = ("total", "coded", "squares", "count")
 
 
 class StillRounds:
-    """Makes the stills of a sequence in rounds.
+    """Renders the stills of a sequence in rounds.
 
     Attributes:
-        frames: counts nothing, for the bar shows samples.
+        frames: a task that shows nothing, because the bar counts samples.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class StillRounds:
         self._key = content_hash((options.job, renderer.scene, code))
 
     def picture(self, number: int, time_s: float) -> Tensor:
-        """The still of a number, from where an interrupted run of the same job left it."""
+        """The still of the given number, continued from an interrupted run of the same job."""
         name = f"frame{number:05d}.rounds"
         store = Store(self.options.out, content_hash((self._key, number)))
         store.require_own([name])
@@ -76,7 +76,7 @@ class StillRounds:
         return self._made.image
 
     def write(self, path: Path, image: Tensor) -> int:
-        """Writes the still that was made last, with its layers if they are asked for."""
+        """Writes the still that was made last, with its layers if they were requested."""
         if not self.options.layers or self._made is None:
             return write_image(path, image)
         write_layers(path, {"": image.numpy(), **self._layers(self._made)})

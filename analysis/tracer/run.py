@@ -1,4 +1,4 @@
-"""Runs the commands about the ray tracer, each from its options to files and a summary."""
+"""Runs the commands of the ray tracer, from their options to files and a summary."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
-    """The scene to render, and what of its file could not be carried over.
+    """The scene to render, and the losses from its file.
 
     Raises:
         InputError: there is no such scene, or its file cannot be read.
@@ -41,7 +41,7 @@ def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
 
 
 def losses_of(scene: str) -> tuple[str, ...]:
-    """What of a scene's file could not be carried over.
+    """The losses from a scene's file.
 
     Raises:
         InputError: there is no such scene, or its file cannot be read.
@@ -53,7 +53,7 @@ def losses_of(scene: str) -> tuple[str, ...]:
 
 
 def explained(scene: Scene) -> list[str]:
-    """What a scene requires of the kernels, and why."""
+    """The kernel features that a scene requires, with reasons."""
     from renderer.tables.requirements import explanation
 
     with bad_input():
@@ -61,7 +61,7 @@ def explained(scene: Scene) -> list[str]:
 
 
 def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
-    """Renders what is missing of a sequence, and its film if one is asked for; returns what ``summary.json`` holds.
+    """Renders missing frames of a sequence, and its film if requested; returns the content of ``summary.json``.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -107,10 +107,10 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
 
 
 def job(options: JobOptions) -> tuple[Work, dict[str, Any]]:
-    """Renders what is missing of a job; returns the job and what ``summary.json`` holds.
+    """Renders missing frames of a job; returns the job and the content of ``summary.json``.
 
     Raises:
-        InputError: something in the job or its scene cannot be used, or the results cannot be written.
+        InputError: the job or its scene is invalid, or the results cannot be written.
     """
     from analysis.tracer.jobs import prepare, run_job
     from renderer.film.files import FilmError
@@ -124,7 +124,7 @@ def job(options: JobOptions) -> tuple[Work, dict[str, Any]]:
 
 
 def tiles(options: TileOptions) -> dict[str, Any]:
-    """Renders a picture, or measures how much faster more workers are; returns what ``summary.json`` holds.
+    """Renders a picture, or measures the speed-up with more workers; returns the content of ``summary.json``.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -150,7 +150,7 @@ def tiles(options: TileOptions) -> dict[str, Any]:
 
 
 def gallery(options: GalleryOptions) -> dict[str, Any]:
-    """Renders all effects that are asked for, and the sheet; returns what ``summary.json`` holds.
+    """Renders all requested effects, and the sheet; returns the content of ``summary.json``.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -175,7 +175,7 @@ def gallery(options: GalleryOptions) -> dict[str, Any]:
 
 
 def accelerators(options: AcceleratorOptions) -> dict[str, Any]:
-    """Measures, or renders the images that are asked for; returns what ``summary.json`` holds.
+    """Measures, or renders the requested images; returns the content of ``summary.json``.
 
     Raises:
         InputError: the results cannot be written.

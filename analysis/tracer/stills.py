@@ -1,7 +1,7 @@
 """Stills of a sequence on disk: finished stills of an interrupted rendering are kept, and foreign files are left alone.
 
-Stills that the same command made of something else, such as another scene or with other settings, are replaced one by
-one and removed when the new ones are there.
+Stills that the same command made of another scene or with other settings are replaced one by one. Those that remain
+are removed once the new ones are complete.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ def render_stills(
     task: Task | None = None,
     write: Callable[[Path, Tensor], int] = write_image,
 ) -> tuple[int, int]:
-    """Renders the stills that are not on disk as they were made under this key.
+    """Renders the stills that are not intact on disk under this key.
 
     Args:
-        picture: linear radiance ``(h, w, 3)`` of the still of a number, at a time.
+        picture: function of a still's number and time that gives its linear radiance ``(h, w, 3)``.
         times_s: animation time of each still by its number, seconds.
-        folder, ending: where stills go, and their format.
-        key: hash of everything that decides a still but its number and time.
-        task: of which a step is a still.
-        write: writes a picture to a file, and says how many values were not finite.
+        folder, ending: folder of the stills, and their format.
+        key: hash of everything that decides a still except its number and time.
+        task: progress, one step a still.
+        write: writes a picture to a file, and returns the number of its non-finite values.
 
     Returns:
-        How many were rendered now, and how many values of all of them, whenever rendered, were not finite.
+        The number of stills rendered now, and the number of non-finite values in all stills, whenever rendered.
 
     Raises:
         ValueError: a file of another origin lies where a still belongs.

@@ -1,4 +1,4 @@
-"""How much faster more workers render a picture, what limits them, and a prediction for twenty."""
+"""Speed-up of rendering a picture with more workers, its limits, and a prediction for twenty workers."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ PREDICTED_WORKERS = 20
 
 @dataclass(frozen=True)
 class FarmModel:
-    """Seconds that a picture takes on a number of workers.
+    """Model of the time of a picture on a number of workers.
 
-    Workers take chunks in order, each as soon as it is free (list scheduling): a chunk occupies its worker for what it
-    takes to render, times ``contention`` where others render beside it, and ``overhead_s`` of scheduling and transfer.
-    The scheduler hands out one chunk after the other, ``dispatch_s`` apart; the picture is put together in the end.
-    Workers beyond the number of cores share them.
+    Workers take chunks in order, each as soon as it is free (list scheduling). A chunk occupies its worker for its
+    rendering time, times ``contention`` if others render at the same time, plus ``overhead_s`` of scheduling and
+    transfer. The scheduler hands out the chunks one by one, ``dispatch_s`` apart; the picture is assembled at the end.
+    Workers beyond the number of cores share the cores.
 
     Attributes:
-        chunk_s: what each chunk takes alone, seconds.
-        overhead_s: per chunk, on the worker.
-        dispatch_s: per chunk, on the scheduler.
-        assembly_s: once.
-        contention: how much longer a chunk takes beside others, at least 1.
-        cores: of the machine or machines.
+        chunk_s: time of each chunk alone, seconds.
+        overhead_s: overhead of a chunk on its worker, seconds.
+        dispatch_s: time of a chunk on the scheduler, seconds.
+        assembly_s: time of the assembly, seconds.
+        contention: factor on the time of a chunk while others render, at least 1.
+        cores: number of cores of the machine or machines.
     """
 
     chunk_s: NDArray[np.float64]
@@ -51,7 +51,7 @@ class FarmModel:
     cores: int
 
     def seconds(self, workers: int, cores: int | None = None) -> float:
-        """What the picture takes; ``cores`` as they are, unless others are given."""
+        """Seconds of the picture, on ``cores`` cores if given, else on those of the model."""
         sharing = max(1.0, workers / (cores or self.cores)) * (self.contention if workers > 1 else 1.0)
         free = [0.0] * workers
         heapq.heapify(free)
@@ -61,7 +61,7 @@ class FarmModel:
         return max(free) + self.assembly_s
 
     def speedup(self, workers: int, cores: int | None = None) -> float:
-        """How many times faster than one worker."""
+        """Speed-up over one worker."""
         return self.seconds(1) / self.seconds(workers, cores)
 
 
@@ -73,7 +73,7 @@ def fitted(
     Args:
         chunk_s: seconds of each chunk on a worker that renders alone.
         wall_s: seconds of the whole picture, by number of workers; that of one worker gives the overhead per chunk.
-        beside_s: seconds of each chunk on workers as many as there are cores, at most.
+        beside_s: seconds of each chunk on several workers, at most as many as there are cores.
         dispatch_s: seconds from one empty chunk to the next, all workers idle.
         assembly_s: seconds to put the picture together.
     """
@@ -89,7 +89,7 @@ def _nothing(shape: tuple[int, ...]) -> NDArray[np.float32]:
 
 
 def _dispatch_s(client: Client, chunks: Sequence[range], workers: Sequence[str]) -> float:
-    """Seconds per chunk of handing out work that takes no time, and of fetching as many bytes back."""
+    """Seconds per chunk to hand out work that takes no time, and to fetch as many bytes back."""
     from distributed import as_completed
 
     start = time.perf_counter()
@@ -107,23 +107,23 @@ def study(
     repetitions: int,
     task: Task,
 ) -> dict[str, Any]:
-    """Times a picture on subsets of a cluster's workers, in turns, fits the model and lets it predict.
+    """Times a picture on subsets of a cluster's workers, in turns, fits the model and makes its prediction.
 
     Args:
-        client: of a local cluster with as many workers as the greatest count.
-        picture: what to render.
+        client: client of a local cluster with as many workers as the greatest count.
+        picture: the picture.
         chunks: runs of tiles.
-        counts: numbers of workers; 1 is always among them.
+        counts: numbers of workers; 1 is always added.
         repetitions: turns of each.
-        task: of which a step is a turn.
+        task: progress, one step a turn.
 
     Returns:
-        Rows for tables, the parameters of the model, and whether all pictures were the same bits.
+        Rows for tables, the parameters of the model, and whether all pictures have the same bits.
     """
     addresses = sorted(client.scheduler_info(n_workers=-1)["workers"])
     wanted = sorted({1, *counts})
     build_s = []
-    for address in addresses:  # every worker builds the scene once, on its own
+    for address in addresses:  # every worker builds the scene once
         start = time.perf_counter()
         for _ in rendered(client, picture, chunks[:1], [address]):
             pass
@@ -187,7 +187,7 @@ def _row(count: int, seconds: Sequence[float], one_s: float, model: FarmModel) -
 
 
 def described(found: Mapping[str, Any]) -> str:
-    """What a study found, in one line."""
+    """The result of a study, in one line."""
     predicted, reported = found["predicted"], found["predicted"]["reported"]
     beside = f" (report: {reported:.1f})" if reported else ""
     return (

@@ -1,4 +1,5 @@
-"""A picture in tiles over processes or machines: the same bits in whatever order and wherever tiles are rendered."""
+"""A picture in tiles over processes or machines, with the same bits wherever and in whatever order tiles are
+rendered."""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ _RETRIES = 5
 
 @dataclass(frozen=True)
 class Picture:
-    """What to render, in full: small enough to send with every chunk."""
+    """Complete description of a picture, small enough to send with every chunk."""
 
     scene: str
     size_px: tuple[int, int]
@@ -47,12 +48,12 @@ class Picture:
 
     @property
     def name(self) -> str:
-        """Of its files: that of the scene, without folder and ending where it is one of a file."""
+        """Name for its files: that of the scene, without folder and ending if the scene is a file."""
         return Path(self.scene).stem
 
     @property
     def content(self) -> dict[str, Any]:
-        """What decides the bits: all but the threads."""
+        """Everything that decides the bits: all fields except the threads."""
         return {name: value for name, value in dataclasses.asdict(self).items() if name != "threads"}
 
 
@@ -71,11 +72,11 @@ def source_of(scene: str, point_set: str) -> str:
 
 
 def picture_of(options: TileOptions, threads: int) -> Picture:
-    """The picture asked for.
+    """The requested picture.
 
     Raises:
-        ValueError: there is no such scene, the point set cannot have so many points, or memory does not hold so many
-            pixels.
+        ValueError: there is no such scene, the point set cannot have this number of points, or the pixels do not fit
+            into memory.
     """
     from renderer.sampling.point_sets import point_set
     from renderer.tables.checks import check_frame_size
@@ -92,7 +93,7 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
 
 
 def chunks_of(picture: Picture, chunk_tiles: int) -> list[range]:
-    """The tiles of a picture in runs."""
+    """Runs of consecutive tiles of a picture."""
     from renderer.frames import tile_count
 
     count = tile_count(*picture.size_px)
@@ -101,7 +102,7 @@ def chunks_of(picture: Picture, chunk_tiles: int) -> list[range]:
 
 @lru_cache(maxsize=1)
 def _renderer(scene: str, seed: int, threads: int) -> Renderer:
-    """A process builds a scene once, however many chunks of it it is handed."""
+    """A renderer of a scene, which a process builds once for all of its chunks."""
     from renderer.trace import Renderer
     from scenes import catalog
 
@@ -109,10 +110,10 @@ def _renderer(scene: str, seed: int, threads: int) -> Renderer:
 
 
 def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:
-    """Pixels ``(tiles, 256, 3)`` of some tiles, the rays they took, and seconds without building the scene.
+    """Pixels ``(tiles, 256, 3)`` of some tiles, counts of their rays, and seconds without building the scene.
 
     Raises:
-        ValueError: this process runs another source, or knows another scene, than the one that asked.
+        ValueError: this process has another source or another scene than the process that asked.
     """
     from renderer.frames import render_tiles
     from renderer.sampling.plan import SamplePlan
@@ -129,16 +130,16 @@ def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.flo
 def rendered(
     client: Client, picture: Picture, chunks: Sequence[range], workers: Sequence[str] | None = None
 ) -> Iterator[tuple[int, tuple[NDArray[np.float32], dict[str, int], float]]]:
-    """Renders chunks on a cluster, in any order; those of a worker that dies are done again by others.
+    """Renders chunks on a cluster, in any order; if a worker dies, others render its chunks again.
 
     Args:
-        client: of the cluster.
-        picture: what to render.
+        client: client of the cluster.
+        picture: the picture.
         chunks: runs of tiles.
-        workers: addresses of the only workers to use.
+        workers: addresses of the workers to use; None for all.
 
     Yields:
-        The number of a chunk and what :func:`render_chunk` returned.
+        The number of a chunk and the result of :func:`render_chunk`.
     """
     from distributed import as_completed
 
@@ -165,19 +166,19 @@ def assembled(picture: Picture, chunks: Sequence[range], pixels: Sequence[NDArra
 
 
 def render_resumed(client: Client, picture: Picture, options: TileOptions, task: Task) -> tuple[Tensor, dict[str, Any]]:
-    """Renders what an interrupted run of the same picture has not left on disk, and puts the picture together.
+    """Renders the chunks that an interrupted run of the same picture has not left on disk, and assembles the picture.
 
     Args:
-        client: of the cluster.
-        picture: what to render.
-        options: of the command.
-        task: of which a step is a chunk.
+        client: client of the cluster.
+        picture: the picture.
+        options: options of the command.
+        task: progress, one step a chunk.
 
     Returns:
-        The picture, and how it came about.
+        The picture, and facts about its rendering.
 
     Raises:
-        ValueError: a file of another origin lies where a chunk belongs, or one was changed as soon as it was written.
+        ValueError: a foreign file has the name of a chunk, or a chunk was changed right after it was written.
     """
     store = Store(options.out / "chunks", content_hash((picture.content, options.chunk_tiles)))
     chunks = chunks_of(picture, options.chunk_tiles)

@@ -1,4 +1,4 @@
-"""Render a picture in tiles over processes or machines, or measure how much faster more workers are.
+"""Render a picture in tiles over processes or machines, or measure the speed-up with more workers.
 
 Examples: python scripts/tiles.py report-one --out out/tiles
           python scripts/tiles.py car.glb --samples 256 --out out/car
@@ -14,7 +14,7 @@ from analysis.tracer.options import TileOptions
 
 
 def main() -> None:
-    """Parses, renders or measures, prints what it took."""
+    """Parses, renders or measures, prints the time."""
     options = parse(TileOptions, __doc__ or "")
     require_extra("study")
     import pandas as pd

@@ -63,7 +63,7 @@ def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytes
         ),
         (("--inputs", "chase", "chase"), ("inputs: expected at least one, none twice",)),
         (("--jod-s", "3"), ("jod_s: expected between 0 and 2",)),
-        (("--ledger", "wall"), ("ledger: expected one that gives the same result again",)),
+        (("--ledger", "wall"), ("ledger: expected one with repeatable results",)),
     ],
 )
 def test_bad_options_are_refused(

@@ -94,7 +94,7 @@ def test_another_instance_at_the_same_depth_is_not_the_same_surface() -> None:
     assert columns(places(other, hits, two).uncovered) == [*range(5)]
 
 
-def test_a_renderer_that_tells_no_hits_is_refused() -> None:
+def test_a_renderer_that_returns_no_hits_is_refused() -> None:
     screen = Screen((Layer(grey),))
-    with pytest.raises(ValueError, match="tells them"):
+    with pytest.raises(ValueError, match="returns them"):
         first_hits(lambda batch: replace(screen.trace(batch), hits=None), SIDE, 0.0)
