@@ -1,4 +1,4 @@
-"""Measure what each part of the policy tsar is worth, where its error lies, and how far a perfect picture is."""
+"""Measure the worth of each part of the policy tsar, the terms of its error, and its distance to a perfect picture."""
 
 import sys
 from pathlib import Path

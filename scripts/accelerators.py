@@ -1,4 +1,4 @@
-"""Compare brute force, kd-tree and tree of boxes by what a ray takes, or render the ray-tracer report's two images."""
+"""Compare brute force, kd-tree and tree of boxes by the cost of a ray, or render the ray-tracer report's two images."""
 
 import sys
 from pathlib import Path

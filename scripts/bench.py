@@ -1,4 +1,4 @@
-"""Measure how fast the simulator is beside Embree, Mitsuba 3 and PyWavelets, and how little its machinery costs."""
+"""Measure the speed of the simulator beside Embree, Mitsuba 3 and PyWavelets, and the overhead of its stages."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Renders converted scenes with Mitsuba 3 and LuxCore and compares their pictures."""
+"""Render converted scenes with Mitsuba 3 and LuxCore and compare their pictures."""
 
 import sys
 from pathlib import Path

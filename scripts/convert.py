@@ -1,4 +1,4 @@
-"""Converts a scene file of one renderer to that of another, and reports what could not be carried over."""
+"""Convert a scene file of one renderer to that of another, and report what could not be carried over."""
 
 import sys
 from pathlib import Path

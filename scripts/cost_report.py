@@ -1,4 +1,4 @@
-"""Report what an adaptive cycle and a framed image cost, by the model of table 7.1 and on this machine."""
+"""Report the cost of an adaptive cycle and of a framed image: by the model of table 7.1, and on this machine."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Compare a policy, by default the best of the project's own, on several inputs, repeated over seeds or phases."""
+"""Compare a policy, by default tsar, on several inputs, repeated over seeds or phases."""
 
 import sys
 from pathlib import Path

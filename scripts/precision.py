@@ -1,4 +1,4 @@
-"""Measure what fewer bits cost: everything that a policy keeps, and textures, in formats down to 8 bits."""
+"""Measure the cost of fewer bits: everything that a policy keeps, and textures, in formats down to 8 bits."""
 
 import sys
 from pathlib import Path

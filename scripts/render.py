@@ -1,4 +1,4 @@
-"""Render a frame or a sequence of a scene."""
+"""Render a frame or a sequence of a scene or a model."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Compare a policy, by default the best of the project's own, with its rivals at equal cost."""
+"""Compare a policy, by default tsar, with its rivals at equal cost."""
 
 import sys
 from pathlib import Path

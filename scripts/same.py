@@ -1,4 +1,4 @@
-"""Tell whether two folders of results hold the same: every number, table and picture, but no measured seconds."""
+"""Tell whether two folders of results are the same: every number, table and picture, except measured seconds."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Vary slopes, offsets and bias of the error estimate (figs 7.23–7.25): which are best, and how flat the optimum is."""
+"""Vary slopes, offsets and bias of the error estimate (figs 7.23–7.25): best values, and flatness of the optimum."""
 
 import sys
 from pathlib import Path

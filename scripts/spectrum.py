@@ -1,4 +1,4 @@
-"""Measure what the error estimate rests on."""
+"""Measure the assumptions of the error estimate."""
 
 import sys
 from pathlib import Path

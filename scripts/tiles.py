@@ -1,4 +1,4 @@
-"""Render a picture in tiles over processes or machines, or measure how much faster more workers are."""
+"""Render a picture in tiles over processes or machines, or measure the speed-up with more workers."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Measure the trade of speed for accuracy: what every knob costs and what it does to the error."""
+"""Measure the trade of speed for accuracy: the cost of every knob and its effect on the error."""
 
 import sys
 from pathlib import Path

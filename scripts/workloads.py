@@ -1,4 +1,4 @@
-"""Draw the map of workloads: which policy to use where, by what a sample costs, how much moves, and the resolution."""
+"""Draw the map of workloads: the best policy by the price of a sample, the amount of motion, and the resolution."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Measure what each part of the policy tsar is worth, where its error lies, and how far it is from a perfect picture.
+"""Measure the worth of each part of the policy tsar, the terms of its error, and its distance to a perfect picture.
 
 Each run leaves one part out, or changes one number, on the five inputs. The error of the whole policy is divided into
 latency, blur, disocclusion, shadows and aliasing, and compared with that of a perfect picture of the same latency.

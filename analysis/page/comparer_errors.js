@@ -1,10 +1,10 @@
-// Errors of pictures, pixel by pixel. All take display-encoded codes, 4 bytes a pixel, and give a number a pixel.
+// Errors of pictures, pixel by pixel. All take display-encoded codes, 4 bytes a pixel, and return a number a pixel.
 "use strict";
 const Errors = (() => {
   const CODES = Float32Array.from({ length: 256 }, (_, i) => i / 255);
   const LINEAR = CODES.map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
 
-  // Mean difference of the channels, from -1 to 1: shown less reference.
+  // Mean difference of the channels, from -1 to 1: shown minus reference.
   function signed(shown, truth) {
     const found = new Float32Array(shown.length / 4);
     for (let i = 0, j = 0; i < found.length; i++, j += 4)
@@ -46,7 +46,7 @@ const Errors = (() => {
     return Float64Array.from({ length: 2 * radius + 1 }, (_, i) => of(i - radius));
   }
 
-  // Convolves rows and columns; pixels beyond the border are those at the border.
+  // Convolves rows and columns; pixels beyond the border repeat those at the border.
   function convolved(plane, w, h, across, down) {
     const turned = passed(plane, w, h, across);
     return passed(turned, h, w, down);
@@ -96,7 +96,7 @@ const Errors = (() => {
   const apart = (p, q) => Math.abs(p[0] - q[0]) + Math.hypot(p[1] - q[1], p[2] - q[2]);
   const GREATEST = apart(lab(0, 1, 0), lab(0, 0, 1)) ** 0.7;
 
-  // Sums of Gaussians that the eye blurs luminance, red-green and blue-yellow by: weight and width.
+  // Weights and widths of the Gaussians whose sums model the eye's blur of luminance, red-green and blue-yellow.
   const EYE = [[[1, 0.0047]], [[1, 0.0053]], [[34.1, 0.04], [13.5, 0.025]]];
   const RADIUS = Math.ceil(3 * Math.sqrt(0.04 / (2 * Math.PI ** 2)) * DEGREE_PX);
 
@@ -144,7 +144,7 @@ const Errors = (() => {
     return lab(...rgb);
   }
 
-  // From 0, no visible difference, to 1.
+  // FLIP error, from 0 (no visible difference) to 1.
   function flip(shown, truth, w, h) {
     const [a, b] = [seen(shown, w, h), seen(truth, w, h)];
     const found = new Float32Array(w * h);

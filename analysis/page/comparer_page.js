@@ -1,4 +1,4 @@
-// The comparer of a page: one moment in time, and everything that follows it. All data lie in the page.
+// The comparer of a page: one moment in time, and everything that depends on it. All data are in the page.
 "use strict";
 (() => {
   const root = document.getElementById("comparer");
@@ -47,7 +47,7 @@
     return reference ? [reference, reference] : shown;
   }
 
-  // Waits until both layers are ready, so that they change at once; what was asked for later wins.
+  // Waits until both layers are ready, so that they change together; a later request wins.
   async function show() {
     const mine = ++turn;
     const { step, mode, stops } = now;
@@ -183,7 +183,7 @@
     return show();
   }
 
-  // Real time times the factor; steps that are not ready in time are left out, so the factor holds.
+  // Plays in real time times the factor; steps that are not ready in time are skipped, so that the speed holds.
   function toggle() {
     if (moving) return stop();
     if (now.step >= last) go(0);
@@ -260,7 +260,7 @@
     redraw();
   }
 
-  // To the step nearest to the pointer, while its button is down.
+  // Moves to the step nearest to the pointer while its button is down.
   function seek(event) {
     if (!(event.buttons & 1)) return;
     const plot = event.currentTarget;

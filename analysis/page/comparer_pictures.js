@@ -19,7 +19,7 @@ const Pictures = (given) => {
     };
   }
 
-  // A decoded picture by its number, or null where its data are broken.
+  // A decoded picture by its number, or null if its data are damaged.
   const image = kept(240, async (number) => {
     const one = new Image();
     one.src = document.getElementById(`picture-${number}`).textContent;
@@ -84,7 +84,7 @@ const Pictures = (given) => {
     });
   }
 
-  // Light times two to the stops, in display codes.
+  // Multiplies linear light by two to the power of the stops; input and output are display codes.
   function exposed(data, stops) {
     const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
     const code = (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
@@ -103,7 +103,7 @@ const Pictures = (given) => {
     return mode === "signed" ? [-most, most] : mode === "squared" ? [most / 1e4, most] : [0, most];
   }
 
-  // Share of the way between the ends, where the error lies; squared errors are on a logarithm.
+  // Position of an error between the ends of the scale, from 0 to 1; squared errors have a logarithmic scale.
   function place(mode, value, [low, high]) {
     const share = mode === "squared" ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : (value - low) / (high - low);
     return Math.min(1, Math.max(0, share));
@@ -123,7 +123,7 @@ const Pictures = (given) => {
 
   const numberOf = (step, label) => given.steps[step].pictures[labels.indexOf(label)] ?? null;
 
-  // What is drawn for a panel at a step; null where there is nothing.
+  // The image of a panel at a step; null if there is none.
   async function layer(step, label, mode, stops) {
     const [panel, number] = [panels.get(label), numberOf(step, label)];
     if (number === null) return null;
@@ -144,7 +144,7 @@ const Pictures = (given) => {
     });
   }
 
-  // Colour scale of what a panel shows: palette, ends, unit; null for pictures.
+  // Colour scale of a panel: palette, ends, unit; null for pictures.
   function scaleOf(label, mode, stops) {
     const panel = panels.get(label);
     if (panel.scale) {
@@ -152,7 +152,7 @@ const Pictures = (given) => {
       return { palette, ends: shown, unit, meaning, special };
     }
     if (mode === "picture" || !panel.truth) return null;
-    const unit = { signed: "shown less reference", squared: "squared error", flip: "FLIP" }[mode];
+    const unit = { signed: "shown minus reference", squared: "squared error", flip: "FLIP" }[mode];
     return { palette: given.errors[mode], ends: range(mode, stops), unit, meaning: "" };
   }
 

@@ -1,4 +1,4 @@
-// The stage: two layers under a wipe or side by side, zoomed and moved in step, in native pixels.
+// The stage: two layers under a wipe or side by side, zoomed and moved together, in native pixels.
 "use strict";
 const Stage = (canvas, handle, onMove) => {
   const context = canvas.getContext("2d");
@@ -11,7 +11,7 @@ const Stage = (canvas, handle, onMove) => {
   const ratio = () => window.devicePixelRatio || 1;
   const panes = () => (view.beside ? 2 : 1);
 
-  // Device pixels for a pixel of the picture where it fits: a whole number where that is possible.
+  // Device pixels for a pixel of the fitted picture: an integer if possible.
   function fitting() {
     const scale = Math.min(canvas.width / panes() / size.width, canvas.height / size.height);
     return scale >= 1 ? Math.floor(scale) : scale;
@@ -48,7 +48,7 @@ const Stage = (canvas, handle, onMove) => {
     context.restore();
   }
 
-  // Where the wipe stands, device pixels.
+  // Position of the wipe, device pixels.
   function wipeX() {
     const [x, width] = [corner()[0], size.width * scale()];
     const [from, to] = [Math.max(0, x), Math.min(canvas.width, x + width)];
@@ -77,7 +77,7 @@ const Stage = (canvas, handle, onMove) => {
     draw();
   }
 
-  // Pixel of the picture below a pointer, fractions included; null where there is none.
+  // Position in the picture under a pointer, in fractional pixels; null if there is none.
   function pixel(event) {
     const box = canvas.getBoundingClientRect();
     let x = (event.clientX - box.left) * (canvas.width / box.width);
@@ -87,7 +87,7 @@ const Stage = (canvas, handle, onMove) => {
     return at[0] >= 0 && at[1] >= 0 && at[0] < size.width && at[1] < size.height ? at : null;
   }
 
-  // Zooms to so many device pixels a pixel, about a pixel that stays where it is.
+  // Zooms to a number of device pixels a pixel, about a pixel that does not move.
   function zoomTo(next, about) {
     const least = fitting();
     next = Math.min(64, Math.max(next, Math.min(least, 1)));
@@ -109,7 +109,7 @@ const Stage = (canvas, handle, onMove) => {
     onMove(null);
   }
 
-  // Steps of zoom: whole numbers of device pixels, or halves of the picture.
+  // Steps of zoom: integers of device pixels, or halvings of the picture.
   function step(up, about) {
     const now = scale();
     const steps = [0.125, 0.25, 0.5, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64];

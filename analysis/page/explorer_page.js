@@ -1,4 +1,4 @@
-// The explorer of a report page: points of two quantities, with their settings and pictures. All data lie in the page.
+// The explorer of a report page: points of two quantities, with their settings and pictures. All data are in the page.
 "use strict";
 (() => {
   const root = document.getElementById("explorer");
@@ -16,7 +16,7 @@
     return element;
   }
 
-  // From values to places on a logarithmic axis; JOD, which may be negative, has a linear one.
+  // Maps values to positions on a logarithmic axis; JOD, which may be negative, has a linear axis.
   function axis(values, low, high, logarithmic) {
     const scaled = logarithmic ? Math.log10 : (v) => v;
     const ends = [Math.min(...values.map(scaled)), Math.max(...values.map(scaled))];
@@ -77,7 +77,7 @@
     if (given.pictures[truth]) pictures.append(picture("reference", truth));
   }
 
-  // Points that no other beats, by rising cost; better is less, but for JOD, where it is more.
+  // Points on the Pareto front, by rising cost; lower is better, except for JOD.
   function front(points, x, y, sign) {
     const sorted = [...points].sort((a, b) => a.values[x] - b.values[x] || sign * (a.values[y] - b.values[y]));
     const kept = [];

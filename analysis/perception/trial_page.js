@@ -1,4 +1,4 @@
-// Shows one trial after the other: two pairs of the same sequence in step, one of which differs.
+// Shows the trials one by one: two synchronised pairs of the same sequence, one of which differs.
 "use strict";
 
 const message = document.getElementById("message"), pairs = document.getElementById("pairs");
@@ -26,7 +26,7 @@ async function frames(trial) {
   return numbers.map((number) => decoded.get(number));
 }
 
-// One pixel of the picture is one of the screen, whatever the browser's zoom.
+// One pixel of the picture is one pixel of the screen, whatever the zoom of the browser.
 function fit([width, height]) {
   const ratio = window.devicePixelRatio || 1;
   for (const canvas of canvases) {
@@ -35,7 +35,7 @@ function fit([width, height]) {
   }
 }
 
-// All four canvases are drawn in the same refresh. Counts refreshes, and those that came late.
+// All four canvases are drawn in the same refresh. Counts refreshes, and late ones.
 function play(sequences, rate) {
   const contexts = canvases.map((canvas) => canvas.getContext("2d"));
   const run = { begun: performance.now(), intervals: [], last: null, over: false };
@@ -89,7 +89,7 @@ async function next() {
 
 function pause(text) {
   phase = "pause";
-  say(`${text}\nSpace goes on.`);
+  say(`${text}\nPress space to continue.`);
 }
 
 async function answer(side) {
@@ -97,7 +97,7 @@ async function answer(side) {
   const facts = measured(shown);
   shown.over = true;
   const body = JSON.stringify({ trial: state.trial.number, answer: side, ...facts });
-  // the next trial is shown only once this one is on disk; a server that is gone is waited for
+  // the next trial is shown only once this one is on disk; if the server is gone, the page waits for it
   for (;;) {
     try {
       const reply = await fetch("answer", { method: "POST", body, headers });

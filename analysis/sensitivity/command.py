@@ -1,5 +1,4 @@
-"""Vary slopes, offsets and bias of the error estimate (figs 7.23–7.25): the best values, and the flatness of the
-optimum.
+"""Vary slopes, offsets and bias of the error estimate (figs 7.23–7.25): best values, and flatness of the optimum.
 
 Examples: python scripts/sensitivity.py --scale quick --out out/sensitivity
           python scripts/sensitivity.py --inputs fast-crossing --spatial-slopes -3 -2 -1 --offsets --biases

@@ -1,8 +1,8 @@
-"""Measure the trade of speed for accuracy: what every knob costs and what it does to the error.
+"""Measure the trade of speed for accuracy: the cost of every knob and its effect on the error.
 
-Each knob is turned alone, then a search turns all of them together. Out come a line a point (trade.csv), the front of
-the settings that nothing beats with its knee, a sentence a knob, figures, and a page on which every point shows its
-setting and its picture.
+Each knob is turned alone, then a search turns all of them together. The results are a line for each point (trade.csv),
+the Pareto front with its knee, a sentence for each knob, figures, and a page on which every point shows its setting and
+its picture.
 
 Examples: python scripts/trade.py --out out/trade
           python scripts/trade.py --inputs fly-by --knobs batch footprint --repetitions 1 --trials 0 --out out/two
@@ -17,7 +17,7 @@ from analysis.trade.options import TradeOptions
 
 
 def main() -> None:
-    """Runs what is missing; prints the tables."""
+    """Makes missing runs; prints the tables."""
     options = parse(TradeOptions, __doc__ or "")
     require_extra("study", "perception", *(["search"] if options.trials else []))
     from analysis.command.console import markdown, show

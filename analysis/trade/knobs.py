@@ -1,4 +1,4 @@
-"""The knobs that trade cost for error: what each may be set to, and how a setting of several becomes a case."""
+"""The knobs that trade cost for error: their values, and cases from settings of several knobs."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from tsar.policies import RIVALS
 
 OWN, THESIS = "tsar", "thesis"
 ROW = 7
-"""Of table 7.2: batch 128 at 512². All knobs stand there where they are not turned."""
+"""Row of table 7.2: batch 128 at 512². Knobs that are not turned have the values of this row."""
 BATCHES_HZ = 50.0
-"""Batches a second: as many as ``tsar`` samples at row 7 on the machine that shows 8 framed images a second."""
+"""Batches a second: the number that ``tsar`` samples at row 7 on the machine that shows 8 framed images a second."""
 
 Value = bool | int | float | str
 
 
 @dataclass(frozen=True)
 class Knob:
-    """Something that can be set.
+    """A knob, which is a parameter of a run.
 
     Attributes:
-        name: as one word, for the command line.
-        words: what it is.
-        policy: whose knob it is.
-        default: where it stands.
-        values: where else it is tried.
-        part: the option of the policy ``tsar`` that it is; empty where it is none.
-        field: the field of :class:`tsar.config.TsarConfig`, dotted; empty where it is none.
-        tracing: the name in :data:`analysis.study.cases.TRACING`; empty where it is none.
+        name: name as one word, for the command line.
+        words: description.
+        policy: policy to which it belongs.
+        default: default value.
+        values: further values to try.
+        part: name of the option of the policy ``tsar``; empty if it is none.
+        field: dotted name of the field of :class:`tsar.config.TsarConfig`; empty if it is none.
+        tracing: name in :data:`analysis.study.cases.TRACING`; empty if it is none.
     """
 
     name: str
@@ -54,7 +54,7 @@ _SWITCHES = {
     "reprojection": "estimates that move with their surfaces",
     "prediction": "poses predicted for the middle of the display",
     "jitter": "samples that move within their pixels",
-    "by_gain": "tiles chosen by what they gain",
+    "by_gain": "tiles chosen by their gain",
     "shadows": "change expected where shadows move",
     "spread": "change expected beside what changed",
     "probes": "tiles that look where nothing is expected",
@@ -63,8 +63,8 @@ _NUMBERS: dict[str, tuple[str, tuple[Value, ...]]] = {
     "share_max": ("longest cycle, as a share of the pixels that it samples", (1 / 128, 1 / 64, 1 / 16, 1 / 8)),
     "footprint": ("samples along a pixel's side that textures are filtered for", (1, 2, 8)),
     "latency_cycles": ("cycles from sampling to display", (2, 3)),
-    "memory_s": ("seconds that observed change is remembered", (0.05, 0.8)),
-    "life_max_s": ("most seconds that a sample is taken to be of use", (0.5, 16.0)),
+    "memory_s": ("time that observed change is remembered, seconds", (0.05, 0.8)),
+    "life_max_s": ("longest time that a sample counts, seconds", (0.5, 16.0)),
     "reach": ("image sides beyond which a moving surface is out of sight", (1 / 32, 1 / 2)),
 }
 
@@ -76,9 +76,9 @@ def _part(name: str, words: str, values: tuple[Value, ...]) -> Knob:
 KNOBS: dict[str, Knob] = {
     knob.name: knob
     for knob in (
-        Knob("policy", "who decides what is sampled", OWN, OWN,
+        Knob("policy", "policy that decides what is sampled", OWN, OWN,
              ("filter", "tsar-densities", THESIS, "framed", *RIVALS)),
-        Knob("batch", "framelets that are rendered 50 times a second", OWN, 128, (16, 32, 64, 256, 512),
+        Knob("batch", "framelets rendered 50 times a second", OWN, 128, (16, 32, 64, 256, 512),
              field="batch_size"),
         Knob("resolution", "share of the display's side that is rendered", OWN, 1.0, (0.5, 0.25)),
         *(_part(name, words, values) for name, (words, values) in _NUMBERS.items()),
@@ -92,12 +92,12 @@ KNOBS: dict[str, Knob] = {
         Knob("framelet", "samples along a framelet's side", THESIS, 16, (32,), field="framelet_side"),
         Knob("field", "elements along the side of the density and error fields", THESIS, 128, (64, 256),
              field="sdf_side"),
-        Knob("octaves", "how octaves of the error meet their template", THESIS, "sum", ("greatest",),
+        Knob("octaves", "comparison of the octaves of the error with their template", THESIS, "sum", ("greatest",),
              field="error.octaves"),
         Knob("extent", "part of a tile whose power is summed", THESIS, "element", ("tile",), field="error.extent"),
-        Knob("estimator", "what measures power", THESIS, "dwt", ("variance", "fft"), field="error.estimator"),
+        Knob("estimator", "measure of power", THESIS, "dwt", ("variance", "fft"), field="error.estimator"),
         Knob("cache", "framelets kept", THESIS, 2048, (4096, 8192), field="cache_size"),
-        Knob("tiles", "tiles of a tiling at most", THESIS, 512, (256, 1024), field="tiling.tile_count_max"),
+        Knob("tiles", "most tiles of a tiling", THESIS, 512, (256, 1024), field="tiling.tile_count_max"),
         Knob("age-support", "pixels over which ages are smoothed", THESIS, 9, (1, 33, 129),
              field="reconstruction.age_support_px"),
     )
@@ -109,11 +109,11 @@ Changes = tuple[tuple[str, Value], ...]
 
 @dataclass(frozen=True)
 class Setting:
-    """Where knobs are set, and who turns them.
+    """A policy, and the values of its knobs.
 
     Attributes:
-        policy: who decides what is sampled.
-        changes: knobs that do not stand at their default, by name in the order of :data:`KNOBS`.
+        policy: policy that decides what is sampled.
+        changes: values of the knobs that differ from their default, by name in the order of :data:`KNOBS`.
     """
 
     policy: str = OWN
@@ -121,7 +121,7 @@ class Setting:
 
     @property
     def words(self) -> str:
-        """For people."""
+        """The setting in words."""
         return ", ".join([self.policy, *(f"{name} {said(value)}" for name, value in self.changes)])
 
 
@@ -135,13 +135,13 @@ def said(value: Value) -> str:
 
 
 def turned(policy: str = OWN, **values: Value) -> Setting:
-    """A setting of a policy, from the values of some knobs by name, with underscores for hyphens."""
+    """A setting of a policy from the values of some knobs, by name with underscores for hyphens."""
     named = {name.replace("_", "-"): value for name, value in values.items()}
     return setting_of(policy, named)
 
 
 def setting_of(policy: str, values: Mapping[str, Value]) -> Setting:
-    """As :func:`turned`, from names as they are."""
+    """As :func:`turned`, from unchanged names."""
     changes = [(name, values[name]) for name in KNOBS if name in values and values[name] != KNOBS[name].default]
     return Setting(policy, tuple(changes))
 
@@ -154,10 +154,10 @@ def alone(knob: Knob) -> list[tuple[Value, Setting]]:
 
 
 def chosen_knobs(names: Sequence[str]) -> tuple[Knob, ...]:
-    """Knobs by their names; all of them where there are none.
+    """Knobs by their names; all knobs where no name is given.
 
     Raises:
-        ConfigError: no knob has a name, or one is there twice.
+        ConfigError: a name is unknown, or given twice.
     """
     for name in names:
         require(name in KNOBS, "knobs", f"names out of {', '.join(KNOBS)}", name)
@@ -167,12 +167,12 @@ def chosen_knobs(names: Sequence[str]) -> tuple[Knob, ...]:
 
 @dataclass(frozen=True)
 class Where:
-    """A place at which settings are measured.
+    """Conditions under which settings are measured.
 
     Attributes:
-        input, camera_path: what is rendered.
-        seed: of everything random.
-        phase: of the animation.
+        input, camera_path: the scene, and its camera motion.
+        seed: seed of all random numbers.
+        phase: phase of the animation.
     """
 
     input: str
@@ -185,13 +185,13 @@ def case_of(setting: Setting, where: Where, scale: Scale, base: Case) -> Case:
     """The case of a setting.
 
     Args:
-        setting: where knobs are set.
-        where: what is rendered.
-        scale: sizes; numbers of knobs are scaled down with it.
-        base: what all cases share; its place and configuration are replaced.
+        setting: the setting of the knobs.
+        where: scene, seed and phase.
+        scale: sizes, which also scale the values of knobs.
+        base: a case with the values that all cases share; its scene and configuration are replaced.
 
     Raises:
-        ConfigError: the values do not fit together.
+        ConfigError: the values are inconsistent.
     """
     values = dict(setting.changes)
     fields = {KNOBS[name].field: value for name, value in setting.changes if KNOBS[name].field}
@@ -214,7 +214,7 @@ def case_of(setting: Setting, where: Where, scale: Scale, base: Case) -> Case:
 
 
 def _with_field(config: Any, change: tuple[str, Value]) -> Any:
-    """A record with one of its fields, dotted where it lies in another record, changed."""
+    """A record with one of its fields changed; the name of a field of an inner record is dotted."""
     (name, _, rest), value = change[0].partition("."), change[1]
     return dataclasses.replace(config, **{name: _with_field(getattr(config, name), (rest, value)) if rest else value})
 

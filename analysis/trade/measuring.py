@@ -1,4 +1,4 @@
-"""Measures points at their places: those of single knobs in one go, those of the search as it asks for them."""
+"""Measures points: those of single knobs all at once, those of the search as it requests them."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ WRITTEN = (
 
 @dataclass
 class Measured:
-    """Runs that were made. Changes in place.
+    """The runs made so far. Changes in place.
 
     Attributes:
-        outcomes: of their cases.
-        runs: all that were asked for, in order.
-        dropped: settings that do not fit the scale, and why.
+        outcomes: outcomes of their cases.
+        runs: all requested runs, in order.
+        dropped: settings that do not fit the scale, with reasons.
     """
 
     outcomes: Outcomes
@@ -39,17 +39,17 @@ class Measured:
     dropped: dict[str, str] = field(default_factory=dict)
 
     def result(self, run: Run) -> Result | None:
-        """What is on disk of a run."""
+        """A run as read from disk; None if it failed."""
         summary = self.outcomes.summary(run.case)
         return None if summary is None else Result(run, summary, self.outcomes.times(run.case))
 
     def results(self) -> list[Result]:
-        """Of all runs that ended well."""
+        """Results of all runs that succeeded."""
         return [found for run in self.runs if (found := self.result(run)) is not None]
 
 
 def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
-    """Runs what is missing, single knobs first, with a bar for each part.
+    """Makes missing runs, those of single knobs first, with a progress bar for each part.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -85,7 +85,7 @@ Pair = tuple[float, float]
 
 
 def _by_place(measured: Measured, found: Sequence[Run], options: TradeOptions) -> dict[object, Pair]:
-    """Cost and error of the runs of one setting, by place."""
+    """Cost and error of the runs of one setting, by scene, seed and phase."""
     pairs = {}
     for run in found:
         result = measured.result(run)
@@ -98,7 +98,8 @@ def _by_place(measured: Measured, found: Sequence[Run], options: TradeOptions) -
 
 
 def _over(here: dict[object, Pair], standing: dict[object, Pair]) -> Pair | None:
-    """Geometric means over the places of the default; None unless it was measured at all of them."""
+    """Geometric means of cost and error over those of the default; None unless all runs of the default have their
+    pair."""
     if not standing or standing.keys() - here.keys():
         return None
     ratios = np.array([np.divide(here[where], standing[where]) for where in standing])

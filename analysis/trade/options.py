@@ -19,46 +19,46 @@ from tsar.config import closed_choices
 @dataclass(frozen=True)
 @closed_choices()
 class TradeOptions:
-    """What every knob costs and what it does to the error: each alone, and all of them together in a search. Runs that
-    are on disk are not repeated."""
+    """The cost of every knob and its effect on the error, alone and together with all others in a search. Runs that are
+    on disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs, other scenes by their names, or scene files."""
     camera_path: Literal["turntable", "fly-through"] = "fly-through"
     """Motion of the camera of scene files."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as of the suitability study. quick: a quarter of the thesis' side, against a reference half as often."""
+    """Sizes, as in the suitability study. quick: a quarter of the thesis' side, and half the rate of the reference."""
     seconds: float = 2.0
     """Simulated time of a run, seconds."""
     repetitions: int = 2
     """Runs of each: repetition r has seed r, and phase r / repetitions where the input has phases."""
     knobs: tuple[str, ...] = ()
-    """Names of the knobs to turn; none turns all. A wrong name lists them."""
+    """Names of the knobs to turn; all where none is named. An unknown name prints the list."""
     search_knobs: tuple[str, ...] = ()
-    """Of the knobs of tsar those that the search turns; none turns all that are named above."""
+    """Knobs of tsar that the search turns; all knobs that are named above where none is named."""
     trials: int = 48
-    """Settings that the search tries; 0 makes no search."""
+    """Number of settings that the search tries; 0 makes no search."""
     at_once: int = 8
-    """Settings that it asks for together, which are then run side by side."""
+    """Number of settings that the search requests together, which then run in parallel."""
     search_seed: int = 0
     """Seed of the search."""
     ledger: Ledger = "work"
-    """What the column cost_flops counts: by default the rays that were traced, each at the price of a segment, and the
-    operations around them; wall is refused, for it gives no result twice."""
+    """Ledger of the column cost_flops: by default the traced rays, each at the price of a segment, and the operations
+    around them; wall is refused, because its results are not repeatable."""
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample, for ledgers that do not count them."""
     jod_s: float = 0.5
-    """Seconds in the middle of a run that ColorVideoVDP scores; 0 for no score."""
+    """Length of the part in the middle of a run that ColorVideoVDP scores, seconds; 0 for no score."""
     display: DisplayModel = field(default_factory=DisplayModel)
-    """The display that it scores for."""
+    """The display that the score assumes."""
     draws: int = 1000
-    """Draws of the bootstrap."""
+    """Number of bootstrap draws."""
     store: bool = False
-    """Make this the front that presets and budgets of run.py choose from, in place of the one that was there."""
+    """Store this front as the one from which presets and budgets of run.py choose."""
     markdown: bool = False
     """Print the tables as Markdown."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
-    """Where the runs are made."""
+    """Where the runs are computed."""
     out: Path = Path("out/trade")
     """Folder for the results."""
     cache: References = REFERENCES

@@ -42,12 +42,12 @@ def write_page(
     """Writes ``report.html``.
 
     Args:
-        path: of the page; figures lie beside it.
-        summary: what goes into ``summary.json``.
-        tables: of the trade.
-        points: all of them.
+        path: path of the page; figures lie beside it.
+        summary: content of ``summary.json``.
+        tables: tables of the trade.
+        points: all points.
         figures: names of files, by caption.
-        place: where the pictures of the results are.
+        place: folder of the results with their pictures.
     """
     config, shown = summary["config"], shown_tables(tables)
     lead = [
@@ -73,7 +73,7 @@ def write_page(
 
 
 def _explorer(points: pd.DataFrame, place: Place) -> Explorer:
-    """Points of the first seed, a setting once."""
+    """The points of the first seed, with each setting once."""
     own = lines(points, points["seed"] == points["seed"].min()).drop_duplicates(["input", "setting"])
     found, pictures, truths = list[Point](), dict[str, bytes](), dict[str, str]()
     for line in own.to_dict("records"):

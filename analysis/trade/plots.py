@@ -1,4 +1,4 @@
-"""The trade as figures; computes only places on the paper."""
+"""The trade as figures; computes only positions on the paper."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from analysis.trade.runs import SEARCH
 from analysis.trade.tables import Relative, lines
 
 _LABELS_APART = 0.15
-"""Least distance of points that have their setting beside them: sum of both differences of natural logarithms."""
+"""Least distance of points that are labelled with their setting: sum of both differences of natural logarithms."""
 
 
 def _plain(axis: Axes, xlabel: str, ylabel: str) -> None:
@@ -38,7 +38,7 @@ def _short_ticks(axis: Axes) -> None:
 
 
 def front(found: Relative, points: pd.DataFrame) -> Figure:
-    """Cost and error of all settings, over those of the default; the front with its band and its knee."""
+    """Cost and error of all settings over those of the default, and the front with its band and its knee."""
     drawn = Figure(figsize=(9.5, 6.5), layout="constrained")
     axis = drawn.subplots()
     _plain(axis, "cost over that of the default (log scale)", "mean squared error over that of the default (log scale)")
@@ -72,7 +72,7 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
 
 
 def _apart(best: list[dict[Any, Any]]) -> list[dict[Any, Any]]:
-    """Points of the front that are far enough from each other to have a label, the knee among them."""
+    """Points of the front that are far enough from each other to be labelled, always with the knee."""
     kept: list[dict[Any, Any]] = [line for line in best if line["knee"]]
     for line in best:
         near = (abs(np.log(line["cost"] / one["cost"])) + abs(np.log(line["error"] / one["error"])) for one in kept)
@@ -82,7 +82,8 @@ def _apart(best: list[dict[Any, Any]]) -> list[dict[Any, Any]]:
 
 
 def knobs(table: pd.DataFrame) -> Figure:
-    """A panel a knob: cost and error of its values, over those of its default, bars for 95 % of the draws."""
+    """A panel for each knob: cost and error of its values over those of its default, with bars for 95 % of the
+    draws."""
     names = list(dict.fromkeys(table["knob"]))
     columns = min(4, len(names))
     rows = -(-len(names) // columns)
@@ -116,7 +117,8 @@ def knobs(table: pd.DataFrame) -> Figure:
 
 
 def inputs(points: pd.DataFrame) -> Figure:
-    """A panel an input: FLOPs and error of all points of all seeds, the front and the knee of the first seed."""
+    """A panel for each input: FLOPs and error of all points of all seeds, and the front and the knee of the first
+    seed."""
     names = list(dict.fromkeys(points["input"]))
     columns = min(3, len(names))
     rows = -(-len(names) // columns)

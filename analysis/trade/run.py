@@ -27,10 +27,10 @@ Tables = dict[str, pd.DataFrame]
 
 
 def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
-    """Runs what is missing and writes everything to ``options.out``.
+    """Makes missing runs and writes everything to ``options.out``.
 
     Returns:
-        What is in ``summary.json``, and the tables.
+        The content of ``summary.json``, and the tables.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -68,7 +68,7 @@ def _figures(options: TradeOptions, points: pd.DataFrame, front: Relative, knobs
         own = lines(knobs, [KNOBS[name].policy == policy for name in knobs["knob"]])
         made[f"Each knob of {policy} alone"] = f"knobs_{policy}.png"
         save(plots.knobs(own), out / f"knobs_{policy}.png")
-    made["Every input by itself"] = "inputs.png"
+    made["Every input separately"] = "inputs.png"
     save(plots.inputs(points), out / "inputs.png")
     return made
 

@@ -1,4 +1,4 @@
-"""Which runs the measurement of the trade has."""
+"""The runs of the measurement of the trade."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from analysis.trade.options import TradeOptions
 from tsar.config import ConfigError, TsarConfig
 
 SEARCH = "search"
-"""In place of a knob: all of them together."""
+"""Stands in place of a knob for the search over all knobs together."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """A setting, and why it is measured.
+    """A setting, and the reason for measuring it.
 
     Attributes:
-        knob: that is turned, or :data:`SEARCH`.
-        value: of the knob; of the search, the number of the trial.
-        setting: of all knobs.
+        knob: name of the knob that is turned, or :data:`SEARCH`.
+        value: value of the knob; for the search, the number of the trial.
+        setting: setting of all knobs.
     """
 
     knob: str
@@ -34,7 +34,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Run:
-    """A point at a place, as a case."""
+    """A point under given conditions, as a case."""
 
     point: Point
     where: Where
@@ -42,8 +42,7 @@ class Run:
 
 
 def points_of(knobs: Iterable[Knob]) -> list[Point]:
-    """Every value of every knob, all others at their defaults; the default of the project's own policy is among
-    them."""
+    """Every value of every knob with all others at their defaults, and always the default of the policy ``tsar``."""
     found = [Point(knob.name, value, setting) for knob in knobs for value, setting in alone(knob)]
     if all(point.setting != Setting() for point in found):
         found.insert(0, Point("policy", OWN, Setting()))
@@ -69,10 +68,10 @@ def scale_of(options: TradeOptions) -> Scale:
 
 
 def runs(options: TradeOptions, points: Iterable[Point]) -> tuple[list[Run], dict[str, str]]:
-    """Every point at every place.
+    """Every point under all conditions.
 
     Returns:
-        The runs; and of settings that do not fit the scale the reason, by what they are in words.
+        The runs; and the reasons why settings do not fit the scale, by the setting in words.
 
     Raises:
         ConfigError: the default does not fit.

@@ -1,8 +1,8 @@
-"""The search over all knobs together, by a tree-structured Parzen estimator for two aims.
+"""The search over all knobs together, by a tree-structured Parzen estimator for two objectives.
 
 Source: Ozaki et al. 2020, "Multiobjective tree-structured Parzen estimator for computationally expensive optimization
-problems" (package ``optuna``). Nothing of it is kept on disk: a search of the same seed asks for the same settings as
-long as they are measured alike, and runs on disk are not repeated.
+problems" (package ``optuna``). The state of the search is not stored: with the same seed it requests the same settings
+as long as their measurements are the same, and runs on disk are not repeated.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ if TYPE_CHECKING:
     import optuna
 
 NOT_SEARCHED = ("policy", "structure", "packets", "latency-cycles", "light-cells")
-"""Knobs that the search leaves alone: policies have knobs of their own, trees and packets change no picture, latency
-costs nothing, and the built-in inputs have no light with an extent."""
+"""Knobs that the search does not turn: policies have their own knobs, trees and packets change no picture, latency
+costs nothing, and the built-in inputs have no area light."""
 
 Measure = Callable[[Sequence[Point]], list[tuple[float, float] | None]]
-"""Cost and error of some points, over those of the default; None where a point cannot be measured."""
+"""Cost and error of points over those of the default; None for a point that cannot be measured."""
 
 
 def searched(knobs: Sequence[Knob]) -> tuple[Knob, ...]:
-    """Those of the knobs that a search turns."""
+    """Those of the knobs that the search turns."""
     return tuple(knob for knob in knobs if knob.policy == OWN and knob.name not in NOT_SEARCHED)
 
 
 def search(knobs: Sequence[Knob], trials: int, at_once: int, seed: int, measure: Measure) -> list[Point]:
-    """Settings that were tried, in order; the first is the default.
+    """The settings that were tried, in order; the first is the default.
 
     Args:
-        knobs: that are turned; of each the default and its values are tried.
-        trials: how many settings.
-        at_once: how many are asked for before any of them is measured.
-        seed: of the search.
-        measure: tells cost and error of settings.
+        knobs: knobs to turn, each to its default and its further values.
+        trials: number of settings.
+        at_once: number of settings that are requested before any of them is measured.
+        seed: seed of the search.
+        measure: measures cost and error of settings.
     """
     import optuna
     from optuna.trial import TrialState
@@ -68,7 +68,7 @@ def _generations(trials: int, at_once: int) -> Iterator[int]:
 
 
 def _choices(knob: Knob) -> list[Value]:
-    """Values in an order in which neighbours are alike: numbers by size, others as they are."""
+    """Values in an order in which neighbours are similar: numbers by size, others unchanged."""
     values = [knob.default, *knob.values]
     numbers = all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
     return sorted(values) if numbers else values  # type: ignore[type-var]

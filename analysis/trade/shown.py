@@ -1,4 +1,4 @@
-"""The tables of the trade as people read them: on the terminal, and as Markdown."""
+"""The tables of the trade as text: on the terminal, and as Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Tables = Mapping[str, pd.DataFrame]
 
 
 def shown_tables(tables: Tables) -> list[Table]:
-    """The front, what every knob does, what it buys and costs in a sentence, and the knee of every input."""
+    """The front, the effect of every knob, a sentence on its gain and cost, and the knee of every input."""
     found = [
         front_table(tables["front"]),
         _knobs(tables["knobs"]),
@@ -26,7 +26,7 @@ def shown_tables(tables: Tables) -> list[Table]:
 
 
 def front_table(front: pd.DataFrame) -> Table:
-    """Settings that nothing beats, by rising cost."""
+    """Settings on the front, by rising cost."""
     header = ["setting", "cost", "error", "95 % of its runs", "on the front", "at the knee", ""]
     kept = lines(front, front["on_front"]).sort_values("cost", kind="stable") if len(front) else front
     rows = [
@@ -42,7 +42,7 @@ def front_table(front: pd.DataFrame) -> Table:
         for line in kept.to_dict("records")
     ]
     title = "The front: cost and error over those of the default, geometric means"
-    return Table(title, header, rows, note="The last columns are shares of the draws of the bootstrap.")
+    return Table(title, header, rows, note="The last columns are shares of the bootstrap draws.")
 
 
 def _knobs(knobs: pd.DataFrame) -> Table:

@@ -1,4 +1,4 @@
-"""The front that presets and budgets choose from, as a file."""
+"""The front from which presets and budgets choose, as a file."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from analysis.trade.runs import scale_of
 from analysis.trade.tables import by_place, lines, relative
 
 NEAR = 0.05
-"""Where the default costs and errs as the knee does, up to this share, it is stored as the knee."""
+"""Relative difference up to which the default counts as equal to the knee, and is stored as the knee."""
 _STORED = ("cost_flops", "mse", "wall_s", *(f"flops_{ledger}" for ledger in LEDGERS if ledger != "wall"))
 
 
 def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | None:
-    """The front of the settings that a run can be given: those of the policy ``tsar`` that turn its batch and its own
-    options alone. None where the default was not measured.
+    """The front of the settings that a run can use: those of the policy ``tsar`` that turn only its batch and its own
+    options. None if the default was not measured.
 
-    Its columns are those of :class:`analysis.comparison.front.Place`. The knee is that of all settings that were
-    measured. The default is stored in its place where it is as good (:data:`NEAR`): no option is changed for a gain
-    that the runs hardly show.
+    Its columns are those of :class:`analysis.comparison.front.Place`. The knee is that of all measured settings. The
+    default is stored in its place if it is as good within :data:`NEAR`, so that no option changes for a gain that the
+    runs hardly show.
     """
     own = lines(points, (points["policy"] == OWN) & points["changes"].map(_can_be_given))
     default = Setting().words
@@ -70,8 +70,8 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
 
 
 def _nearest(points: pd.DataFrame, kept: list[str], standing: int, costs: np.ndarray, errors: np.ndarray) -> int:
-    """The setting that is as good as the knee of all that was measured: the default within :data:`NEAR`, or else the
-    one whose logarithms lie nearest."""
+    """The setting to store as the knee of all measured settings: the default if it is within :data:`NEAR`, or else the
+    setting whose logarithms are nearest."""
     front = relative(points, 10).front
     best = front[front["knee"]].iloc[0]
     away = [np.log(own / own[standing] / best[name]) for own, name in ((costs, "cost"), (errors, "error"))]
@@ -81,7 +81,7 @@ def _nearest(points: pd.DataFrame, kept: list[str], standing: int, costs: np.nda
 
 
 def _front_through(at: int, costs: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """The front, without what would beat one point, which is on it."""
+    """The front through a given point: settings that dominate the point are left out."""
     kept = on_front(costs, errors) & ~((costs <= costs[at]) & (errors <= errors[at]))
     return np.flatnonzero(kept | (np.arange(len(costs)) == at))
 

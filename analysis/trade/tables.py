@@ -1,4 +1,4 @@
-"""From the results of the runs to the tables of the trade. The order in which runs were made does not matter."""
+"""Tables of the trade from the results of the runs. They do not depend on the order of the runs."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ COLUMNS = (
 )
 """The first columns of ``trade.csv``."""
 COSTS = {"cost_flops": "FLOPs", "wall_s": "wall seconds", "peak_bytes": "peak memory", "latency_s": "latency"}
-"""What a point costs, by column."""
+"""Columns of the costs of a point."""
 _MODELLED = tuple(ledger for ledger in LEDGERS if ledger != "wall")
 _FURTHER = ("setting", "policy", "changes", "rays", "ssim", "result", *(f"flops_{ledger}" for ledger in _MODELLED))
 GRID = 64
-"""Budgets at which bands are computed."""
+"""Number of budgets at which bands are computed."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What is on disk of a run: its place in the measurement, its summary, and its table over the reference times."""
+    """A run as read from disk: its place in the measurement, its summary, and its table over the reference times."""
 
     run: Run
     summary: Mapping[str, Any]
@@ -38,8 +38,7 @@ class Result:
 
 
 def point_table(results: Iterable[Result], ledger: Ledger) -> pd.DataFrame:
-    """A line a point and place: :data:`COLUMNS`, then the setting in words and as JSON, and
-    more of its numbers.
+    """A line for each run: :data:`COLUMNS`, then the setting in words and as JSON, and further numbers.
 
     Costs are those of the whole measured span. ``on_front`` says whether no other point of the same input and seed has
     both less cost and less error (:func:`analysis.metrics.front.on_front`) by ``cost_flops`` and ``mse``.
@@ -81,13 +80,14 @@ def _line(one: Result, ledger: Ledger) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Relative:
-    """Cost and error of every setting at every place, over those of the default at the same place.
+    """Cost and error of every setting at every place (input, seed and phase), over those of the default there.
 
     Attributes:
-        settings: in words, in the order of the rows.
-        costs, errors: a row a setting and a column a place.
-        front: a line a setting: geometric means, whether it is on the front of these, and how often in the bootstrap.
-        bands: of the front.
+        settings: the settings in words, in the order of the rows.
+        costs, errors: a row for each setting and a column for each place.
+        front: a line for each setting: geometric means, whether it is on their front, and the share of the bootstrap
+            draws in which it is.
+        bands: bands of the front.
     """
 
     settings: list[str]
@@ -98,7 +98,7 @@ class Relative:
 
 
 def relative(points: pd.DataFrame, draws: int, cost: str = "cost_flops", error: str = "mse") -> Relative:
-    """The front of all settings that were measured at every place at which the default was."""
+    """The front of all settings that were measured at every place where the default was measured."""
     pivots = [by_place(points, column) for column in (cost, error)]
     default = Setting().words
     if default not in pivots[0].index:
@@ -127,20 +127,20 @@ def relative(points: pd.DataFrame, draws: int, cost: str = "cost_flops", error: 
 
 
 def lines(frame: pd.DataFrame, flags: Any) -> pd.DataFrame:
-    """Those lines of a table that are flagged."""
+    """The flagged lines of a table."""
     found: Any = frame[flags]
     return found
 
 
 def by_place(points: pd.DataFrame, column: str) -> pd.DataFrame:
-    """Values of a column: a line a setting and a column a place."""
+    """Values of a column, with a line for each setting and a column for each place."""
     once = points.drop_duplicates(["setting", "input", "seed"])
     return once.pivot(index="setting", columns=["input", "seed"], values=column).reindex(once["setting"].unique())
 
 
 def knob_table(points: pd.DataFrame, draws: int) -> pd.DataFrame:
-    """A line a knob and value: geometric means over all places of every cost and of both errors, over those of the
-    knob's default there; and of JOD the mean difference. ``mse_low`` and ``mse_high`` are bounds of the bootstrap."""
+    """A line for each knob and value: geometric means over all places of every cost and of both errors, over those of
+    the knob's default there, and the mean difference in JOD. ``mse_low`` and ``mse_high`` are bootstrap bounds."""
     made = []
     for knob, found in _groups(lines(points, points["knob"] != SEARCH), "knob"):
         standing = found[found["value"] == said(KNOBS[knob].default)].set_index(["input", "seed"])
@@ -165,8 +165,8 @@ def _groups(frame: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
 
 
 def sentences(knobs: pd.DataFrame) -> dict[str, str]:
-    """For each knob in one sentence what the cheapest and the dearest of its other values buy and cost; of those that
-    cost alike, the least and the most accurate."""
+    """For each knob a sentence on cost and error of its cheapest and its most expensive other value; among equal costs,
+    of the least and the most accurate one."""
     found = {}
     for name, own in _groups(knobs, "knob"):
         default = said(KNOBS[name].default)
@@ -174,12 +174,12 @@ def sentences(knobs: pd.DataFrame) -> dict[str, str]:
         if others:
             order = sorted(others, key=lambda line: (round(line["cost_flops"], 1), -line["mse"]))
             ends = [order[0], *order[1:][-1:]]
-            found[name] = f"Beside {default}, {'; '.join(map(_told, ends))}."
+            found[name] = f"Relative to the default ({default}), {'; '.join(map(_told, ends))}."
     return found
 
 
 def _told(line: Mapping[Any, Any]) -> str:
-    """What one value does: cost and error, and the latency where that changes by more than a tenth."""
+    """The effect of one value: cost and error, and the latency if it changes by more than a tenth."""
     low, high = line["mse_low"], line["mse_high"]
     parts = [f"{_times(line['cost_flops'])} the FLOPs", f"{_times(line['mse'])} the error ({low:.2f}–{high:.2f})"]
     if abs(np.log(line["latency_s"])) > np.log(1.1):
@@ -196,7 +196,7 @@ def _listed(parts: Sequence[str]) -> str:
 
 
 def knees(points: pd.DataFrame) -> pd.DataFrame:
-    """A line an input and seed: the setting at the knee of its own front, its cost and its error."""
+    """A line for each input and seed: the setting at the knee of its own front, its cost and its error."""
     made = []
     for _, found in points.groupby(["input", "seed"], sort=False) if len(points) else ():
         at = found.iloc[knee(found["cost_flops"].to_numpy(), found["mse"].to_numpy())]

@@ -1,7 +1,7 @@
-"""Draw the map of workloads: which policy to use where, by what a sample costs, how much moves, and the resolution.
+"""Draw the map of workloads: the best policy by the price of a sample, the amount of motion, and the resolution.
 
-The machine is always as fast as the framed renderer needs to keep its rate. The cheaper a sample, the more samples are
-displaced by a policy's own work; the fewer framed images a second, the more moves from one to the next.
+The machine is always as fast as the framed renderer needs to keep its rate. The cheaper a sample, the more samples a
+policy gives up for its own work; the fewer framed images a second, the more moves from one to the next.
 
 Examples: python scripts/workloads.py --out out/workloads
           python scripts/workloads.py --inputs fly-by --sample-flops 100 10000 --image-hz 8 --out out/two
@@ -18,7 +18,7 @@ from analysis.workloads.options import WorkloadOptions
 
 
 def main() -> None:
-    """Runs what is missing; prints the tables."""
+    """Makes missing runs; prints the tables."""
     options = parse(WorkloadOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.study.written import end_study

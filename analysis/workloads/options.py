@@ -18,30 +18,30 @@ from tsar.policies import POLICIES, RIVALS
 @dataclass(frozen=True)
 @closed_choices()
 class WorkloadOptions:
-    """Which policy has the least error, by what a sample costs, how fast the picture moves and how large it is. Runs
-    that are on disk are not repeated."""
+    """The policy of least error, by the price of a sample, the speed of motion and the resolution. Runs that are on
+    disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs."""
     policies: tuple[str, ...] = ("tsar", "thesis", "framed", *RIVALS)
-    """Policies that are compared; framed is one of them in any case."""
+    """Policies to compare; framed is always one of them."""
     sample_flops: tuple[float, ...] = (1e2, 1e3, 1e4, 1e5)
-    """What a sample costs, FLOPs, on a machine that keeps the framed renderer's rate at that price."""
+    """Prices of a sample, FLOPs; the machine keeps the framed renderer's rate at each price."""
     image_hz: tuple[float, ...] = (32.0, 8.0, 2.0)
-    """Images a second of the framed renderer: the fewer, the more moves from one to the next."""
+    """Images a second of the framed renderer: the fewer they are, the more moves from one to the next."""
     sides_px: tuple[int, ...] = (512,)
     """Output sides at the thesis' own size, powers of two up to 1024; batches have an eighth as many samples as there
     are pixels."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as of the suitability study."""
+    """Sizes, as in the suitability study."""
     repetitions: int = 1
     """Runs of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
-    """Of all runs; batch and resolution come from the side, the seed from the repetition."""
+    """The pipeline of all runs; batch and resolution come from the side, the seed from the repetition."""
     markdown: bool = False
     """Print the tables as Markdown."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
-    """Where the runs are made."""
+    """Where the runs are computed."""
     out: Path = Path("out/workloads")
     """Folder for the results."""
     cache: References = REFERENCES

@@ -1,4 +1,4 @@
-"""The map of workloads as a figure; computes only places on the paper."""
+"""The map of workloads as a figure; computes only positions on the paper."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from analysis.page.figures import ADAPTIVE, FRAMED, inks
 
 
 def figure(maps: pd.DataFrame) -> Figure:
-    """A panel a side: what a sample costs to the right, how much moves between framed images upwards; each cell has the
-    ink of its best policy, its name, and its error over the framed renderer's."""
+    """A panel for each side, with the price of a sample on the horizontal axis and the motion between framed images on
+    the vertical one. Each cell has the ink and the name of its best policy, and its error over that of framed."""
     sides = sorted(set(maps["side_px"]))
     drawn = Figure(figsize=(2.0 + 6.2 * len(sides), 4.6), layout="constrained")
     axes = drawn.subplots(1, len(sides), squeeze=False)[0]
@@ -31,7 +31,7 @@ def figure(maps: pd.DataFrame) -> Figure:
             line = cells.get((price, rate))
             if line is None:
                 continue
-            # the paler, the closer to the second
+            # paler cells are closer to the second policy
             share = 1.0 - min(1.0, line["ratio"] / line["second ratio"]) if np.isfinite(line["second ratio"]) else 1.0
             face = (colors[line["best"]], 0.2 + 0.6 * share)
             axis.add_patch(Rectangle((column, row), 1, 1, facecolor=face, edgecolor="white", linewidth=2))

@@ -1,4 +1,4 @@
-"""Which runs the map of workloads has."""
+"""The runs of the map of workloads."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from analysis.workloads.options import WorkloadOptions
 from tsar.config import ConfigError
 
 UNPRICED = ("framed", "framed-1", "framed-super")
-"""Policies that are charged for samples alone: on a machine that keeps the framed renderer's rate, what a sample costs
-changes nothing for them."""
+"""Policies that are charged for samples alone: on a machine that keeps the framed renderer's rate, the price of a
+sample does not affect them."""
 _BATCH, _SIDE = ROWS[7]
 
 
@@ -24,9 +24,9 @@ class Workload:
     """A place on the map.
 
     Attributes:
-        sample_flops: what a sample costs, FLOPs.
+        sample_flops: price of a sample, FLOPs.
         image_hz: images a second of the framed renderer.
-        side_px: of the output, at the thesis' own size.
+        side_px: side of the output at the thesis' own size, pixels.
     """
 
     sample_flops: float
@@ -36,7 +36,7 @@ class Workload:
 
 @dataclass(frozen=True)
 class Run:
-    """A case and its place on the map. ``case`` is None where the policy has no time for a cycle within the run."""
+    """A case and its place on the map. ``case`` is None if no cycle of the policy fits into the run."""
 
     policy: str
     workload: Workload

@@ -1,4 +1,4 @@
-"""From the results of the map of workloads to its tables. The order in which runs were made does not matter."""
+"""Tables from the results of the map of workloads. They do not depend on the order of the runs."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ PLACE = ["side_px", "image_hz", "sample_flops"]
 
 @dataclass(frozen=True)
 class Result:
-    """A run and its mean squared error over the reference times; NaN where it could not be made."""
+    """A run and its mean squared error over the reference times; NaN if the run was not possible."""
 
     run: Run
     mse: float
 
 
 def policy_table(results: Iterable[Result]) -> pd.DataFrame:
-    """A line a workload and policy: ``ratio`` is the geometric mean over inputs and repetitions of its error over that
-    of the framed renderer, NaN where it is missing for any of them; ``least`` and ``most`` are those of single runs."""
+    """A line for each workload and policy: ``ratio`` is the geometric mean over inputs and repetitions of its error
+    over that of the framed renderer, NaN if one is missing; ``least`` and ``most`` are the ratios of single runs."""
     errors: dict[Workload, dict[str, dict[tuple[str, int], float]]] = {}
     for one in results:
         run = one.run
@@ -49,7 +49,7 @@ def policy_table(results: Iterable[Result]) -> pd.DataFrame:
 
 
 def map_table(policies: pd.DataFrame) -> pd.DataFrame:
-    """A line a workload: the policy of least ratio, the one after it, and their ratios."""
+    """A line for each workload: the policy of least ratio, the second one, and their ratios."""
     found = []
     groups: Any = policies.dropna(subset=["ratio"]).groupby(PLACE, sort=False) if len(policies) else ()
     for place, group in groups:
@@ -66,9 +66,9 @@ def map_table(policies: pd.DataFrame) -> pd.DataFrame:
 
 
 def paying_table(policies: pd.DataFrame) -> pd.DataFrame:
-    """A line a side, rate and policy: ``pays from`` is the least price of a sample, FLOPs, from which on its error is
-    at most that of the framed renderer, between those measured on logarithmic scales; the least price measured where
-    it always is, infinite where it is not at the greatest."""
+    """A line for each side, rate and policy: ``pays from`` is the price of a sample, FLOPs, from which on its error is
+    at most that of the framed renderer, interpolated on logarithmic scales. It is the least measured price if the error
+    always is, and infinite if it is not at the greatest price."""
     found = []
     groups: Any = policies.groupby(["side_px", "image_hz", "policy"], sort=False) if len(policies) else ()
     for (side, rate, policy), group in groups:
@@ -80,7 +80,7 @@ def paying_table(policies: pd.DataFrame) -> pd.DataFrame:
 
 
 def pays_from(flops: np.ndarray, ratio: np.ndarray) -> float:
-    """Where a ratio falls to 1 for good, prices ascending; one that is missing is taken for above 1."""
+    """The price from which on a ratio stays at most 1, for ascending prices; a missing ratio counts as above 1."""
     above = np.flatnonzero(~(ratio <= 1.0))
     if not len(above):
         return float(flops[0])
@@ -95,7 +95,7 @@ def pays_from(flops: np.ndarray, ratio: np.ndarray) -> float:
 
 
 def shown_tables(maps: pd.DataFrame, paying: pd.DataFrame) -> list[Table]:
-    """The tables as people read them: a map for each side, and from where on every policy pays."""
+    """The tables as text: a map for each side, and the price from which on each policy pays."""
     found = []
     for side in sorted(set(maps["side_px"])) if len(maps) else ():
         here: Any = maps[maps["side_px"] == side]

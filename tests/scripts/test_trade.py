@@ -37,7 +37,7 @@ def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytes
     assert front.loc["tsar", "cost"] == front.loc["tsar", "error"] == 1.0 and front["knee"].sum() == 1
     summary = json.loads((out / "summary.json").read_text())
     assert summary["runs"] == summary["runs_done"] == len(runs) and not summary["failures"]
-    assert summary["sentences"]["depth"].startswith("Beside of the scene, 0 has 0.")
+    assert summary["sentences"]["depth"].startswith("Relative to the default (of the scene), 0 has 0.")
     page = (out / "report.html").read_text()
     assert (
         page.count('"group":"fly-by"') >= 8 and "data:image/webp" in page and "http://" not in page.split("</style>")[0]

@@ -152,7 +152,7 @@ def test_tables_say_what_a_knob_costs_and_does() -> None:
     assert ((knobs["mse_low"] <= knobs["mse"]) & (knobs["mse"] <= knobs["mse_high"])).all()
     told = sentences(knobs.reset_index())
     assert (
-        told["smoothing"].startswith("Beside on, off has 1.00 times the FLOPs and ")
+        told["smoothing"].startswith("Relative to the default (on), off has 1.00 times the FLOPs and ")
         and told["batch"].count(" has ") == 2
     )
 
