@@ -38,7 +38,7 @@ COMMANDS = {
     "bench": "analysis.bench.command",
     "same": "analysis.storage.command",
 }
-"""Modules whose ``main`` runs a command; a script of the same name calls it too, but for study: suitability."""
+"""Modules whose ``main`` runs a command. A script of the same name calls it too; the script of study is suitability."""
 
 TABLES = {
     "policies": "tsar.policies:POLICIES",

@@ -16,7 +16,7 @@ from analysis.command.extras import require_extra
 
 
 def main() -> None:
-    """Runs what is missing; prints the tables."""
+    """Makes missing runs; prints the tables."""
     options = parse(AblationOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.ablation.run import study

@@ -27,7 +27,7 @@ WRITTEN = ("tables/*.csv", "tables.md", "moments.parquet", "parts_row_*.png")
 
 
 def study(options: AblationOptions) -> tuple[dict[str, Any], Tables]:
-    """Runs what is missing and writes everything to ``options.out``.
+    """Makes missing runs and writes everything to ``options.out``.
 
     Returns:
         The content of ``summary.json``, and the tables.

@@ -213,7 +213,7 @@ def _plots(runs: Sequence[FinishedRun]) -> Iterable[Plot]:
                 seen.add(values)
                 style = len(errors) % len(INKS)
                 errors.append(Curve(f"{run.name}: {name}", run.summary["reference_time_s"], values, style))
-    yield Plot("Mean squared error of what is shown", "", errors)
+    yield Plot("Mean squared error of the shown image", "", errors)
     first = runs[0]
     ratios = []
     for number, run in enumerate(runs[1:], 1):

@@ -15,7 +15,7 @@ from analysis.storage.results import own_results
 
 
 def main() -> None:
-    """Runs what is missing, prints and writes a table of the ratios."""
+    """Makes missing runs, prints and writes a table of the ratios."""
     options = parse(InputsOptions, __doc__ or "")
     with bad_input():
         own_results(options.out, ())

@@ -80,7 +80,7 @@ def _error_plots(measured: Measured) -> list[Plot]:
     rival = measured.rival
     marks = measured.seen[rival].refresh_s if rival else []
     errors = [Curve(name, times, values.tolist(), styles[name]) for name, values in measured.mse.items()]
-    found = [Plot("Mean squared error of what is shown", "", errors, marks_s=marks)]
+    found = [Plot("Mean squared error of the shown image", "", errors, marks_s=marks)]
     if rival:
         own = measured.mse[measured.own]
         ratios = [Curve(name, times, ratio(own, measured.mse[name]).tolist(), styles[name])

@@ -19,7 +19,7 @@ from analysis.precision.options import PrecisionOptions
 
 
 def main() -> None:
-    """Runs what is missing; prints the tables."""
+    """Makes missing runs; prints the tables."""
     options = parse(PrecisionOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.study.written import end_study

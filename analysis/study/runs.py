@@ -226,16 +226,16 @@ def begin(
 def require_pace(name: str, price: Price, machine: Machine, span_s: tuple[float, float], warmup_cycles: int) -> None:
     """Refuses a policy whose cycles are too long, too many or too short for a run, at its own price.
 
-    Framed renderers are never refused: a run of less than a frame shows what they made before it.
+    Framed renderers are never refused: a run shorter than a frame shows the frame made before it.
 
     Args:
-        name, price: of the policy.
-        machine: what it runs on; one that measures its speed, or keeps up with every policy, refuses none.
-        span_s: from and to, seconds.
-        warmup_cycles: cycles before it.
+        name, price: name and price of the policy.
+        machine: the simulated machine; one that measures time, or keeps up with every policy, refuses none.
+        span_s: beginning and end of the run, seconds.
+        warmup_cycles: cycles before the run.
 
     Raises:
-        ConfigError: they do not fit.
+        ConfigError: the cycles do not fit.
     """
     if machine.ledger == "wall" or machine.samples_per_s is not None or is_framed(name):
         return

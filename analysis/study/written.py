@@ -41,7 +41,7 @@ def write_tables(out: Path, tables: Mapping[str, pd.DataFrame], shown: Sequence[
 
 
 def end_study(summary: Mapping[str, Any], broken: Sequence[str], out: Path, files: str) -> None:
-    """Says how many runs there are and what was written beside ``summary.json``; status 1 where runs failed.
+    """Prints the number of runs and the files beside ``summary.json``; ends with status 1 if runs failed.
 
     Raises:
         BrokenInvariants: ``broken`` names results whose cycles broke an invariant.

@@ -13,7 +13,7 @@ from analysis.suitability.options import SuitabilityOptions
 
 
 def main() -> None:
-    """Runs what is missing; prints the tables."""
+    """Makes missing runs; prints the tables."""
     options = parse(SuitabilityOptions, __doc__ or "")
     require_extra("study", "perception")
     from analysis.command.console import show

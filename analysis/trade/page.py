@@ -53,9 +53,9 @@ def write_page(
     lead = [
         f"{summary['runs_done']} of {summary['runs']} runs at scale {config['scale']}, cost by the ledger "
         f"{summary['ledger']}, {config['repetitions']} repetitions, each with its seed and, where the input has "
-        "phases, its phase. All policies are given as many samples a second as their batch and framelets say, "
-        "50 batches a second; cost is what they spend.",
-        "A setting is on the front where no other has both less cost and less error. The knee is the point of the "
+        "phases, its phase. All policies sample 50 batches of their framelets a second; cost is what they "
+        "spend.",
+        "A setting is on the front if no other has both less cost and less error. The knee is the point of the "
         "front that lies farthest below the line between its ends, on logarithmic axes.",
     ]
     if summary["failures"]:
@@ -94,7 +94,7 @@ def _explorer(points: pd.DataFrame, place: Place) -> Explorer:
         colours={_ALONE: OTHER, _SEARCHED: ADAPTIVE, _OTHERS: FRAMED},
         pictures=pictures,
         truths=truths,
-        note="The line is the front of what is drawn. Pictures are of the middle of the run. Memory is what the run "
+        note="The line is the front of the drawn points. Pictures are of the middle of the run. Memory is what the run "
         "took on top of what its process held before.",
     )
 

@@ -28,8 +28,8 @@ def main() -> None:
 
 
 def study(options: WorkloadOptions) -> dict[str, Any]:
-    """Runs what is missing, writes everything to ``options.out`` and prints the tables. Returns what ``summary.json``
-    holds.
+    """Makes missing runs, writes everything to ``options.out`` and prints the tables. Returns the content of
+    ``summary.json``.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
