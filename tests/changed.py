@@ -1,8 +1,8 @@
 """Runs the tests nearest to what changed: ``python -m tests.changed [FILE...]``.
 
-Without files, those that differ from where the branch left ``main``, committed or not. The nearest tests of a module
-are those that import it; where none does, those that import a module that imports it, and so on. The test that bears
-its name is always among them. Where many are as near, those of the room that mirrors the module's are run.
+Without files, these are the files that differ from the point where the branch left ``main``, committed or not. The
+nearest tests of a module are those that import it; if there are none, those that import a module that imports it, and
+so on. The test of the same name is always among them. If many are equally near, those of the mirroring folder are run.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ from tests.test_architecture import PACKAGES, ROOT, imports
 
 ALWAYS = ("tests/test_architecture.py",)
 FILES_MOST = 8
-"""Test files of one module, at most, where others are as near: the rest is left to the whole suite."""
+"""Most test files for one module if many are equally near: the rest is left to the whole suite."""
 _PLACE = re.compile(r"[a-z_]\w*(\.\w+)+(:\w+)?")
-"""A module, or ``module:attribute``, that is imported by a text when it is asked for; ``run.py`` is a script."""
+"""A module, or ``module:attribute``, that is named in a string and imported at its first use; ``run.py`` is a
+script."""
 
 
 def used_by(root: Path) -> dict[str, set[str]]:
-    """Of each file of the packages and the tests, by its path, the files that import it or what it defines."""
+    """For each file of the packages and the tests, by its path, the files that import it or a name that it defines."""
     files = {
         path.relative_to(root).as_posix() for package in (*PACKAGES, "tests") for path in (root / package).rglob("*.py")
     }
@@ -60,9 +61,9 @@ def nearest(file: str, users: Mapping[str, Iterable[str]]) -> set[str]:
 
 
 def mirrored(root: Path, file: str) -> tuple[str | None, str | None]:
-    """The test file that bears a file's name, and the folder of tests that mirrors its own; None where there is none.
+    """The test file with a file's name, and the folder of tests that mirrors its folder; None if there is none.
 
-    Of what is no Python, the nearest folder above that has tests.
+    For a file that is not Python, the nearest folder above it that has tests.
     """
     parts = Path(file).parts[:-1]
     while parts and not (root / "tests" / Path(*parts)).is_dir():
@@ -75,12 +76,12 @@ def mirrored(root: Path, file: str) -> tuple[str | None, str | None]:
 
 
 def chosen_for(root: Path, file: str, users: Mapping[str, Iterable[str]]) -> set[str]:
-    """The tests to run where a file changed; empty where none knows of it.
+    """The tests to run if a file changed; empty if no test reaches it.
 
     Args:
         root: the folder of the checkout.
         file: path below it, with forward slashes; the file may be gone.
-        users: what :func:`used_by` found there.
+        users: result of :func:`used_by` for the root.
     """
     if file.startswith("tests/") and Path(file).name == "conftest.py":
         return {str(Path(file).parent)}
@@ -113,7 +114,7 @@ def changed(root: Path) -> list[str]:
 
 
 def main(files: list[str]) -> int:
-    """Runs them on all cores; the exit status."""
+    """Runs the tests on all cores; returns the exit status."""
     import pytest
 
     files = files or changed(ROOT)

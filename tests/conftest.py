@@ -13,7 +13,7 @@ from tests import shapes
 # Tensors are small here: threads of torch cost more than they save, and on a busy machine wait for one another for most
 # of the time. No result depends on their number, which has tests of its own. Processes that tests start inherit this.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# where a test asks for more, those that wait leave their core to others
+# if a test asks for more threads, waiting ones leave their core to others
 os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 settings.register_profile("tsar", deadline=None, max_examples=60, derandomize=True)

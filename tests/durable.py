@@ -1,4 +1,4 @@
-"""Small commands that keep what they made on disk, and what of it must be the same after damage or a kill."""
+"""Small commands that keep files on disk, and the results that must be the same after damage or a kill."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Kind:
     """A command, small.
 
     Attributes:
-        make: makes everything in a folder that is not there yet; returns the exit status.
-        result: what must be the same, read from the folder.
-        prepare: puts into a new folder what the command is given.
+        make: makes everything that a folder lacks; returns the exit status.
+        result: the values that must be the same, read from the folder.
+        prepare: puts the input of the command into a new folder.
         kept: patterns of the files that the command reads back.
     """
 
@@ -61,14 +61,14 @@ def call(name: str, *arguments: str) -> int:
 
 
 def unmeasured(value: Any) -> Any:
-    """A summary without what differs between two runs of the same."""
+    """A summary without the entries that differ between two equal runs."""
     if isinstance(value, dict):
         return {name: unmeasured(item) for name, item in value.items() if name not in MEASURED}
     return [unmeasured(item) for item in value] if isinstance(value, list) else value
 
 
 def read(path: Path) -> Any:
-    """A file as it must be the same."""
+    """The content of a file that must be the same."""
     if path.suffix == ".json":
         return unmeasured(json.loads(path.read_text()))
     if path.suffix == ".parquet":

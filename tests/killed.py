@@ -1,4 +1,4 @@
-"""Kills a small command at random moments and lets it go on; a process of its own, as it forks.
+"""Kills a small command at random moments and lets it continue; runs as a separate process, because it forks.
 
 ``python -m tests.killed KIND FOLDER KILLS SEED`` makes everything unbroken in ``FOLDER/whole``, and in ``FOLDER/0`` and
 so on kills the command just before an operation on files, twice in each, and then lets it end. Prints the kills and the
@@ -24,7 +24,7 @@ _OPERATIONS = {"open", "os.rename", "os.remove", "os.mkdir", "os.truncate", "sql
 def forked(name: str, folder: Path, kill_at: int | None) -> int:
     """Makes a kind in a process that is killed at an operation on files of the folder; its wait status.
 
-    How many operations there were is in ``FOLDER.count`` afterwards, unless it was killed.
+    The number of operations is in ``FOLDER.count`` afterwards, unless the process was killed.
     """
     pid = os.fork()
     if pid:

@@ -1,7 +1,7 @@
-"""Checks of shapes and types at run time, in every test, but not again and again.
+"""Checks of shapes and types at run time in every test, up to a number of checks.
 
-A cycle passes some hundred checks, and they take longer than the cycle. What a test does for the thousandth time has
-the shapes that it had before.
+A cycle passes about a hundred checks, which take longer than the cycle. The thousandth call in a test has the same
+shapes as the calls before it.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ import jaxtyping
 from beartype import BeartypeConf, beartype
 
 CHECKS_MOST = 5000
-"""Checks in one test, at most: those of some twenty cycles."""
+"""Most checks in one test: those of about twenty cycles."""
 
 _conf = BeartypeConf(is_pep484_tower=True)  # an int passes for a float, as in Python
 _made = 0
 
 
 def begin() -> None:
-    """Has everything checked again, as a test begins."""
+    """Switches all checks on again, at the beginning of a test."""
     global _made
     _made = 0
     jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def checked(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function whose calls are checked while the test has checks left: the type checker that jaxtyping is given."""
+    """The type checker for jaxtyping: a function whose calls are checked while the test has checks left."""
     checks = beartype(function, conf=_conf)
 
     @functools.wraps(function)

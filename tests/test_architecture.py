@@ -1,4 +1,4 @@
-"""Who may import whom: what each room may use. Reads the source; runs nothing."""
+"""Imports that each room may use. Reads the source; runs nothing."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def rule(path: str) -> tuple[str, tuple[str, ...]]:
 
 
 def violations(path: str, source: str) -> list[str]:
-    """What a file breaks, a line each; ``path`` is relative to the root, with forward slashes."""
+    """The rules that a file breaks, a line each; ``path`` is relative to the root, with forward slashes."""
     tree, found = ast.parse(source), []
     room, allowed = rule(path)
     for line, name in imports(tree, path):

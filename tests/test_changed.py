@@ -1,4 +1,4 @@
-"""Which tests are run for what changed."""
+"""The tests that are run for changed files."""
 
 from __future__ import annotations
 

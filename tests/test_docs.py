@@ -1,4 +1,4 @@
-"""What README and documentation say exists: links, commands, targets, and code that runs."""
+"""README and documentation are correct: links, commands and targets exist, and code runs."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def tutorial(folder: Path, *options: str) -> str:
 
 
 def test_the_tutorial_runs_small(tmp_path: Path) -> None:
-    """Its text and code are those of the page; what it prints has the same form, and every picture is drawn."""
+    """Its text and code are those of the page; its output has the same form, and every picture is drawn."""
     page = (ROOT / "docs/tutorial.md").read_text()
     settings = re.findall(r"(?m)^SECONDS, .*$", page)
     found = re.sub(r"(?m)^SECONDS, .*$", "".join(settings), tutorial(tmp_path, "--small"))

@@ -1,4 +1,5 @@
-"""What packages add works everywhere: the examples of the documentation, from a checkout and from installed wheels."""
+"""Additions of packages work everywhere: the examples of the documentation, from a checkout and from installed
+wheels."""
 
 from __future__ import annotations
 
@@ -31,7 +32,7 @@ def tables() -> dict[str, Named]:
 
 
 def assert_used(shown: str) -> None:
-    """Whether what ``python -m tsar_examples`` prints shows that everything was used."""
+    """Whether the output of ``python -m tsar_examples`` shows that everything was used."""
     assert re.search(r"(?m)^interlaced +0\.0", shown) and "edges" in shown
     assert all(f"  {line}\n" in shown for line in ("solver cautious", "norm mean", "reconstruction smooth"))
     pictures = re.findall(r"(?m)^picture.*: (\S+)$", shown)

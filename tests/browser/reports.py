@@ -1,4 +1,4 @@
-"""Reports whose pictures tell by their colour which they are, and what a browser shows of them."""
+"""Reports whose pictures are identified by their colour, and readings of a browser that shows them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SCALE = ColorScale.of((1.0, 1000.0), "ms", "viridis", special=(200, 0, 0), meani
 
 @dataclass
 class Opened:
-    """A page and what it said and asked for while it was open."""
+    """A page, with its messages and requests while it was open."""
 
     page: Page
     messages: list[str] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""The report page in a real browser: what is missing is said to be missing, and text stays text."""
+"""The report page in a real browser: missing pictures are shown as missing, and text stays text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The comparer of the report page in a real browser: time, wipe, errors, loupe, keys, and what it looks like."""
+"""The comparer of the report page in a real browser: time, wipe, errors, loupe, keys, and appearance."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _pattern(at: int, label: str):
 
 
 def test_time_and_the_wipe_decide_what_is_seen(opened: Opened) -> None:
-    """Left of the wipe the one picture, right of it the other, of the step of the slider, in whole native pixels."""
+    """One picture left of the wipe and the other right of it, of the slider's step, in whole native pixels."""
     page = opened.page
     for step in (0, 3, 6, 1):
         move(page, step)

@@ -1,4 +1,4 @@
-"""The study of parts from the command line, small: what it writes, that it goes on where it was, and its failures."""
+"""The study of parts from the command line, small: its files, continuing where it was, and its failures."""
 
 from __future__ import annotations
 

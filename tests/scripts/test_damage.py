@@ -1,4 +1,4 @@
-"""A bit that flips in any durable file is noticed: the result is that of an unbroken run, or the file is refused."""
+"""A flipped bit in any durable file is detected: the result is that of an undamaged run, or the file is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A command that is killed at any moment goes on and ends with what an unbroken one makes."""
+"""A command that is killed at any moment continues, and ends with the results of an uninterrupted one."""
 
 from __future__ import annotations
 

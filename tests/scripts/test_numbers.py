@@ -1,4 +1,4 @@
-"""Every number of every command has bounds: what no run could serve is refused in one line, before anything runs."""
+"""Every number of every command has bounds: impossible values are refused in one line, before anything runs."""
 
 import dataclasses
 import math
@@ -171,7 +171,7 @@ ABSURD = {
     "perception.py": [("recover", "--experiments", "100000", "--bootstraps", "100000")],
     "tiles.py": [("--farm.workers", "100000"), ("--time-s", "inf")],
 }
-"""What ended in a traceback or never, or would have."""
+"""Command lines that ended in a traceback or never, or would have."""
 
 
 @pytest.mark.parametrize(

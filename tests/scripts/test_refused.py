@@ -125,7 +125,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "tiles plain --farm.scheduler nowhere": ("scheduler", "nowhere"),
     "tiles plain --study 0": ("study", "0"),
 }
-"""Command lines, and parts of what each is told."""
+"""Command lines, and parts of the message of each."""
 
 
 @pytest.mark.parametrize("line", REFUSED)

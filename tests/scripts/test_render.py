@@ -1,4 +1,4 @@
-"""Stills, sequences that go on where they stopped, and films."""
+"""Stills, sequences that continue where they stopped, and films."""
 
 from __future__ import annotations
 
@@ -164,7 +164,8 @@ def test_an_upgraded_renderer_renders_again(render, monkeypatch: pytest.MonkeyPa
 def test_a_model_is_rendered_whole_and_in_part(
     render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...]
 ) -> None:
-    """A bare model in the middle of its picture, or lit by a Radiance picture; the part of a crop is that of it."""
+    """A plain model in the middle of its picture, or lit by a Radiance picture; a crop is the same part of the
+    picture."""
     (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" + SKY)
     monkeypatch.chdir(tmp_path)
     arguments = (str(CUBE), "--size", "80x60", *arguments)

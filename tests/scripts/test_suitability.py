@@ -1,4 +1,4 @@
-"""The study from the command line: bad input, and what a killed one leaves (slow)."""
+"""The study from the command line: bad input, and the files of a killed one (slow)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def tables(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_a_study_killed_twice_gives_the_tables_of_an_unbroken_one(tmp_path: Path) -> None:
-    """Killed hard, children and all survivors included, each time when some more results are on disk."""
+    """Killed by SIGKILL, including children and all survivors, each time when some more results are on disk."""
     cache = ("--cache", str(tmp_path / "cache"))
 
     def command(name: str) -> list[str]:

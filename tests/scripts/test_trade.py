@@ -1,4 +1,4 @@
-"""The measurement of the trade from the command line, small: what it writes, and that it goes on where it was."""
+"""The measurement of the trade from the command line, small: its files, and continuing where it was."""
 
 from __future__ import annotations
 

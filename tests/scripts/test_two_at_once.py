@@ -1,4 +1,5 @@
-"""Two of the same command into one folder: the second is told who is there, and a killed one leaves the way free."""
+"""The same command twice into one folder: the second ends and names the first; a killed one does not block the
+folder."""
 
 from __future__ import annotations
 

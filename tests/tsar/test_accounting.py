@@ -1,4 +1,4 @@
-"""What a cycle's record says of the whole field."""
+"""Values of a cycle's record over the whole field."""
 
 import torch
 

@@ -1,4 +1,4 @@
-"""What memory is free: the least that the machine, control groups of both versions and the process leave."""
+"""Free memory: the least that the machine, control groups of both versions and the process leave."""
 
 from __future__ import annotations
 

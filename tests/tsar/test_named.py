@@ -1,4 +1,4 @@
-"""Tables of names: what is found, what is refused, and where an entry comes from."""
+"""Tables of names: entries found, names refused, and the origin of an entry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses that go on as they did."""
+"""Poses extrapolated by steady motion."""
 
 from __future__ import annotations
 

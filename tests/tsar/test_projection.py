@@ -1,4 +1,4 @@
-"""Points and directions on the image, worked out by hand."""
+"""Projections of points and directions onto the image, computed by hand."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What can be changed in the policy, and which runs that makes."""
+"""The parts of the policy that can be changed, and the runs that follow."""
 
 from __future__ import annotations
 

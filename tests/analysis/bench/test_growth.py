@@ -25,7 +25,7 @@ def test_growth_within_and_beyond_the_limit() -> None:
     assert linear.ours == pytest.approx(1.0) and linear.met is True and linear.peer == EXPONENT_LIMIT
     square = exponent_row("square", SIZES, [[1e-3 * size**2] * 3 for size in SIZES])
     assert square.ours == pytest.approx(2.0) and square.met is False
-    # what doubles the size multiplies the cost by 4, where 2^1.05 is allowed
+    # twice the size costs 4 times as much, where 2^1.05 is allowed
     assert square.ratio == pytest.approx(2**1.05 / 4)
     assert square.note.startswith("16: 256 ms, 32: ")
 

@@ -1,4 +1,4 @@
-"""Mitsuba as a peer: the same picture, and what is said where it cannot run."""
+"""Mitsuba as a peer: the same picture, and the message if it cannot run."""
 
 from pathlib import Path
 

@@ -65,7 +65,7 @@ def test_a_run_is_measured_past_its_warm_up() -> None:
 
 
 def test_pywavelets_finds_the_coefficients_that_ours_finds() -> None:
-    """Over some updates after a black past, up to the normalisation: theirs is orthonormal."""
+    """Over some updates after black history, up to the normalisation: PyWavelets' is orthonormal."""
     pytest.importorskip("pywt")
     tiles, side, raster = 5, 16, raster_to_morton(16)
     generator = torch.Generator().manual_seed(1)

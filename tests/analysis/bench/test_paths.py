@@ -73,7 +73,7 @@ def ball_on_the_floor(material: Material) -> Scene:
 
 
 def of_seed(scene: Scene, seed: int) -> np.ndarray:
-    """Our picture ``(h, w, 3)``; kernels are those for everything, which tests share."""
+    """Our picture ``(h, w, 3)``, by the kernels with all features, which tests share."""
     renderer = Renderer(scene, seed=seed, specialise=False)
     return render_image(renderer, SamplePlan(SAMPLES, "random", seed), SIDE_PX, SIDE_PX, 0.0).numpy()
 

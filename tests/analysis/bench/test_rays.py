@@ -1,4 +1,4 @@
-"""Rays that are compared with Embree's: what they are, and that both sides answer alike."""
+"""Rays that are compared with Embree's: their properties, and the same answers from both sides."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def test_both_sides_agree_on_nearly_every_ray(ours: RayQueries) -> None:
 
 
 def test_disagreements_are_counted(ours: RayQueries) -> None:
-    """Against another mesh there are many: the agreement above is not that of a blind comparison."""
+    """Against another mesh there are many differences, so the agreement above is not that of a blind comparison."""
     pytest.importorskip("embreex")
     other = bench_rays.EmbreeMesh(MESH.vertices * np.float32(0.9), MESH.faces)
     for kind, calls in all_kinds(ours).items():

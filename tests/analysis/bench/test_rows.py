@@ -1,4 +1,4 @@
-"""What a benchmark is made of: options, rows, turns."""
+"""Options, rows and turns of the benchmark."""
 
 from pathlib import Path
 

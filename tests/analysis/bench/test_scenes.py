@@ -1,4 +1,4 @@
-"""What the benchmark renders."""
+"""Scenes and batches of the benchmark."""
 
 from pathlib import Path
 

@@ -164,7 +164,7 @@ def test_bad_input_lets_other_faults_through() -> None:
 
 
 def of_a_library() -> Exception:
-    """As Warp says it where there is no room for its libraries."""
+    """As Warp reports it if there is no memory for its libraries."""
     error = RuntimeError("Failed to load the shared library 'warp.so'")
     error.__cause__ = OSError("warp.so: failed to map segment from shared object")
     return error
@@ -210,7 +210,7 @@ def test_require_memory_says_what_is_needed_and_what_is_free(monkeypatch: pytest
 
 
 def test_a_command_under_a_limit_of_memory_ends_with_one_line(tmp_path: Path) -> None:
-    """The limit of the process, not of the machine, is what is free."""
+    """Free memory is that of the process's limit, not of the machine."""
     program = "import analysis.command.cli as c\nimport numpy as np\nc.run_cli(lambda: {body})"
     root = Path(__file__).resolve().parents[3]
     bodies = ("c.require_memory(3e9, 'pictures')", "np.ones(400_000_000)")

@@ -23,7 +23,7 @@ os._exit(0)
 
 
 def test_semaphores_of_killed_workers_are_not_reported() -> None:
-    """The process that tracks them ends after this one, so its words would follow the one line of an interrupt."""
+    """The semaphore tracker ends after this process, so its output would follow the one line of an interrupt."""
     done = subprocess.run([sys.executable, "-c", LOST], cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -1,4 +1,4 @@
-"""Text on the terminal appears as it is, whatever brackets and colons a path or a name holds."""
+"""Text on the terminal appears unchanged, whatever brackets and colons a path or a name contains."""
 
 import ast
 import types

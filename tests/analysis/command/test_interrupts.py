@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command, whoever loses it, and lets it clean up."""
+"""Ctrl-C ends a command, whatever library loses it, and lets it clean up."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_one_that_is_lost_comes_again(capsys: pytest.CaptureFixture) -> None:
 
 
 def test_an_error_that_follows_a_lost_one_is_the_interrupt(capsys: pytest.CaptureFixture) -> None:
-    """As of a module whose own code turns it into an ImportError."""
+    """Like a module whose own code turns it into an ImportError."""
 
     def main() -> None:
         lost()
@@ -125,7 +125,7 @@ def test_one_that_was_heeded_does_not_come_again() -> None:
 
 
 def test_one_that_comes_while_workers_start_is_heard_afterwards() -> None:
-    """Also where another thread takes it, so that Python would raise it in this one."""
+    """Also if another thread takes the signal, so that Python would raise KeyboardInterrupt in this one."""
     program = """
 import os, signal, threading, time
 from analysis.command.cli import run_cli

@@ -1,4 +1,4 @@
-"""Presets and budgets: what they put into the options, and what is said and came."""
+"""Presets and budgets: the options that they set, and predicted and measured values."""
 
 from __future__ import annotations
 

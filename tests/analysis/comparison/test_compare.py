@@ -1,4 +1,4 @@
-"""Comparisons from Python: objects and names, what comes back, and what is refused."""
+"""Comparisons from Python: objects and names, results, and refused arguments."""
 
 from __future__ import annotations
 

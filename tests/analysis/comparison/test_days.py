@@ -18,7 +18,7 @@ TIMES_S = [0.0, 0.1, 0.2]
 
 
 def left(folder: Path, own: float, truth: int = 7, seed: int = 0, steps: int = 3, comparer: bool = True) -> Path:
-    """What a run left: errors of a policy and a rival, and pictures that tell them apart."""
+    """The files of a run: errors of a policy and a rival, and pictures that distinguish them."""
     panels = [Panel("reference"), Panel("tsar", truth="reference"), Panel("framed", truth="reference")]
     values = {"reference": truth, "tsar": int(1000 * own), "framed": 90}
     pictures = {name: png_bytes(np.full((2, 2, 3), value, np.uint8)) for name, value in values.items()}

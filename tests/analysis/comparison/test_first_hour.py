@@ -1,4 +1,5 @@
-"""What a new user meets first: wrong input is said before anything loads, and sizes are said to change the pace."""
+"""The first experience of a new user: bad input is reported before anything loads, and so is a size that changes the
+pace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples and values that are not finite are counted by every policy, in everything that says how a run went."""
+"""Non-finite samples and values are counted for every policy, in the summary, the output and the study."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RIVALS = ("framed", "afr", "frameless")
 
 @pytest.fixture
 def broken_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Has the renderer answer with NaN now and then, and one in each picture of the reference."""
+    """Makes the renderer return NaN now and then, and puts one NaN into each picture of the reference."""
     trace, render_frame = Renderer.trace, Renderer.render_frame
 
     def some_bad(renderer: Renderer, *arguments: Any) -> SampleBatch:

@@ -1,4 +1,4 @@
-"""What is made of a comparison as it goes by: steps of the page, and frames of the film."""
+"""Steps of the page and frames of the film, made while a comparison runs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_the_film_has_a_frame_every_stride(stride: int, expected: int, tmp_path:
 
 
 def test_the_best_framed_rival_is_seen_and_the_others_are_not(tmp_path: Path) -> None:
-    """By the median, whatever the mean is; all that is not framed has a panel, and the run's own is last."""
+    """By the median, whatever the mean is; every run that is not framed has a panel, and the run's own is last."""
     mse = {"own": [1.0] * 3, "framed": [2.0] * 3, "afr": [9.0] * 3, "framed-half": [1.0, 1.0, 99.0], "framing": [8.0]}
     panels = Panels.of({name: np.array(values) for name, values in mse.items()}, "own")
     assert panels.runs == ("framed-half", "afr", "framing", "own") and panels.hidden == ("framed",)

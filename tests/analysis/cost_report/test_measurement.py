@@ -33,7 +33,7 @@ MIB = 2.0**20
 
 
 def cell(setting: tuple[int, int], seconds: Callable[[str, float], float], image_s: float = 0.5) -> Cell:
-    """A setting whose stages take what a function of their name and operations says."""
+    """A setting whose stages take seconds given by a function of their name and operations."""
     batch, side = setting
     p = CostParameters(batch_size=batch, recon_res=side**2, trace_segments=2.5, tiling_size=4 * batch)
     empty = Cell(batch, side, {}, 0.0, 2.5, p, image_s, image_s, 2.5, 1, 1)
@@ -162,7 +162,7 @@ def test_memory_growth_of_a_leak_and_of_a_start() -> None:
 
 
 class Silent:
-    """Bars that remember what they were told."""
+    """Bars that record their calls."""
 
     def __init__(self) -> None:
         self.told: dict[str, list[int]] = {}
@@ -180,7 +180,7 @@ def test_the_cache_is_full_before_a_setting_is_measured() -> None:
 
 @pytest.fixture
 def one_torch_thread() -> Iterator[None]:
-    """On a busy machine the threads of torch wait for one another; how many there are does not matter here."""
+    """On a busy machine the threads of torch wait for one another; their number does not matter here."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

@@ -92,7 +92,7 @@ def test_values_of_the_dissertation() -> None:
 
 
 def test_advantages_by_both_readings_of_the_overdraw() -> None:
-    """7.2, 5.2 and 1.2 are not all of one reading: the overdraw, which is not printed, is 1 in the first two."""
+    """7.2, 5.2 and 1.2 do not follow from one reading: the overdraw, which is not printed, is 1 in the first two."""
     found = summarise(DEFAULT, None)
     assert {name: round(value, 1) for name, value in found["advantage"].items()} == {
         "thesis": 6.8,

@@ -1,4 +1,4 @@
-"""Shares of an image's error on constructed images: they add up, and each finds what was put there."""
+"""Shares of an image's error on constructed images: they add up, and each finds the error that was put there."""
 
 from __future__ import annotations
 

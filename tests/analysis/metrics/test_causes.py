@@ -107,7 +107,7 @@ def test_each_part_against_its_definition(seed: int) -> None:
 
 
 def only(found: causes.Split, name: str, least: float = 1e-4) -> None:
-    """Nothing but one cause, and a good deal of that."""
+    """Only one cause, and a large one."""
     assert found.known == 1.0 and found.mse > least
     assert found.causes[name] == pytest.approx(found.mse, rel=1e-5)
     others = [value for other, value in found.causes.items() if other != name]

@@ -55,7 +55,7 @@ def test_mse_of_constants() -> None:
     errors, _ = quality.pixel_errors(one, zero)
     assert errors.mse == pytest.approx(1.0, abs=1e-6)
     assert errors.log_mse == pytest.approx(math.log(2.0) ** 2, rel=1e-5)
-    # beyond white the display shows no difference, the log-compressed error does
+    # beyond white the display shows no difference, but the log-compressed error does
     assert quality.pixel_errors(7 * one, 3 * one)[0].mse == 0.0
     assert quality.pixel_errors(7 * one, 3 * one)[0].log_mse == pytest.approx(math.log(2.0) ** 2, rel=1e-5)
     with pytest.raises(ValueError, match="shapes"):

@@ -1,4 +1,4 @@
-"""Where curves lie in a plot: places agree with the labels of the axes, and labels of lines stand apart."""
+"""Layout of curves in a plot: positions agree with the labels of the axes, and labels of lines do not overlap."""
 
 from __future__ import annotations
 

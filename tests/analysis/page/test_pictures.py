@@ -158,7 +158,7 @@ def test_age_image_is_in_raster_order_and_says_where_nothing_was_sampled() -> No
 
 
 def test_pictures_are_exact_or_near() -> None:
-    """Near: colours stand where they stood, also beside a sharp edge of colour."""
+    """Lossy pictures: colours stay in their places, also beside a sharp edge of colour."""
     ramp = np.linspace(0, 255, 64).astype(np.uint8)
     pixels = np.stack((*np.meshgrid(ramp, ramp), np.full((64, 64), 90, np.uint8)), -1)
     pixels[20:30, 20:40] = (255, 0, 0)

@@ -216,7 +216,7 @@ def test_no_run_is_left_out(count: int, columns: int, rows: int) -> None:
 
 
 def test_maps_of_a_rival_bear_its_name_and_a_policy_shows_what_it_knows() -> None:
-    """A run that records is shown whoever it is; the named maps and the ages are of the run's own."""
+    """Any run that records is shown; the named maps and the ages are those of the run's own policy."""
     one = view()
     (record, display), (_, framed) = one.shown["own"], one.shown["framed"]
     known = MapShown(torch.tensor([[1.0, 2.0], [4.0, 8.0]]), (1.0, 8.0), "volts")

@@ -1,4 +1,4 @@
-"""Distances in JOD become what an observer notices and prefers."""
+"""Distances in JOD become the batch sizes that an observer notices and prefers."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def filled(file: Path) -> Path:
 
 
 def killed_feeder(file: Path, after_lines: int) -> int:
-    """Kills a process that stores answers; the last one that it was told is stored, or -1."""
+    """Kills a process that stores answers; returns the last acknowledged one, or -1."""
     with subprocess.Popen([sys.executable, "-c", FEEDER, str(file)], stdout=subprocess.PIPE, text=True) as feeder:
         assert feeder.stdout is not None
         lines = [feeder.stdout.readline() for _ in range(after_lines)]
@@ -104,7 +104,7 @@ def test_a_store_of_another_session_is_refused(tmp_path: Path) -> None:
 
 
 def flips_noticed(file: Path, count: int, seed: int) -> tuple[int, int]:
-    """How many of so many flipped bits are refused, and how many change nothing."""
+    """Numbers of flipped bits that are refused, and that change nothing."""
     whole, rng, found = file.read_bytes(), np.random.default_rng(seed), [0, 0]
     for place in rng.integers(0, 8 * len(whole), count):
         content = bytearray(whole)

@@ -1,4 +1,4 @@
-"""Simulated observers answer as their rule says, whoever else does."""
+"""Simulated observers answer by their rule, independently of each other."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_the_harder_scene_has_the_higher_threshold_and_the_tests_see_it() -> Non
 
 
 def test_filters_and_shifts_are_compared_as_scenes_are() -> None:
-    """One filter needs more samples: every level finds it over observers, and says how many asked."""
+    """One filter needs more samples: the tests of every level find that over observers, and state their number."""
     box = stimuli()
     both = pd.concat([box, box.assign(time_filter="triangle", jod=4.0 * box["jod"])], ignore_index=True)
     trials = simulated_trials(both, drawn_observers(12, 1, 0.2, 0.01), 4, 3, 0.5)
@@ -95,7 +95,7 @@ def test_filters_and_shifts_are_compared_as_scenes_are() -> None:
 
 
 def test_equal_conditions_are_found_to_differ_as_often_as_the_tests_say() -> None:
-    """Each observer finds another scene harder; on average none is.
+    """Each observer finds another scene harder, but on average none is harder.
 
     A test whose entries are cells, two point sets of each observer, finds three times as many differences.
     """

@@ -1,4 +1,4 @@
-"""Sessions lose nothing, ask nothing twice, and belong to one process at a time."""
+"""Sessions lose no answer, ask no question twice, and belong to one process at a time."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_a_session_of_an_earlier_version_goes_on(tmp_path: Path, stimuli: Path) 
     file = begun_earlier(tmp_path, stimuli)
     first = {"trial": 0, "answer": "left", "response_s": 2.5, "dropped_frames": 10**400, "fits_window": True}
     lines = [json.dumps(row) for row in (first, {"trial": 1, "answer": "right"}, {"trial": 2, "answer": "left"})]
-    file.write_text(f"{lines[0]}\n{lines[1]}{lines[2][:-5]}")  # no end of a line, and a write that was cut off
+    file.write_text(f"{lines[0]}\n{lines[1]}{lines[2][:-5]}")  # a line without an end, and a truncated write
     before = file.read_bytes()
     with opened(tmp_path, stimuli) as session:
         assert session.current is not None and session.current.number == 2

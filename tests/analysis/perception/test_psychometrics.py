@@ -1,4 +1,4 @@
-"""Fits give back what they were drawn from, and say what they cannot know."""
+"""Fits recover the functions that answers were drawn from, and say so if they cannot."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_an_interval_holds_its_estimate() -> None:
 
 
 def test_intervals_are_of_observers_not_of_answers() -> None:
-    """As many answers say less where they are of observers that differ; the estimate is that of all answers."""
+    """The same number of answers says less if the observers differ; the estimate is that of all answers."""
     far = np.array([-1.5, -1.0, -0.5, 0.5, 1.0, 1.5])
     levels = np.array(LEVELS, np.float64)
     right = np.stack([np.rint(200 * correct_share(levels, 6.0 + away, 1.0, 0.0)) for away in far]).astype(np.int64)
@@ -86,7 +86,7 @@ def test_intervals_are_of_observers_not_of_answers() -> None:
 
 
 def test_tails_are_those_of_few_observers() -> None:
-    """Hesterberg 2015, sec. 4.3; many are as normal."""
+    """Hesterberg 2015, sec. 4.3; for many observers the share is that of the normal distribution."""
     assert tail_share(1) == 0.025 and tail_share(10_000) == pytest.approx(0.025, abs=1e-4)
     assert tail_share(12) == pytest.approx(0.0108, abs=2e-4)
     assert 0.0 < tail_share(3) < tail_share(6) < tail_share(12)

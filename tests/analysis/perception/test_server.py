@@ -1,4 +1,4 @@
-"""The server of the trials: it shows the right pair, and heeds nobody but its own page."""
+"""The server of the trials: it shows the right pair, and serves only its own page."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ def result(run: Run, mse: float, asked: str, broken: bool = False) -> Result:
 
 
 def results(options: PrecisionOptions, of: dict[tuple[str, str], tuple[float, str, bool]]) -> list[Result]:
-    """Of every run; those that are not named are like the policy as it is."""
+    """Results of every run; runs that are not named equal the unchanged policy."""
     return [result(run, *of.get((run.kept, run.form), (2.0, "abcd", False))) for run in runs(options)]
 
 

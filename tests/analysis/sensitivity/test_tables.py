@@ -1,4 +1,4 @@
-"""What the tables of a sensitivity study say of made-up results."""
+"""Tables of a sensitivity study from made-up results."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ ERROR = ErrorConfig()
 
 @pytest.mark.parametrize("error", [ERROR, ErrorConfig(extent="tile"), ErrorConfig(estimator="fft")])
 def test_estimate_is_the_pipelines_own(error: ErrorConfig) -> None:
-    """At a stride that leaves one framelet: what the pipeline finds of a tile that is refreshed at those times."""
+    """At a stride that leaves one framelet: the error that the pipeline finds for a tile refreshed at those times."""
     planes = (0.4 + 0.05 * noise(1, 5, 32, 32, seed=4).float()).clamp(0.1, 0.8)
     found = streaming_error(planes, 2, 2, error, 64)
     assert found.shape == (1, 2, 2)
@@ -108,7 +108,7 @@ def test_perfect_opposite_and_random_estimates() -> None:
 
 
 def test_dealing_keeps_how_often_each_sign_occurs() -> None:
-    """An estimate that says the same of every tile is no better than chance, however often it is right."""
+    """An estimate that is the same for every tile is no better than chance, however often it is right."""
     true = np.abs(vectors(100, 2))
     found = agreement(np.ones_like(true), true)
     assert found["share_same_quadrant"]["value"] == 1.0

@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, and what is written as JSON is JSON."""
+"""Files appear complete or not at all, and JSON files are valid JSON."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text()
 
 @given(st.recursive(leaves, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=12))
 def test_plain_values_survive_strict_json(value) -> None:
-    """Everything comes back as it was, but for floats that JSON lacks."""
+    """Everything is read back unchanged, except floats that JSON lacks."""
 
     def same(before, after) -> bool:
         if isinstance(before, float) and not math.isfinite(before):

@@ -1,4 +1,4 @@
-"""Broken invariants are found, from records as they come and from a file alone."""
+"""Broken invariants are found, from records as they arrive and from a file alone."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_a_check_tells_at_any_time_what_it_has_seen() -> None:
 
 
 def test_densities_are_rounded_as_in_a_file(tmp_path: Path) -> None:
-    """A density over its bound by less than float32 can tell passes both ways, one that it can tell fails both ways."""
+    """A density beyond its bound by less than a float32 step passes both ways, one beyond by more fails both ways."""
     for excess, broken in ((1e-9, 0), (3e-6, 1)):
         record = good_record(1, spatial=field(SPATIAL[1] * (1 + excess)))
         assert checked(tmp_path / f"{broken}.parquet", [record])["densities_out_of_bounds"] == broken

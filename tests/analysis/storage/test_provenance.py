@@ -1,4 +1,4 @@
-"""Where a result comes from is told as it is, and nothing is told that is not known."""
+"""The provenance of a result is correct, and unknown entries are null."""
 
 from __future__ import annotations
 

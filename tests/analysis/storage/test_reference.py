@@ -1,4 +1,4 @@
-"""References are rendered once, go on where they stopped, and are named by everything that decides their content."""
+"""References are rendered once, continue where they stopped, and are named by everything that decides their content."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SPEC = ReferenceSpec(
 
 
 class Renderer:
-    """Renders a number for the time, counts, and breaks at an image if told to."""
+    """Renders a number that depends on the time, counts calls, and fails at a given image."""
 
     def __init__(self, break_at: int | None = None, error: type[BaseException] = RuntimeError) -> None:
         self.times: list[float] = []

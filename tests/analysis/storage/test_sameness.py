@@ -1,4 +1,4 @@
-"""Whether two folders hold the same: what counts as a difference, and what two equal runs may differ in."""
+"""Comparison of two folders: what counts as a difference, and where two equal runs may differ."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def test_versions_of_libraries_decide_it(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_every_library_has_a_version(entry: str) -> None:
-    """A name that cannot be told would leave its version out."""
+    """A name that cannot be resolved would leave its version out."""
     assert [name for name in modules_of(ENTRIES[entry])[1] if version_of(name) is None] == []
 
 
@@ -175,7 +175,7 @@ def test_nothing_is_loaded_that_was_not_found(entry: str) -> None:
 
 
 def test_no_module_is_imported_by_a_name_that_cannot_be_read() -> None:
-    """But what a table names, which is followed, and what a package offers to those who use it."""
+    """The exceptions are entries of tables, which are followed, and names that a package re-exports."""
     known = {ROOT / "tsar/named.py", ROOT / "tsar/lazy.py"}
     for module in set.union(*(modules_of(maker)[0] for maker in ENTRIES.values())) - known:
         names = {

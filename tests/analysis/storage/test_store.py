@@ -1,4 +1,5 @@
-"""What a command finds on disk is what was written there, or it is not there: cut off, changed, exchanged, foreign."""
+"""A command finds a file on disk unchanged or not at all: truncated, changed, exchanged and foreign files are
+missing."""
 
 from __future__ import annotations
 
@@ -165,7 +166,7 @@ def _make_until_killed(folder: Path) -> None:
 
 @pytest.mark.parametrize("after_s", [0.01, 0.05, 0.11])
 def test_a_process_may_be_killed_at_any_moment(after_s: float, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    """Whatever is there is whole, and what is missing can be made. The same content is written again and again."""
+    """Every listed file is complete, and missing ones can be made. The same content is written again and again."""
     process = multiprocessing.get_context("fork").Process(target=_make_until_killed, args=(tmp_path,))
     process.start()
     process.join(after_s)

@@ -1,4 +1,4 @@
-"""What a study is made of: rows, scales, cost, and the names of results."""
+"""Parts of a study: rows, scales, cost, and the names of results."""
 
 from __future__ import annotations
 

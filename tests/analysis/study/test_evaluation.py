@@ -36,7 +36,7 @@ def key(one: Case) -> str:
 
 
 def content(place: Place, name: str) -> tuple[bytes, list[bytes], dict]:
-    """A result without what was measured of the machine."""
+    """A result without its measurements of the machine."""
     files = place.files(name)
     summary = json.loads(files["summary"].read_text())
     stills = [(place.results / still).read_bytes() for still in summary["stills"]]
@@ -208,8 +208,8 @@ def test_parts_of_the_policy_are_left_out_and_named(place: Place) -> None:
 
 @pytest.mark.parametrize("policy", ["tsar", "framed"])
 def test_the_budget_of_an_error_adds_up(policy: str, place: Place) -> None:
-    """At every time, with the truth rendered at the time that the image shows; the longer a frame is shown, the more
-    its latency leaves."""
+    """At every time, with the truth rendered at the time that the image shows; the longer a frame is shown, the larger
+    the floor that its latency sets."""
     one = case(policy, budget_s=0.05)
     table = pd.read_parquet(place.files(evaluate(one, key(one), place))["times"])
     assert len(table) == TIMES and np.allclose(table[[f"budget_{name}" for name in SHARES]].sum(axis=1), table["mse"])

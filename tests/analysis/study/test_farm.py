@@ -1,4 +1,4 @@
-"""Clusters of processes: who can reach them, and what is said when they end."""
+"""Clusters of processes: who can reach them, and the messages when they end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run asks of the renderer, and what its cycles add up to."""
+"""Requests of a run to the renderer, and sums over its cycles."""
 
 from __future__ import annotations
 

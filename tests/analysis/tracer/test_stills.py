@@ -1,4 +1,4 @@
-"""Stills on disk: kept where they are what was asked for, counted always, and nobody else's files are touched."""
+"""Stills on disk: kept if they are the requested ones, always counted, and foreign files are not touched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tiles over processes: the same bits whatever happens to the workers; and a model of what more workers give."""
+"""Tiles over processes: the same bits whatever happens to the workers; and a model of the speed-up."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_a_worker_of_another_source_renders_nothing() -> None:
 
 
 def test_a_chunk_that_fails_is_tried_again(client, expected) -> None:
-    """Such as for want of memory that others have for a moment."""
+    """For example for lack of memory that other processes use for a moment."""
 
     def fail_twice() -> None:
         import analysis.tracer.tiles
@@ -151,7 +151,7 @@ def test_a_chunk_that_fails_is_tried_again(client, expected) -> None:
 def test_a_study_counts_and_compares(client) -> None:
     found = study(client, PICTURE, chunks_of(PICTURE, 5), (2,), 1, Task())
     assert [row["workers"] for row in found["rows"]] == [1, 2] and found["same_bits"]
-    # how near the model comes is for scripts/tiles.py to say: here other work may run beside it
+    # the accuracy of the model is measured by scripts/tiles.py: here other work may run at the same time
     assert found["rows"][0]["speedup"] == 1.0
     assert all(0.0 < row["modelled_over_measured"] < np.inf for row in found["rows"])
     assert found["predicted"]["reported"] is None and 0.0 < found["predicted"]["speedup"] <= 20.0

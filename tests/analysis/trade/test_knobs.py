@@ -92,7 +92,7 @@ def test_the_default_is_measured_at_every_place() -> None:
 
 
 def test_a_search_nears_the_front_and_is_the_same_again() -> None:
-    """Of a plain function of two knobs, of which a batch costs and jitter is free."""
+    """Cost and error by a simple function of two knobs: the batch costs, and jitter is free."""
     knobs = searched(chosen_knobs(["batch", "jitter", "depth", "policy", "structure", "tiles"]))
     assert [knob.name for knob in knobs] == ["batch", "jitter", "depth"]
     asked = list[list[Point]]()
@@ -117,7 +117,7 @@ def test_a_search_nears_the_front_and_is_the_same_again() -> None:
 
 
 def results(seed: int = 0) -> list[Result]:
-    """Runs of a plain law: error falls with cost, and every input has a level of its own."""
+    """Runs of a simple law: the error falls with cost, and every input has its own level."""
     drawn = np.random.default_rng(seed)
     found = []
     points = [*points_of(chosen_knobs(["batch", "smoothing"])), Point("search", 1, turned(batch=64, jitter=False))]

@@ -1,7 +1,8 @@
 """How policies behave where the right behaviour is known: scenes of flat layers of 64 pixels, cycles of 1/64 s.
 
-Every policy is held to what is right for any: its pictures are finite and no brighter than the scene, and once the
-scene stands still it comes to show it. What more is right is claimed of those that are meant to do it.
+Every policy must do what is right for any: its pictures are finite and no brighter than the scene, and once the
+scene stands still they converge to it. Further properties are required only of the policies that are meant to have
+them.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ SCREENS = {
 
 @cache
 def shown(policy: str, name: str, end_s: float = 0.6) -> tuple[ShownImage, ...]:
-    """What a policy shows; a cycle of fewer samples than a batch has is as much shorter."""
+    """Pictures of a policy; a cycle with fewer samples than a batch is shorter in proportion."""
     screen = SCREENS[name]
     made = POLICIES[policy](Setting(CONFIG, stages, view=screen.view))
     cycle_s = CYCLE_S * made.price.samples / CONFIG.budget

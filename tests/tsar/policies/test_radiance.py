@@ -1,4 +1,4 @@
-"""Radiance at its ends, for every policy and both sets of stages: what is no number is never shown, and what lies in
+"""Extremes of radiance, for every policy and both sets of stages: non-finite values are never shown, and the value of
 one pixel stays there."""
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from tsar.types import Trace
 
 GREY = 0.4
 NOWHERE = {(5, 5): nan, (50, 9): inf, (30, 33): -inf, (12, 52): 1.001e30, (57, 57): torch.finfo(torch.float32).max}
-"""What is no radiance, pixel by pixel."""
+"""Non-finite values, by pixel."""
 FEATURES = {(20, 44): 1e30, (44, 20): -1.0, (36, 60): 0.0}
-"""What is one, as far from the others as pixels go."""
+"""Finite values that are extreme, by pixel."""
 REACH_PX = 6
-"""A feature of one pixel is seen no farther once the picture has been sampled: 4 were measured, where what is not
-known yet is filled from around."""
+"""Pixels from a single-pixel feature beyond which it has no effect once the picture has been sampled: 4 were measured,
+because unknown pixels are filled in from their surroundings."""
 
 
 @pytest.fixture(autouse=True)
@@ -52,7 +52,7 @@ def test_single_pixels_stay_where_they_are_and_nonfinite_values_are_never_shown(
 
 @pytest.mark.parametrize(("policy", "kind"), CASES)
 def test_a_region_of_nan_is_dark_at_worst(policy: str, kind: StagesName) -> None:
-    """Whole tiles of it: half of the picture."""
+    """Half of the picture is NaN, so whole tiles are."""
 
     def spoil(color: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
         color[x < 32] = nan
@@ -66,7 +66,7 @@ def test_a_region_of_nan_is_dark_at_worst(policy: str, kind: StagesName) -> None
 @pytest.mark.parametrize("value", [pytest.param(0.0, marks=pytest.mark.slow), 1e-30, 1e30])
 @pytest.mark.parametrize(("policy", "kind"), CASES)
 def test_constant_frames(policy: str, kind: StagesName, value: float) -> None:
-    """Black is black, next to nothing is next to nothing, and what is brighter than any display is white."""
+    """Black stays black, a tiny value stays tiny, and a value brighter than any display is white."""
     screen = Screen((Layer(grey(value)),))
     pictures = shown(policy, kind, screen.trace, 0.02)[-1]
     assert bool(pictures.isfinite().all())
