@@ -10,7 +10,7 @@ from renderer.kernels.shapes import cube_distance, meets_box, misses_sphere, pla
 from renderer.layout.features import Feature
 from renderer.layout.kinds import Shape
 from renderer.layout.sizes import LIT
-from renderer.layout.structs import Hit, InstanceRecord, SceneData, ViewData
+from renderer.layout.structs import GroupRecord, Hit, InstanceRecord, SceneData, ViewData
 
 # On a GPU every mesh has a tree of Warp's, so this is never called there.
 _NATIVE = """
@@ -118,6 +118,32 @@ def instance_blocks(
 
 
 @wp.func
+def in_group(
+    features: wp.int32,
+    scene: SceneData,
+    view: ViewData,
+    group: GroupRecord,
+    time_s: wp.float64,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t_max: wp.float32,
+):
+    """Whether a world ray misses all of a group before ``t_max``; and its origin and direction in the space of the
+    group's track, where it does not."""
+    start = wp.vec3(origin[0], origin[1], origin[2])
+    towards = wp.vec3(direction[0], direction[1], direction[2])
+    missed = wp.bool(False)
+    if (features & Feature.MOTION) != 0 and group.track != 0:
+        start = origin - track_translation(scene, view, group.track, time_s)
+        missed = misses_sphere(start, direction, group.radius, t_max)
+        if not missed:
+            rotation = track_rotation(scene, view, group.track, time_s)
+            start = wp.quat_rotate_inv(rotation, start)
+            towards = wp.quat_rotate_inv(rotation, direction)
+    return missed, start, towards
+
+
+@wp.func
 def closest_hit(
     features: wp.int32,
     scene: SceneData,
@@ -133,16 +159,7 @@ def closest_hit(
     best.t = t_max
     for g in range(scene.group_count):
         group = scene.groups[g]
-        start = wp.vec3(origin[0], origin[1], origin[2])
-        towards = wp.vec3(direction[0], direction[1], direction[2])
-        missed = wp.bool(False)
-        if (features & Feature.MOTION) != 0 and group.track != 0:
-            start = origin - track_translation(scene, view, group.track, time_s)
-            missed = misses_sphere(start, direction, group.radius, best.t)
-            if not missed:
-                rotation = track_rotation(scene, view, group.track, time_s)
-                start = wp.quat_rotate_inv(rotation, start)
-                towards = wp.quat_rotate_inv(rotation, direction)
+        missed, start, towards = in_group(features, scene, view, group, time_s, origin, direction, best.t)
         if not missed:
             inverse = reciprocal(towards)
             index = wp.int32(group.first)
@@ -173,16 +190,7 @@ def occluder(
     for none."""
     for g in range(scene.group_count):
         group = scene.groups[g]
-        start = wp.vec3(origin[0], origin[1], origin[2])
-        towards = wp.vec3(direction[0], direction[1], direction[2])
-        missed = wp.bool(False)
-        if (features & Feature.MOTION) != 0 and group.track != 0:
-            start = origin - track_translation(scene, view, group.track, time_s)
-            missed = misses_sphere(start, direction, group.radius, t_max)
-            if not missed:
-                rotation = track_rotation(scene, view, group.track, time_s)
-                start = wp.quat_rotate_inv(rotation, start)
-                towards = wp.quat_rotate_inv(rotation, direction)
+        missed, start, towards = in_group(features, scene, view, group, time_s, origin, direction, t_max)
         if not missed:
             inverse = reciprocal(towards)
             index = wp.int32(group.first)
