@@ -5,8 +5,9 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,17 +21,30 @@ from scenes.formats.directives.syntax import Directive, Parameters
 from scenes.formats.losses import SAME_PICTURE
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
 
-SAMPLERS = {"halton": "halton", "sobol": "sobol", "02sequence": "sobol", "lowdiscrepancy": "sobol",
-            "maxmindist": "sobol", "random": "independent", "stratified": "stratified"}  # fmt: skip
-INTEGRATORS = {"path": "path", "volpath": "path", "bdpt": "bidirectional", "directlighting": "direct",
-               "whitted": "whitted", "mlt": "metropolis", "sppm": "photonmap",
-               "ambientocclusion": "direct"}  # fmt: skip
 _DEPTH = 5
 
 
 @dataclass
 class PbrtReader(SceneReader):
-    """State of a PBRT file while it is read."""
+    """State of a PBRT file while it is read.
+
+    Attributes:
+        samplers, integrators: canonical names by those of the dialect.
+        same_picture: integrators that differ in time alone.
+        sampler_hints, integrator_hints: parameters that are hints to the renderer.
+    """
+
+    samplers: ClassVar[Mapping[str, str]] = {
+        "halton": "halton", "sobol": "sobol", "02sequence": "sobol", "lowdiscrepancy": "sobol", "maxmindist": "sobol",
+        "random": "independent", "stratified": "stratified",
+    }  # fmt: skip
+    integrators: ClassVar[Mapping[str, str]] = {
+        "path": "path", "volpath": "path", "bdpt": "bidirectional", "directlighting": "direct", "whitted": "whitted",
+        "mlt": "metropolis", "sppm": "photonmap", "ambientocclusion": "direct",
+    }  # fmt: skip
+    same_picture: ClassVar[frozenset[str] | set[str]] = SAME_PICTURE
+    sampler_hints: ClassVar[tuple[str, ...]] = ()
+    integrator_hints: ClassVar[tuple[str, ...]] = ()
 
     def make_surfaces(self) -> PbrtSurfaces:
         return PbrtSurfaces(self.files, self.report, self.names)
@@ -50,19 +64,27 @@ class PbrtReader(SceneReader):
 
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        name = self.report.kind(SAMPLERS, kind, "sampler", directive.place, picture=False)
+        name = self.report.kind(self.samplers, kind, "sampler", directive.place, picture=False)
         if kind == "stratified":
             count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
         else:
             count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
         self.sampler = Sampler(name, count)  # type: ignore[arg-type]
+        self._hints(directive, parameters, self.sampler_hints, "sampler")
         self.left_over(parameters, f"sampler {kind!r}")
 
     def _read_integrator(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        name = self.report.kind(INTEGRATORS, kind, "integrator", directive.place, kind not in SAME_PICTURE)
+        name = self.report.kind(self.integrators, kind, "integrator", directive.place, kind not in self.same_picture)
         self.integrator = Integrator(name, parameters.whole("maxdepth", _DEPTH, 0, 1 << 20))  # type: ignore[arg-type]
+        self._hints(directive, parameters, self.integrator_hints, "integrator")
         self.left_over(parameters, f"integrator {kind!r}")
+
+    def _hints(self, directive: Directive, parameters: Parameters, names: tuple[str, ...], of: str) -> None:
+        for name in names:
+            if name in parameters:
+                parameters.asked.add(name)
+                self.report.hint(str(directive.place), f"{name} of the {of}")
 
     def _read_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)

@@ -12,11 +12,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 from scenes.arithmetic import product
-from scenes.canonical import Film, Instance, Integrator, Sampler, SceneError
+from scenes.canonical import Film, Instance, Sampler, SceneError
 from scenes.formats.directives.reader import typed, word
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of, parse_directives
 from scenes.formats.geometry.meshed import as_mesh
@@ -26,12 +27,6 @@ from scenes.formats.pbrt.read import PbrtReader
 from scenes.formats.pbrt.v4_lights import V4Lights
 from scenes.formats.pbrt.v4_materials import PbrtV4Surfaces
 
-SAMPLERS = {"zsobol": "sobol", "sobol": "sobol", "paddedsobol": "sobol", "pmj02bn": "sobol", "halton": "halton",
-            "independent": "independent", "stratified": "stratified"}  # fmt: skip
-INTEGRATORS = {"volpath": "path", "path": "path", "simplevolpath": "path", "simplepath": "path", "lightpath": "path",
-               "bdpt": "bidirectional", "mlt": "metropolis", "sppm": "photonmap", "randomwalk": "path",
-               "ambientocclusion": "direct", "function": "path"}  # fmt: skip
-_SAME = SAME_PICTURE | {"simplepath", "simplevolpath", "lightpath", "randomwalk"}
 _TARGETS = {"Shape": "shape", "LightSource": "light", "AreaLightSource": "light", "Material": "material",
             "MakeNamedMaterial": "material", "Texture": "texture", "MakeNamedMedium": "medium"}  # fmt: skip
 _PICTURE_OPTIONS = ("forcediffuse", "disablepixeljitter", "disabletexturefiltering", "rendercoordsys")
@@ -42,6 +37,19 @@ _DEVIATION = 0.5  # of the Gaussian filter, pixels
 @dataclass
 class PbrtV4Reader(PbrtReader):
     """State of a PBRT v4 file while it is read."""
+
+    samplers: ClassVar = {
+        "zsobol": "sobol", "sobol": "sobol", "paddedsobol": "sobol", "pmj02bn": "sobol", "halton": "halton",
+        "independent": "independent", "stratified": "stratified",
+    }  # fmt: skip
+    integrators: ClassVar = {
+        "volpath": "path", "path": "path", "simplevolpath": "path", "simplepath": "path", "lightpath": "path",
+        "bdpt": "bidirectional", "mlt": "metropolis", "sppm": "photonmap", "randomwalk": "path",
+        "ambientocclusion": "direct", "function": "path",
+    }  # fmt: skip
+    same_picture: ClassVar = SAME_PICTURE | {"simplepath", "simplevolpath", "lightpath", "randomwalk"}
+    sampler_hints: ClassVar = ("seed", "randomization", "jitter")
+    integrator_hints: ClassVar = ("lightsampler", "regularize", "samplelights", "samplebsdf")
 
     film: Film = field(default_factory=lambda: Film(1280, 720, "gaussian", 1.5))
     sampler: Sampler = field(default_factory=lambda: Sampler("sobol", 16))
@@ -165,30 +173,6 @@ class PbrtV4Reader(PbrtReader):
             self.report.add(str(directive.place), "sigma of the filter", f"{_DEVIATION}")
         self.film = dataclasses.replace(self.film, filter=name, filter_radius_px=radius)  # type: ignore[arg-type]
         self.left_over(parameters, f"filter {kind!r}")
-
-    def _read_sampler(self, directive: Directive) -> None:
-        kind, parameters = typed(directive)
-        name = self.report.kind(SAMPLERS, kind, "sampler", directive.place, picture=False)
-        if kind == "stratified":
-            count = parameters.whole("xsamples", 4, 1, 4096) * parameters.whole("ysamples", 4, 1, 4096)
-        else:
-            count = parameters.whole("pixelsamples", 16, 1, 1 << 24)
-        for hint in ("seed", "randomization", "jitter"):
-            if hint in parameters:
-                parameters.asked.add(hint)
-                self.report.hint(str(directive.place), f"{hint} of the sampler")
-        self.sampler = Sampler(name, count)  # type: ignore[arg-type]
-        self.left_over(parameters, f"sampler {kind!r}")
-
-    def _read_integrator(self, directive: Directive) -> None:
-        kind, parameters = typed(directive)
-        name = self.report.kind(INTEGRATORS, kind, "integrator", directive.place, kind not in _SAME)
-        self.integrator = Integrator(name, parameters.whole("maxdepth", 5, 0, 1 << 20))  # type: ignore[arg-type]
-        for hint in ("lightsampler", "regularize", "samplelights", "samplebsdf"):
-            if hint in parameters:
-                parameters.asked.add(hint)
-                self.report.hint(str(directive.place), f"{hint} of the integrator")
-        self.left_over(parameters, f"integrator {kind!r}")
 
     # --- lights --------------------------------------------------------------------------------------------------
 

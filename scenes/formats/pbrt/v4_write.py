@@ -11,17 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from scenes import loading
-from scenes.arithmetic import product
 from scenes.canonical import Camera, EnvironmentLight, Light, PerspectiveCamera, Scene, SpotLight
 from scenes.formats.appearance.equal_area import equal_area, latitude_longitude
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.directives.scene_writer import quoted
-from scenes.formats.geometry.conventions import MAP_AXES
-from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport
-from scenes.formats.pbrt.v4_write_materials import PICTURES, PbrtV4SurfaceWriter
+from scenes.formats.pbrt.v4_write_materials import V4_PICTURES, PbrtV4SurfaceWriter
 from scenes.formats.pbrt.write import PbrtWriter
-from scenes.formats.text.numbers import listed, number, written_matrix
+from scenes.formats.text.numbers import listed, number
 from scenes.formats.text.output import Output
 
 _TYPES = {'"point P"': '"point3 P"', '"point from"': '"point3 from"', '"point to"': '"point3 to"',
@@ -77,21 +74,12 @@ class PbrtV4Writer(PbrtV4SurfaceWriter, PbrtWriter):
         ends = f'"point3 from" {listed(light.position)} "point3 to" {listed(light.target)}'
         self.lines.append(f'\tLightSource "spot" {ends} "rgb I" {listed(light.intensity)} {cone}')
 
-    def infinite(self, light: EnvironmentLight) -> None:
-        if light.image.shape[:2] == (1, 1):
-            super().infinite(light)
-            return
+    def map_of(self, light: EnvironmentLight) -> str:
         square, source = _square_of(light)
         if not source:
             self.report.add("light", "an environment map by latitude and longitude", "one of equal area, resampled")
-        file = self.output.picture(square, source, PICTURES)
-        turn = product(light.to_world, inverse(MAP_AXES))
-        self.lines += [
-            "\tAttributeBegin",
-            f"\t\tTransform {written_matrix(turn)}",
-            f'\t\tLightSource "infinite" "string filename" [ "{file}" ] "float scale" [ {number(light.scale)} ]',
-            "\tAttributeEnd",
-        ]
+        file = self.output.picture(square, source, V4_PICTURES)
+        return f'"string filename" [ "{file}" ] "float scale" [ {number(light.scale)} ]'
 
 
 def _square_of(light: EnvironmentLight) -> tuple[np.ndarray, str]:

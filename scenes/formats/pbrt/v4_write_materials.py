@@ -35,10 +35,10 @@ from scenes.formats.appearance.folding import folded, height_of, mean_of
 from scenes.formats.appearance.mixtures import added_metal, dimmed, lobes_of
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.surface_writer import Kind
-from scenes.formats.pbrt.write_materials import PbrtSurfaceWriter, unmapped_roughness
+from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter, unmapped_roughness
 from scenes.formats.text.numbers import number
 
-PICTURES = (".exr", ".png", ".tga", ".pfm", ".hdr", ".qoi")
+V4_PICTURES = (*PICTURES, ".hdr", ".qoi")
 """Endings of pictures that PBRT v4 reads."""
 
 _MIRROR = grey(0.0), grey(1.0)
@@ -48,7 +48,7 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
     """Lines of textures and materials."""
 
     def image_line(self, texture: ImageTexture) -> str:
-        file = self.output.picture(texture.image, texture.source, PICTURES)
+        file = self.output.picture(texture.image, texture.source, V4_PICTURES)
         kind = {"bilinear": "bilinear", "nearest": "point", "mipmap": "trilinear"}[texture.filter]
         more = f'"string filter" [ "{kind}" ] '
         return self.placed_image(file, texture, more, texture.uv_scale, texture.uv_offset)

@@ -38,13 +38,13 @@ from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, tracks_of
 from scenes.formats.geometry.transform_stack import inverse, track_times
 from scenes.formats.losses import LossReport, first_of
-from scenes.formats.pbrt.read import INTEGRATORS, SAMPLERS
+from scenes.formats.pbrt.read import PbrtReader
 from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter
 from scenes.formats.text.numbers import listed, number, written_matrix
 from scenes.formats.text.output import Output
 
-_FILTERS, _INTEGRATORS = first_of(FILTERS), first_of(INTEGRATORS)
-_SAMPLERS = {**first_of(SAMPLERS), "hammersley": "halton"}
+_FILTERS, _INTEGRATORS = first_of(FILTERS), first_of(PbrtReader.integrators)
+_SAMPLERS = {**first_of(PbrtReader.samplers), "hammersley": "halton"}
 
 
 @dataclass
@@ -146,14 +146,18 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
             radiance = light.scale * light.image[0, 0].astype(np.float64)
             self.lines.append(f'\tLightSource "infinite" "rgb L" {listed(radiance)}')
             return
-        file = self.output.picture(light.image, light.source, PICTURES)
         turn = product(light.to_world, inverse(MAP_AXES))
         self.lines += [
             "\tAttributeBegin",
             f"\t\tTransform {written_matrix(turn)}",
-            f'\t\tLightSource "infinite" "string mapname" [ "{file}" ] "rgb L" {listed((light.scale,) * 3)}',
+            f'\t\tLightSource "infinite" {self.map_of(light)}',
             "\tAttributeEnd",
         ]
+
+    def map_of(self, light: EnvironmentLight) -> str:
+        """The picture of an environment light, and its strength."""
+        file = self.output.picture(light.image, light.source, PICTURES)
+        return f'"string mapname" [ "{file}" ] "rgb L" {listed((light.scale,) * 3)}'
 
     # --- shapes --------------------------------------------------------------------------------------------------
 
