@@ -9,7 +9,7 @@ DOCS := $(VENV)/.docs
 
 .PHONY: demo test test-fast test-slow lint bench study-quick solvers docs constraints clean
 
-# the base alone, which is all that the demo needs
+# the base alone, which is enough for the demo
 $(BASE): pyproject.toml constraints.txt
 	test -x $(PY) || $(PYTHON) -m venv $(VENV)
 	$(INSTALL) .
@@ -32,11 +32,11 @@ lint: $(STAMP)
 	$(VENV)/bin/clang-format --dry-run --Werror renderer/*/native/*.h
 	$(VENV)/bin/pyright
 
-# on all cores, as far as there is memory; a worker goes on with the neighbours of its tests, which share fixtures
+# on all cores, as far as memory allows; a worker continues with neighbouring tests, which share fixtures
 test: $(STAMP)
 	$(PY) -m pytest -n auto --dist worksteal
 
-# the tests of the modules that differ from the main branch, or of those named: make test-fast MODULES='tsar/morton.py'
+# the tests nearest to the changes since the main branch, or to named modules: make test-fast MODULES='tsar/morton.py'
 test-fast: $(STAMP)
 	$(PY) -m tests.changed $(MODULES)
 
@@ -46,7 +46,7 @@ test-slow: $(STAMP)
 study-quick: $(STAMP)
 	$(PY) scripts/suitability.py --scale quick --out out/study-quick
 
-# every transport solver on every input, at row 7; what is on disk is not run again
+# every transport solver on every input, at row 7; finished runs are not repeated
 solvers: $(STAMP)
 	$(PY) scripts/suitability.py --scale quick --rows 7 --policies framed --jod-repetitions 0 --out out/solvers \
 		--solvers trivial slow_greater scale_lesser square descend diffusion
@@ -58,7 +58,7 @@ bench: $(STAMP)
 docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
 
-# writes down what is installed now
+# records the installed versions
 constraints: $(STAMP) $(DOCS)
 	$(PY) -m pip freeze --all --exclude-editable | grep -v ^pip== | sed 's/+cpu$$//' > constraints.txt
 
