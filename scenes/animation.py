@@ -25,7 +25,7 @@ UP = np.array([0.0, 0.0, 1.0])
 LEAD_S = 3.0
 """Motion before the first moment and after the last, seconds: warm-up, latency and filters reach there."""
 
-_VERTICAL = 1e-9  # sine of the angle to the vertical below which the right of a picture is not told by it
+_VERTICAL = 1e-9  # sine of the angle to the vertical below which the vertical does not determine the right of a picture
 
 
 def continuous_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -49,8 +49,8 @@ def sample_track(pose: PoseFunction, start_s: float, end_s: float, interval_s: f
         pose: the motion; defined on the whole interval.
         start_s: time of the first key, seconds.
         end_s: the last key lies at or after this time, seconds.
-        interval_s: time between keys, seconds. What turns must turn by less than half a turn in it, and by much less
-            if its chords are not to show.
+        interval_s: time between keys, seconds. A rotation must be less than half a turn per interval, and much less for
+            smooth arcs.
     """
     count = int(np.ceil((end_s - start_s) / interval_s - 1e-9)) + 1
     translation, rotation = pose(start_s + interval_s * np.arange(count))
@@ -58,11 +58,11 @@ def sample_track(pose: PoseFunction, start_s: float, end_s: float, interval_s: f
 
 
 def pose_at(track: RigidTrack, time_s: float) -> Matrix:
-    """Pose of a track at one time: the plain version that faster ones are tested against.
+    """Pose of a track at one time: the plain version against which faster ones are tested.
 
     Args:
-        track: keys; held before the first and after the last.
-        time_s: seconds.
+        track: track, whose pose is held before the first key and after the last.
+        time_s: time, seconds.
 
     Returns:
         ``(4, 4)`` float64 rigid transform.
@@ -83,12 +83,12 @@ def pose_at(track: RigidTrack, time_s: float) -> Matrix:
 def look_at(eye: NDArray[np.float64], target: NDArray[np.float64], roll_rad: float = 0.0) -> Rotation:
     """Orientation of a camera (looking along its ``-z``, ``+y`` up) at ``eye`` that sees ``target`` in the centre.
 
-    Of a camera that looks straight up or down, the right of the picture is the world's ``+x``: the picture is that of a
-    camera a little nearer to ``-y``.
+    For a camera that looks straight up or down, the right of the picture is the world's ``+x``, as for a camera
+    slightly closer to ``-y``.
 
     Args:
         eye, target: ``(3,)`` or ``(n, 3)``, scene units.
-        roll_rad: turn about the viewing axis, radians.
+        roll_rad: rotation about the viewing axis, radians.
 
     Raises:
         SceneError: both are the same point, or not finite.
@@ -114,11 +114,11 @@ def camera_to_world(eye: NDArray[np.float64], target: NDArray[np.float64], roll_
 
 
 def attached(parent: PoseFunction, offset: NDArray[np.float64], turn: Callable[[Times], Rotation]) -> PoseFunction:
-    """Motion of a part that turns about a point fixed to a parent.
+    """Motion of a part that rotates about a point fixed to a parent.
 
     Args:
-        parent: motion of the body the part belongs to.
-        offset: ``(3,)`` where the part's origin lies in the parent's frame, scene units.
+        parent: motion of the body to which the part belongs.
+        offset: ``(3,)`` position of the part's origin in the parent's frame, scene units.
         turn: orientation of the part in the parent's frame at times ``(n,)``.
     """
 
@@ -137,8 +137,8 @@ class Path:
         start: ``(x, y)`` at distance zero, scene units.
         heading_rad: direction of travel there, counter-clockwise from ``+x``.
         speed: scene units per second.
-        bends: ``(distance, length, turn_rad)`` of each bend: where it begins, how long it is, and by how much the
-            heading turns (left positive). Curvature rises and falls as ``sin²`` over the bend.
+        bends: ``(distance, length, turn_rad)`` of each bend: its start, its length, and the change of heading (left
+            positive). Curvature rises and falls as ``sin²`` over the bend.
         advance: distance already covered at time zero.
     """
 
@@ -183,7 +183,7 @@ class Path:
         return np.stack([np.interp(distance, knots, points[:, axis]) for axis in (0, 1)], axis=-1)
 
     def pose(self, time_s: Times) -> Pose:
-        """Motion of a body with ``+x`` ahead and ``+z`` up, its origin on the path at height zero."""
+        """Motion of a body with ``+x`` ahead and ``+z`` up, whose origin is on the path at height zero."""
         distance = self.distance(time_s)
         points = self.position(distance)
         return np.concatenate([points, np.zeros((len(points), 1))], axis=1), rotation_about(UP, self.heading(distance))

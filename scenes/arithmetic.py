@@ -1,9 +1,9 @@
 """Functions that give the same bits on every x86-64 processor.
 
-NumPy, PyTorch, BLAS and the C library choose code by the instructions that a processor has, and each rounds in its own
-way. The functions here add, multiply, divide and take roots one after the other, as IEEE 754 rounds them. Other
-functions are evaluated with the 64 bits of precision of ``long double``, which no vector unit has, and rounded to the
-53 bits of float64. Where ``long double`` is another type, results agree up to rounding.
+NumPy, PyTorch, BLAS and the C library select code by the instructions of the processor, and the variants round
+differently. The functions here add, multiply, divide and take roots in a fixed order, with the rounding of IEEE 754.
+Other functions are evaluated with the 64 bits of precision of ``long double``, which vector units lack, and rounded to
+the 53 bits of float64. Where ``long double`` is another type, results agree up to rounding.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _rounded(function: Callable[..., Any], *values: ArrayLike) -> Any:
 
 
 sin = partial(_rounded, np.sin)
-"""Sine of an angle, radians. This and what follows takes numbers or arrays and gives float64."""
+"""Sine of an angle, radians. This function and those below take numbers or arrays and return float64."""
 
 cos = partial(_rounded, np.cos)
 """Cosine of an angle, radians."""
@@ -48,16 +48,16 @@ exp = partial(_rounded, np.exp)
 """Exponential function."""
 
 expm1 = partial(_rounded, np.expm1)
-"""Exponential function, less one."""
+"""Exponential function minus one."""
 
 log = partial(_rounded, np.log)
 """Natural logarithm."""
 
 log1p = partial(_rounded, np.log1p)
-"""Natural logarithm of one more than the number."""
+"""Natural logarithm of one plus the number."""
 
 power = partial(_rounded, np.power)
-"""A base to the power of an exponent."""
+"""A base raised to an exponent."""
 
 hypot = partial(_rounded, np.hypot)
 """Distance of a point ``x``, ``y`` from the origin."""
@@ -86,7 +86,7 @@ def product(first: ArrayLike, second: ArrayLike) -> Any:
 
 
 def products(*matrices: ArrayLike) -> Any:
-    """The :func:`product` of several, from the left."""
+    """The :func:`product` of several matrices, from the left."""
     total = matrices[0]
     for matrix in matrices[1:]:
         total = product(total, matrix)
@@ -94,10 +94,10 @@ def products(*matrices: ArrayLike) -> Any:
 
 
 def inverse(matrix: ArrayLike) -> Array:
-    """Inverse of a matrix ``(n, n)`` by elimination, with the greatest pivots of each column.
+    """Inverse of a matrix ``(n, n)`` by Gaussian elimination with partial pivoting.
 
     Raises:
-        numpy.linalg.LinAlgError: it has none.
+        numpy.linalg.LinAlgError: the matrix is singular.
     """
     rows = np.array(matrix, np.float64)
     size = len(rows)
@@ -114,23 +114,24 @@ def inverse(matrix: ArrayLike) -> Array:
 
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> Rotation:
-    """Turns about a unit axis ``(3,)``, counter-clockwise seen from its tip, by one or ``(n,)`` angles, radians."""
+    """Rotations about a unit axis ``(3,)``, counter-clockwise seen from its tip, by one angle or ``(n,)`` angles,
+    radians."""
     half = np.asarray(angle, np.float64) / 2.0
     sine, cosine = np.asarray(sin(half)), np.asarray(cos(half))
     return Rotation.from_quat(np.concatenate([sine[..., None] * np.asarray(axis), cosine[..., None]], axis=-1))
 
 
 def rotation_between(first: Array, second: Array, fraction: ArrayLike) -> Rotation:
-    """Spherical interpolation between unit quaternions ``(..., 4)``, the shorter way.
+    """Spherical linear interpolation between unit quaternions ``(..., 4)`` along the shorter arc.
 
     Args:
         first, second: ``(x, y, z, w)``.
-        fraction: of the way from the first to the second, ``(...,)``.
+        fraction: ``(...,)`` fraction of the arc from the first to the second.
     """
     share = np.asarray(fraction, np.float64)[..., None]
     cosine = (first * second).sum(axis=-1, keepdims=True)
     second = np.where(cosine < 0.0, -second, second)
-    # by the chord: well conditioned for near ones, where an arc cosine is not
+    # from the chord, which is well conditioned for close quaternions, unlike an arc cosine
     chord = np.linalg.norm(second - first, axis=-1, keepdims=True)
     angle = 2.0 * np.asarray(arcsin(np.minimum(chord / 2.0, 1.0)))
     sine = np.asarray(sin(angle))

@@ -1,4 +1,4 @@
-"""Motion for scenes that have none: the camera goes round what it looks at, or towards it."""
+"""Camera motion for static scenes: around the point looked at, or towards it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from scenes.formats.geometry.meshed import as_mesh
 
 CameraPath = Literal["turntable", "fly-through"]
 TURN_S = 8.0
-"""Of a full turn, seconds."""
+"""Duration of a full turn, seconds."""
 
 FLIGHT_S, FLIGHT_SHARE = 4.0, 0.5
-"""Of the flight, seconds, and how much of the way to what is looked at it takes."""
+"""Duration of the flight, seconds, and its length as a share of the distance to the point looked at."""
 
 _KEYS = 65
 
@@ -26,11 +26,11 @@ _KEYS = 65
 def on_a_path(scene: Scene, path: CameraPath) -> Scene:
     """The scene with its camera in motion.
 
-    ``turntable`` turns about the vertical through the point looked at, once in :data:`TURN_S`; the vertical is the axis
-    of the world nearest to the camera's own. ``fly-through`` goes straight ahead, and back.
+    ``turntable`` rotates about the vertical through the point looked at, once in :data:`TURN_S`; the vertical is the
+    world axis nearest to the camera's up axis. ``fly-through`` moves straight ahead and back.
 
     Raises:
-        SceneError: the camera moves already, or is not a perspective one.
+        SceneError: the camera already moves, or is not a perspective camera.
     """
     camera = scene.camera
     if not isinstance(camera, PerspectiveCamera):
@@ -58,7 +58,7 @@ def on_a_path(scene: Scene, path: CameraPath) -> Scene:
 
 
 def looked_at_distance(scene: Scene, eye: np.ndarray, forward: np.ndarray) -> float:
-    """Median distance along the line of sight of the middles of the shapes in front of the camera."""
+    """Median distance, along the line of sight, of the centres of the shapes in front of the camera."""
     middles = []
     for instance in scene.instances:
         shape = instance.shape

@@ -1,6 +1,6 @@
-"""Scenes by name: the project's own, those of installed packages, those added from Python, and those of files.
+"""Scenes by name: the project's own, those of installed packages, those added from Python, and scene files.
 
-A package offers scenes through entry points of the group ``tsar.scenes``; ``SCENES.add(name, make)`` adds one.
+A package provides scenes through entry points of the group ``tsar.scenes``; ``SCENES.add(name, make)`` adds one.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from scenes.viewing import Up
 
 IntegratorName = Literal["whitted", "path"]
-"""What draws a scene: direct light, mirrors and glass; or light between all surfaces."""
+"""Integrator of a scene: direct light, mirrors and glass; or path tracing with light between all surfaces."""
 
 MakeScene = Callable[[float], Scene]
-"""Makes a scene; takes its phase, a fraction in [0, 1) by which a repetition of an animation is ahead."""
+"""Creates a scene from its phase, a fraction in [0, 1) by which a repetition of an animation is shifted."""
 
 NAMES: tuple[str, ...] = tuple(animations.ANIMATIONS)
-"""Names of the driving scenes, the inputs of experiments; their numbers also name them."""
+"""Names of the driving scenes, the inputs of experiments; their indices are accepted as names too."""
 
 BLUR_SCENES = {"planescene": "plane/planescene.txt", "spheresscene": "spheres/spheresscene.txt"}
 """The two scenes of the motion-blur perception study, and their files among the assets."""
 
 
 def blur_scene_file(name: str) -> Path:
-    """The block file of a scene of the study."""
+    """The block file of a scene of that study."""
     return asset(BLUR_SCENES[name])
 
 
@@ -75,11 +75,11 @@ def load(scene: str | Scene, phase: float = 0.0) -> Scene:
 
     Args:
         scene: a name in :data:`SCENES`, the number of a driving scene in :data:`NAMES`, or a scene.
-        phase: fraction of a wheel's turn by which the car of a driving scene is ahead, in [0, 1). Repetitions differ
-            in it. Other scenes take 0 alone.
+        phase: fraction of a wheel's turn by which the car of a driving scene is ahead, in [0, 1); it distinguishes
+            repetitions. Other scenes accept only 0.
 
     Raises:
-        ConfigError: no scene has this name; the message has the known names and the nearest of them.
+        ConfigError: no scene has this name; the message lists the known names and the nearest of them.
         SceneError: the scene does not have this phase.
     """
     if not 0.0 <= phase < 1.0:
@@ -91,10 +91,10 @@ def load(scene: str | Scene, phase: float = 0.0) -> Scene:
 
 
 def require_known(scene: str) -> None:
-    """Refuses what is neither the name or number of a scene nor looks like a file, without loading anything.
+    """Rejects a name that is neither the name or number of a scene nor that of a file, without loading anything.
 
     Raises:
-        ConfigError: the message has the known names and the nearest of them.
+        ConfigError: the name is rejected; the message lists the known names and the nearest of them.
     """
     if not Path(scene).suffix and not (scene.isdecimal() and int(scene) < len(NAMES)):
         SCENES.require(scene, "scene")
@@ -103,12 +103,12 @@ def require_known(scene: str) -> None:
 def load_file(
     name: str, camera_path: str = "", integrator: IntegratorName = "whitted"
 ) -> tuple[Scene, tuple[str, ...]]:
-    """The scene of a file, as this project's renderer can draw it, and what was lost on the way.
+    """The scene of a file, converted to what this project's renderer supports, and the losses.
 
     Args:
-        name: of the file; its ending tells the format.
-        camera_path: ``turntable`` or ``fly-through`` moves the camera of a file without motion; empty for none.
-        integrator: what draws it; along paths more of its materials can be drawn.
+        name: name of the file, whose ending determines the format.
+        camera_path: ``turntable`` or ``fly-through`` to move the camera of a static file; empty for none.
+        integrator: integrator for the scene; path tracing supports more materials.
 
     Raises:
         SceneError: the file cannot be read.
@@ -133,16 +133,16 @@ def load_file(
 
 @dataclass(frozen=True)
 class Look:
-    """How a scene is looked at and lit, instead of as its file or name says.
+    """Changes of the view and the lighting of a scene.
 
     Attributes:
-        up: upward axis of the world; None for that of the file of a model, or the nearer to the camera's.
-        smooth_deg: edges of meshes without normals that turn by at most this are smooth, degrees.
-        camera: eye and target of a camera at rest, six numbers.
-        fov_deg: its full angle along the shorter image axis; None keeps that of the scene.
-        environment: picture that lights the scene from all around, see :func:`scenes.viewing.with_environment`.
-        integrator: what draws it.
-        bounces: greatest number of them; None for that of the scene.
+        up: upward axis of the world; None for that of a model's file, or the one nearer to the camera's.
+        smooth_deg: greatest angle between faces, degrees, at which edges of meshes without normals are smooth.
+        camera: eye and target of a static camera, six numbers.
+        fov_deg: full angle of the camera along the shorter image axis; None for that of the scene.
+        environment: environment map that lights the scene, see :func:`scenes.viewing.with_environment`.
+        integrator: integrator for the scene.
+        bounces: greatest number of bounces; None for that of the scene.
     """
 
     up: Up | None = None
@@ -155,10 +155,11 @@ class Look:
 
 
 def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[str, ...]]:
-    """A scene as :func:`load_any` loads it, looked at and lit as asked for.
+    """A scene as :func:`load_any` loads it, with changes of its view and lighting.
 
     Raises:
-        SceneError: as :func:`load_any`; or the picture cannot be read, or the camera looks nowhere.
+        SceneError: as :func:`load_any`; or the environment map cannot be read, or eye and target of the camera
+            coincide.
     """
     from scenes.loading import read_image
     from scenes.models import MODEL_ENDINGS
@@ -187,17 +188,17 @@ def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[
 def load_any(
     scene: str | Path | Scene, phase: float = 0.0, camera_path: str = "", integrator: IntegratorName = "whitted"
 ) -> tuple[Scene, tuple[str, ...]]:
-    """A scene by its name, that of a file, or the scene itself; and what was lost.
+    """A scene by its name, that of a file, or the scene itself; and the losses.
 
     Args:
         scene: as in :func:`load`, or a file whose name has an ending.
         phase: as in :func:`load`; files have none.
-        camera_path: as in :func:`load_file`, for files alone.
-        integrator: as in :func:`load_file`; a scene that is given keeps its own unless paths are asked for.
+        camera_path: as in :func:`load_file`, for files only.
+        integrator: as in :func:`load_file`; a given scene keeps its own unless path tracing is requested.
 
     Raises:
         ConfigError: no scene has this name.
-        SceneError: the file cannot be read, or the scene does not have the phase or takes no camera path.
+        SceneError: the file cannot be read, or the scene does not have the phase or does not support a camera path.
     """
     if not isinstance(scene, Scene) and str(scene) not in SCENES and Path(scene).suffix:
         return load_file(str(scene), camera_path, integrator)

@@ -1,8 +1,8 @@
-"""Analytic daylight: the sky's radiance, the sun's irradiance, and where the sun stands.
+"""Analytic daylight: radiance of the sky, irradiance of the sun, and position of the sun.
 
 Source: L. Hošek and A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Trans. Graph. 31 (4), 2012
 (the sky, eq. 8 and its published coefficients); "Adding a Solar-Radiance Function to the Hošek–Wilkie Skylight Model",
-IEEE CG&A 33 (3), 2013 (the sun, as Mitsuba 3.9 evaluates it).
+IEEE CG&A 33 (3), 2013 (the sun, evaluated as in Mitsuba 3.9).
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ SUN_DEG = 0.5358
 """Full angle of the sun's disk."""
 
 MAP_HEIGHT = 256
-"""Rows of a sky that is written as a picture."""
+"""Number of rows of a sky that is written as an image."""
 
 _UNIT = 0.00936766
-"""From the coefficients' radiance to that of Mitsuba 3: W m⁻² sr⁻¹ nm⁻¹, as measured."""
+"""Factor from the radiance of the coefficients to that of Mitsuba 3 in W m⁻² sr⁻¹ nm⁻¹, as measured."""
 
 
 def _tables() -> dict[str, NDArray[np.float64]]:
-    """Turbidity 1 to 10 along the first axis of each."""
+    """Coefficient tables, with turbidity 1 to 10 along the first axis of each."""
     path = asset("daylight/hosek_wilkie.npz")
     return _read_tables(path, state_of(path))
 
@@ -62,8 +62,8 @@ def sky_radiance(light: SunSky, directions: NDArray[np.float64]) -> NDArray[np.f
     ``χ = (1 + cos² γ) / (1 + H² - 2 H cos γ)^1.5`` (Hošek and Wilkie 2012, eq. 8).
 
     Args:
-        light: turbidity from 1 to 10 and a sun above the horizon; others are held at the nearest.
-        directions: ``(n, 3)`` unit, towards the sky.
+        light: sun and sky; the turbidity is clamped to [1, 10] and the sun to the horizon.
+        directions: ``(n, 3)`` unit vectors towards the sky.
 
     Returns:
         ``(n, 3)`` linear RGB, not negative.
@@ -108,7 +108,7 @@ def sky_map(light: SunSky, height: int = MAP_HEIGHT) -> EnvironmentLight:
 
 
 def sun_light(light: SunSky) -> DirectionalLight:
-    """The sun as a light from one direction, as wide as its disk."""
+    """The sun as a directional light with the width of its disk."""
     x = power(_elevation_rad(light) / (0.5 * math.pi), 1.0 / 3.0)
     of_height = _between(_tables()["sun_irradiance"], light.turbidity - 1.0)
     irradiance = light.scale * np.maximum(_between(of_height, x * (len(of_height) - 1)), 0.0)
@@ -117,7 +117,7 @@ def sun_light(light: SunSky) -> DirectionalLight:
 
 
 def facing_up(up: tuple[float, float, float], axis: int = 1) -> Matrix:
-    """A rotation that takes an axis (y, unless another is asked for) to ``up``; identity where it is that already."""
+    """A rotation that takes an axis (by default y) to ``up``; the identity if they coincide."""
     unit = np.array(up) / norm(up)
     matrix = np.eye(4)
     if np.array_equal(unit, np.eye(3)[axis]):
@@ -134,19 +134,19 @@ def facing_up(up: tuple[float, float, float], axis: int = 1) -> Matrix:
 def sun_at(
     date: tuple[int, int, int], hour: float, latitude_deg: float, longitude_deg: float, timezone: float
 ) -> tuple[float, float, float]:
-    """Where the sun stands, without the air's refraction.
+    """Position of the sun, without atmospheric refraction.
 
     Args:
         date: year, month, day.
         hour: local time, hours with fractions.
         latitude_deg, longitude_deg: north and east are positive.
-        timezone: hours ahead of Greenwich.
+        timezone: offset from Greenwich, hours.
 
     Returns:
-        Unit direction towards it: east, north, up.
+        Unit direction towards the sun: east, north, up.
 
     Raises:
-        ValueError, OverflowError: there is no such date or time.
+        ValueError, OverflowError: the date or the time is invalid.
     """
     from astral import Observer
     from astral.sun import azimuth, elevation

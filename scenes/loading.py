@@ -1,4 +1,4 @@
-"""Pictures of files as arrays, and the files delivered with the project.
+"""Image files as arrays, and the assets of the project.
 
 A failure is a SceneError that names the file and the reason.
 """
@@ -22,11 +22,11 @@ ASSETS = Path(__file__).parent / "assets"
 Picture = Pixels
 
 RADIANCE_MOST = 65504.0
-"""The greatest number of half precision, of which infinite values of a picture are taken to be."""
+"""The greatest half-precision number, which replaces infinite values of an image."""
 
 
 def one_line(error: BaseException) -> str:
-    """The message of an error without line breaks; its kind where it has none."""
+    """The message of an error without line breaks; its type if it has none."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
@@ -46,9 +46,9 @@ FileState = tuple[int, int, int, int]
 
 
 def state_of(path: Path) -> FileState | None:
-    """Times, size and number of a file, which change when it is written to or replaced; None where there is no file.
+    """Times, size and inode of a file, which change when it is modified or replaced; None if there is no file.
 
-    What is read from a file is kept for as long as its state stays the same.
+    Contents of a file are cached as long as its state is the same.
     """
     try:
         found = path.stat()
@@ -58,11 +58,10 @@ def state_of(path: Path) -> FileState | None:
 
 
 def read_image(path: Path) -> Picture:
-    """Reads a picture as linear Rec. 709 RGB.
+    """Reads an image as linear Rec. 709 RGB.
 
-    Whole numbers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and TIFF files of floating-point numbers
-    are linear already. Infinite values of these, such as a sun that half precision cannot hold, become
-    :data:`RADIANCE_MOST`, with a warning.
+    Integers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and floating-point TIFF files are linear.
+    Infinite values, such as those of a sun beyond half precision, become :data:`RADIANCE_MOST`, with a warning.
 
     Args:
         path: PNG, JPEG or another format Pillow reads, ``.exr``, ``.hdr``, ``.pfm`` or ``.tif``.
@@ -80,7 +79,7 @@ def read_image(path: Path) -> Picture:
 
 
 def is_linear(path: Path) -> bool:
-    """Whether a picture holds linear numbers, not encoded ones; raises what :func:`read_image` does."""
+    """Whether an image file holds linear and not encoded values; raises as :func:`read_image`."""
     read_image(path)
     return _image(Path(path), state_of(Path(path)))[1]
 
@@ -91,7 +90,7 @@ def _image(path: Path, state: FileState | None) -> tuple[Picture, bool]:
         found = decoded(path)
         linear = found.dtype == np.float32
         pixels = _clamped(cast(Picture, found), path) if linear else decode_srgb(cast(NDArray[np.uint8], found))
-    except Exception as error:  # decoders raise what they like on broken files
+    except Exception as error:  # decoders raise arbitrary exceptions on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
         raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
@@ -100,7 +99,7 @@ def _image(path: Path, state: FileState | None) -> tuple[Picture, bool]:
 
 
 def _clamped(pixels: Picture, path: Path) -> Picture:
-    """A picture without infinite values."""
+    """An image with infinite values replaced."""
     infinite = np.isposinf(pixels)
     if not infinite.any():
         return pixels
@@ -110,7 +109,7 @@ def _clamped(pixels: Picture, path: Path) -> Picture:
 
 
 def decode_srgb(encoded: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]:
-    """Linear values of sRGB ones of 8 or 16 bits."""
+    """Linear values of 8-bit or 16-bit sRGB values."""
     most = np.iinfo(encoded.dtype).max
     steps = np.arange(most + 1, dtype=np.float32) / np.float32(most)
     bright = power((steps + np.float32(0.055)) / np.float32(1.055), np.float32(2.4)).astype(np.float32)
@@ -118,16 +117,17 @@ def decode_srgb(encoded: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.f
 
 
 def encoded_srgb(image: Picture) -> Picture:
-    """sRGB values of linear ones, not rounded: undoes the decoding of a picture whose file says that it is linear."""
+    """sRGB values of linear ones, not rounded: the inverse of decoding, for an image that was linear already."""
     low = image <= 0.0031308
     return np.where(low, 12.92 * image, 1.055 * power(np.maximum(image, 0.0), 1.0 / 2.4) - 0.055).astype(np.float32)
 
 
 def clamp_radiance(image: Picture, limit: float) -> Picture:
-    """Scales texels down whose greatest channel exceeds ``limit``, keeping their colour.
+    """Scales down texels whose greatest channel exceeds ``limit``, preserving their colour.
 
-    An environment map holds the sun's disk, tens of thousands of times brighter than the sky; seen in a mirror by one
-    sample in thousands it would be noise that no sample count removes. The disk's light comes from a directional light.
+    The sun's disk in an environment map is tens of thousands of times brighter than the sky. In a mirror, where one
+    sample in thousands hits it, it would cause noise that no practical number of samples removes. A directional light
+    replaces the light of the disk.
     """
     peak = image.max(axis=-1, keepdims=True)
     return (image * np.minimum(1.0, limit / np.maximum(peak, 1e-12))).astype(np.float32)

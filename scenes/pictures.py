@@ -1,7 +1,7 @@
-"""Decoders of pictures: each makes an array of the numbers that a file holds.
+"""Decoders of image files: each returns the values of a file as an array.
 
-OpenImageIO reads numbers of more than 8 bits, for Pillow reads few of them and cuts colours of 16 bits to 8; Pillow
-reads the rest.
+OpenImageIO reads values of more than 8 bits, because Pillow supports few of these and truncates 16-bit colours to 8
+bits; Pillow reads other files.
 """
 
 from __future__ import annotations
@@ -21,20 +21,21 @@ Pixels = NDArray[np.float32]
 _WIDE = (".exr", ".hdr", ".pfm", ".pic", ".png", ".rgbe", ".tif", ".tiff")
 
 PIXELS_MOST = 1 << 27
-"""Most pixels of a picture, such as 16384 x 8192. A file of some kilobytes can hold more pixels than memory does; one
-pixel takes about 36 bytes while its scene is loaded."""
+"""Maximum number of pixels of an image, such as 16384 x 8192. A file of a few kilobytes can contain more pixels than
+fit into memory; one pixel takes about 36 bytes while its scene is loaded."""
 
 
 def decoded(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
-    """The numbers of a picture: linear ones are float32, and whole ones are encoded with the curve of sRGB.
+    """The values of an image: linear ones are float32, and integers are sRGB-encoded.
 
-    Deviation: Radiance files from before 1991, whose runs repeat whole pixels, are refused, as in other renderers.
+    Deviation: Radiance files from before 1991, whose run-length encoding repeats whole pixels, are rejected, as in
+    other renderers.
 
     Returns:
         ``(height, width, 3)`` float32, uint8 or uint16, row 0 at the top.
 
     Raises:
-        ValueError, OSError or what the decoders raise: the file cannot be read.
+        ValueError, OSError or other exceptions of the decoders: the file cannot be read.
     """
     found = _wide(path) if path.suffix.lower() in _WIDE else None
     return by_pillow(path) if found is None else found
@@ -48,23 +49,23 @@ def _require_size(width: int, height: int) -> None:
 
 
 def by_pillow(path: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
-    """As :func:`decoded`, of a file that Pillow reads, or of the content of one."""
+    """Like :func:`decoded`, for a file that Pillow reads, or for its content."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large ones are refused here
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large images are rejected here
         image = Image.open(path)
     with image:
         _require_size(*image.size)
         if image.mode == "F":
             return _three(np.array(image, np.float32)[..., None])
-        if image.mode.startswith("I"):  # grey of 16 bits
+        if image.mode.startswith("I"):  # 16-bit grey
             return _three(np.clip(np.array(image), 0, 65535).astype(np.uint16)[..., None])
         return np.array(image.convert("RGB"))
 
 
 def alpha_of(path: Path | BinaryIO) -> Pixels:
-    """The opacity ``(h, w)`` of a picture that Pillow reads, 0 to 1, to 8 bits; 1 where it has none."""
+    """The opacity ``(h, w)`` of an image that Pillow reads, 0 to 1 with 8 bits of precision; 1 if it has none."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large ones are refused here
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large images are rejected here
         image = Image.open(path)
     with image:
         _require_size(*image.size)
@@ -79,13 +80,13 @@ def _three(pixels: np.ndarray) -> np.ndarray:
 
 
 def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
-    """Numbers of more than 8 bits; None for files of 8 bits."""
-    import OpenImageIO as oiio  # here, for its types complain where a process ends before it used any
+    """Values of more than 8 bits; None for 8-bit files."""
+    import OpenImageIO as oiio  # imported here: its types complain if a process ends before it used any
 
-    oiio.attribute("threads", 1)  # processes that fork keep no threads
+    oiio.attribute("threads", 1)  # threads would not survive a fork
     oiio.attribute("exr_threads", -1)
     hints = oiio.ImageSpec()
-    hints.attribute("oiio:UnassociatedAlpha", 1)  # what alpha hides keeps its colour
+    hints.attribute("oiio:UnassociatedAlpha", 1)  # colours are not multiplied by alpha
     image = oiio.ImageBuf(str(path), 0, 0, hints)
     spec = image.spec()
     _require_read(image)

@@ -1,4 +1,4 @@
-"""How a scene is looked at and lit where its file does not say, or the user says otherwise."""
+"""View and lighting of a scene if its file does not define them, or the user changes them."""
 
 from __future__ import annotations
 
@@ -29,17 +29,18 @@ from scenes.loading import Picture
 Up = Literal["y", "z"]
 
 FOV_DEG = 40.0
-"""Of a camera that is placed here."""
+"""Field of view of a camera that is placed here, degrees."""
 
 _FROM = (0.5, -1.0, 0.45)
-"""Where a camera stands from what it looks at, with z upwards: in front, to the right and above."""
+"""Direction from the target to the camera, with z upwards: in front, to the right and above."""
 
 _MARGIN = 1.08
 _KEY, _FILL, _AMBIENT, _BACKGROUND = 2.2, 0.6, 0.18, 0.75
 
 
 def turned_up(up: Up) -> Matrix:
-    """World from a world whose z is upwards ``(4, 4)``; +y there, the depth, is -z where y is upwards."""
+    """The transform ``(4, 4)`` from a world with z upwards to one with ``up`` upwards; +y, the depth, becomes -z if y
+    is upwards."""
     matrix = np.eye(4)
     if up == "y":
         matrix[:3, :3] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
@@ -47,7 +48,7 @@ def turned_up(up: Up) -> Matrix:
 
 
 def camera_at(eye: Sequence[float], target: Sequence[float], up: Up) -> Matrix:
-    """Camera to world ``(4, 4)`` of a camera that sees a target in the centre, upright.
+    """Camera-to-world transform ``(4, 4)`` of an upright camera with a target in the centre.
 
     Raises:
         SceneError: both are the same point, or not finite.
@@ -61,7 +62,7 @@ def camera_at(eye: Sequence[float], target: Sequence[float], up: Up) -> Matrix:
 
 
 def up_of(scene: Scene) -> Up:
-    """Which of y and z is upwards in a scene: the nearer to the upward direction of its camera."""
+    """The upward axis of a scene, y or z: the one nearer to the upward direction of its camera."""
     above = np.abs(scene.camera.to_world[:3, 1])
     return "y" if above[1] > above[2] else "z"
 
@@ -69,12 +70,12 @@ def up_of(scene: Scene) -> Up:
 def with_camera(
     scene: Scene, eye: Sequence[float], target: Sequence[float], up: Up, fov_deg: float | None = None
 ) -> Scene:
-    """The scene from a camera at rest that sees a target in the centre.
+    """The scene with a static camera that has a target in the centre.
 
     Args:
-        scene: of which the shutter, and the field of view unless it is given, are kept.
-        eye, target: in the world.
-        up: the upward axis of the world.
+        scene: scene, whose shutter is kept, and whose field of view is kept unless it is given.
+        eye, target: points in the world.
+        up: upward axis of the world.
         fov_deg: full angle of the shorter image axis.
     """
     before = scene.camera if isinstance(scene.camera, PerspectiveCamera) else PerspectiveCamera(fov_deg=FOV_DEG)
@@ -85,10 +86,10 @@ def with_camera(
 
 
 def with_environment(scene: Scene, picture: Picture, up: Up, source: str = "") -> Scene:
-    """The scene lit by a picture of all directions around it, whose top is upwards.
+    """The scene lit by an environment map whose top is upwards.
 
-    It takes the place of what lights the scene from infinity: environment maps, sky, directional lights, the ambient
-    light and the background. Lamps stay.
+    The map replaces the lights at infinity: environment maps, sky, directional lights, the ambient light and the
+    background. Lamps are kept.
     """
     turn = product(turned_up(up), turned_up("y").T)
     light = EnvironmentLight(picture, turn, source=source)
@@ -98,13 +99,13 @@ def with_environment(scene: Scene, picture: Picture, up: Up, source: str = "") -
 
 
 def framed(instances: tuple[Instance, ...], up: Up, name: str = "") -> Scene:
-    """A scene of things alone: a camera that sees all of them, and light from behind it.
+    """A scene of instances with a camera that shows all of them, and lights.
 
     The camera stands in front, to the right and above. A key light comes from its upper left, a weaker one from its
-    right, and ambient light fills the shadows; the background is an even grey, and lights nothing.
+    right, and ambient light fills the shadows; the background is a uniform grey that lights nothing.
 
     Raises:
-        SceneError: there is nothing to see.
+        SceneError: there are no instances.
     """
     points = np.concatenate([_points(instance) for instance in instances]) if instances else np.zeros((0, 3))
     if not len(points):

@@ -1,6 +1,6 @@
-"""The canonical scene: one typed description that built-in scenes and importers fill and the renderer reads.
+"""The canonical scene: one typed description that built-in scenes and importers produce and the renderer reads.
 
-Conventions, fixed here once:
+Conventions:
 
 * World space is right-handed; lengths are in scene units (metres in the built-in scenes). No axis is "up".
 * A transform is a ``(4, 4)`` float64 matrix acting on column vectors, object (or camera) to world.

@@ -15,11 +15,11 @@ class PerspectiveCamera:
         to_world: ``(4, 4)`` camera-to-world; a negative determinant (a mirrored picture) is kept, not repaired.
         fov_deg: full angle of the *shorter* image axis, in (0, 180).
         track: rigid animation applied outside ``to_world``.
-        lens_radius: of the aperture, scene units.
-        focal_distance: from the lens to the plane in focus, along the viewing direction, positive.
-        shutter_s: ``(open, close)`` offsets from the frame's time.
-        shift: how far the middle of the picture lies from the viewing direction, to the right and up, in widths and
-            heights of the picture. The renderer draws none; kept for conversion.
+        lens_radius: radius of the aperture, scene units.
+        focal_distance: distance from the lens to the focal plane along the viewing direction, positive.
+        shutter_s: ``(open, close)`` times relative to the frame's time, seconds.
+        shift: offset of the picture's centre from the viewing direction, to the right and up, in widths and heights of
+            the picture. The renderer does not support it; it is kept for conversion.
     """
 
     to_world: Matrix = field(default_factory=identity)
@@ -60,7 +60,7 @@ class EnvironmentCamera:
 
 @dataclass(frozen=True, eq=False)
 class RealisticCamera:
-    """A lens system read from a file; kept for conversion."""
+    """A lens system read from a file. The renderer does not support it; it is kept for conversion."""
 
     to_world: Matrix = field(default_factory=identity)
     lens_file: str = ""

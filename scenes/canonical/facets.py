@@ -1,4 +1,4 @@
-"""Materials of facets, and coats, of the canonical scene; conventions as in :mod:`scenes.canonical`."""
+"""Microfacet materials and coats of the canonical scene; conventions as in :mod:`scenes.canonical`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scenes.canonical.values import Rgb, SceneError
 
 @dataclass(frozen=True)
 class Metal:
-    """Conductor with complex index ``eta + i k`` in RGB; ``roughness`` is the microfacet alpha."""
+    """Conductor with the complex refractive index ``eta + i k`` in RGB; ``roughness`` is the microfacet alpha."""
 
     eta: Rgb
     k: Rgb
@@ -34,11 +34,11 @@ class Plastic:
     """A dielectric coat of index ``ior`` over a diffuse base.
 
     Attributes:
-        diffuse: albedo of the base by itself.
-        specular: multiplies what Fresnel's equations reflect.
+        diffuse: albedo of the base without the coat.
+        specular: factor of the Fresnel reflectance.
         roughness: microfacet alpha of the coat.
-        layered: whether the base gets what the coat lets through, both ways (Mitsuba); otherwise the coat adds to the
-            base and takes nothing from it (PBRT).
+        layered: whether the coat attenuates light to and from the base (Mitsuba); otherwise the reflection of the coat
+            is added to the base (PBRT).
     """
 
     diffuse: Texture
@@ -50,16 +50,17 @@ class Plastic:
 
 @dataclass(frozen=True)
 class MetallicRough:
-    """The surface of glTF: facets over a diffuse base, in part a metal, under a clear coat.
+    """The metallic-roughness surface of glTF: microfacets over a diffuse base, in part metallic, under a clear coat.
 
     Attributes:
-        base: colour, of the diffuse part and of the metal.
+        base: colour of the diffuse part and of the metal.
         metallic, roughness: in [0, 1]; the alpha of the facets is the roughness squared.
-        parts: picture whose green multiplies ``roughness`` and whose blue multiplies ``metallic``; None for none.
-        ior: index of refraction of what is not metal.
+        parts: texture whose green channel multiplies ``roughness`` and whose blue channel multiplies ``metallic``; None
+            for none.
+        ior: refractive index of the dielectric part.
         coat, coat_roughness: strength and roughness of the clear coat, in [0, 1].
         emission: radiance.
-        glow: picture that multiplies it; None for none.
+        glow: texture that multiplies the emission; None for none.
     """
 
     base: Texture

@@ -27,8 +27,8 @@ class DirectionalLight:
     """Parallel light that travels along ``direction``; ``irradiance`` on a surface facing it.
 
     Attributes:
-        direction: of travel, from the light into the scene; need not be unit.
-        angle_deg: full angle of the cone the light fills (the sun's disk is 0.53), zero for a hard shadow.
+        direction: direction of travel, from the light into the scene; need not be a unit vector.
+        angle_deg: full angle of the cone that the light fills (0.53 for the sun's disk), zero for hard shadows.
     """
 
     direction: Rgb
@@ -41,10 +41,10 @@ class SpotLight:
     """Intensity within a cone, falling off from ``inner_deg`` to ``outer_deg`` (half angles).
 
     Attributes:
-        intensity: on the axis.
-        profile: of the fall-off, with ``x`` from 0 at the edge to 1: ``3x² - 2x³`` or ``x⁴`` in the cosine, ``x`` in
-            the angle, or (``secant``) ``x⁴`` in the cosine with all of the light divided by the cosine. The renderer
-            draws the first.
+        intensity: intensity on the axis.
+        profile: profile of the fall-off, with ``x`` from 0 at the edge to 1: ``3x² - 2x³`` or ``x⁴`` in the cosine,
+            ``x`` in the angle, or (``secant``) ``x⁴`` in the cosine with the whole light divided by the cosine. The
+            renderer supports the first.
     """
 
     position: Rgb
@@ -57,14 +57,14 @@ class SpotLight:
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight:
-    """Radiance from infinity: an image, or a constant where the image is one texel.
+    """Radiance from infinity: an image, or a constant if the image has one texel.
 
-    Among a scene's lights it lights surfaces and is seen; as a scene's background it is seen only.
+    Among the lights of a scene it lights surfaces and is visible; as the background it is only visible.
 
     Attributes:
         image: ``(height, width, 3)`` float32 linear RGB, latitude–longitude.
         to_world: rotation of the map, ``(4, 4)``.
-        scale: multiplies the image.
+        scale: factor of the image.
     """
 
     image: NDArray[np.float32]
@@ -78,12 +78,12 @@ class SunSky:
     """Analytic daylight (:mod:`scenes.daylight`).
 
     Attributes:
-        sun_direction: towards the sun, in the world.
-        turbidity: of the air, 1 (none) to 10 (haze).
-        scale: multiplies the radiance, which is in W m⁻² sr⁻¹ nm⁻¹ where it is 1.
-        part: what of it shines.
-        up: towards the zenith, in the world.
-        ground_albedo: of the ground, which lights the sky from below, 0 to 1.
+        sun_direction: direction towards the sun, in the world.
+        turbidity: turbidity of the air, 1 (clear) to 10 (hazy).
+        scale: factor of the radiance, which is in W m⁻² sr⁻¹ nm⁻¹ at a scale of 1.
+        part: part that emits light.
+        up: direction towards the zenith, in the world.
+        ground_albedo: albedo of the ground, which lights the sky from below, 0 to 1.
     """
 
     sun_direction: Rgb

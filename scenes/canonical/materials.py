@@ -13,7 +13,7 @@ from scenes.canonical.values import Rgb, SceneError
 
 
 def _check_spread(name: str, spread_deg: float) -> None:
-    """Raises SceneError unless a cone of rays fits above a surface."""
+    """Raises SceneError unless the cone's angle is in [0, 180] degrees."""
     if not 0.0 <= spread_deg <= 180.0:
         raise SceneError(f"{name}: expected an angle in [0, 180], got {spread_deg}")
 
@@ -22,20 +22,20 @@ def _check_spread(name: str, spread_deg: float) -> None:
 class Phong:
     """Phong reflection with a Fresnel-weighted mirror term: the material of the driving scenes.
 
-    Outgoing radiance is ``ambient * diffuse``, plus over all lights the sum of
-    ``(diffuse / π * cos + specular * (e + 2) / 2π * cos^e)`` times the arriving irradiance, plus
+    Outgoing radiance is ``ambient * diffuse``, plus the sum over all lights of
+    ``(diffuse / π * cos + specular * (e + 2) / 2π * cos^e)`` times the incident irradiance, plus
     ``F * mirrored radiance`` with ``F = fresnel_min + (fresnel_max - fresnel_min) * (1 - cos)^fresnel_exponent``; the
     diffuse part is scaled by ``1 - F``.
 
     Attributes:
         diffuse: albedo.
         specular: colour of the highlight.
-        exponent: of the highlight, at least 1.
-        ambient: weight of the constant ambient term, of which the world supplies the radiance.
+        exponent: exponent of the highlight, at least 1.
+        ambient: weight of the constant ambient term, whose radiance the scene defines.
         fresnel_min, fresnel_max: mirror reflectance at normal and at grazing incidence, in [0, 1].
-        fresnel_exponent: 5 is Schlick's.
+        fresnel_exponent: exponent of the mirror reflectance; 5 is Schlick's.
         mirror_tint: colour of the mirrored part (metals).
-        mirror_spread_deg: full angle of the cone that mirrored rays fill evenly, zero for a sharp mirror image.
+        mirror_spread_deg: full angle of the cone that mirrored rays fill uniformly, zero for a sharp mirror image.
     """
 
     diffuse: Texture
@@ -68,7 +68,7 @@ class Matte:
 
 @dataclass(frozen=True)
 class Mirror:
-    """Specular reflection: perfect, or glossy over an even cone of full angle ``spread_deg`` about the mirrored ray."""
+    """Specular reflection: perfect, or uniform over a cone of full angle ``spread_deg`` about the mirrored ray."""
 
     reflectance: Texture = WHITE
     spread_deg: float = 0.0
@@ -82,11 +82,12 @@ class Glass:
     """Dielectric.
 
     Attributes:
-        reflectance, transmittance: multiply what Fresnel's equations send each way.
-        ior: index of refraction of the inside over the outside, positive.
+        reflectance, transmittance: factors of the Fresnel reflectance and transmittance.
+        ior: refractive index of the inside over that of the outside, positive.
         roughness: microfacet alpha per tangent axis, zero for smooth.
-        thin: a pane without thickness: light passes unbent, and reflections between its faces are summed.
-        spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill evenly.
+        thin: whether it is a pane without thickness: light passes undeflected, and reflections between its faces are
+            summed.
+        spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill uniformly.
     """
 
     reflectance: Texture = WHITE
@@ -137,14 +138,14 @@ class HeightField:
     """Relief on a :class:`Rectangle`, carved into it.
 
     Height 1 lies in the plane of the rectangle, height 0 lies ``depth`` below it (against its normal). Rays that leave
-    the relief through its sides pass on, so its silhouette is that of the relief.
+    the relief through its sides continue, so its silhouette is that of the relief.
 
     Attributes:
-        base: what the relief is made of.
-        height: ``(h, w)`` or ``(h, w, 3)`` float32 in [0, 1], of which the first channel counts; stretched over the
-            rectangle, bilinear, row 0 at the top (``v = 1``).
-        depth: in object space, positive.
-        steps: even steps that a ray takes through the whole relief, at least 2, before the secant search.
+        base: material of the relief.
+        height: ``(h, w)`` or ``(h, w, 3)`` float32 in [0, 1], of which the first channel is used; stretched over the
+            rectangle, interpolated bilinearly, row 0 at the top (``v = 1``).
+        depth: depth of the relief in object space, positive.
+        steps: number of equal steps of a ray through the whole relief, at least 2, before the secant search.
     """
 
     base: Material
@@ -165,20 +166,20 @@ class HeightField:
 
 @dataclass(frozen=True)
 class Emissive:
-    """A surface that only emits, two-sided, constant radiance."""
+    """A surface that only emits, with constant radiance on both sides."""
 
     radiance: Rgb
 
 
 @dataclass(frozen=True)
 class Masked:
-    """A material with holes: ``opacity`` of it is there, the rest lets light pass unbent.
+    """A material with holes: it covers the share ``opacity`` of the surface; the rest transmits light undeflected.
 
     Attributes:
-        base: what has holes.
-        opacity: its red channel counts.
-        cutoff: all of the material is there where the opacity is at least this, and nothing elsewhere; None for what
-            ``opacity`` says.
+        base: material with the holes.
+        opacity: opacity in the red channel.
+        cutoff: the material is opaque where the opacity is at least this, and absent elsewhere; None to use ``opacity``
+            as it is.
     """
 
     base: Material
@@ -188,12 +189,12 @@ class Masked:
 
 @dataclass(frozen=True)
 class NormalMapped:
-    """A material whose shading normal a picture gives.
+    """A material whose shading normal is given by a texture.
 
     Attributes:
-        base: what is bent.
-        normals: vectors ``2 c - 1`` in the frame of growing u, growing v and the normal, not encoded.
-        scale: multiplies their first two parts.
+        base: material whose normal is perturbed.
+        normals: vectors ``2 c - 1`` in the frame of increasing u, increasing v and the normal, not encoded.
+        scale: factor of their first two components.
     """
 
     base: Material
@@ -206,9 +207,9 @@ class Bumped:
     """A material whose shading normal follows a height field.
 
     Attributes:
-        base: what is bumped.
-        height: displacement along the normal, of which the mean of the channels counts.
-        scale: of the height, scene units.
+        base: material whose normal is perturbed.
+        height: displacement along the normal, the mean of the channels.
+        scale: factor of the height, scene units.
     """
 
     base: Material

@@ -1,6 +1,6 @@
 """The canonical scene, and how it is rendered; conventions as in :mod:`scenes.canonical`.
 
-Source: Hagemann 2018, sec. 4.2 and table 4.1 (which constructs a common scene must hold).
+Source: Hagemann 2018, sec. 4.2 and table 4.1 (constructs of a common scene).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Film:
 
 @dataclass(frozen=True)
 class Sampler:
-    """How pixels are sampled by the renderer the file was written for."""
+    """Sampling of pixels by the renderer for which the file was written."""
 
     kind: Literal["independent", "stratified", "sobol", "halton", "hammersley"] = "independent"
     samples_per_pixel: int = 1
@@ -37,15 +37,15 @@ class Sampler:
 
 @dataclass(frozen=True)
 class Integrator:
-    """Light transport asked for.
+    """The requested light transport.
 
     Attributes:
         depth: greatest number of bounces, -1 for no limit.
-        shadow_rays: towards each light that has an extent, ``one`` per shaded point, samples sharing the light out
-            among them, or ``all``: one to a random point of each of its cells.
-        light_cells: cells along each of the two axes of such a light, for ``all``.
-        reflection_rays, refraction_rays: spread about the perfect direction at the first glossy surface a camera ray
-            meets; deeper ones send one.
+        shadow_rays: shadow rays towards each light that has an extent: ``one`` per shaded point, stratified over the
+            samples of a group, or ``all``: one to a random point of each of its cells.
+        light_cells: number of cells along each of the two axes of such a light, for ``all``.
+        reflection_rays, refraction_rays: number of rays about the perfect direction at the first glossy surface that a
+            camera ray hits; deeper surfaces send one ray.
 
     Source: Olszewski, "Distribution Ray Tracing" (sections on soft shadows and on diffuse reflection).
     """
@@ -68,10 +68,10 @@ class Scene:
     """A whole scene.
 
     Attributes:
-        ambient: constant ambient radiance that Phong materials weigh by their ``ambient``.
-        materials: named materials, kept for round trips; instances hold theirs directly.
-        duration_s: length of the animation; 0 for a still.
-        background: what primary and mirror rays that hit nothing see; None means the environment light.
+        ambient: constant ambient radiance, which Phong materials weight by their ``ambient``.
+        materials: named materials, kept for round trips; instances refer to their materials directly.
+        duration_s: length of the animation, seconds; 0 for a still.
+        background: radiance for camera and mirror rays that hit nothing; None for that of the environment light.
     """
 
     camera: Camera

@@ -1,4 +1,4 @@
-"""Shapes of the canonical scene, and their places; conventions as in :mod:`scenes.canonical`."""
+"""Shapes of the canonical scene, and their instances; conventions as in :mod:`scenes.canonical`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Mesh:
     """An indexed triangle mesh in object space.
 
     Attributes:
-        vertices: ``(v, 3)`` float32, or float64 where they are far from their origin.
+        vertices: ``(v, 3)`` float32, or float64 for vertices far from their origin.
         faces: ``(f, 3)`` int32, counter-clockwise seen from outside.
         normals: ``(v, 3)`` float32 unit shading normals, or None for face normals.
         uvs: ``(v, 2)`` float32, or None for zero.
@@ -78,14 +78,14 @@ class Instance:
     """A shape with a material, placed by ``track(t) @ to_world`` (the track is the outer, rigid motion).
 
     Attributes:
-        shape: shared between instances where it is the same object.
-        material: what it is made of.
+        shape: shape, which instances share if it is the same object.
+        material: material of the shape.
         to_world: ``(4, 4)`` float64, non-singular.
         track: rigid animation, or None for a static instance.
-        name: for messages and reports.
-        emission: radiance of an area light, linear RGB, or None. It leaves the side that the normal points to, of a
+        name: name for messages and reports.
+        emission: radiance of an area light, linear RGB, or None. It is emitted on the side of the normal by a
             :class:`Rectangle` or :class:`Sphere`.
-        one_sided: whether the back is black. Renderers draw both sides alike; kept for conversion.
+        one_sided: whether the back is black. The renderer treats both sides equally; it is kept for conversion.
     """
 
     shape: Shape

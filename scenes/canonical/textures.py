@@ -23,13 +23,13 @@ WHITE = ConstantTexture((1.0, 1.0, 1.0))
 
 @dataclass(frozen=True, eq=False)
 class ImageTexture:
-    """An image looked up at ``uv * uv_scale + uv_offset``.
+    """An image that is looked up at ``uv * uv_scale + uv_offset``.
 
     Attributes:
         image: ``(height, width, 3)`` float32, linear RGB, row 0 at the top (``v = 1``).
-        wrap: what lies outside ``[0, 1]``.
+        wrap: extension of the image outside ``[0, 1]``.
         filter: ``mipmap`` is bilinear within a level chosen by the ray's footprint.
-        source: the file it came from, for export and for messages.
+        source: file of the image, for export and for messages.
     """
 
     image: NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""What all parts of a scene are made of: colours, transforms, rigid motion, and the error that names a fault."""
+"""Common types of all parts of a scene: colours, transforms, rigid motion, and the error for invalid descriptions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Rgb = tuple[float, float, float]
 Matrix = NDArray[np.float64]
 
-_SPANS_AWAY = 128.0  # from the origin, beyond which float32 keeps less than a 60,000th of a mesh
+_SPANS_AWAY = 128.0  # distance beyond which float32 resolves less than a 60,000th of a mesh
 
 
 def identity() -> Matrix:
@@ -19,12 +19,13 @@ def identity() -> Matrix:
 
 
 class SceneError(ValueError):
-    """A scene description that cannot be used; the message says what was expected, what arrived, and where."""
+    """A scene description that cannot be used; the message gives the expected value, the actual one, and the place."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidTrack:
-    """A rigid motion sampled at uniform key times; between keys, translation is linear and rotation is slerped.
+    """A rigid motion sampled at uniform key times; between keys, translation is interpolated linearly and rotation
+    spherically.
 
     Before the first and after the last key the pose is held.
 
@@ -32,8 +33,8 @@ class RigidTrack:
         start_s: time of the first key, seconds.
         interval_s: time between keys, seconds, positive.
         translation: ``(keys, 3)`` float64, scene units.
-        rotation: ``(keys, 4)`` float64 unit quaternions ``(x, y, z, w)``; neighbouring keys less than half a turn apart
-            and of the same sign (non-negative dot product).
+        rotation: ``(keys, 4)`` float64 unit quaternions ``(x, y, z, w)``; neighbouring keys are less than half a turn
+            apart and have the same sign (non-negative dot product).
     """
 
     start_s: float
@@ -56,7 +57,8 @@ class RigidTrack:
 
 
 def vertices_of(points: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Vertices ``(v, 3)`` in float32, or in float64 where they lie so far away that float32 spoils their form."""
+    """Vertices ``(v, 3)`` in float32, or in float64 if they are so far from the origin that float32 would distort their
+    shape."""
     span = np.ptp(points, axis=0).max(initial=0.0)
     far = len(points) > 0 and np.abs(points).max() > _SPANS_AWAY * span
     return np.asarray(points, np.float64 if far and points.dtype.itemsize > 4 else np.float32)

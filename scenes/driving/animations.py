@@ -1,8 +1,8 @@
-"""The five animations of the driving world: one vehicle, five ways of looking at it.
+"""The five animations of the driving world: one vehicle, seen in five ways.
 
 Each is a path of the car and a motion of the camera over :data:`DURATION_S` seconds from time zero.
 
-Source: Stephens 2011, sec. 7.1.1.1 and figs 7.1–7.2 (inputs 0 to 4); paths, speeds and lenses are our own.
+Source: Stephens 2011, sec. 7.1.1.1 and figs 7.1–7.2 (inputs 0 to 4); paths, speeds and fields of view are our own.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ View = Callable[[Path], PerspectiveCamera]
 
 @dataclass(frozen=True)
 class Animation:
-    """One input: how the car drives, and what watches it."""
+    """One input: motion of the car and of the camera."""
 
     path: Path
     view: View
@@ -57,7 +57,7 @@ def _chase(behind: float, aside: float, height: float, aim: float, fov_deg: floa
 
 
 def _pivot(eye: tuple[float, float, float], aim: float, fov_deg: float) -> View:
-    """A camera that stands still and turns to follow the car."""
+    """A camera at a fixed place that turns to follow the car."""
 
     def view(path: Path) -> PerspectiveCamera:
         def pose(time_s: Times) -> Pose:
@@ -71,7 +71,7 @@ def _pivot(eye: tuple[float, float, float], aim: float, fov_deg: float) -> View:
 
 
 ANIMATIONS: dict[str, Animation] = {
-    # comes in the upper left, turns right at the crossing and is gone; paving in the foreground
+    # enters at the upper left, turns right at the crossing and leaves; paving in the foreground
     "corner-exit": Animation(
         Path((-2.6, 15.0), -0.5 * np.pi, 9.5, bends=((6.5, 9.0, -0.5 * np.pi),)),
         _fixed((5.0, -8.0, 4.6), (2.7, 0.55, -0.1), 50.0),
@@ -81,7 +81,7 @@ ANIMATIONS: dict[str, Animation] = {
     "approach": Animation(Path((-28.0, _LANE_M), 0.0, 11.0), _fixed((3.4, 0.4, 1.35), (-10.0, -1.9, 0.75), 42.0)),
     "fast-crossing": Animation(Path((-15.0, _LANE_M), 0.0, 22.0), _fixed((0.6, 7.0, 1.5), (0.0, -2.6, 0.95), 50.0)),
 }
-"""By name, in the order of the thesis' inputs 0 to 4."""
+"""Animations by name, in the order of the thesis' inputs 0 to 4."""
 
 
 def load(name: str, phase: float = 0.0) -> Scene:
@@ -89,8 +89,8 @@ def load(name: str, phase: float = 0.0) -> Scene:
 
     Args:
         name: a key of :data:`ANIMATIONS`.
-        phase: fraction of a turn of its wheels by which the car is ahead at time zero: a repetition that differs in
-            where edges fall on pixels and tiles, and in nothing else.
+        phase: fraction of a wheel's turn by which the car is ahead at time zero: a repetition that differs only in the
+            positions of edges on pixels and tiles.
     """
     animation = ANIMATIONS[name]
     old = animation.path

@@ -1,8 +1,9 @@
 """The car's body as one lofted surface.
 
-Car frame: ``+x`` ahead, ``+y`` left, ``+z`` up, the ground at ``z = 0``, the origin between the axles; metres. The loft
-is a family of sections, each a cubic B-spline from the top centre line round the left side to the bottom centre line,
-closed by rounded ends and then bent: swept back towards the corners, raked in side view, flared over the wheels.
+Car frame: ``+x`` ahead, ``+y`` left, ``+z`` up, with the ground at ``z = 0`` and the origin between the axles; metres.
+The loft is a family of sections, each a cubic B-spline from the top centre line around the left side to the bottom
+centre line. It is closed by rounded ends and then bent: swept back towards the corners, raked in side view, flared over
+the wheels.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def belt_at(x: Array) -> Array:
 
 
 def _stations() -> Array:
-    """Where sections lie: evenly, but denser over the windscreens, whose edges bend most."""
+    """Positions of the sections: uniform, but denser over the windscreens, whose edges bend most."""
     x = np.linspace(-2.25 + _END_RADIUS, 2.25 - _END_RADIUS, 1200)
     density = 1.0 + 0.5 * exp(-(((x - 0.6) / 0.5) ** 2)) + 0.5 * exp(-(((x + 1.35) / 0.4) ** 2))
     share = np.cumsum(density)
@@ -70,7 +71,7 @@ def _stations() -> Array:
 
 
 def _controls(x: Array) -> Array:
-    """Control points ``(stations, controls, 2)`` of (y, z) from the top centre line to the bottom one."""
+    """Control points ``(stations, controls, 2)``, (y, z) from the top centre line to the bottom one."""
     top, belt, width, bottom = (_outline(table, x) for table in (_TOP, _BELT, _WIDTH, _BOTTOM))
     height = top - belt
     cabin = np.clip((height - 0.14) / 0.22, 0.0, 1.0)
@@ -97,7 +98,7 @@ def _controls(x: Array) -> Array:
 
 
 def _sections(x: Array) -> Array:
-    """Points ``(stations, samples, 2)`` of (y, z) on the sections."""
+    """Points ``(stations, samples, 2)``, (y, z) on the sections."""
     controls = _controls(x)
     count = controls.shape[1]
     knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, count - 2), np.ones(3)])
@@ -108,9 +109,9 @@ def _sections(x: Array) -> Array:
 
 
 def _end(section: Array, x: float, side: float) -> list[Array]:
-    """Rings ``(samples, 3)`` that round an end off and close it; ``side`` is +1 at the nose.
+    """Rings ``(samples, 3)`` that round off an end and close it; ``side`` is +1 at the nose.
 
-    Rings shrink towards the middle of the section, not along its normals, which would fold over at tight corners.
+    Rings shrink towards the centre of the section, not along its normals, which would fold at tight corners.
     """
     middle = np.array([0.0, 0.5 * (section[:, 1].min() + section[:, 1].max())])
     reach = np.array([section[:, 0].max(), 0.5 * np.ptp(section[:, 1])])
@@ -148,7 +149,7 @@ def _bend(points: Array) -> Array:
 
 
 def shell() -> Surface:
-    """The whole closed body, before anything is cut out of it."""
+    """The whole closed body, before parts are cut out."""
     x = _stations()
     sections = _sections(x)
     middle = [np.insert(section, 0, at, axis=1) for section, at in zip(sections, x, strict=True)]
@@ -160,7 +161,7 @@ def shell() -> Surface:
 
 
 def wheel_housing(side: float, axle: float) -> Surface:
-    """Liner around one wheel: an arch from the body's skin inwards, closed by a wall; seen from the wheel."""
+    """Liner around one wheel: an arch from the body's skin inwards, closed by a wall, facing the wheel."""
     angle = np.linspace(np.radians(-25.0), np.radians(205.0), 30)
     ring = np.stack([axle + ARCH_RADIUS_M * cos(angle), AXLE_HEIGHT_M + ARCH_RADIUS_M * sin(angle)], -1)
     ring[:, 1] = np.maximum(ring[:, 1], 0.20)

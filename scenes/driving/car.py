@@ -1,6 +1,6 @@
 """A four-door saloon: the lofted body cut into paint, glass, lamps and trim, on four wheels that spin.
 
-Car frame as in :mod:`scenes.driving.body`. Everything but the wheels moves as one; each wheel has a motion of its own.
+Car frame as in :mod:`scenes.driving.body`. All parts except the wheels move together; each wheel has its own motion.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _wheel_arch(axle: float) -> Field:
 
 
 def _regions() -> list[tuple[str, list[Field]]]:
-    """What is cut out of the shell, in order, and the part it becomes."""
+    """Regions that are cut out of the shell, in order, each with the name of its part."""
     cuts: list[tuple[str, list[Field]]] = [
         ("", [_wheel_arch(axle), _off_centre(0.5)]) for axle in (FRONT_AXLE_M, REAR_AXLE_M)
     ]
@@ -125,7 +125,7 @@ def _screen_half(z: Array) -> Array:
 
 @lru_cache(maxsize=1)
 def body_parts() -> dict[str, Mesh]:
-    """Everything that is fixed to the body, one mesh a material."""
+    """All parts fixed to the body, one mesh per material."""
     parts: dict[str, list[Surface]] = {name: [] for name in MATERIALS}
     rest = shell()
     for name, fields in _regions():
@@ -163,14 +163,14 @@ def _details() -> list[tuple[str, Surface]]:
 
 
 def instances(path: Path, start_s: float, end_s: float, interval_s: float = 1.0 / 240.0) -> list[Instance]:
-    """The car on its path, with front wheels that steer and wheels that roll.
+    """The car on its path, with steering front wheels and rolling wheels.
 
-    Wheels roll as far as the ground passes along the car. They do not slip on straights, and the rear wheels do not in
-    bends; the roll of the front wheels neglects their steering angle.
+    Wheels roll by the distance that the ground passes along the car. No wheel slips on straights, and rear wheels do
+    not slip in bends; the roll of the front wheels neglects their steering angle.
 
     Args:
-        path: of the point between the axles, on the ground.
-        start_s, end_s: span that is animated, seconds; poses are held outside it.
+        path: path of the point between the axles, on the ground.
+        start_s, end_s: animated time span, seconds; poses are held outside it.
         interval_s: time between keys, seconds.
     """
     body_track = sample_track(path.pose, start_s, end_s, interval_s)
@@ -185,13 +185,14 @@ def instances(path: Path, start_s: float, end_s: float, interval_s: float = 1.0 
 
 
 def _wheel_turn(path: Path, steered: bool, side: float) -> Callable[[Times], Rotation]:
-    """Orientation of a wheel in the car's frame: steering about z, rolling about the axle, outer side outwards."""
+    """Orientation of a wheel in the car's frame: steering about z, rolling about the axle, with the outer side
+    outwards."""
     outward = rotation_about(UP, 0.0 if side > 0 else np.pi)
 
     def turn(time_s: Times) -> Rotation:
         distance = path.distance(time_s)
         steer = arctan(path.curvature(distance) * (FRONT_AXLE_M - REAR_AXLE_M)) * steered
-        # in a bend the inner wheel goes a shorter way
+        # in a bend the path of the inner wheel is shorter
         rolled = distance - side * HUB_OFFSET_M * (path.heading(distance) - path.heading_rad)
         return rotation_about(UP, steer) * rotation_about((0.0, 1.0, 0.0), rolled / RADIUS_M) * outward
 

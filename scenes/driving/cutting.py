@@ -14,8 +14,8 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
     """Cuts a surface along the zero line of a function, splitting the triangles it crosses.
 
     Args:
-        surface: what to cut.
-        value: ``(v,)`` the function at the vertices, linear in between.
+        surface: surface to cut.
+        value: ``(v,)`` values of the function at the vertices, interpolated linearly.
 
     Returns:
         The part where the function is negative, and the rest; normals and uv are interpolated on the cut.
@@ -30,7 +30,7 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
         return replace(surface, faces=inside[0]).compact(), replace(surface, faces=outside[0]).compact()
     lone = below[crossed] == (below[crossed].sum(axis=1) == 1)[:, None]
     shift = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(crossed, shift, axis=1).T  # a is alone on its side
+    a, b, c = np.take_along_axis(crossed, shift, axis=1).T  # vertex a is alone on its side
     low, high = np.sort([np.tile(a, 2), np.concatenate([b, c])], axis=0)
     edges, which = np.unique(low * len(value) + high, return_inverse=True)
     low, high = np.divmod(edges, len(value))
@@ -53,10 +53,10 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
 def carve(surface: Surface, *sides: Callable[[Array], Array]) -> tuple[Surface, Surface]:
     """Cuts out the part where each of several functions of the vertices ``(v, 3)`` is negative.
 
-    The cuts are made one after the other, so that corners between them stay sharp.
+    The cuts are made successively, so that corners between them stay sharp.
 
     Returns:
-        What was cut out, and the rest.
+        The part that was cut out, and the rest.
     """
     inside, rest = surface, []
     for side in sides:

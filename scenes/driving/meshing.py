@@ -33,8 +33,8 @@ class Surface:
     uvs: Array
 
     def mesh(self, source: str) -> Mesh:
-        """The surface as a canonical mesh, without triangles of no area and without unused vertices."""
-        # as they will be: single precision flattens some more
+        """The surface as a canonical mesh, without degenerate triangles and unused vertices."""
+        # after rounding: single precision makes some more triangles degenerate
         vertices = self.vertices.astype(np.float32).astype(np.float64)
         a, b, c = (vertices[self.faces[:, corner]] for corner in range(3))
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -58,19 +58,19 @@ class Surface:
 
 
 def unit(vectors: Array) -> Array:
-    """Rows scaled to length one; rows of no length become ``+z``."""
+    """Rows scaled to unit length; zero rows become ``+z``."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), np.array([0.0, 0.0, 1.0]))
 
 
 def smooth_normals(vertices: Array, faces: Indices, weld_m: float = 1e-6, piece: Indices | None = None) -> Array:
-    """Normals averaged over the faces around each place, weighted by angle; coincident vertices share theirs.
+    """Normals averaged over the faces around each point, weighted by angle; coincident vertices share normals.
 
     Args:
         vertices: ``(v, 3)``.
         faces: ``(f, 3)``.
-        weld_m: vertices closer than about this count as one place.
-        piece: ``(v,)`` what each vertex belongs to; vertices of different pieces share nothing.
+        weld_m: vertices closer than about this count as one point.
+        piece: ``(v,)`` number of the piece of each vertex; vertices of different pieces share no normals.
     """
     place = _places(np.round(vertices / weld_m).astype(np.int64), piece)
     sums = np.zeros((place.max() + 1, 3))
@@ -87,7 +87,7 @@ def smooth_normals(vertices: Array, faces: Indices, weld_m: float = 1e-6, piece:
 
 
 def _places(cells: Indices, piece: Indices | None) -> Indices:
-    """Numbers ``(v,)`` that are equal where rows of cells ``(v, 3)`` and pieces are."""
+    """Numbers ``(v,)`` that are equal where the rows of ``cells``, ``(v, 3)``, and the pieces are equal."""
     keys = np.array([*cells.T, *([] if piece is None else [piece])])
     order = np.lexsort(keys)
     fresh = (keys[:, order[1:]] != keys[:, order[:-1]]).any(axis=0)
@@ -105,7 +105,7 @@ def from_faces(vertices: Array, faces: Indices, uvs: Array | None = None) -> Sur
 
 
 def flat(surface: Surface) -> Surface:
-    """The surface with each triangle on its own and facing one way."""
+    """The surface with separate triangles, each with its face normal."""
     vertices = surface.vertices[surface.faces].reshape(-1, 3)
     a, b, c = vertices[0::3], vertices[1::3], vertices[2::3]
     normals = np.repeat(unit(np.cross(b - a, c - a)), 3, axis=0)
@@ -114,16 +114,16 @@ def flat(surface: Surface) -> Surface:
 
 
 def grid(points: Array) -> Surface:
-    """A surface through a net of points.
+    """A surface through a grid of points.
 
     Args:
-        points: ``(m, n, 3)``; outside is where ``∂/∂m × ∂/∂n`` points. uv runs from 0 to 1 along ``(m, n)``.
+        points: ``(m, n, 3)``; the outside is where ``∂/∂m × ∂/∂n`` points. uv runs from 0 to 1 along ``(m, n)``.
     """
     return grids(points[None])
 
 
 def grids(nets: Array) -> Surface:
-    """Surfaces through nets ``(k, m, n, 3)`` as :func:`grid` makes them, joined; edges between them stay sharp."""
+    """Surfaces through grids ``(k, m, n, 3)`` as in :func:`grid`, joined with sharp edges between them."""
     count, rows, columns = nets.shape[:3]
     index = np.arange(count * rows * columns).reshape(count, rows, columns)
     a, b, c, d = index[:, :-1, :-1], index[:, 1:, :-1], index[:, 1:, 1:], index[:, :-1, 1:]
@@ -136,13 +136,13 @@ def grids(nets: Array) -> Surface:
 
 
 def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> Surface:
-    """A profile turned about the y axis.
+    """The surface of revolution of a profile about the y axis.
 
     Args:
-        profile: ``(n, 2)`` of (radius, y); outside lies to the right of the profile's direction in the plane with
-            radius to the right and y up.
-        segments: around.
-        crease_deg: profile corners sharper than this are not smoothed over.
+        profile: ``(n, 2)`` points (radius, y); the outside lies to the right of the profile's direction in the plane
+            with the radius to the right and y up.
+        segments: number of segments around the axis.
+        crease_deg: corners of the profile sharper than this stay sharp.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, segments + 1)
     heading = np.unwrap(arctan2(*np.diff(profile, axis=0).T[::-1]))
@@ -162,7 +162,7 @@ def box(lower: Sequence[float], upper: Sequence[float]) -> Surface:
 
 
 def boxes(spans: Sequence[tuple[Sequence[float], Sequence[float]]]) -> Surface:
-    """Boxes by their lower and upper corners, joined: as :func:`box`, but all at once."""
+    """Boxes by their lower and upper corners, joined: like :func:`box`, but all at once."""
     ends = np.asarray(spans, np.float64)
     corners = np.empty((len(ends), 3, 2, 2, 2, 3))  # box, axis, side, net
     for axis in range(3):
@@ -170,7 +170,7 @@ def boxes(spans: Sequence[tuple[Sequence[float], Sequence[float]]]) -> Surface:
         net = corners[:, axis]
         net[..., axis] = ends[:, :, None, None, axis]
         net[..., u], net[..., v] = ends[:, None, :, None, u], ends[:, None, None, :, v]
-        net[:, 0] = net[:, 0].transpose(0, 2, 1, 3).copy()  # turned over: the lower side faces down the axis
+        net[:, 0] = net[:, 0].transpose(0, 2, 1, 3).copy()  # reversed: the lower side faces down the axis
     sheets = grids(corners.reshape(-1, 2, 2, 3))
     # u is always the horizontal axis of a wall and v its height
     uvs = np.stack([corners[:, axis][..., pair] for axis, pair in enumerate(([1, 2], [0, 2], [0, 1]))], axis=1)
@@ -191,7 +191,7 @@ def extrude(outline: Array, lower: float, upper: float) -> Surface:
 
 
 def tube(start: Sequence[float], end: Sequence[float], radius: float, end_radius: float, sides: int = 10) -> Surface:
-    """A closed, tapering round bar between two points, metres."""
+    """A closed, tapered round bar between two points, metres."""
     begin, finish = np.asarray(start, np.float64), np.asarray(end, np.float64)
     length = norm(finish - begin)
     profile = np.array([[0.0, 0.0], [radius, 0.0], [end_radius, length], [0.0, length]])
@@ -212,20 +212,20 @@ def ellipsoid(center: Sequence[float], radii: Sequence[float], rings: int = 10, 
 
 @lru_cache(maxsize=8)
 def _ball(rings: int, segments: int) -> Surface:
-    """A ball of radius one; shared, so never changed in place."""
+    """A unit ball; it is shared, so it must not be changed in place."""
     turn = np.linspace(np.pi, 0.0, rings + 1)
     return lathe(np.stack([sin(turn), cos(turn)], -1), segments)
 
 
 def transformed(surface: Surface, rotation: Array, translation: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Surface:
-    """The surface turned by ``(3, 3)`` and shifted; a reflection also turns its faces round."""
+    """The surface rotated by a matrix ``(3, 3)`` and translated; a reflection also reverses its faces."""
     faces = surface.faces if np.linalg.det(rotation) > 0.0 else surface.faces[:, ::-1]
     vertices = product(surface.vertices, rotation.T) + np.asarray(translation, np.float64)
     return Surface(vertices, faces, product(surface.normals, rotation.T), surface.uvs)
 
 
 def moved(surface: Surface, translation: Sequence[float] | Array) -> Surface:
-    """The surface shifted."""
+    """The surface translated."""
     return transformed(surface, np.eye(3), translation)
 
 

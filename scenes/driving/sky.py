@@ -1,6 +1,6 @@
-"""The sky of the driving scenes: a picture of a sky over a strip of hills, and the sun that stands in it.
+"""The sky of the driving scenes: an image of a sky over a strip of hills, and the sun in it.
 
-Source: Stephens 2011, sec. 7.1.1.1, which describes such a world; pictures and numbers are our own.
+Source: Stephens 2011, sec. 7.1.1.1, which describes such a world; images and numbers are our own.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ SKY_LIMIT = 6.0
 
 SUN_IRRADIANCE: Rgb = (3.1, 2.95, 2.65)
 _SKY_PX = (1536, 3072)
-_HORIZON_DEG = 10.0  # what the strip of hills spans above the horizon
+_HORIZON_DEG = 10.0  # height of the strip of hills above the horizon
 _SEAM_PX = 384  # columns by which the hills and their mirror image are shifted: the joints then lie behind houses
 _Y_UP_TO_Z_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-_SUN_UV = (0.595, 0.232)  # where the sun stands in the sky picture
+_SUN_UV = (0.595, 0.232)  # position of the sun in the sky image
 
 
 def sun_towards() -> Array:
@@ -41,19 +41,20 @@ def sun_towards() -> Array:
 
 
 def _gaussian(sigma: float, radius: int) -> Array:
-    """Weights of a filter, which add up to one."""
+    """Weights of a Gaussian filter, whose sum is one."""
     weights = exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
     return weights / weights.sum()
 
 
 def blurred(image: Array, sigma: float) -> Array:
-    """A Gaussian over ``(h, w)`` that wraps around, cut off at four deviations."""
+    """An image ``(h, w)`` filtered by a periodic Gaussian, truncated at four standard deviations."""
     weights = _gaussian(sigma, int(4.0 * sigma + 0.5))
     return correlate1d(correlate1d(image, weights, 0, mode="wrap"), weights, 1, mode="wrap")
 
 
 def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    """Bilinear, after a Gaussian along what becomes smaller; as ``kornia.geometry.transform.resize`` with antialias."""
+    """Bilinear resizing, after a Gaussian filter along axes that are reduced, as ``kornia.geometry.transform.resize``
+    with antialias."""
     planes = image.astype(np.float64)
     factors = image.shape[0] / height, image.shape[1] / width
     for axis, factor in enumerate(factors):
@@ -62,7 +63,7 @@ def _resized(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.
             planes = correlate1d(planes, _gaussian(sigma, int(max(4.0 * sigma, 3.0)) // 2), axis, mode="mirror")
     for axis, (factor, count) in enumerate(zip(factors, (height, width), strict=True)):
         last = image.shape[axis] - 1
-        # places in float32, as there
+        # positions in float32, as in kornia
         at = np.clip((np.float64(np.float32(factor)) * (np.arange(count) + 0.5) - 0.5).astype(np.float32), 0.0, last)
         first = at.astype(np.int64)
         share = np.expand_dims(at - first, (1, 2) if axis == 0 else (0, 2))
@@ -98,6 +99,6 @@ def _sky(*states: FileState | None) -> EnvironmentLight:
 
 
 def sun() -> DirectionalLight:
-    """Sunlight from where the sky picture has the sun."""
+    """Sunlight from the direction of the sun in the sky image."""
     x, y, z = (-sun_towards()).tolist()
     return DirectionalLight((x, y, z), SUN_IRRADIANCE)

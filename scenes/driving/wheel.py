@@ -1,6 +1,6 @@
 """A road wheel as lathed profiles and five lofted spokes.
 
-Wheel frame: the axle is the y axis, the outer side faces ``+y``, the origin is the middle of the tyre; metres.
+Wheel frame: the axle is the y axis, the outer side faces ``+y``, and the origin is the centre of the tyre; metres.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def rim() -> Mesh:
             (_RIM_RADIUS + 0.004, 0.094),
         ]
     )  # fmt: skip
-    # seen from the axle, so the profile runs down; the lip then faces outwards
+    # facing the axle, so the profile runs down; the lip then faces outwards
     lip = lathe(barrel[::-1], _SEGMENTS, crease_deg=50.0)
     back = lathe(np.array([(inner - 0.012, -0.098), (_RIM_RADIUS, -0.104)]), _SEGMENTS // 2)
     profile = [(0.062, -0.02), (0.064, 0.058), (0.058, 0.067), (0.031, 0.069), (0.029, 0.076), (0.02, 0.080)]

@@ -29,10 +29,10 @@ from scenes.loading import FileState, asset, read_image, state_of
 ROAD_HALF_WIDTH_M = 6.0
 ROAD_LENGTH_M = 240.0
 PAVING_M = 1.1
-"""Width of one repetition of the paving texture."""
+"""Width of one repetition of the paving texture, metres."""
 
 AMBIENT: Rgb = (0.46, 0.53, 0.66)
-"""Radiance of the sky on surfaces, as a constant."""
+"""Ambient radiance: a constant that approximates the sky's light on surfaces."""
 
 
 @lru_cache(maxsize=1)
@@ -68,7 +68,7 @@ Span = tuple[float, float]
 
 
 def _sheets(spans: Sequence[tuple[Span, Span]], height: float) -> Surface:
-    """Level rectangles that face up, each from its spans along x and y; uv is ``(x, y)`` in metres."""
+    """Horizontal rectangles that face up, each given by its spans along x and y; uv is ``(x, y)`` in metres."""
     (west, east), (south, north) = np.moveaxis(np.asarray(spans, np.float64), 0, -1)
     level = np.full_like(west, height)
     corners = [np.stack([x, y, level], -1) for x in (west, east) for y in (south, north)]
@@ -154,7 +154,7 @@ _TREES = (
 
 
 def _crowns() -> Surface:
-    """Crowns of the trees, each some overlapping balls of leaves with an uneven surface."""
+    """Crowns of the trees, each of several overlapping balls of leaves with an uneven surface."""
     shapes = np.random.default_rng(3)
     crowns = []
     for x, y, size in _TREES:
@@ -195,7 +195,7 @@ def _posts() -> Surface:
 
 
 def instances() -> tuple[Instance, ...]:
-    """Everything that stands still, one mesh a material."""
+    """All static parts, one mesh per material."""
     return _instances(state_of(asset("pavement_albedo_512.png")))
 
 

@@ -1,7 +1,7 @@
-"""Two scenes after the two images of the ray-tracer report: as many polygons, the same effects.
+"""Two scenes after the two images of the ray-tracer report, with as many polygons and the same effects.
 
 The report shows a model over a box under an area light, with soft shadows and diffuse reflections; in its second image
-the model refracts as well. Its models are not named; a knotted tube stands in for them here.
+the model is also refractive. The report does not name its models; a knotted tube replaces them here.
 
 Source: Olszewski, "Distribution Ray Tracing", section "Results".
 """
@@ -36,13 +36,14 @@ IMAGES = ("report-one", "report-two")
 """Names of the scenes."""
 
 SAMPLES = 32
-"""Samples per pixel of both images."""
+"""Number of samples per pixel of both images."""
 
-_BOX_FACES = 12 + 2  # of the box and the floor, were they triangles
+_BOX_FACES = 12 + 2  # triangles of the box and the floor, if they were meshes
 
 
 def knotted_tube(around: int, along: int) -> Mesh:
-    """A trefoil of a round tube: ``2 * around * along`` triangles with smooth normals, within 3 units of the origin."""
+    """A round tube along a trefoil knot: ``2 * around * along`` triangles with smooth normals, within 3 units of the
+    origin."""
     t = np.linspace(0.0, 2.0 * np.pi, along, endpoint=False)
     center = np.stack(
         [
@@ -120,12 +121,12 @@ def load(name: str) -> Scene:
             mirror_spread_deg=8.0,
         )
         return _scene(name, knotted_tube(18, 280), paint, (1000, 800), 1)
-    if name == "report-two":  # about 5,500 polygons; refraction besides
+    if name == "report-two":  # about 5,500 polygons; refraction in addition
         return _scene(name, knotted_tube(14, 196), Glass(ior=1.4, spread_deg=4.0), (800, 600), 8)
     raise SceneError(f"image: expected one of {', '.join(IMAGES)}, got {name!r}")
 
 
 def polygon_count(scene: Scene) -> int:
-    """Triangles of the meshes, and those that the box and the floor would be."""
+    """Number of triangles of the meshes, and of those that would form the box and the floor."""
     meshes = [instance.shape for instance in scene.instances if isinstance(instance.shape, Mesh)]
     return sum(len(mesh.faces) for mesh in meshes) + _BOX_FACES

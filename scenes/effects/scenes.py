@@ -1,4 +1,4 @@
-"""One small scene for each effect of the ray tracer, with nothing in it that the effect does not need.
+"""One minimal scene for each effect of the ray tracer.
 
 World space has ``z`` up and a floor at ``z = 0``; the camera looks along ``+y``.
 """
@@ -55,9 +55,9 @@ from scenes.effects.stage import (
 from scenes.loading import asset, read_image
 
 SHUTTER_S = 0.5
-"""For how long the shutter of the blurred scenes is open, from time 0."""
+"""Time for which the shutter of the blurred scenes is open, from time 0, seconds."""
 
-_SPEED = 3.0  # of what moves, scene units a second
+_SPEED = 3.0  # speed of moving objects, scene units per second
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class Effect:
     """An effect.
 
     Attributes:
-        what: in words, for captions.
-        scene: makes the scene that shows it.
+        what: description for captions.
+        scene: creates the scene that shows the effect.
     """
 
     what: str
@@ -87,12 +87,12 @@ def plain() -> Scene:
 
 
 def quad_light() -> Scene:
-    """A square lamp: shadows soften with the distance from what casts them."""
+    """A square lamp: shadows soften with the distance from the object that casts them."""
     return staged(*pair(paint(RED), paint(BLUE)), lamp((-2.5, -1.0, 5.5), 1.2, 16.0))
 
 
 def quad_light_cells() -> Scene:
-    """As :func:`quad_light`, with a shadow ray to each of 16 cells."""
+    """Like :func:`quad_light`, with a shadow ray to each of 16 cells."""
     scene = quad_light()
     return Scene(
         scene.camera,
@@ -117,13 +117,13 @@ def spot_light() -> Scene:
 
 
 def sun_disc() -> Scene:
-    """The sun ten times as wide as it is: half-shadows grow along a shadow."""
+    """A sun of ten times its width: the penumbra widens along a shadow."""
     sun = DirectionalLight((0.8, 0.7, -0.6), (3.0, 2.8, 2.4), angle_deg=5.3)
     return staged(*pair(paint(RED), paint(BLUE)), lights=(sun,))
 
 
 def environment_light() -> Scene:
-    """Light from the whole of a sky picture."""
+    """Light from a whole sky image."""
     light = sky.sky()
     balls = pair(paint((0.8, 0.8, 0.8), ambient=0.0), Mirror())
     floor = Instance(Rectangle(), paint(GREY, ambient=0.0), placed((0, 6, 0), (12, 12, 1)), name="floor")
@@ -141,9 +141,9 @@ def glossy_reflection() -> Scene:
 
 
 def glass() -> Scene:
-    """A solid ball of glass, a bubble's thin shell of it, and a box."""
+    """A solid ball of glass, a bubble with a thin shell, and a box."""
     solid, shell = Glass(), Glass(thin=True)
-    box = placed((2.3, 0.6, 0.95), (0.7, 0.7, 0.9))  # just above the floor, so that the two do not coincide
+    box = placed((2.3, 0.6, 0.95), (0.7, 0.7, 0.9))  # slightly above the floor, so that the two do not coincide
     return staged(
         Instance(Sphere(1.0), solid, placed((-0.2, 0.0, 1.0)), name="ball"),
         Instance(Sphere(0.9), shell, placed((-2.4, 0.6, 0.9)), name="bubble"),
@@ -194,7 +194,7 @@ def _sliding(velocity: tuple[float, float, float]) -> RigidTrack:
 
 
 def moving_object() -> Scene:
-    """A ball that flies to the right past one at rest, and its shadow with it."""
+    """A ball that moves to the right past one at rest, with its shadow."""
     camera = PerspectiveCamera(camera_to_world(np.array(EYE), np.array(TARGET)), 38.0, shutter_s=(0.0, SHUTTER_S))
     return staged(
         Instance(Sphere(0.8), paint(RED), placed((-1.8, -1.0, 0.8)), _sliding((_SPEED, 0.0, 0.0)), name="moving"),
@@ -205,7 +205,7 @@ def moving_object() -> Scene:
 
 
 def moving_camera() -> Scene:
-    """The camera slides to the right: what is near blurs most."""
+    """The camera moves to the right: near objects blur most."""
     camera = PerspectiveCamera(
         camera_to_world(np.array(EYE), np.array(TARGET)),
         38.0,
@@ -216,7 +216,8 @@ def moving_camera() -> Scene:
 
 
 def height_field() -> Scene:
-    """Paving carved into a rectangle, low sun: stones hide and shade their joints, also at the border."""
+    """Paving as a height field on a rectangle, with a low sun: stones hide and shade their joints, even at the
+    border."""
     height = np.asarray(Image.open(asset("pavement_height_512.png")).convert("L"), np.float32) / 255.0
     stone = Phong(ImageTexture(read_image(asset("pavement_albedo_512.png"))))
     relief = Instance(Rectangle(), HeightField(stone, height, 0.16, 128), placed((0, 0, 1), (2.2, 2.2, 1)), name="slab")
@@ -236,7 +237,7 @@ def parallel_projection() -> Scene:
 
 
 def whole_sphere() -> Scene:
-    """Everything around the camera, latitude–longitude."""
+    """The whole sphere around the camera in a latitude–longitude projection."""
     matrix = np.eye(4)
     matrix[:3, :3] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # +y of the camera is up
     matrix[:3, 3] = (0.0, -3.0, 1.5)

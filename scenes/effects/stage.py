@@ -1,4 +1,4 @@
-"""A floor, a few things to put on it, and light: what the scenes of effects share. ``z`` is up."""
+"""Common parts of the scenes of effects: a floor, a few objects to place on it, and light. ``z`` is up."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ AMBIENT = (0.10, 0.11, 0.13)
 
 
 def paint(color: Rgb, **more: float | Rgb) -> Phong:
-    """Phong of one diffuse colour."""
+    """A Phong material of one diffuse colour."""
     return Phong(ConstantTexture(color), **more)  # type: ignore[arg-type]
 
 
 def placed(at: tuple[float, float, float], size: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Matrix:
-    """A transform that scales and then moves."""
+    """A transform that scales and then translates."""
     matrix = np.diag([*size, 1.0])
     matrix[:3, 3] = at
     return matrix
@@ -48,7 +48,7 @@ def facing_down(at: tuple[float, float, float], half_x: float, half_y: float) ->
 
 
 def floor(scale: float = 1.0) -> Instance:
-    """A chequered square at ``z = 0``, 24 units wide; ``scale`` widens it and keeps its squares."""
+    """A chequered square at ``z = 0``, 24 units wide; ``scale`` widens it and keeps the size of its squares."""
     squares = CheckerboardTexture(
         ConstantTexture((0.62, 0.60, 0.56)), ConstantTexture((0.30, 0.31, 0.34)), (24.0 * scale, 24.0 * scale)
     )
@@ -56,13 +56,13 @@ def floor(scale: float = 1.0) -> Instance:
 
 
 def staged(*instances: Instance, lights: tuple[Light, ...] = (), camera: Camera | None = None, **more) -> Scene:
-    """A scene of the floor and some instances before the haze; ``more`` goes to :class:`Scene`."""
+    """A scene of the floor and some instances in front of the haze; ``more`` is passed to :class:`Scene`."""
     camera = camera or PerspectiveCamera(camera_to_world(np.array(EYE), np.array(TARGET)), 38.0)
     return Scene(camera, (floor(), *instances), lights, ambient=AMBIENT, background=haze(), **more)
 
 
 def haze() -> EnvironmentLight:
-    """A plain gradient behind everything: dark below, bright at the horizon, blue above."""
+    """A gradient as background: dark below, bright at the horizon, blue above."""
     heights = np.linspace(1.0, -1.0, 64)[:, None, None]
     above = np.array([0.75, 0.82, 0.9]) + np.clip(heights, 0.0, 1.0) * np.array([-0.55, -0.42, -0.15])
     return EnvironmentLight(np.where(heights > 0.0, above, 0.25).astype(np.float32), sky.sky().to_world)

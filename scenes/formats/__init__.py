@@ -1,7 +1,7 @@
 """Formats of scene files by name: the project's own, those of installed packages, and those added from Python.
 
-A package offers formats through entry points of the group ``tsar.scene_formats``; ``FORMATS.add(name, format)`` adds
-one. Everything that takes a scene file then takes files with its endings.
+A package provides formats through entry points of the group ``tsar.scene_formats``; ``FORMATS.add(name, format)`` adds
+one. All commands that take a scene file then accept files with its endings.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Whether two scenes are the same, and where they differ."""
+"""Comparison of two scenes, and the place where they differ."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _NOT_COMPARED = ("source", "name", "materials", "filename")
 def difference(
     first: Any, second: Any, tolerance: float = 1e-5, where: str = "scene", alike: set[tuple[int, int]] | None = None
 ) -> str | None:
-    """The first place where two scenes, or parts of them, differ; None where they do not.
+    """The first place where two scenes, or parts of them, differ; None if they are equal.
 
-    Names, files that parts came from, and named materials that nothing uses do not count. Numbers may differ by
-    ``tolerance`` of their size, or of that of the array they are in. ``alike`` are pairs that have been compared.
+    Names, source files of parts, and unused named materials are ignored. Numbers may differ by ``tolerance`` relative
+    to their magnitude, or to that of their array. ``alike`` holds the pairs that have been compared.
     """
     alike = set() if alike is None else alike
     if dataclasses.is_dataclass(first) and not isinstance(first, type):

@@ -1,4 +1,4 @@
-"""From a scene file of one renderer to that of another, by way of the canonical scene."""
+"""Conversion between scene files of different renderers, through the canonical scene."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from scenes.loading import one_line
 
 
 def format_of(path: Path) -> str:
-    """The name of the format of a file, by the ending of its name.
+    """The name of a file's format, from the ending of its name.
 
     Raises:
-        SceneError: no format has the ending; the message has the known endings and the nearest of them.
+        SceneError: no format has the ending; the message lists the known endings and the nearest of them.
     """
     ending = Path(path).suffix.lower()
     known: dict[str, str] = {}
@@ -37,11 +37,11 @@ def load_scene_file(path: Path, root: Path | None = None, report: LossReport | N
 
     Args:
         path: the file.
-        root: folder that nothing is read outside of; by default the file's own.
-        report: receives what could not be kept.
+        root: folder outside of which nothing is read; by default the file's own.
+        report: receives the losses.
 
     Raises:
-        SceneError: it cannot be read; the message has file, line and column.
+        SceneError: the file cannot be read; the message gives file, line and column.
     """
     found = FORMATS[format_of(path)]
     if found.read is None:
@@ -55,18 +55,18 @@ def load_scene_file(path: Path, root: Path | None = None, report: LossReport | N
 def save_scene_file(
     scene: Scene, path: Path, to: str | None = None, report: LossReport | None = None, strict: bool = False
 ) -> None:
-    """Writes a scene with its meshes and pictures; all of it, or nothing.
+    """Writes a scene with its meshes and images, completely or not at all.
 
     Args:
-        scene: what to write.
-        path: the file; meshes and pictures go to folders beside it.
-        to: name of its format, by default that of its ending.
-        report: receives what could not be kept.
-        strict: whether a loss in the report, also one from reading, is an error.
+        scene: scene to write.
+        path: file to write; meshes and images are written to folders beside it.
+        to: name of the format; by default that of the file's ending.
+        report: receives the losses.
+        strict: whether any loss in the report, including those from reading, is an error.
 
     Raises:
         ConfigError: ``to`` names no format.
-        SceneError: the scene cannot be written, or would lose something and must not.
+        SceneError: the scene cannot be written, or there is a loss and ``strict`` is true.
     """
     found, wanted = report or LossReport(), FORMATS[to or format_of(path)]
     if wanted.write is None:

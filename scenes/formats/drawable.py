@@ -1,7 +1,8 @@
-"""A canonical scene as this project's renderer can draw it: what the renderer lacks is replaced and reported.
+"""Conversion of a canonical scene to what this project's renderer supports; other parts are replaced, which is
+reported.
 
-Facets of alpha ``α`` spread mirrored rays about evenly over a cone of half angle ``2 atan α``: that of a facet whose
-slope is ``α`` turns the ray by twice its angle.
+Microfacets of alpha ``α`` are approximated by a uniform cone of mirrored rays of half angle ``2 atan α``, because a
+facet of slope ``α`` deflects a ray by twice its angle.
 """
 
 from __future__ import annotations
@@ -59,16 +60,16 @@ from scenes.formats.losses import LossReport
 from scenes.models.phong_of_parts import EXPONENT_MAX
 
 PATH_MATERIALS = Matte | Glass | Metal | MetallicRough | Masked | Bumped | NormalMapped
-"""What is drawn along paths as it is, beside plastic that takes from its base what its coat reflects."""
+"""Materials that path tracing supports without replacement, besides layered plastic."""
 
 DEPTH_MAX = 8
-"""Most bounces of mirrored and refracted rays."""
+"""Maximum number of bounces of mirrored and refracted rays."""
 
-_SMOOTH = 0.02  # alpha below which a mirror is drawn sharp
+_SMOOTH = 0.02  # alpha below which a mirror is rendered as perfect
 
 
 class Approximation:
-    """Replaces parts of a scene, each once."""
+    """Replaces parts of a scene, each part once."""
 
     def __init__(self, report: LossReport, paths: bool = False) -> None:
         self.report, self.paths = report, paths
@@ -76,7 +77,7 @@ class Approximation:
         self._textures: dict[int, tuple[Texture, Texture]] = {}
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene with everything replaced that cannot be drawn."""
+        """The scene with all unsupported parts replaced."""
         camera, depth = scene.camera, scene.integrator.depth
         if isinstance(camera, RealisticCamera):
             self.report.add("camera", "a camera with lenses", "a pinhole of 45 degrees")
@@ -100,7 +101,8 @@ class Approximation:
         return dataclasses.replace(scene, camera=camera, lights=lights, instances=instances, integrator=integrator)
 
     def light(self, light: Light) -> list[Light]:
-        """Daylight becomes a map and a light as wide as the sun."""
+        """Lights that are supported: daylight becomes an environment map and a directional light with the sun's
+        width."""
         if isinstance(light, SpotLight):
             return [reshaped(light, "hermite", self.report)]
         if not isinstance(light, SunSky):
@@ -113,7 +115,8 @@ class Approximation:
         return made
 
     def instance(self, instance: Instance, number: int) -> list[Instance]:
-        """Instances for a shape: lamps are rectangles and spheres, a cube is six of them, and others give no light."""
+        """Instances for a shape. Lamps must be rectangles or spheres: a cube becomes six rectangles, a disk a square,
+        and other shapes only glow."""
         name = instance.name or f"shape {number}"
         lose_back(dataclasses.replace(instance, name=name), self.report)
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
@@ -131,12 +134,12 @@ class Approximation:
             self.report.add(name, "a round lamp", "a square one of the same area")
             scaled = product(instance.to_world, np.diag([side, side, 1.0, 1.0]))
             return [dataclasses.replace(made, shape=Rectangle(), to_world=scaled)]
-        if not self.paths:  # which find it by chance
+        if not self.paths:  # paths find it by chance
             self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
         return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
 
     def texture(self, texture: Texture, where: str) -> Texture:
-        """A plain texture; products and mixtures that are not plain become their means."""
+        """A plain texture; products and mixtures that cannot be folded become their means."""
         if id(texture) not in self._textures:
             self._textures[id(texture)] = texture, self._texture(folded(texture), where)
         return self._textures[id(texture)][1]
@@ -152,7 +155,7 @@ class Approximation:
         return ConstantTexture(mean_of(texture))
 
     def material(self, material: Material, where: str) -> Material:
-        """A material that can be drawn; the same object where it can."""
+        """A supported material; the same object if it is supported."""
         if id(material) not in self._materials:
             self._materials[id(material)] = material, self._material(material, where)
         return self._materials[id(material)][1]
@@ -190,7 +193,7 @@ class Approximation:
         return material
 
     def _along_paths(self, material: Material, where: str) -> Material:
-        """A material of facets, with holes or with bent normals, all of which paths draw."""
+        """A material with microfacets, holes or perturbed normals, which path tracing supports."""
         changed: dict[str, object] = {}
         for field in dataclasses.fields(material):
             value = getattr(material, field.name)
@@ -223,7 +226,7 @@ class Approximation:
         return Glass(*sides, material.ior, (0.0, 0.0), material.thin, spread)
 
     def _metal(self, material: Metal, where: str) -> Material:
-        """A mirror of the colour that the metal reflects straight back."""
+        """A mirror with the colour of the metal at normal incidence."""
         color = np.array(reflectance_of_index(material.eta, material.k)) * mean_of(material.reflectance_scale)
         alpha = math.sqrt(material.roughness[0] * material.roughness[1])
         spread = spread_deg(alpha) if alpha > _SMOOTH else 0.0
@@ -231,7 +234,7 @@ class Approximation:
         return Mirror(ConstantTexture(rgb(np.minimum(color, 1.0))), spread)
 
     def _coated(self, material: Glossy | Plastic | Uber, where: str) -> Material:
-        """Phong: the highlight as wide as the facets make it, the coat's mirror where it is smooth."""
+        """A Phong material with a highlight as wide as that of the facets, or with a mirror if the coat is smooth."""
         base = self.texture(material.diffuse, where)
         coat = np.array(mean_of(material.specular))
         if isinstance(material, Plastic):
@@ -258,7 +261,7 @@ class Approximation:
 
 
 def _sides() -> list[np.ndarray]:
-    """Where the rectangle lies as each side of the cube, facing outwards."""
+    """Transforms of the rectangle to the sides of the cube, facing outwards."""
     made = []
     for axis in range(3):
         for sign in (1.0, -1.0):
@@ -270,16 +273,16 @@ def _sides() -> list[np.ndarray]:
 
 
 def spread_deg(alpha: float) -> float:
-    """Full angle of the cone that facets of an alpha spread rays over."""
+    """Full angle of the cone over which facets of an alpha spread rays, degrees."""
     return min(180.0, math.degrees(4.0 * arctan(alpha)))
 
 
 def drawable(scene: Scene, report: LossReport, integrator: Literal["whitted", "path"] = "whitted") -> Scene:
-    """A scene that this project's renderer draws.
+    """A scene that this project's renderer supports.
 
     Args:
         scene: any canonical scene.
-        report: receives what was replaced.
-        integrator: what will draw it.
+        report: receives the replacements.
+        integrator: integrator that will render it.
     """
     return Approximation(report, integrator == "path").scene(scene)

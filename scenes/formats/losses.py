@@ -1,4 +1,4 @@
-"""Losses of a conversion: what could not be carried over, and what became of it."""
+"""Losses of a conversion: parts that could not be kept, and their replacements."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SAME_PICTURE = frozenset(
     "path volpath volpath_simple bdpt bidirectional mlt pssmlt erpt metropolis photonmapper photonmap ppm sppm "
     "exphotonmap ptracer adaptive irrcache vpl distributedpath igi".split()
 )
-"""Integrators of files that take all light into account: they differ in how soon the picture is good."""
+"""Integrators of files that compute the same picture; they differ only in convergence."""
 
 
 HINTS = frozenset(
@@ -19,19 +19,18 @@ HINTS = frozenset(
     "lightpathstrategy lightstrategy shadowraycount strictNormals samplesPerPass directsamples indirectsamples "
     "usevariance largemutationprob maxconsecrejects scramble diagonal".split()
 )
-"""Parameters that say how a renderer gets to its picture."""
+"""Parameters that affect how a renderer computes its picture, but not the picture."""
 
 
 @dataclass(frozen=True)
 class Loss:
-    """Something that a format has and the target does not have.
+    """A part of a scene that the target format cannot represent.
 
     Attributes:
         where: file and line, or the name of the part of the scene.
-        what: that could not be kept.
-        became: what stands in its place; ``left out`` where nothing does.
-        picture: whether the picture that a renderer converges to changes; otherwise it was a hint to a renderer about
-            how to get there.
+        what: part that could not be kept.
+        became: its replacement; ``left out`` if there is none.
+        picture: whether the converged picture changes; otherwise the part was only a hint to the renderer.
     """
 
     where: str
@@ -54,14 +53,14 @@ class LossReport:
         self._losses.setdefault(Loss(where, what, became, picture))
 
     def hint(self, where: str, what: str, became: str = "left out") -> None:
-        """Adds the loss of a hint to a renderer, without which the picture is the same."""
+        """Adds the loss of a hint to a renderer, which does not change the picture."""
         self.add(where, what, became, picture=False)
 
     def kind(self, table: Mapping[str, str], wanted: str, what: str, where: object, picture: bool = True) -> str:
-        """The canonical kind for the kind of a file; ``picture`` says whether a known one changes the picture.
+        """The canonical kind for a file's kind; ``picture`` is whether the loss of a known one changes the picture.
 
-        Several kinds of files may become one canonical kind; all but the first of them are reported. A kind that the
-        table lacks becomes the first canonical kind and is reported.
+        Several kinds in files may map to one canonical kind; all but the first of them are reported. An unknown kind
+        becomes the first canonical kind and is reported.
         """
         if wanted not in table:
             found = next(iter(table.values()))
@@ -73,7 +72,7 @@ class LossReport:
         return found
 
     def unknown(self, where: object, what: str, wanted: str, became: str = "left out") -> None:
-        """Reports a kind that is not known, and what stands in its place."""
+        """Reports an unknown kind and its replacement."""
         self.add(str(where), f"{what} {wanted!r}, which is not known", became)
 
     @property
@@ -86,7 +85,8 @@ class LossReport:
         return [asdict(loss) for loss in self._losses]
 
     def lines(self) -> list[str]:
-        """What changes the picture, then the hints; equal losses at several places in one line."""
+        """Lines of the losses that change the picture, then of the hints; equal losses at several places share a
+        line."""
         made = []
         for picture, title in ((True, "changes the picture"), (False, "hints to the renderer, which it does not need")):
             places: dict[tuple[str, str], list[str]] = {}
@@ -100,11 +100,11 @@ class LossReport:
         return made
 
     def text(self) -> str:
-        """The losses, one a line."""
+        """The losses, one per line."""
         return "\n".join(map(str, self._losses))
 
     def refuse_any(self) -> None:
-        """Raises SceneError where something was lost that changes the picture."""
+        """Raises SceneError if there is a loss that changes the picture."""
         found = [loss for loss in self._losses if loss.picture]
         if found:
             rest = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
@@ -112,5 +112,5 @@ class LossReport:
 
 
 def first_of(table: Mapping[str, str]) -> dict[str, str]:
-    """For each canonical kind the first kind of files that becomes it."""
+    """For each canonical kind, the first kind of files that maps to it."""
     return {ours: theirs for theirs, ours in reversed(list(table.items()))}

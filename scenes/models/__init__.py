@@ -26,29 +26,28 @@ MODEL_ENDINGS = tuple(_READERS)
 _KEPT_MAX = 32
 _Kept = tuple[dict[Path, FileState | None], tuple[Instance, ...], tuple[Loss, ...]]
 _kept: dict[tuple[Path, bool], _Kept] = {}
-"""Models that were read, with facets or without, and the files that each was made of."""
+"""Cache of models, by path and facets, with the files on which each depends."""
 
 
 def read_model(path: Path, report: LossReport | None = None, facets: bool = False) -> tuple[Instance, ...]:
-    """Parts of a model, each with its own material, in the file's frame.
+    """Parts of a model, each with one material, in the file's coordinate system.
 
-    A part without normals has flat faces, unless its file asks for smoothing (smoothing groups of OBJ);
+    A part without normals has flat faces, unless its file requests smoothing (smoothing groups of OBJ);
     :func:`scenes.models.smoothing.smoothed` smooths it. Materials become Phong, mirrors, panes and lamps:
-    :mod:`scenes.models.mtl_files` says how those of MTL do, :mod:`scenes.models.gltf_materials` those of glTF. Colours
-    of vertices become a picture (:mod:`scenes.models.vertex_colours`). Files without materials are grey (STL, most
-    PLY).
+    :mod:`scenes.models.mtl_files` converts those of MTL, :mod:`scenes.models.gltf_materials` those of glTF. Vertex
+    colours become an image (:mod:`scenes.models.vertex_colours`). Files without materials are grey (STL, most PLY).
 
     Args:
         path: OBJ, PLY, STL, GLB or glTF.
-        report: receives what the file holds and is not kept.
-        facets: materials of glTF are as paths draw them (:mod:`scenes.models.gltf_facets`).
+        report: receives the losses.
+        facets: whether glTF materials are converted for path tracing (:mod:`scenes.models.gltf_facets`).
 
     Returns:
         Instances whose transforms are those of the file's nodes.
 
     Raises:
-        SceneError: the file is missing, of another kind, cannot be read, has no faces, vertices that are not finite, or
-            a texture or material file that is not there.
+        SceneError: the file is missing, has an unsupported format or cannot be read; it has no faces or non-finite
+            vertices; or one of its texture or material files is missing.
     """
     path, report = Path(path), report or LossReport()
     files, kept, losses = _kept.pop((path, facets), ({}, (), ()))
@@ -74,7 +73,7 @@ def _read(path: Path, sources: Sources, report: LossReport, facets: bool) -> tup
         parts = read_gltf(sources, report, facets=True) if facets and read is read_gltf else read(sources, report)
     except SceneError as error:
         raise SceneError(f"model {path}: {str(error).removeprefix(f'{path}: ')}") from None
-    except Exception as error:  # parsers raise what they like on broken files
+    except Exception as error:  # parsers raise arbitrary exceptions on broken files
         raise SceneError(f"model {path}: cannot be read: {one_line(error)}") from error
     if not parts:
         raise SceneError(f"model {path}: expected at least one face, found none")
@@ -89,15 +88,16 @@ def place_model(
     name: str = "",
     smooth_deg: float = 0.0,
 ) -> tuple[Instance, ...]:
-    """A model's parts moved into the world.
+    """The parts of a model, placed in the world.
 
     Args:
         path: see :func:`read_model`.
-        to_world: applied outside the transforms of the file.
+        to_world: transform applied outside those of the file.
         track: rigid motion of all parts.
-        material: of all parts, instead of the file's.
-        name: of the instances, instead of the file's.
-        smooth_deg: edges of parts without normals that turn by at most this are smooth, degrees; 0 keeps faces flat.
+        material: material of all parts, instead of the file's.
+        name: name of the instances, instead of the file's.
+        smooth_deg: greatest angle between faces, degrees, at which edges of parts without normals are smooth; 0 keeps
+            faces flat.
     """
     return tuple(
         dataclasses.replace(

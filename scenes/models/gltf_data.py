@@ -1,7 +1,7 @@
-"""The container of a glTF 2.0 file: its JSON, its buffers, and the numbers of its accessors.
+"""The container of a glTF 2.0 file: its JSON, its buffers, and the values of its accessors.
 
 trimesh, which reads STL here, drops sparse accessors, samplers, texture transforms and all but the first texture
-coordinates; pygltflib reads the JSON alone, and leaves accessors to its callers.
+coordinates; pygltflib reads only the JSON and leaves accessors to its callers.
 
 Source: Khronos Group, "glTF 2.0 specification", sections 3.6 (buffers, views, accessors) and 4 (GLB).
 """
@@ -31,14 +31,14 @@ class GltfData:
     """A glTF or GLB file.
 
     Attributes:
-        json: its objects.
+        json: parsed JSON object.
     """
 
     def __init__(self, sources: Sources) -> None:
         """Reads the file.
 
         Raises:
-            SceneError: it is no glTF 2.
+            SceneError: it is not a glTF 2 file.
         """
         self.sources = sources
         content = sources.path.read_bytes()
@@ -55,7 +55,7 @@ class GltfData:
         self._buffers: dict[int, bytes] = {}
 
     def _chunks(self, content: bytes) -> bytes:
-        """The JSON of a GLB file; remembers its buffer."""
+        """The JSON of a GLB file; its buffer is kept."""
         if len(content) < 20 or struct.unpack_from("<I", content, 4)[0] != 2:
             raise SceneError("cannot be read: expected GLB of version 2")
         at, text = 12, b""
@@ -72,14 +72,14 @@ class GltfData:
         return text
 
     def items(self, name: str) -> list[dict[str, Any]]:
-        """The objects of a list at the top, such as ``nodes``."""
+        """The objects of a top-level list, such as ``nodes``."""
         return self.json.get(name, [])
 
     def at(self, name: str, index: Any) -> dict[str, Any]:
         """An object of such a list.
 
         Raises:
-            SceneError: there is none.
+            SceneError: there is no such object.
         """
         items = self.items(name)
         if not isinstance(index, int) or not 0 <= index < len(items):
@@ -87,7 +87,7 @@ class GltfData:
         return items[index]
 
     def resource(self, uri: str, what: str) -> bytes:
-        """The bytes that a URI names: data in the file, or a file beside it."""
+        """The bytes of a URI: embedded data, or a file beside it."""
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2])
@@ -110,7 +110,7 @@ class GltfData:
         return found
 
     def numbers(self, index: Any) -> NDArray[np.float64]:
-        """The elements ``(count, width)`` of an accessor, integers that stand for fractions as these."""
+        """The elements ``(count, width)`` of an accessor; normalised integers are converted to fractions."""
         accessor = self.at("accessors", index)
         width, kind = _WIDTHS[accessor["type"]], np.dtype(_TYPES[accessor["componentType"]])
         count = accessor["count"]
@@ -132,7 +132,7 @@ class GltfData:
         return np.maximum(found.astype(np.float64) / most, -1.0)
 
     def _replaced(self, dense: NDArray[Any], sparse: dict[str, Any], kind: np.dtype) -> NDArray[Any]:
-        """Elements of which some are given by index."""
+        """Elements with those of a sparse accessor replaced."""
         count, indices, values = sparse["count"], sparse["indices"], sparse["values"]
         index_kind = np.dtype(_TYPES[indices["componentType"]])
         places = _strided(self.view(indices["bufferView"]), indices.get("byteOffset", 0), count, 1, index_kind, 0)
@@ -144,7 +144,7 @@ class GltfData:
         return made
 
     def image_bytes(self, index: Any) -> tuple[str, io.BytesIO | None]:
-        """The name of an image's file, or a name for messages and its content."""
+        """The file name of an image and None, or a name for messages and the embedded content."""
         image = self.at("images", index)
         uri = image.get("uri", "")
         if uri and not uri.startswith("data:"):
@@ -154,7 +154,7 @@ class GltfData:
 
 
 def _strided(content: bytes, start: int, count: int, width: int, kind: np.dtype, stride: int) -> NDArray[Any]:
-    """Rows of numbers; Deviation: columns of matrices of one and two bytes are taken to be packed."""
+    """Rows of numbers. Deviation: columns of matrices of one-byte and two-byte elements are assumed to be packed."""
     size = kind.itemsize * width
     stride = stride or size
     if start < 0 or stride < size or (count and start + stride * (count - 1) + size > len(content)):

@@ -1,7 +1,7 @@
-"""Materials of a glTF file as paths draw them: metallic and rough texel by texel, with normals, holes and glow.
+"""Materials of a glTF file for path tracing: textured metallic-roughness surfaces with normal maps, holes and emission.
 
-All pictures of a material are looked up alike, as the first that it has; one that is not is left out, with a line.
-Occlusion is not needed where light between surfaces is followed.
+All textures of a material must have the coordinates of its first one; others are left out, which is reported. Occlusion
+maps are not needed, because path tracing computes the light between surfaces.
 
 Source: Khronos Group, "glTF 2.0 specification", section 3.9 and appendix B; extensions KHR_materials_clearcoat,
 KHR_materials_emissive_strength, KHR_materials_ior, KHR_materials_unlit.
@@ -20,13 +20,13 @@ from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import GltfTextures, Lookup, lookup_of
 
 ALONG_PATHS = {"KHR_materials_clearcoat"}
-"""Extensions that are read here alone."""
+"""Extensions that only this module reads."""
 
 _BLACK = ConstantTexture((0.0, 0.0, 0.0))
 
 
 def lookups_beside(given: dict[str, Any]) -> Iterator[tuple[str, Lookup]]:
-    """The pictures of a material but that of its colour, by their names."""
+    """The textures of a material except that of its colour, by name."""
     parts = given.get("pbrMetallicRoughness", {})
     for name, info in (
         ("metallicRoughnessTexture", parts.get("metallicRoughnessTexture")),
@@ -39,19 +39,19 @@ def lookups_beside(given: dict[str, Any]) -> Iterator[tuple[str, Lookup]]:
 
 
 class FacetMaterials:
-    """Makes materials of the pictures of one file."""
+    """Creates materials from the textures of one file."""
 
     def __init__(self, textures: GltfTextures, report: LossReport) -> None:
         self.textures, self.report = textures, report
 
     def material(self, given: dict[str, Any], base: Texture, shared: Lookup | None, where: str) -> Material:
-        """The material of these properties.
+        """The material with the given properties.
 
         Args:
-            given: of the file.
-            base: its colour.
-            shared: how its pictures are looked up; None where there are no coordinates for any.
-            where: for messages.
+            given: properties from the file.
+            base: base colour.
+            shared: lookup of its textures; None if there are no coordinates.
+            where: place for messages.
         """
         extensions, parts = given.get("extensions", {}), given.get("pbrMetallicRoughness", {})
         pictures = {name: self._alike(name, lookup, shared, where) for name, lookup in lookups_beside(given)}

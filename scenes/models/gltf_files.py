@@ -1,4 +1,4 @@
-"""glTF 2.0 and GLB: a part for each primitive of each node.
+"""Reader of glTF 2.0 and GLB: one part for each primitive of each node.
 
 Source: Khronos Group, "glTF 2.0 specification", sections 3.5 (scenes, nodes) and 3.7 (meshes).
 """
@@ -26,14 +26,14 @@ _DEPTH_MAX = 256
 
 
 def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
-    """Parts of the file's scene, or of all of its nodes where it names none; animations and skins stand still.
+    """Parts of the file's scene, or of all nodes if it names no scene; animations and skins are ignored.
 
-    With ``facets`` materials are as paths draw them, else Phong.
+    With ``facets`` materials are converted for path tracing, otherwise to Phong.
 
-    Parts without normals have flat faces, as the format says.
+    Parts without normals have flat faces, as the format specifies.
 
     Raises:
-        SceneError: it cannot be read, or requires an extension that is not known here.
+        SceneError: the file cannot be read, or requires an unsupported extension.
     """
     data = GltfData(sources)
     _check_extensions(data, report)
@@ -139,7 +139,7 @@ class _Reader:
 
 
 def _unit(normals: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Unit normals; those of the faces where the file has none that can be used."""
+    """Unit normals; face normals where the file has no usable ones."""
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     usable = np.isfinite(length) & (length > 0.0)
     if usable.all():
@@ -163,7 +163,7 @@ def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
 
 
 def _placed(node: dict[str, Any]) -> Matrix:
-    """Parent from node."""
+    """The transform from a node to its parent."""
     if "matrix" in node:
         return np.asarray(node["matrix"], np.float64).reshape(4, 4).T
     matrix = np.eye(4)

@@ -1,7 +1,7 @@
-"""Materials of a glTF file: factors times textures, as metallic and rough as they say.
+"""Materials of a glTF file as Phong materials, from factors and textures.
 
-The base colour is the factor times the texture times the colours of the vertices, all linear. The diffuse colour is the
-base colour where it is not metal, texel by texel. The highlight is that of the means of base colour, metal and
+The base colour is the product of factor, texture and vertex colours, all linear. The diffuse colour is the non-metallic
+share of the base colour, texel by texel. The highlight comes from the means of base colour, metallic share and
 roughness (:func:`scenes.models.phong_of_parts.metallic_rough`).
 
 Source: Khronos Group, "glTF 2.0 specification", section 3.9; extensions KHR_materials_emissive_strength,
@@ -34,12 +34,12 @@ _EVERYWHERE = Lookup(-1)
 
 @dataclass(frozen=True)
 class Painted:
-    """A material for triangles.
+    """A material of triangles.
 
     Attributes:
-        material: of all of them.
-        uvs: texture coordinates of their corners; None for no picture.
-        baked: whether these are of a picture of the colours of the corners, so that each triangle has its own.
+        material: material of all triangles.
+        uvs: texture coordinates of their corners; None without texture.
+        baked: whether the texture holds the colours of the corners, so that each triangle has its own coordinates.
     """
 
     material: Material
@@ -48,10 +48,11 @@ class Painted:
 
 
 class GltfMaterials:
-    """Materials of a file, each made once for meshes without colours of vertices."""
+    """Materials of a file; for meshes without vertex colours each is created once."""
 
     def __init__(self, data: GltfData, report: LossReport, facets: bool = False) -> None:
-        """Reads on demand; with ``facets`` as paths draw them (:mod:`scenes.models.gltf_facets`)."""
+        """Materials are read on demand; with ``facets`` they are converted for path tracing
+        (:mod:`scenes.models.gltf_facets`)."""
         self.data, self.report = data, report
         self.textures = GltfTextures(data, report)
         self._facets = FacetMaterials(self.textures, report) if facets else None
@@ -63,8 +64,8 @@ class GltfMaterials:
         """The material of a primitive.
 
         Args:
-            number: of the material; None for the default one.
-            sets: texture coordinates ``(f, 3, 2)`` of the corners, by their number.
+            number: index of the material; None for the default one.
+            sets: texture coordinates ``(f, 3, 2)`` of the corners, by the index of their set.
             colors: linear colours of the corners.
         """
         given = {} if number is None else self.data.at("materials", number)
@@ -134,7 +135,8 @@ class GltfMaterials:
         return self.textures.texture(lookup, image, where)
 
     def _rough(self, given: dict[str, Any], base: Texture, where: str, lookup: Lookup | None) -> Phong:
-        """Metal and roughness by their factors times the blue and green channels of their texture."""
+        """A Phong material; the metallic share and the roughness are the factors times the blue and green channels of
+        their texture."""
         parts = _rough(given)
         metallic, roughness = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in PARTS)
         beside = lookup_of(parts.get("metallicRoughnessTexture"))
@@ -158,7 +160,7 @@ class GltfMaterials:
         return metallic_rough(base, diffuse, metallic, roughness)
 
     def _glass(self, given: dict[str, Any], base: Texture, extensions: dict[str, Any], where: str) -> Material:
-        """Glass of the mean base colour, thin unless it has a volume; along paths as rough as it says."""
+        """Glass of the mean base colour, thin unless it has a volume; for path tracing with its roughness."""
         thickness = extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0)
         if "KHR_materials_volume" in extensions:
             self.report.add(where, "colour by the length of the way in glass")

@@ -26,12 +26,12 @@ _NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
 
 @dataclass(frozen=True)
 class Lookup:
-    """How a texture is looked up.
+    """Lookup of a texture.
 
     Attributes:
-        texture: its number.
-        coordinates: which of the texture coordinates of a mesh.
-        offset, rotation_rad, scale: of the coordinates.
+        texture: index of the texture.
+        coordinates: index of the set of texture coordinates.
+        offset, rotation_rad, scale: transform of the coordinates.
     """
 
     texture: int
@@ -42,13 +42,13 @@ class Lookup:
 
     @property
     def place(self) -> tuple[Any, ...]:
-        """What two textures share that are looked up alike."""
+        """A key that is equal for textures with the same lookup of coordinates."""
         return self.coordinates, self.offset, self.rotation_rad, self.scale
 
     def moved(self, uvs: Uvs) -> Uvs:
-        """Coordinates in the file, ``v`` downwards, as canonical ones, ``v`` upwards.
+        """Converts coordinates of the file, with ``v`` downwards, to canonical ones, with ``v`` upwards.
 
-        They are scaled, turned counter-clockwise as seen on the picture, and moved.
+        They are scaled, rotated counter-clockwise as seen on the image, and translated.
         """
         u, v = uvs[..., 0] * self.scale[0], uvs[..., 1] * self.scale[1]
         along, across = cos(self.rotation_rad), sin(self.rotation_rad)
@@ -57,7 +57,7 @@ class Lookup:
 
 
 def lookup_of(info: dict[str, Any] | None) -> Lookup | None:
-    """The lookup that a material describes; None where it has none."""
+    """The lookup of a texture reference in a material; None if there is none."""
     if info is None or "index" not in info:
         return None
     change = info.get("extensions", {}).get("KHR_texture_transform", {})
@@ -72,7 +72,7 @@ def lookup_of(info: dict[str, Any] | None) -> Lookup | None:
 
 
 class GltfTextures:
-    """Pictures and samplers of a file, each picture read once."""
+    """Images and samplers of a file; each image is read once."""
 
     def __init__(self, data: GltfData, report: LossReport) -> None:
         self.data, self.report = data, report
@@ -80,7 +80,7 @@ class GltfTextures:
         self._opacities: dict[int, Picture] = {}
 
     def picture(self, lookup: Lookup, numbers: bool = False) -> Picture:
-        """Texels ``(h, w, 3)`` of a texture: linear colours, or numbers that are not encoded."""
+        """Texels ``(h, w, 3)`` of a texture: linear colours, or raw values with ``numbers``."""
         source = self._source(lookup)
         key = (source, numbers)
         if key not in self._pictures:
@@ -96,7 +96,7 @@ class GltfTextures:
         return self._pictures[key]
 
     def opacity(self, lookup: Lookup) -> Picture:
-        """Texels ``(h, w, 3)`` of the alpha of a texture, 1 where its picture has none."""
+        """Texels ``(h, w, 3)`` of the alpha channel of a texture; 1 if its image has none."""
         source = self._source(lookup)
         if source not in self._opacities:
             name, content = self.data.image_bytes(source)
@@ -114,7 +114,7 @@ class GltfTextures:
         wraps = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
         scale, offset = [1.0, 1.0], [0.0, 0.0]
         for axis, wrap in enumerate(wraps):
-            if wrap == _MIRRORED:  # twice as large, the second half turned round
+            if wrap == _MIRRORED:  # twice as large, with the second half mirrored
                 along = 1 - axis
                 image = np.concatenate([image, np.flip(image, along)], axis=along)
                 scale[axis] = 0.5
@@ -133,13 +133,13 @@ class GltfTextures:
 
 
 def resized(image: Picture, height: int, width: int) -> Picture:
-    """A picture with more texels, each the nearest one of before."""
+    """An image enlarged by nearest-neighbour sampling."""
     rows = np.arange(height) * image.shape[0] // height
     columns = np.arange(width) * image.shape[1] // width
     return image[rows[:, None], columns[None]]
 
 
 def multiplied(first: Picture, second: Picture) -> Picture:
-    """The product of two pictures, with as many texels as the larger along each axis."""
+    """The product of two images, with the larger number of texels along each axis."""
     height, width = (max(first.shape[axis], second.shape[axis]) for axis in (0, 1))
     return resized(first, height, width) * resized(second, height, width)

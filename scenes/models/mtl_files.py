@@ -1,11 +1,12 @@
 """Material libraries of OBJ (MTL).
 
-``Kd`` or the picture of ``map_Kd`` is the diffuse colour, ``Ks`` and ``Ns`` the highlight, dimmed so that no more is
-reflected than arrives. By ``illum``, 0 is a colour that no light changes, 1 has no highlight, 3 and 8 mirror by ``Ks``,
-5 mirrors more at grazing angles, 4 and 9 are thin panes, 6 and 7 glass of the index ``Ni``. ``d`` (or ``1 - Tr``) is
-the opacity, ``Ke`` emission. ``Pm`` and ``Pr``, where given, make it as metallic and rough as of glTF.
+``Kd`` or the image of ``map_Kd`` is the diffuse colour; ``Ks`` and ``Ns`` are the highlight, dimmed so that no more
+light is reflected than arrives. By ``illum``, 0 is a constant colour without lighting, 1 has no highlight, 3 and 8 are
+mirrors by ``Ks``, 5 is a mirror that grows at grazing angles, 4 and 9 are thin panes, 6 and 7 are glass of the index
+``Ni``. ``d`` (or ``1 - Tr``) is the opacity, ``Ke`` the emission. ``Pm`` and ``Pr``, if given, are the metallic share
+and the roughness as in glTF.
 
-Deviation: a picture replaces ``Kd`` (the format multiplies them), for exporters leave it at whatever grey it was.
+Deviation: an image replaces ``Kd`` (the format multiplies them), because exporters leave ``Kd`` at an arbitrary grey.
 
 Source: Wavefront, "MTL material format" (Advanced Visualizer appendix); D. Dodson, "PBR extension of MTL".
 """
@@ -33,7 +34,7 @@ _UNUSED = ("map_ka", "map_aat")  # ambient light, and anti-aliasing of pictures
 
 @dataclass
 class _Entry:
-    """What a library says of one material: rest of the line by keyword in lower case."""
+    """The entry of a material in a library: rests of lines by keyword in lower case."""
 
     lines: dict[str, str] = field(default_factory=dict)
 
@@ -42,7 +43,7 @@ class _Entry:
         return _number(words[-1]) if words else default
 
     def color(self, name: str, default: Rgb) -> Rgb | None:
-        """A colour; None where it is no RGB triple."""
+        """A colour; None if it is not an RGB triple."""
         words = self.lines.get(name, "").split()
         if not words:
             return default
@@ -63,7 +64,7 @@ def _number(word: str) -> float:
 
 
 def entries(text: str) -> dict[str, _Entry]:
-    """Materials of a library by name; of several with one name the first counts."""
+    """Materials of a library by name; of several with one name the first is used."""
     found: dict[str, _Entry] = {}
     entry = None
     for line in text.replace("\\\n", " ").splitlines():
@@ -78,7 +79,7 @@ def entries(text: str) -> dict[str, _Entry]:
 
 @dataclass(frozen=True)
 class Map:
-    """A picture's name and the options before it."""
+    """The name of an image and the options before it."""
 
     name: str
     options: dict[str, tuple[str, ...]]
@@ -92,7 +93,7 @@ class Map:
 def map_of(rest: str) -> Map:
     """The options and the name of a line such as ``-s 2 2 1 -clamp on bricks old.png``.
 
-    Vectors have one to three numbers, fewer where the name itself is a number; the name may hold blanks.
+    Vectors have one to three numbers, fewer if the name itself is a number; the name may contain spaces.
     """
     words = rest.split()
     options: dict[str, tuple[str, ...]] = {}
@@ -105,7 +106,7 @@ def map_of(rest: str) -> Map:
                 count += 1
         options[name] = tuple(words[at + 1 : at + 1 + count])
         at += 1 + count
-    # blanks of the name as they are in the line
+    # spaces of the name as in the line
     name = rest.split(maxsplit=at)[at] if at < len(words) else ""
     return Map(name.strip().strip('"'), options)
 
@@ -119,11 +120,11 @@ def _is_number(word: str) -> bool:
 
 
 def picture_of(line: str, sources: Sources, where: str, report: LossReport) -> ImageTexture:
-    """The texture of a map: ``-s`` scales and ``-o`` moves the coordinates, ``-clamp`` ends them, ``-mm`` changes the
-    values; other options are reported.
+    """The texture of a map: ``-s`` scales and ``-o`` offsets the coordinates, ``-clamp`` clamps them, ``-mm`` changes
+    the values; other options are reported.
 
     Raises:
-        SceneError: the picture is not there, or cannot be read.
+        SceneError: the image is missing, or cannot be read.
     """
     found = map_of(line)
     path, image = sources.picture(found.name)
@@ -140,7 +141,7 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport) 
     """A material of a library.
 
     Raises:
-        SceneError: a number is none, or a diffuse picture is not there.
+        SceneError: a number is invalid, or a diffuse image is missing.
     """
     where = f"material {name}"
     for keyword in entry.lines:
@@ -162,7 +163,7 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport) 
 
 
 def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport) -> Material:
-    """What ``illum`` makes of the colours."""
+    """The material for the colours by ``illum``."""
     kind = int(entry.number("illum", -1))
     if "pm" in entry.lines or "pr" in entry.lines:
         metallic, roughness = (float(np.clip(entry.number(*part), 0.0, 1.0)) for part in (("pm", 0.0), ("pr", 0.5)))
@@ -185,6 +186,6 @@ def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport)
         return Phong(
             texture, (0.0, 0.0, 0.0), 1.0, fresnel_min=share, fresnel_max=grazing, mirror_tint=rgb(specular / share)
         )
-    if exponent < 1.0 or kind == 1:  # a highlight wider than that is not visible as one
+    if exponent < 1.0 or kind == 1:  # a wider highlight is not visible as such
         return Phong(texture)
     return Phong(texture, rgb(specular), min(exponent, EXPONENT_MAX))

@@ -1,7 +1,7 @@
-"""OBJ files: a part for each material.
+"""Reader of OBJ files: one part for each material.
 
-trimesh, which reads STL here, drops smoothing groups, pictures with options, and the texture coordinates of a material
-of which one face has none, and says nothing of it.
+trimesh, which reads STL here, silently drops smoothing groups, images with options, and the texture coordinates of a
+material if one of its faces has none.
 
 Source: Wavefront, "OBJ file format" (Advanced Visualizer manual, appendix B1).
 """
@@ -29,7 +29,7 @@ _UNREAD = ("curv", "curv2", "surf", "vp", "p", "l", "lod", "shadow_obj", "trace_
 
 @dataclass
 class _Group:
-    """Polygons of one material: their corners, one behind the other, how many each has, and smoothing groups."""
+    """Polygons of one material: their corners in sequence, the number of corners of each, and smoothing groups."""
 
     corners: list[str] = field(default_factory=list)
     counts: list[int] = field(default_factory=list)
@@ -38,7 +38,7 @@ class _Group:
 
 @dataclass
 class _File:
-    """What the lines of a file hold."""
+    """The parsed lines of a file."""
 
     points: list[str] = field(default_factory=list)
     uvs: list[str] = field(default_factory=list)
@@ -49,13 +49,13 @@ class _File:
 
 
 def read_obj(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
-    """A part for each material of an OBJ file, in the order of their first faces.
+    """One part for each material of an OBJ file, in the order of their first faces.
 
-    Parts without normals have flat faces but for those in a smoothing group (``s``), over which normals are smooth.
-    Colours behind the coordinates of vertices are taken for sRGB.
+    Parts without normals have flat faces, except for faces in a smoothing group (``s``), which have smooth normals.
+    Colours after the coordinates of vertices are assumed to be sRGB.
 
     Raises:
-        SceneError: something cannot be read, or a material library or a diffuse picture is not there.
+        SceneError: the file cannot be read, or a material library or a diffuse image is missing.
     """
     stem = sources.path.stem
     file = _parsed(text_of(sources.path))
@@ -112,7 +112,7 @@ def _parsed(text: str) -> _File:
 
 
 def _absolute(corner: str, counts: Sequence[int], number: int) -> str:
-    """A corner whose indices count from the first; negative ones count from the last line before."""
+    """A corner with absolute indices; negative ones are relative to the last line before."""
     parts = corner.split("/")
     try:
         made = [str(int(part) + count + 1) if part[:1] == "-" else part for part, count in zip(parts, counts)]  # noqa: B905
@@ -122,7 +122,7 @@ def _absolute(corner: str, counts: Sequence[int], number: int) -> str:
 
 
 def _table(rows: list[str], widths: Sequence[int], keyword: str) -> NDArray[np.float64]:
-    """Numbers of lines; those that a line lacks are 0."""
+    """Numbers of lines; missing ones are 0."""
     if not rows:
         return np.zeros((0, widths[-1]))
     counts = [len(row.split()) for row in rows]
@@ -140,10 +140,10 @@ def _table(rows: list[str], widths: Sequence[int], keyword: str) -> NDArray[np.f
 
 
 def _materials(libraries: list[str], sources: Sources, report: LossReport) -> dict[str, Material]:
-    """Materials of all libraries; of several with one name the first counts."""
+    """Materials of all libraries; of several with one name the first is used."""
     found: dict[str, Material] = {}
     for line in libraries:
-        # a name may hold blanks, and a line several names
+        # a name may contain spaces, and a line several names
         names = [line] if sources.find(line) is not None else line.split() or [line]
         for name in names:
             path = sources.require(name, "its materials in")
@@ -161,14 +161,14 @@ def _part(
     material: Material,
     source: str,
 ) -> tuple[Mesh | None, Material]:
-    """The triangles of a group: polygons are fans about their first corner."""
+    """The triangles of a group; polygons are split into fans about their first corner."""
     index = _indices(group, (len(points), len(uvs), len(normals)))
     starts = np.concatenate([[0], np.cumsum(group.counts)])
     triangles = np.repeat(np.arange(len(group.counts)), np.asarray(group.counts) - 2)
     within = np.arange(len(triangles)) - np.repeat(
         np.cumsum(np.asarray(group.counts) - 2), np.asarray(group.counts) - 2
     )
-    within += np.asarray(group.counts)[triangles] - 2  # from 0 on in each polygon
+    within += np.asarray(group.counts)[triangles] - 2  # index within each polygon, from 0
     first = starts[triangles]
     faces = np.stack([first, first + within + 1, first + within + 2], axis=1)
     if not len(faces):
@@ -200,10 +200,10 @@ def _eight_bits(colors: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def _indices(group: _Group, counts: Sequence[int]) -> NDArray[np.int64]:
-    """Indices of point, texture coordinates and normal of each corner, from 0; -1 where it has none.
+    """Indices of point, texture coordinates and normal of each corner, from 0; -1 for none.
 
     Raises:
-        SceneError: one is no number, or beyond what there is.
+        SceneError: an index is not a number or out of range.
     """
     place = {corner: number for number, corner in enumerate(dict.fromkeys(group.corners))}
     fields = ((*corner.split("/"), "", "")[:3] for corner in place)
@@ -223,7 +223,7 @@ def _indices(group: _Group, counts: Sequence[int]) -> NDArray[np.int64]:
 def _shading(
     corners: NDArray[np.float64], normal: NDArray[np.int64], normals: NDArray[np.float64], smoothing: NDArray[np.int64]
 ) -> NDArray[np.float32] | None:
-    """Normals ``(f, 3, 3)`` at the corners; None where all faces are flat."""
+    """Normals ``(f, 3, 3)`` at the corners; None if all faces are flat."""
     given = normal >= 0
     if not given.any() and not smoothing.any():
         return None

@@ -1,4 +1,4 @@
-"""Materials of models in those that the renderer has."""
+"""Conversion of the materials of models to those of the renderer."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 
 EXPONENT_MAX = 1.0e4
-_SMOOTH = 0.2  # roughness below which metal mirrors
+_SMOOTH = 0.2  # roughness below which metal is a mirror
 _CLEAR = 0.5  # opacity below which a surface is a pane
 
 
 def scaled(texture: Texture, factor: float) -> Texture:
-    """A constant or a picture times a number."""
+    """A constant or an image times a number."""
     if isinstance(texture, ImageTexture):
         return texture if factor == 1.0 else dataclasses.replace(texture, image=texture.image * np.float32(factor))
     assert isinstance(texture, ConstantTexture)
@@ -26,27 +26,27 @@ def scaled(texture: Texture, factor: float) -> Texture:
 
 
 def _scattered(roughness: float) -> float:
-    """How much of what rough metal reflects counts as diffuse: its alpha, but none where it mirrors."""
+    """The diffuse share of the reflection of rough metal: its alpha, or 0 if it is a mirror."""
     return roughness * roughness if roughness >= _SMOOTH else 0.0
 
 
 def diffuse_share(metallic: float, roughness: float) -> float:
-    """How much of the base colour of a surface is diffuse."""
+    """The diffuse share of a surface's base colour."""
     return 1.0 - metallic * (1.0 - _scattered(roughness))
 
 
 def metallic_rough(base: Texture, diffuse: Texture, metallic: float, roughness: float) -> Phong:
-    """Phong of a metallic and rough surface.
+    """The Phong material of a metallic-roughness surface.
 
     The highlight is 4 % of white, or the base colour for metal, with the exponent ``2 / roughness⁴ - 2``; below a
-    roughness of 0.2 metal mirrors.
+    roughness of 0.2 metal is a mirror.
 
-    Deviation: what rough metal reflects is divided into a diffuse part, by its alpha (``roughness²``), and the
-    highlight, for the highlight has one colour, and the metal may have a picture.
+    Deviation: the reflection of rough metal is divided into a diffuse part, with the share of its alpha
+    (``roughness²``), and the highlight, because the highlight has one colour and the metal may have a texture.
 
     Args:
-        base: colour of the surface, of which the mean counts.
-        diffuse: what of it is diffuse, see :func:`diffuse_share`.
+        base: colour of the surface, of which the mean is used.
+        diffuse: diffuse part of the colour, see :func:`diffuse_share`.
         metallic, roughness: means of both, 0 to 1.
     """
     color = np.clip(mean_of(base), 0.0, 1.0)
@@ -62,7 +62,7 @@ def metallic_rough(base: Texture, diffuse: Texture, metallic: float, roughness: 
 
 
 def seen_through(material: Phong, opacity: float, where: str, report: LossReport) -> Material:
-    """A surface of constant opacity: a clear pane of its colour below a half, else opaque."""
+    """A surface of constant opacity: a clear pane of its colour below 1/2, else opaque."""
     if opacity >= 1.0:
         return material
     if opacity < _CLEAR:
@@ -74,7 +74,7 @@ def seen_through(material: Phong, opacity: float, where: str, report: LossReport
 
 
 def glowing(material: Material, radiance: Rgb, where: str, report: LossReport) -> Material:
-    """A surface that emits evenly: one that only emits."""
+    """A surface with uniform emission, which replaces its other properties."""
     if max(radiance) <= 0.0:
         return material
     became = "a surface that is seen and gives no light"

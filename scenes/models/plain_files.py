@@ -1,4 +1,4 @@
-"""Models without materials: PLY and STL."""
+"""Reader of models without materials: PLY and STL."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GREY = Phong(ConstantTexture((0.5, 0.5, 0.5)))
 
 
 def read_plain(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
-    """The one part of a file, grey unless its vertices have colours (of sRGB, as programs write them)."""
+    """The single part of a file, grey unless its vertices have colours, which are assumed to be sRGB."""
     path = sources.path
     name = f"{path.stem}/{path.stem}"
     if path.suffix.lower() == ".stl":
@@ -38,8 +38,8 @@ def read_plain(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
 
 
 def _stl(content: bytes, name: str) -> Mesh | None:
-    """Triangles of an STL file; its normals are those of the triangles, and not read."""
-    import trimesh  # slow, and most scenes read no model
+    """Triangles of an STL file; its normals are those of the triangles and are not read."""
+    import trimesh  # a slow import, and most scenes read no model
 
     loaded = trimesh.load_mesh(io.BytesIO(content), file_type="stl", process=False)
     vertices, faces = np.array(loaded.vertices, np.float64), np.array(loaded.faces, np.int64)

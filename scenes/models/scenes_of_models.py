@@ -1,4 +1,4 @@
-"""Models as scenes of their own, so that a file of a model can stand wherever one of a scene can."""
+"""Models as scenes, so that a model file can be used in place of a scene file."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from scenes.models.smoothing import smoothed
 from scenes.viewing import Up, framed
 
 _Y_UP = (".obj", ".gltf", ".glb")
-"""Endings of formats whose files have y upwards: glTF by its specification, OBJ by custom."""
+"""Endings of formats whose files have y upwards: glTF by its specification, OBJ by convention."""
 
 
 def model_up(path: Path) -> Up:
-    """The upward axis of a model, by its ending."""
+    """The upward axis of a model, by the ending of its file name."""
     return "y" if path.suffix.lower() in _Y_UP else "z"
 
 
 def model_scene(
     path: Path, report: LossReport, up: Up | None = None, smooth_deg: float = 0.0, facets: bool = False
 ) -> Scene:
-    """A model with a camera that sees all of it, and light (:func:`scenes.viewing.framed`).
+    """A model with lights and a camera that shows all of it (:func:`scenes.viewing.framed`).
 
     Args:
         path: see :func:`scenes.models.read_model`.
-        report: receives what the file holds and is not kept.
-        up: the upward axis; by default :func:`model_up`.
+        report: receives the losses.
+        up: upward axis; by default :func:`model_up`.
         smooth_deg: see :func:`scenes.models.place_model`.
         facets: see :func:`scenes.models.read_model`.
 
     Raises:
-        SceneError: it cannot be read.
+        SceneError: the model cannot be read.
     """
     return framed(smoothed(read_model(path, report, facets), smooth_deg), up or model_up(path), path.stem)
 

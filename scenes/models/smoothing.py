@@ -1,4 +1,4 @@
-"""Shading normals for meshes that have none."""
+"""Shading normals for meshes without normals."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ def corner_normals(
     smooth_deg: float = 0.0,
     groups: Int[NDArray[np.int64], " f"] | None = None,
 ) -> Float[NDArray[np.float32], "f 3 3"]:
-    """Normals at the corners of triangles: of each triangle at a point, those of its neighbours there are added.
+    """Normals at the corners of triangles: the sum over the triangle and its neighbours at that point.
 
-    Normals weigh by the angle at the corner, so that it does not matter how polygons were cut into triangles.
-    Neighbours are the triangles with a corner at the same point whose normals are at most ``smooth_deg`` apart, and
-    those of the same group.
+    Normals are weighted by the angle at the corner, so that the triangulation of polygons has no effect. Neighbours are
+    the triangles with a corner at the same point whose normals differ by at most ``smooth_deg``, and those of the same
+    group.
 
     Args:
         corners: points of the triangles.
-        smooth_deg: degrees, 0 to 180.
+        smooth_deg: greatest angle between normals, degrees, 0 to 180.
         groups: smoothing group of each triangle; 0 is none.
 
     Returns:
-        Unit normals; of triangles without area ``(0, 0, 1)`` where they have no neighbours.
+        Unit normals; ``(0, 0, 1)`` for degenerate triangles without neighbours.
 
     Source: Thürmer and Wüthrich 1998, "Computing vertex normals from polygonal facets".
     """
@@ -51,7 +51,7 @@ def corner_normals(
     found = np.empty((len(order), 3))
     low = 0
     while low < len(sizes):
-        # as many points as have a bounded number of pairs of corners
+        # as many points as keep the number of pairs of corners bounded
         pairs = np.cumsum(sizes[low:] ** 2)
         high = low + max(1, int(np.searchsorted(pairs, _PAIRS_AT_ONCE, side="right")))
         here = slice(first[low], first[high])
@@ -76,7 +76,7 @@ def corner_normals(
 
 
 def _angles(corners: Float[NDArray[np.float64], "f 3 3"]) -> Float[NDArray[np.float64], "f 3"]:
-    """Angles of triangles at their corners, radians; 0 where two corners are one point."""
+    """Angles of triangles at their corners, radians; 0 if two corners coincide."""
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     lengths = np.linalg.norm(ahead, axis=2) * np.linalg.norm(behind, axis=2)
     cosines = (ahead * behind).sum(axis=2) / np.where(lengths > 0.0, lengths, 1.0)
@@ -90,14 +90,14 @@ def with_corners(
     source: str,
     keys: Int[NDArray[np.int64], "f 3"] | None = None,
 ) -> Mesh:
-    """A mesh of triangles by their corners; corners that are alike become one vertex.
+    """A mesh of triangles given by their corners; equal corners become one vertex.
 
     Args:
         corners: points.
         normals: unit normals, or None for flat faces.
         uvs: texture coordinates, or None.
-        source: file, for messages.
-        keys: numbers that corners share if they are alike, where these are known.
+        source: file name, for messages.
+        keys: numbers that are equal for equal corners, if these are known.
     """
     if keys is not None:
         _, first, index = np.unique(keys.reshape(-1), return_index=True, return_inverse=True)
@@ -119,7 +119,7 @@ def with_corners(
 
 
 def smoothed(parts: Iterable[Instance], smooth_deg: float) -> tuple[Instance, ...]:
-    """Instances whose meshes without normals have smooth edges where these turn by at most so many degrees."""
+    """Instances whose meshes without normals get smooth edges between faces that differ by at most ``smooth_deg``."""
     made: dict[int, Mesh] = {}
 
     def mesh_of(mesh: Mesh) -> Mesh:

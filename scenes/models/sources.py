@@ -1,4 +1,4 @@
-"""The files that a model is made of."""
+"""The files of a model."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (code
 
 
 class Sources:
-    """Reads the files that a model names, and remembers their states, also of those that are not there.
+    """Reads the files to which a model refers, and records their states, including those of missing files.
 
     Attributes:
-        path: of the model.
-        files: states of all files that were asked for.
+        path: path of the model.
+        files: states of all requested files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -25,8 +25,8 @@ class Sources:
         self.files: dict[Path, FileState | None] = {path: state_of(path)}
 
     def find(self, name: str) -> Path | None:
-        """The file of a name: in the model's folder as the name says, or, where the name is a path of another machine,
-        by its last part. None where there is none."""
+        """The path of a file name, relative to the model's folder; if the name is a path of another machine, its last
+        part is used. None if there is no such file."""
         text = name.replace("\\", "/")
         for candidate in dict.fromkeys((text, unquote(text), text.rpartition("/")[2])):
             path = self.path.parent / candidate
@@ -36,25 +36,25 @@ class Sources:
         return None
 
     def require(self, name: str, what: str) -> Path:
-        """As :func:`find`; raises SceneError where there is none."""
+        """Like :meth:`find`, but raises SceneError if there is no such file."""
         path = self.find(name)
         if path is None:
             raise SceneError(f"expected {what} {self.path.parent / name}, found no file")
         return path
 
     def picture(self, name: str) -> tuple[Path, Picture]:
-        """A texture of a name, as linear RGB, and its file.
+        """An image by its file name, as linear RGB, and its path.
 
         Raises:
-            SceneError: there is none, or it cannot be read.
+            SceneError: the image is missing, or cannot be read.
         """
         path = self.require(name, "a texture at")
         return path, read_image(path)
 
 
 def text_of(path: Path) -> str:
-    """A text in the encoding that its first bytes tell, else UTF-8, else that of Windows (code page 1252), which gives
-    a character to nearly every byte; bytes that have none there are replaced."""
+    """The text of a file in the encoding of its byte order mark, else in UTF-8, else in Windows code page 1252, which
+    assigns a character to nearly every byte; other bytes are replaced."""
     content = path.read_bytes()
     for mark, encoding in _MARKS:
         if content.startswith(mark):

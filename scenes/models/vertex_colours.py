@@ -1,6 +1,6 @@
-"""Colours of vertices as a picture.
+"""Vertex colours as an image.
 
-The renderer looks colours up in pictures. Each triangle gets 2 x 2 texels of its own, in which bilinear lookup between
+The renderer supports colours in images only. Each triangle gets its own 2 x 2 texels, in which bilinear lookup between
 texel centres is linear interpolation between the colours of its corners.
 """
 
@@ -18,13 +18,13 @@ from scenes.canonical import ConstantTexture, ImageTexture, Texture
 def coloured(
     colors: Float[NDArray[np.floating], "f 3 3"], source: str
 ) -> tuple[Texture, Float[NDArray[np.float32], "f 3 2"] | None]:
-    """A texture for triangles whose corners have these linear colours, and the corners' texture coordinates.
+    """A texture for triangles with these linear colours at their corners, and the texture coordinates of the corners.
 
-    The fourth texel of a triangle, beyond its longest reach, continues the plane through the other three; where that is
-    negative it is 0, and the middle of one edge is brighter by up to a quarter of what was cut off.
+    The fourth texel of a triangle, opposite to its longest edge, extrapolates the other three linearly. If that is
+    negative, it is clamped to 0, and the middle of one edge is brighter by up to a quarter of the clamped amount.
 
     Returns:
-        One colour and no coordinates where all are alike.
+        One colour and no coordinates if all colours are equal.
     """
     colors = np.clip(colors, 0.0, None).astype(np.float32)
     if (colors == colors[0, 0]).all():
@@ -33,7 +33,7 @@ def coloured(
     count = len(colors)
     side = math.ceil(math.sqrt(count))
     image = np.zeros((2 * side, 2 * side, 3), np.float32)
-    # the fourth texel continues from the corner from which it is least negative
+    # the fourth texel extrapolates from the corner for which it is least negative
     beyond = np.stack([colors.sum(axis=1) - 2.0 * colors[:, corner] for corner in range(3)], axis=1)
     turn = np.argmax(np.minimum(beyond, 0.0).sum(axis=2), axis=1)
     place = (np.arange(3) - turn[:, None]) % 3

@@ -1,8 +1,8 @@
-"""A diffuse base under a smooth coat, and the colours that light takes on between the two.
+"""A diffuse base under a smooth coat, and the colour of light that bounces between the two.
 
-Light that the base sends up and the coat back down meets the base again. Mitsuba's plastic counts these bounces without
-their colour: a base ``p`` reflects ``p / (1 - f)``, where ``f`` is what the coat sends back. Its ``nonlinear`` one and
-PBRT v4 count them with it: ``p / (1 - p f)``.
+The coat reflects some of the light from the base back to it. Mitsuba's plastic sums these bounces without their colour:
+a base of albedo ``p`` reflects ``p / (1 - f)``, where ``f`` is the internal reflectance of the coat. Its ``nonlinear``
+plastic and PBRT v4 include the colour: ``p / (1 - p f)``.
 
 Source: Mitsuba 0.5 documentation, "plastic"; the geometric series of the bounces.
 """
@@ -19,18 +19,18 @@ from scenes.formats.losses import LossReport
 
 
 def sent_back(ior: float) -> float:
-    """What a smooth coat sends back of even light from within: ``1 - (1 - F) / ior²``, with ``F`` that from outside."""
+    """Internal diffuse reflectance of a smooth coat: ``1 - (1 - F) / ior²``, with the external one ``F``."""
     return 1.0 - (1.0 - mean_reflectance(ior)) / (ior * ior) if ior > 1.0 else 0.0
 
 
 def without_bounces(base: Texture, ior: float, where: str, report: LossReport) -> Texture:
-    """The base for a model that counts no colour of the bounces: ``p (1 - f) / (1 - p f)``."""
+    """The base for a model without the colour of the bounces: ``p (1 - f) / (1 - p f)``."""
     back = sent_back(ior)
     return _recoloured(base, lambda p: p * (1.0 - back) / np.maximum(1.0 - p * back, 1e-6), where, report)
 
 
 def with_bounces(base: Texture, ior: float, where: str, report: LossReport) -> Texture:
-    """Undoes :func:`without_bounces`."""
+    """The inverse of :func:`without_bounces`."""
     back = sent_back(ior)
     return _recoloured(base, lambda p: p / np.maximum(1.0 - back + p * back, 1e-6), where, report)
 

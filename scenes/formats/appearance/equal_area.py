@@ -1,4 +1,4 @@
-"""Environment maps of equal area: the sphere on a square, as PBRT v4 stores them.
+"""Equal-area environment maps: the sphere on a square, as in PBRT v4.
 
 Source: Clarberg 2008, "Fast equal-area mapping of the (hemi)sphere using SIMD"; PBRT v4, infinite lights.
 """
@@ -14,11 +14,11 @@ from scenes.arithmetic import arctan2, cos, sin
 
 Image = NDArray[np.float32]
 Numbers = NDArray[np.float64]
-_ACROSS = 4  # samples of a texel along each axis
+_ACROSS = 4  # number of samples of a texel along each axis
 
 
 def direction_of_square(point: Numbers) -> Numbers:
-    """Unit directions ``(n, 3)`` of points ``(n, 2)`` of the unit square; its middle is +z, its corners are -z.
+    """Unit directions ``(n, 3)`` of points ``(n, 2)`` of the unit square; its centre is +z, its corners are -z.
 
     With ``a = |2x - 1|``, ``b = |2y - 1|``, ``d = 1 - a - b`` and ``r = 1 - |d|``: ``z`` is ``1 - r²`` with the sign of
     ``d``, and the azimuth within a quadrant ``π/4 ((b - a) / r + 1)``.
@@ -35,7 +35,8 @@ def direction_of_square(point: Numbers) -> Numbers:
 
 
 def square_of_direction(direction: Numbers) -> Numbers:
-    """Points ``(n, 2)`` of the unit square of unit directions ``(n, 3)``; undoes :func:`direction_of_square`."""
+    """Points ``(n, 2)`` of the unit square for unit directions ``(n, 3)``; the inverse of
+    :func:`direction_of_square`."""
     x, y, z = np.abs(direction).T
     r = np.sqrt(np.maximum(1.0 - z, 0.0))
     share = 2.0 / np.pi * arctan2(y, x)  # of the quadrant
@@ -47,7 +48,7 @@ def square_of_direction(direction: Numbers) -> Numbers:
 
 
 def latitude_longitude(square: Image) -> Image:
-    """A map of equal area ``(n, n, 3)`` as latitude and longitude ``(n, 2 n, 3)``, z upwards; resampled.
+    """An equal-area map ``(n, n, 3)`` resampled to a latitude–longitude map ``(n, 2 n, 3)`` with z upwards.
 
     Azimuth runs from left to right from +x over +y, the polar angle from the top row (+z) down.
     """
@@ -63,7 +64,7 @@ def latitude_longitude(square: Image) -> Image:
 
 
 def equal_area(image: Image) -> Image:
-    """The reverse of :func:`latitude_longitude`: ``(h, w, 3)`` to ``(h, h, 3)``, resampled."""
+    """The inverse of :func:`latitude_longitude`: ``(h, w, 3)`` resampled to ``(h, h, 3)``."""
 
     def color(x: Numbers, y: Numbers) -> Numbers:
         to = direction_of_square(np.stack([x, y], axis=1))
@@ -75,7 +76,7 @@ def equal_area(image: Image) -> Image:
 
 
 def _sampled(height: int, width: int, color: Callable[[Numbers, Numbers], Numbers]) -> Image:
-    """The mean of samples spread evenly over each texel, row by row."""
+    """The mean of samples on a regular grid in each texel, row by row."""
     made = np.empty((height, width, 3), np.float32)
     steps = (np.arange(_ACROSS) + 0.5) / _ACROSS
     across = ((np.arange(width)[:, None] + steps) / width).ravel()
@@ -89,7 +90,8 @@ def _sampled(height: int, width: int, color: Callable[[Numbers, Numbers], Number
 
 
 def _bilinear(image: Image, u: Numbers, v: Numbers, wraps: bool) -> Numbers:
-    """Colours ``(n, 3)`` at points from the left and top; the left edge joins the right one where the image wraps."""
+    """Colours ``(n, 3)`` at points measured from the left and the top; if the image wraps, the left edge joins the
+    right one."""
     height, width = image.shape[:2]
     x, y = u * width - 0.5, np.clip(v * height - 0.5, 0.0, height - 1.0)
     if not wraps:

@@ -1,4 +1,5 @@
-"""Products, mixtures and means of textures; products and mixtures become plainer textures where that loses nothing."""
+"""Products, mixtures and means of textures; products and mixtures are folded into simpler textures where that is
+lossless."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ Pairs = Callable[[Texture, Texture], Texture | None]
 
 
 def folded(texture: Texture) -> Texture:
-    """The texture without its products and mixtures, where one part is constant or both parts repeat alike."""
+    """The texture with products and mixtures folded where one part is constant or both parts have the same layout."""
     return once_a_node(_fold, texture)
 
 
@@ -50,7 +51,7 @@ def _mixture(amount: float) -> Join:
 
 
 def _of_two(first: Texture, second: Texture, join: Join) -> Texture | None:
-    """Two textures joined point by point, or None where the result is not a plain texture."""
+    """Two textures combined point by point, or None if the result is not a plain texture."""
     found: dict[tuple[int, int], Texture | None] = {}
 
     def again(first: Texture, second: Texture) -> Texture | None:
@@ -84,7 +85,7 @@ def _joined(first: Texture, second: Texture, join: Join, again: Pairs) -> Textur
 
 
 def changed(texture: Texture, change: Change) -> Texture | None:
-    """A texture with every colour changed, or None where it is not plain."""
+    """A texture with every colour changed, or None if it is not plain."""
     return once_a_node(lambda node, again: _change(node, change, again), texture)
 
 
@@ -102,7 +103,7 @@ def _change(texture: Texture, change: Change, again: Callable[[Texture], Texture
 
 
 def product_of(first: Texture, second: Texture) -> Texture:
-    """The product of two textures; a constant where both are, and the other one where one is white."""
+    """The product of two textures; a constant if both are, and the other one if one is white."""
     if isinstance(first, ConstantTexture) and isinstance(second, ConstantTexture):
         return ConstantTexture(rgb(np.multiply(first.value, second.value)))
     if isinstance(first, ConstantTexture) and first.value == (1.0, 1.0, 1.0):
@@ -113,7 +114,7 @@ def product_of(first: Texture, second: Texture) -> Texture:
 
 
 def greatest_of(texture: Texture) -> float:
-    """The greatest value of any channel of a texture, or a bound on it where two textures are multiplied."""
+    """The greatest value of any channel of a texture, or an upper bound if two textures are multiplied."""
     return once_a_node(_greatest, texture)
 
 
@@ -129,7 +130,7 @@ def _greatest(texture: Texture, again: Callable[[Texture], float]) -> float:
 
 
 def height_of(material: Bumped) -> Texture:
-    """The height of a bump map in scene units, with its scale."""
+    """The height of a bump map in scene units, with its scale applied."""
     return product_of(material.height, ConstantTexture(grey(material.scale)))
 
 

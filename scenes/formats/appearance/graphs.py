@@ -1,4 +1,4 @@
-"""Textures and materials as graphs: parts that several others share are visited once, and depth is bounded."""
+"""Textures and materials as graphs: shared parts are visited once, and the depth is bounded."""
 
 from __future__ import annotations
 
@@ -9,32 +9,33 @@ from typing import Any, TypeVar
 from scenes.canonical import Material, SceneError, Texture
 
 NESTED_MAX = 64
-"""Most textures or materials inside each other."""
+"""Maximum depth of nested textures or materials."""
 
 Result = TypeVar("Result")
 Visit = Callable[[Any, Callable[[Any], Result]], Result]
 
 
 def once_a_node(visit: Visit[Result], root: Any) -> Result:
-    """What a visit makes of a graph; it is called once for each node, with the way to visit others."""
+    """The result of a visit of a graph. ``visit`` is called once for each node, with a function that visits other
+    nodes."""
     found: dict[int, tuple[Any, Result]] = {}
 
     def again(node: Any) -> Result:
         if id(node) not in found:
-            found[id(node)] = node, visit(node, again)  # the node is kept, so that its number stays its own
+            found[id(node)] = node, visit(node, again)  # the node is kept alive, so that its id is not reused
         return found[id(node)][1]
 
     return again(root)
 
 
 def parts_of(node: Any) -> list[Any]:
-    """Textures and materials that a texture or material holds."""
+    """Textures and materials that a texture or material contains."""
     values = (getattr(node, field.name) for field in dataclasses.fields(node))
     return [value for value in values if dataclasses.is_dataclass(value)]
 
 
 def check_depth(part: Texture | Material, where: str) -> None:
-    """Raises SceneError where too many textures or materials are inside each other; their parts have been checked."""
+    """Raises SceneError if textures or materials are nested too deeply; their parts have been checked."""
     depth = once_a_node(lambda node, again: 1 + max(map(again, parts_of(node)), default=0), part)
     if depth > NESTED_MAX:
         raise SceneError(f"{where}: expected at most {NESTED_MAX} textures or materials inside each other")

@@ -1,4 +1,4 @@
-"""Indices of refraction, and what surfaces reflect of light that arrives along the normal."""
+"""Refractive indices, and the reflectance of surfaces at normal incidence."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from scenes.formats.appearance.spectra import grey, rgb
 
 
 def index_of_reflectance(reflectance: Rgb) -> tuple[Rgb, Rgb]:
-    """The real index of refraction with a reflectance ``r`` at normal incidence: ``(1 + √r) / (1 - √r)``."""
+    """The real refractive index with a reflectance ``r`` at normal incidence: ``(1 + √r) / (1 - √r)``."""
     root = np.sqrt(np.clip(reflectance, 0.0, 0.9999))
     return rgb((1.0 + root) / (1.0 - root)), grey(0.0)
 
 
 def mean_reflectance(ior: float) -> float:
-    """What a smooth dielectric reflects of even light from outside: ``∫ 2 F(c) c dc`` over the cosine ``c``.
+    """External diffuse reflectance of a smooth dielectric: ``∫ 2 F(c) c dc`` over the cosine ``c``.
 
     Args:
-        ior: index of refraction of the inside over the outside, above 1.
+        ior: refractive index of the inside over that of the outside, above 1.
 
     Source: Walsh's integral of Fresnel's equations for light without polarization (Prahl 1988, "Light transport in
-    tissue", eq. B41). Near an index of 1, where its terms cancel, the first one of its series.
+    tissue", eq. B41). Near an index of 1, where its terms cancel, the first term of its series is used.
     """
     if ior < 1.0001:
         return (ior - 1.0) / 3.0
@@ -39,6 +39,6 @@ def mean_reflectance(ior: float) -> float:
 
 
 def reflectance_of_index(eta: Rgb, k: Rgb) -> Rgb:
-    """What a conductor reflects at normal incidence: ``((eta - 1)² + k²) / ((eta + 1)² + k²)`` (Fresnel)."""
+    """Reflectance of a conductor at normal incidence: ``((eta - 1)² + k²) / ((eta + 1)² + k²)`` (Fresnel)."""
     n, absorbed = np.array(eta), np.array(k)
     return rgb(((n - 1.0) ** 2 + absorbed**2) / ((n + 1.0) ** 2 + absorbed**2))

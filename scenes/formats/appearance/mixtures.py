@@ -1,4 +1,4 @@
-"""Mixtures of materials: metals that reflect less are mixtures with black, and sums of lobes are mixtures of them."""
+"""Mixtures of materials: dimmed metals are mixtures with black, and sums of lobes are mixtures of them."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from scenes.formats.losses import LossReport
 BLACK = Matte(ConstantTexture(grey(0.0)))
 
 NOTHING = Masked(BLACK, ConstantTexture(grey(0.0)))
-"""A surface that is not there, such as the border of a medium."""
+"""An invisible surface, such as the border of a medium."""
 
 
 def is_nothing(material: Material) -> bool:
-    """Whether a surface is not there."""
+    """Whether a surface is invisible."""
     return isinstance(material, Masked) and material.opacity == NOTHING.opacity
 
 
 def mixture_of(first: Material, second: Material, amount: Texture) -> Material:
-    """A mixture, ``amount`` of it the second material; a metal mixed with black is a metal that reflects less."""
+    """A mixture with the share ``amount`` of the second material; a metal mixed with black becomes a dimmed metal."""
     black = isinstance(first, Matte) and first.reflectance == BLACK.reflectance
     if black and isinstance(second, Metal) and second.reflectance_scale == WHITE:
         return dataclasses.replace(second, reflectance_scale=amount)
@@ -44,7 +44,7 @@ def mixture_of(first: Material, second: Material, amount: Texture) -> Material:
 
 
 def dimmed(material: Metal) -> MixMaterial:
-    """A metal whose reflection is multiplied by a factor, as a mixture with black: undoes :func:`mixture_of`."""
+    """A dimmed metal as a mixture with black: the inverse of :func:`mixture_of`."""
     bright = dataclasses.replace(material, reflectance_scale=WHITE)
     return MixMaterial(BLACK, bright, material.reflectance_scale)
 
@@ -54,13 +54,14 @@ def _scaled(texture: Texture, factor: float) -> Texture:
 
 
 def _capped(texture: Texture, factor: float) -> Texture:
-    """A texture times a factor, at most 1 where it is constant."""
+    """A texture times a factor, clamped to 1 if it is constant."""
     scaled = _scaled(texture, factor)
     return ConstantTexture(rgb(np.minimum(scaled.value, 1.0))) if isinstance(scaled, ConstantTexture) else scaled
 
 
 def coat_share(material: Plastic) -> float:
-    """The share of the coat in a mixture with the base; neither must reflect more than all there is, the base first."""
+    """The share of the coat in a mixture with the base, in [0.02, 1]. Neither must reflect more than the incident
+    light; the base has priority."""
     room = 1.0 - greatest_of(material.diffuse)
     return float(np.clip(min(greatest_of(material.specular), room), 0.02, 1.0))
 
@@ -75,9 +76,9 @@ class Lobe:
 
 
 def sum_of(lobes: list[Lobe], where: str, report: LossReport) -> Material:
-    """A sum of lobes as a mixture: each is scaled by the inverse of its share, and what is missing to one is black.
+    """A sum of lobes as a mixture: each is scaled by the inverse of its share, and the remainder is black.
 
-    Lobes that reflect more than all together become darker, which is reported.
+    Lobes that together reflect more than the incident light are darkened, which is reported.
     """
     found = [lobe for lobe in lobes if lobe.greatest > 0.0]
     total = sum(lobe.greatest for lobe in found)
@@ -94,10 +95,10 @@ def sum_of(lobes: list[Lobe], where: str, report: LossReport) -> Material:
 
 
 def lobes_of(material: Uber, where: str, report: LossReport, schlick: bool = False) -> Material:
-    """The parts of PBRT's uber under its opacity: diffuse, glossy, mirrored and transmitted.
+    """The parts of PBRT's uber, with its opacity: diffuse, glossy, mirrored and transmitted.
 
-    Mirror and transmission together are glass. Glossy part and mirror follow Fresnel's equations, as metals that do not
-    absorb, or Schlick's rule, as coats over black.
+    Mirror and transmission together become glass. Glossy part and mirror follow Fresnel's equations as non-absorbing
+    metals, or Schlick's approximation as coats over black.
     """
 
     def shiny(color: Texture, roughness: tuple[float, float]) -> Lobe:
@@ -121,9 +122,9 @@ def lobes_of(material: Uber, where: str, report: LossReport, schlick: bool = Fal
 
 
 def added_metal(material: Plastic, where: str, report: LossReport) -> Material:
-    """A plastic whose coat adds to its base, as a mixture of the base with a metal that does not absorb.
+    """A plastic whose coat is added to its base, as a mixture of the base with a non-absorbing metal.
 
-    Fresnel's equations for such a metal are those of the coat. :func:`plastic_of` undoes this.
+    The Fresnel reflectance of such a metal is that of the coat. :func:`plastic_of` is the inverse.
     """
     if greatest_of(material.specular) == 0.0:
         return Matte(material.diffuse)
@@ -136,7 +137,7 @@ def added_metal(material: Plastic, where: str, report: LossReport) -> Material:
 
 
 def plastic_of(material: MixMaterial) -> Material:
-    """The plastic that :func:`added_metal` made a mixture of, or the mixture itself."""
+    """The plastic that :func:`added_metal` turned into a mixture, or the mixture itself."""
     base, coat, amount = material.first, material.second, material.amount
     if not (isinstance(base, Matte) and isinstance(coat, Metal) and isinstance(amount, ConstantTexture)):
         return material
@@ -153,7 +154,8 @@ def plastic_of(material: MixMaterial) -> Material:
 
 
 def added_coat(material: Plastic) -> Material:
-    """The same for LuxRender: a mixture of the base with a coat over black, which reflects by Schlick's rule."""
+    """The same for LuxRender: a mixture of the base with a coat over black, which reflects by Schlick's
+    approximation."""
     if greatest_of(material.specular) == 0.0:
         return Matte(material.diffuse)
     share, straight = coat_share(material), ((material.ior - 1.0) / (material.ior + 1.0)) ** 2

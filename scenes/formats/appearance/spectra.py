@@ -1,4 +1,4 @@
-"""Colours that scene files give as XYZ, as samples over wavelengths, as black bodies or as names of metals."""
+"""Colours from scene files, given as XYZ, sampled spectra, black bodies or names of metals."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from scenes.canonical.values import Rgb
 XYZ_TO_RGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
-"""From CIE XYZ to linear Rec. 709 with white D65 (IEC 61966-2-1)."""
+"""Matrix from CIE XYZ to linear Rec. 709 with the white point D65 (IEC 61966-2-1)."""
 
-_Y_INTEGRAL = 106.856895  # of the colour matching function for luminance, CIE 1931
+_Y_INTEGRAL = 106.856895  # integral of the colour matching function for luminance, CIE 1931
 
 METALS: dict[str, tuple[Rgb, Rgb]] = {
     "Ag": ((0.15528, 0.11673, 0.13839), (4.82835, 3.12222, 2.14690)),
@@ -26,18 +26,18 @@ METALS: dict[str, tuple[Rgb, Rgb]] = {
     "Li": ((0.26579, 0.19562, 0.22095), (3.54016, 2.31112, 1.66861)),
     "W": ((4.37082, 3.30025, 2.99841), (3.50064, 2.60487, 2.27323)),
 }
-"""Complex index of refraction in RGB, ``(eta, k)``: what Mitsuba 3.9.1 makes of its measured spectra."""
+"""Complex refractive index in RGB, ``(eta, k)``, as computed by Mitsuba 3.9.1 from its measured spectra."""
 
 _LONG_NAMES = {"silver": "Ag", "aluminium": "Al", "aluminum": "Al", "gold": "Au", "copper": "Cu"}
 
 
 def metal(name: str) -> tuple[Rgb, Rgb] | None:
-    """Index of refraction of a metal by its symbol or name, or None where it is not known."""
+    """Refractive index of a metal by its symbol or name, or None if it is unknown."""
     return METALS.get(name) or METALS.get(_LONG_NAMES.get(name.lower(), ""))
 
 
 def rgb(values: ArrayLike) -> Rgb:
-    """A colour of any three numbers."""
+    """A colour from any three numbers."""
     red, green, blue = (float(value) for value in np.asarray(values, np.float64).reshape(3))
     return red, green, blue
 
@@ -75,7 +75,7 @@ def sampled_rgb(wavelength_nm: NDArray[np.float64], values: NDArray[np.float64])
 
     Args:
         wavelength_nm: ``(n,)`` in any order.
-        values: ``(n,)`` of the spectrum there.
+        values: ``(n,)`` values of the spectrum.
     """
     order = np.argsort(wavelength_nm)
     at = np.arange(360.0, 831.0)
@@ -93,13 +93,13 @@ def planck(wavelength_nm: NDArray[np.float64], kelvin: float) -> NDArray[np.floa
 
 
 def radiant_rgb(kelvin: float, scale: float) -> Rgb:
-    """Colour of a black body in its own radiance, W m⁻² sr⁻¹ nm⁻¹, times ``scale`` (as Mitsuba does)."""
+    """Colour of a black body with its absolute radiance, W m⁻² sr⁻¹ nm⁻¹, times ``scale`` (as in Mitsuba)."""
     at = np.arange(360.0, 831.0)
     return sampled_rgb(at, scale * planck(at, kelvin))
 
 
 def blackbody_rgb(kelvin: float, scale: float) -> Rgb:
-    """Colour of a black body whose spectrum is scaled so that its highest value is ``scale`` (as PBRT v3 does).
+    """Colour of a black body whose spectrum is scaled to the maximum ``scale`` (as in PBRT v3).
 
     Source: Planck's law; Wien's displacement law for the peak.
     """

@@ -1,8 +1,8 @@
-"""How spot lights fall off towards their edges in each renderer, and how one profile becomes another.
+"""The fall-off of spot lights in each renderer, and conversion between the profiles.
 
 Source: PBRT v3 (Pharr, Jakob and Humphreys 2016, sec. 12.3.1); Mitsuba 0.5 documentation, section on spot lights;
-:mod:`renderer.kernels.lights` for this project's. LuxCore 2.10 falls off as PBRT does, and divides by the cosine
-(measured in ``tests/scenes/formats/test_light.py``).
+``renderer/kernels/lights.py`` for this project's renderer. The fall-off of LuxCore 2.10 is that of PBRT divided by the
+cosine (measured in ``tests/scenes/formats/test_light.py``).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NAMES = {
 
 
 def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
-    """Power of a spot of unit intensity over 2π, from its axis to its edge."""
+    """Power of a spot light of unit intensity, from its axis to its edge, over 2π."""
     low, high = cos(math.radians(outer_deg)), cos(math.radians(inner_deg))
     if outer_deg - inner_deg < 1e-6:
         return -log(low) if profile == "secant" else 1.0 - low
@@ -34,15 +34,15 @@ def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
         inner, outer = math.radians(inner_deg), math.radians(outer_deg)
         return 1.0 - (sin(outer) - sin(inner)) / (outer - inner)
     if profile == "secant":
-        # the integral of x⁴ / c over the cosine c, with x = (c - low) / (high - low)
+        # integral of x⁴ / c over the cosine c, with x = (c - low) / (high - low)
         return _quartic_over(low / (high - low)) - log(high)
     share = 0.5 if profile == "hermite" else 0.2
     return 1.0 - high + share * (high - low)
 
 
 def _quartic_over(ratio: float) -> float:
-    """The integral of ``x⁴ / (x + ratio)`` from 0 to 1, by division of polynomials; for large ratios, where that
-    cancels, by the series of powers of ``-1 / ratio``."""
+    """The integral of ``x⁴ / (x + ratio)`` from 0 to 1, by polynomial division; for large ratios, where that suffers
+    from cancellation, by a series in powers of ``-1 / ratio``."""
     if ratio < 4.0:
         return 0.25 - ratio * (1.0 / 3.0 - ratio * (0.5 - ratio * (1.0 - ratio * log1p(1.0 / ratio))))
     total = 0.0
@@ -52,7 +52,7 @@ def _quartic_over(ratio: float) -> float:
 
 
 def _narrower(light: SpotLight) -> SpotLight:
-    """A cone that does not reach the plane of the light, where the cosine is zero."""
+    """The spot light with a cone narrow enough to exclude cosines of zero."""
     outer = min(light.outer_deg, 89.0)
     return dataclasses.replace(light, inner_deg=min(light.inner_deg, outer), outer_deg=outer)
 
@@ -60,7 +60,7 @@ def _narrower(light: SpotLight) -> SpotLight:
 def reshaped(light: SpotLight, profile: str, report: LossReport) -> SpotLight:
     """The spot light with another profile, the same edge and the same power; a change is reported.
 
-    The inner angle is changed so that the power stays. Where no angle does that, the intensity is changed.
+    The inner angle is changed to keep the power. If no angle keeps it, the intensity is changed.
     """
     sharp = light.inner_deg == light.outer_deg and "secant" not in (light.profile, profile)
     if light.profile == profile or sharp:

@@ -1,6 +1,7 @@
-"""Job files of the motion-blur perception thesis: which ways of sampling a sequence is rendered with.
+"""Job files of the motion-blur perception thesis: the sampling methods with which a sequence is rendered.
 
-Seven lines: a name; how many sampling levels and which; how many point sets and which; how many time filters and which.
+A file has seven lines: a name; the number of sampling levels, and these; the number of point sets, and these; the
+number of time filters, and these.
 
 A point set's name may end in ``+blue``: pixels then shift it by spatiotemporal blue noise.
 
@@ -26,7 +27,7 @@ _LINES = ("a name", "how many sampling levels", "the sampling levels", "how many
 
 @dataclass(frozen=True)
 class Combination:
-    """One way of sampling a sequence."""
+    """One sampling method of a sequence."""
 
     samples: int
     point_set: str
@@ -39,18 +40,18 @@ class Combination:
 
     @property
     def shift(self) -> str:
-        """How pixels shift it: ``white`` or ``blue``."""
+        """Shift of the point set in pixels: ``white`` or ``blue``."""
         return "blue" if self.point_set.endswith(BLUE) else "white"
 
     @property
     def name(self) -> str:
-        """For folders and tables."""
+        """Name of the combination for folders and tables."""
         return f"{self.point_set}-{self.time_filter}-{self.samples:04d}"
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job: every level with every point set and time filter."""
+    """A job: all combinations of levels, point sets and time filters."""
 
     name: str
     levels: tuple[int, ...]
@@ -59,7 +60,7 @@ class Job:
 
     @property
     def combinations(self) -> tuple[Combination, ...]:
-        """All of them, levels rising."""
+        """All combinations, in order of increasing level."""
         return tuple(
             Combination(level, points, time)
             for level, points, time in product(sorted(self.levels), self.point_sets, self.time_filters)
@@ -67,10 +68,11 @@ class Job:
 
 
 def read_job(path: Path) -> Job:
-    """Reads a job file; empty lines and what follows ``#`` do not count.
+    """Reads a job file; empty lines and comments after ``#`` are ignored.
 
     Raises:
-        SceneError: the file is missing or a line is not as it must be; file and line, what was expected and what came.
+        SceneError: the file is missing, or a line is invalid; the message gives file and line, the expected and the
+            actual value.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -96,7 +98,7 @@ def read_job(path: Path) -> Job:
 
 
 def _counted(path: Path, lines: list[tuple[int, list[str]]], at: int) -> list[str]:
-    """The words of a line, as many as the line before it says."""
+    """The words of a line, whose number the line before it gives."""
     (number, words), (next_number, values) = lines[at : at + 2]
     count = _whole(words[0] if len(words) == 1 else " ".join(words), f"{path}:{number}: {_LINES[at]}")
     if len(values) != count:

@@ -1,7 +1,7 @@
-"""Scene files of the motion-blur perception thesis: blocks into the canonical scene.
+"""Reader of scene files of the motion-blur perception thesis: blocks to the canonical scene.
 
-A file's clock runs in time units of its own; what moves is at ``location + velocity * t``. In the scene the clock
-starts with the first frame and runs in seconds, such that frames follow each other at the file's frame rate.
+The clock of a file has its own time unit; a moving object is at ``location + velocity * t``. In the scene, time is in
+seconds from the first frame, scaled so that the frames have the file's frame rate.
 
 Source: motion-blur perception thesis, chapter 3, fig. 13. Attributes that the figure does not show (``rotation``,
 ``spread``, ``aperture`` and others) are listed in :data:`scenes.formats.blocks.text.ALLOWED`.
@@ -51,17 +51,17 @@ from scenes.formats.blocks.transforms import aimed, facing, transform
 from scenes.loading import clamp_radiance, read_image
 from scenes.models import place_model
 
-_KEYS_PER_FRAME = 4  # of a camera that turns
+_KEYS_PER_FRAME = 4  # keys of a rotating camera
 _SHAPES = {"sphere": Sphere, "disk": Disk, "rectangle": Rectangle, "cube": Cube}
 
 
 def load_blocks(path: Path) -> tuple[Scene, Settings]:
-    """A block file as a scene, and how its sequence is rendered.
+    """A block file as a scene, and the settings of its sequence.
 
-    Files that it names are looked for beside it.
+    Files that it names are searched in its folder.
 
     Raises:
-        SceneError: the file, or one that it names, cannot be used; the message says where and what was expected.
+        SceneError: the file, or one that it names, cannot be used; the message gives the place and the expected value.
     """
     path = Path(path)
     blocks = read_blocks(path)
@@ -69,7 +69,7 @@ def load_blocks(path: Path) -> tuple[Scene, Settings]:
 
 
 class _Loader:
-    """Turns the blocks of one file into a scene."""
+    """Converts the blocks of one file to a scene."""
 
     def __init__(self, folder: Path, blocks: list[Block], name: str) -> None:
         self.folder, self.blocks, self.name = folder, blocks, name
@@ -153,7 +153,8 @@ class _Loader:
             raise SceneError(f"{block.where}: {str(error).removeprefix(f'{block.where}: ')}") from None
 
     def _phong(self, block: Block, diffuse: Rgb) -> Phong:
-        """Deviation: the ambient colour weighs the diffuse one by their means; Phong here has one number for it."""
+        """A Phong material. Deviation: the weight of the ambient term is the ratio of the means of ambient and diffuse
+        colour, because the canonical material has one number for it."""
         ambient = 1.0
         if "ambientcolor" in block.values:
             ambient = float(np.mean(block.get("ambientcolor")) / max(np.mean(diffuse), 1e-6))
@@ -173,7 +174,7 @@ class _Loader:
         )
 
     def _object(self, source: Block, block: Block) -> list[Instance]:
-        """Instances of an object, placed as ``block`` says."""
+        """Instances of an object, placed by ``block``."""
         kind = source.require("type")
         name = block.get("objectname", f"{kind} of {block.where}")
         matrix, velocity = self._placed(block)
@@ -197,7 +198,7 @@ class _Loader:
         return [Instance(_SHAPES[kind](**radius), material, matrix, track, name)]
 
     def _placed(self, block: Block) -> tuple[Matrix, NDArray[np.float64]]:
-        """Place at time 0 of the file, and velocity; a group's are applied outside its members'."""
+        """Placement at time 0 of the file, and velocity; those of a group are applied outside those of its members."""
         matrix, velocity = transform(block), np.asarray(block.get("velocity", (0.0, 0.0, 0.0)))
         if "groupname" in block.values:
             group = self._known(self.groups, block, "groupname")
@@ -209,7 +210,7 @@ class _Loader:
         return matrix, velocity
 
     def _track(self, velocity: NDArray[np.float64]) -> RigidTrack | None:
-        """Uniform motion over the whole sequence: two keys."""
+        """Uniform motion over the whole sequence, with two keys."""
         if not velocity.any():
             return None
         settings = self.settings
@@ -240,7 +241,7 @@ class _Loader:
         raise SceneError(f"{block.where}: light.type: expected one of {wanted}, got {kind!r}")
 
     def _camera(self) -> PerspectiveCamera:
-        """A camera whose place, aim and up vector move uniformly; turning is sampled four times a frame."""
+        """A camera whose position, target and up vector move uniformly; rotation is sampled four times per frame."""
         block, settings = self._single("camera"), self.settings
         rows = {
             name: (np.asarray(block.get(name, default)), np.asarray(block.get(f"{name}velocity", (0.0, 0.0, 0.0))))

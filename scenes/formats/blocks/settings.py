@@ -1,4 +1,4 @@
-"""How the sequence of a block file is rendered.
+"""Settings with which the sequence of a block file is rendered.
 
 Source: motion-blur perception thesis, chapter 3, figs 12 and 13.
 """
@@ -26,23 +26,23 @@ POINT_SET_NAMES = {
     "cells-time": "cells-time",
     "random": "random",
 }
-"""Point sets by the names that files give them."""
+"""Point sets by their names in files."""
 
 TIME_FILTERS = ("box", "triangle")
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a file's sequence is rendered.
+    """Settings of a file's sequence.
 
     Attributes:
-        name: of the scene.
-        start_time, frame_time: of the first frame and from one to the next, time units of the file.
-        frame_count: frames of the sequence.
-        frame_rate_hz: frames a second of the scene's clock.
-        shutter_share: of the time from one frame to the next, for which the shutter is open.
-        width_px, height_px: of a frame.
-        point_set, sample_count, time_filter: of every pixel.
+        name: name of the scene.
+        start_time, frame_time: time of the first frame and interval between frames, time units of the file.
+        frame_count: number of frames of the sequence.
+        frame_rate_hz: frames per second of the scene's clock.
+        shutter_share: share of the interval between frames for which the shutter is open.
+        width_px, height_px: size of a frame.
+        point_set, sample_count, time_filter: sampling of every pixel.
     """
 
     name: str
@@ -59,20 +59,20 @@ class Settings:
 
     @property
     def seconds_per_unit(self) -> float:
-        """Seconds of the scene's clock in a time unit of the file."""
+        """Seconds of the scene's clock per time unit of the file."""
         return 1.0 / (self.frame_rate_hz * self.frame_time)
 
     def frame_start_s(self, number: int) -> float:
-        """When the shutter of a frame opens, on the scene's clock."""
+        """Time at which the shutter of a frame opens, on the scene's clock, seconds."""
         return number / self.frame_rate_hz
 
     def file_time(self, time_s: float | NDArray[np.floating]) -> NDArray[np.float64]:
-        """The file's time at a second of the scene's clock."""
+        """The file's time at a time of the scene's clock."""
         return self.start_time + np.asarray(time_s, np.float64) / self.seconds_per_unit
 
 
 def read_settings(block: Block, default_name: str) -> Settings:
-    """Settings of a block, with defaults where it says nothing.
+    """Settings of a block, with defaults for missing attributes.
 
     Raises:
         SceneError: a value cannot be used.

@@ -1,4 +1,4 @@
-"""The text of block files: blocks of attributes, each attribute a line, checked against what a block may hold.
+"""The text of block files: blocks of attributes, one per line, checked against the allowed attributes.
 
 Source: motion-blur perception thesis, chapter 3, figs 12 and 13.
 """
@@ -27,7 +27,7 @@ _NL: /([ \t]*(#[^\n]*)?\r?\n)+[ \t]*/
 _PARSER = lark.Lark(_GRAMMAR, parser="lalr", propagate_positions=True)
 
 Shape = int | tuple[int, ...] | type[str]
-"""What an attribute holds: so many numbers, one of several counts of numbers, or a word."""
+"""Type of an attribute's value: a count of numbers, one of several counts, or a word."""
 
 ALLOWED: Mapping[str, Mapping[str, Shape]] = {
     "group": {"groupname": str, "location": 3, "velocity": 3, "rotation": 3, "scale": (1, 3)},
@@ -109,7 +109,7 @@ ALLOWED: Mapping[str, Mapping[str, Shape]] = {
         "envmaplimit": 1,
     },
 }
-"""Attributes of each kind of block."""
+"""Allowed attributes of each kind of block, with their types."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Block:
 
     Attributes:
         kind: one of :data:`ALLOWED`.
-        values: by attribute: a number, a tuple of numbers, or a word.
+        values: values by attribute: a number, a tuple of numbers, or a word.
         where: file and line, for messages.
     """
 
@@ -134,7 +134,7 @@ class Block:
         """The value of an attribute.
 
         Raises:
-            SceneError: it is missing.
+            SceneError: the attribute is missing.
         """
         if name not in self.values:
             raise SceneError(f"{self.where}: {self.kind}: expected {name!r}, found none")
@@ -145,8 +145,8 @@ def read_blocks(path: Path) -> list[Block]:
     """Blocks of a file, in order.
 
     Raises:
-        SceneError: the file is missing, is not UTF-8, or something in it is not as it must be: file and line, what was
-            expected and what arrived.
+        SceneError: the file is missing, is not UTF-8, or is invalid; the message gives file and line, the expected and
+            the actual value.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -158,7 +158,7 @@ def read_blocks(path: Path) -> list[Block]:
 
 
 def parse_blocks(text: str, name: str) -> list[Block]:
-    """Blocks of a text; ``name`` goes into messages. Raises as :func:`read_blocks`."""
+    """Blocks of a text; ``name`` is used in messages. Raises as :func:`read_blocks`."""
     try:
         tree = _PARSER.parse(text + "\n")
     except lark.exceptions.UnexpectedInput as error:

@@ -12,7 +12,7 @@ from scenes.formats.blocks.text import Block
 
 
 def transform(block: Block) -> Matrix:
-    """Scale, then turns about x, y and z in degrees, then location."""
+    """The transform of a block: scale, then rotations about x, y and z in degrees, then location."""
     matrix = np.eye(4)
     angles = np.radians(block.get("rotation", (0.0, 0.0, 0.0)))
     x, y, z = (rotation_about(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
@@ -23,7 +23,7 @@ def transform(block: Block) -> Matrix:
 
 
 def aimed(eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64], block: Block) -> Rotation:
-    """Orientations of a camera that looks along ``-z``, rows of times."""
+    """Orientations of a camera that looks along ``-z``, one for each row of the arguments."""
     back = eye - target
     right = np.cross(up, back)
     size = np.linalg.norm(right, axis=1, keepdims=True)
@@ -34,7 +34,7 @@ def aimed(eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.
 
 
 def facing(block: Block, place: NDArray[np.float64], target: NDArray[np.float64]) -> Matrix:
-    """A rectangle's transform whose outside looks at a target."""
+    """The transform of a rectangle whose outside faces a target."""
     aim = target - place
     if not aim.any():
         raise SceneError(f"{block.where}: light.target: expected another place than its location, got {tuple(target)}")

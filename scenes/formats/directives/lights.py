@@ -1,4 +1,4 @@
-"""Lights of files of directives, into those of the canonical scene."""
+"""Lights of directive files, converted to the canonical scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from scenes.formats.losses import LossReport
 
 
 def lamp(kind: str, parameters: Parameters, start: Rgb, strength: Rgb, report: LossReport) -> PointLight:
-    """A light at a point; one of another kind than ``point`` shines alike in all directions, which is reported."""
+    """A point light; other kinds become isotropic point lights, which is reported."""
     if kind != "point":
         parameters.asked.update(parameters.given)
         report.add(str(parameters.place), f"light {kind!r}", "a point light as bright in all directions")
@@ -38,7 +38,7 @@ def distant(start: Rgb, target: Rgb, strength: Rgb, where: str, angle_deg: float
     """A light from one direction.
 
     Raises:
-        SceneError: its two points are the same.
+        SceneError: the two points are the same.
     """
     direction = np.subtract(target, start)
     if not norm(direction) > 0.0:
@@ -47,12 +47,12 @@ def distant(start: Rgb, target: Rgb, strength: Rgb, where: str, angle_deg: float
 
 
 def even_environment(strength: Rgb) -> EnvironmentLight:
-    """An environment of the same radiance in all directions."""
+    """An environment of equal radiance in all directions."""
     return EnvironmentLight(np.array([[list(strength)]], np.float32))
 
 
 def environment_map(image: NDArray[np.float32], placed: Matrix, strength: Rgb, path: Path) -> EnvironmentLight:
-    """An environment map, turned as ``placed`` says, its radiance multiplied by ``strength``."""
+    """An environment map, rotated by ``placed``, with its radiance multiplied by ``strength``."""
     turn = placed.copy()
     turn[:3, 3] = 0.0
     if strength[0] == strength[1] == strength[2]:
@@ -61,7 +61,7 @@ def environment_map(image: NDArray[np.float32], placed: Matrix, strength: Rgb, p
 
 
 def lose_hints(parameters: Parameters, report: LossReport) -> None:
-    """Reports the parameters that say how to sample a light, not how it shines."""
+    """Reports the parameters that control the sampling of a light and not its emission."""
     for hint in ("samples", "nsamples", "importance"):
         if hint in parameters:
             parameters.number(hint, 1.0)

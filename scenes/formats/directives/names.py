@@ -1,7 +1,7 @@
-"""Names of textures and materials, which hold within the block that they are given in.
+"""Names of textures and materials, whose scope is the block that defines them.
 
-Source: PBRT v3, ``GraphicsState``: a block works on a copy of the tables, and textures of numbers and of colours have
-tables of their own. LuxRender 1.x has the same.
+Source: PBRT v3, ``GraphicsState``: a block works on a copy of the tables, and float and colour textures have separate
+tables. LuxRender 1.x has the same.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from typing import Any, Literal
 from scenes.canonical import Material, Rgb, Texture
 
 Of = Literal["color", "float"]
-"""What the values of a texture are."""
+"""Type of a texture's values."""
 
 
 @dataclass
 class Names:
-    """Tables of what has a name; what a block names is forgotten at its end, which costs no more than it named.
+    """Tables of named objects. Names defined in a block are removed at its end, at a cost proportional to their number.
 
     Attributes:
-        lasting: whether nothing is forgotten: names of PBRT v4 belong to the whole scene.
+        lasting: whether names are never removed, as in PBRT v4, where they belong to the whole scene.
     """
 
     colors: dict[str, Texture] = field(default_factory=dict)
@@ -35,12 +35,12 @@ class Names:
         return self.colors if of == "color" else self.floats
 
     def define(self, table: dict[str, Any], name: str, value: Any) -> None:
-        """Gives a name within the innermost block."""
+        """Defines a name within the innermost block."""
         self._before.append((table, name, table.get(name)))
         table[name] = value
 
     def mark(self) -> int:
-        """Where a block begins."""
+        """Marks the beginning of a block."""
         return len(self._before)
 
     def forget(self, mark: int) -> None:

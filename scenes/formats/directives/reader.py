@@ -1,4 +1,4 @@
-"""Reads files of directives: includes, transforms and attributes. The dialect says what the other directives mean.
+"""Reader of directive files: includes, transforms and attributes. A dialect defines the other directives.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3).
 """
@@ -30,24 +30,24 @@ from scenes.formats.text.places import Place
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
 SAVED_MAX = 1024
-"""Greatest depth of attribute blocks."""
+"""Maximum depth of attribute blocks."""
 
 
 @dataclass
 class Attributes:
-    """What ``AttributeBegin`` saves beside the transform."""
+    """State that ``AttributeBegin`` saves in addition to the transform."""
 
     material: Material | None = None
     emission: tuple[float, float, float] | None = None
-    power: float = 0.0  # lumens that the emission is scaled to, 0 for none
+    power: float = 0.0  # power to which the emission is scaled, lumens; 0 for none
     reversed: bool = False
-    # parameters of what follows, by target and name
+    # parameters for the following directives, by target and name
     assumed: Mapping[tuple[str, str], tuple[Values, Values]] = field(default_factory=dict)
 
 
 @dataclass
 class Block:
-    """A block that is open: its kind, what it restores, and where its names begin."""
+    """An open block: its kind, the state that it restores, and the mark of its names."""
 
     kind: str
     attributes: Attributes | None
@@ -56,12 +56,12 @@ class Block:
 
 @dataclass
 class DirectiveReader:
-    """State while a file is read; a dialect adds the directives that describe a scene.
+    """State of reading a file; a dialect adds the directives that describe a scene.
 
     Attributes:
-        files: what may be read.
-        report: of what could not be kept.
-        left_handed: whether ``LookAt`` has x to the right in a left-handed world.
+        files: files that may be read.
+        report: receives the losses.
+        left_handed: whether ``LookAt`` assumes a left-handed world with x to the right.
     """
 
     files: SceneFiles
@@ -75,17 +75,17 @@ class DirectiveReader:
     _known: dict[str, Callable[[Directive], None]] = field(default_factory=dict)
 
     def read(self, path: Path) -> None:
-        """Reads a file and what it includes.
+        """Reads a file and its includes.
 
         Raises:
-            SceneError: something in it is not as it must be; file, line, column.
+            SceneError: the file is invalid; the message gives file, line and column.
         """
         for directive in parse_directives(self.files.text(path, str(path)), path, self._open):
             self._file = directive.file
             self._do(directive)
 
     def _open(self, name: str, place: Place, inside: tuple[Path, ...]) -> tuple[str, Path]:
-        """Text and path of a file that another one includes."""
+        """Text and path of an included file."""
         path, where = self.files.path(name, str(place), inside[-1]), str(inside[-1])
         if path in inside:
             raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
@@ -94,13 +94,13 @@ class DirectiveReader:
         return self.files.text(path, where), path
 
     def finish(self) -> None:
-        """Raises SceneError where a block is still open."""
+        """Raises SceneError if a block is still open."""
         if self._saved:
             raise SceneError(f"{self.files.main}: expected every block to end, {self._saved[-1].kind}Begin does not")
 
     @property
     def beside(self) -> Path:
-        """The file that is being read."""
+        """The file that is being read, beside which others are searched."""
         return self._file or self.files.main
 
     def dialect(self) -> dict[str, Callable[[Directive], None]]:
@@ -180,7 +180,7 @@ class DirectiveReader:
             self.names.forget(block.names)
 
     def _cross(self, kind: str, directive: Directive) -> None:
-        """Blocks of attributes and objects that cross: the inner one ends, whatever its kind, as in PBRT."""
+        """Handles overlapping blocks of attributes and objects: the inner one ends, whatever its kind, as in PBRT."""
         inner = self._saved[-1] if self._saved else None
         if kind == "Transform" or inner is None or inner.kind in (kind, "Transform"):
             return
@@ -190,7 +190,7 @@ class DirectiveReader:
             inner.kind, other.kind = other.kind, inner.kind
 
     def left_over(self, parameters: Parameters, what: str) -> None:
-        """Reports parameters that nothing asked for."""
+        """Reports unused parameters."""
         for name in parameters.unasked():
             self.report.add(str(parameters.place), f"{what}: parameter {name!r}", picture=name not in HINTS)
 
@@ -199,7 +199,7 @@ def word(directive: Directive, at: int = 0) -> str:
     """A string value of a directive.
 
     Raises:
-        SceneError: it has no string there.
+        SceneError: there is no string at this position.
     """
     found = directive.values[at] if at < len(directive.values) else None
     if not isinstance(found, tuple) or len(found) != 1:
@@ -211,7 +211,7 @@ def numbers(directive: Directive, count: int) -> list[float]:
     """The numbers of a directive, bracketed or not.
 
     Raises:
-        SceneError: there are strings, or another count of numbers.
+        SceneError: there are strings, or a different count of numbers.
     """
     found: list[float] = []
     for value in directive.values:
@@ -224,15 +224,15 @@ def numbers(directive: Directive, count: int) -> list[float]:
 
 
 def matrix(directive: Directive) -> Matrix:
-    """Sixteen numbers, column by column."""
+    """A matrix of sixteen numbers, column by column."""
     return np.array(numbers(directive, 16)).reshape(4, 4).T.copy()
 
 
 def checked(directive: Directive, found: Matrix) -> Matrix:
-    """The transform itself, where it can be inverted.
+    """The transform, if it is invertible.
 
     Raises:
-        SceneError: it cannot.
+        SceneError: it is not invertible.
     """
     if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not invertible(found):
         raise SceneError(

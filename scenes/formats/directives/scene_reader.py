@@ -1,4 +1,4 @@
-"""Reads scenes of directives: what PBRT and LuxRender share of the camera, lights, objects and shapes.
+"""Reader of scenes of directives: camera, lights, objects and shapes as far as PBRT and LuxRender share them.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
 """
@@ -49,19 +49,19 @@ from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import inverse, motion, moved_by, translation
 
 FORWARD = np.diag([1.0, 1.0, -1.0, 1.0])
-"""From a camera that looks along +z with x to the right to the canonical one, which looks along -z."""
+"""Transform from a camera that looks along +z with x to the right to the canonical one, which looks along -z."""
 
 FILTERS = {"box": "box", "triangle": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "sinc": "sinc"}
 _RADII = {"box": 0.5, "tent": 2.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 4.0}
 
 _DEFAULT = Matte(ConstantTexture((0.5, 0.5, 0.5)))
 _SHAPE_MAX = 1 << 20
-"""Greatest number of instances of a scene: nested object instances multiply."""
+"""Maximum number of instances of a scene, as nested object instances multiply."""
 
 
 @dataclass
 class SceneReader(DirectiveReader):
-    """State of a scene while its file is read; a dialect adds its film, samplers, integrators and lights."""
+    """State of reading a scene; a dialect adds film, samplers, integrators and lights."""
 
     camera: Camera | None = None
     window: Window | None = None
@@ -78,7 +78,7 @@ class SceneReader(DirectiveReader):
         self.surfaces = self.make_surfaces()
 
     def make_surfaces(self) -> Surfaces:
-        """What makes the textures and materials of the dialect."""
+        """The reader of the dialect's textures and materials."""
         raise NotImplementedError
 
     # --- directives ----------------------------------------------------------------------------------------------
@@ -165,20 +165,20 @@ class SceneReader(DirectiveReader):
         self.left_over(parameters, f"camera {kind!r}")
 
     def _field_of_view(self, parameters: Parameters, half: float, directive: Directive) -> float:
-        """Full angle of the shorter side, degrees, of a window whose shorter side is twice ``half``."""
+        """Full angle along the shorter side, degrees, of a window whose shorter side is twice ``half``."""
         fov = parameters.number("fov", 2.0 * parameters.number("halffov", 45.0))
         if not 0.0 < fov < 180.0:
             raise SceneError(f"{directive.place}: fov: expected an angle in (0, 180), got {fov:g}")
         return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * half)) if half != 1.0 else fov
 
     def read_size(self, parameters: Parameters, width_px: int, height_px: int) -> None:
-        """The size of the picture, by default the given one, and its file; the filter stays."""
+        """Reads the size of the picture, with the given default, and its file name; the filter is kept."""
         size = [parameters.whole(f"{axis}resolution", px, 1, 32768) for axis, px in (("x", width_px), ("y", height_px))]
         name = parameters.text("filename", "")
         self.film = dataclasses.replace(self.film, width_px=size[0], height_px=size[1], filename=name)
 
     def read_filter(self, directive: Directive) -> None:
-        """A filter of pixels."""
+        """Reads a pixel filter."""
         kind, parameters = typed(directive)
         name = self.report.kind(FILTERS, kind, "filter", directive.place)
         radius = parameters.number("xwidth", _RADII[name])
@@ -255,7 +255,7 @@ class SceneReader(DirectiveReader):
 
 
 def scene_of(reader: SceneReader, path: Path) -> Scene:
-    """Reads a file and makes a scene of it."""
+    """Reads a file and returns its scene."""
     main = reader.files.folder / Path(path).name
     if not main.is_file():
         raise SceneError(f"{path}: expected a scene file, found none")

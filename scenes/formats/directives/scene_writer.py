@@ -1,4 +1,4 @@
-"""Lines of directives of a whole scene: what PBRT and LuxRender share.
+"""Directives of a whole scene, as far as PBRT and LuxRender share them.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
 """
@@ -24,14 +24,14 @@ from scenes.formats.geometry.placing import PartKey, lose_back, part_key, shared
 from scenes.formats.text.numbers import listed, number
 
 INLINE_MAX = 64
-"""Triangles of a mesh that is written into the scene file; larger ones get a file of their own."""
+"""Maximum number of triangles of a mesh that is written into the scene file; larger meshes get their own file."""
 
-_ENDLESS = 1000  # bounces in the place of paths without a limit
+_ENDLESS = 1000  # bounces that replace an unlimited depth
 
 
 @dataclass
 class SceneWriter(SurfaceWriter):
-    """Lines of a scene, as they are made; a dialect adds its settings, lights and shapes."""
+    """Collects the lines of a scene; a dialect adds settings, lights and shapes."""
 
     aspect: tuple[float, float] = (1.0, 1.0)
     shared: frozenset[PartKey] = frozenset()
@@ -59,7 +59,7 @@ class SceneWriter(SurfaceWriter):
         raise NotImplementedError
 
     def write_camera(self, camera: Camera) -> None:
-        """Writes the camera in its place."""
+        """Writes the camera with its placement."""
         raise NotImplementedError
 
     def write_light(self, light: Light) -> None:
@@ -67,11 +67,11 @@ class SceneWriter(SurfaceWriter):
         raise NotImplementedError
 
     def write_instance(self, instance: Instance) -> None:
-        """Writes a shape, or the place of an object that was written before."""
+        """Writes a shape, or a reference to an object that was written before, with its placement."""
         raise NotImplementedError
 
     def part(self, instance: Instance) -> list[str]:
-        """Lines of a shape and what it is made of, without its place."""
+        """Lines of a shape and its material, without its placement."""
         raise NotImplementedError
 
     def _environment_only_seen(self, scene: Scene) -> None:
@@ -82,21 +82,22 @@ class SceneWriter(SurfaceWriter):
             self.report.add(scene.name or "scene", "constant ambient light")
 
     def depth(self, scene: Scene) -> int:
-        """Greatest number of bounces; a finite one where there is no limit, which is reported."""
+        """Greatest number of bounces; an unlimited one is replaced by a finite one, which is reported."""
         if scene.integrator.depth >= 0:
             return scene.integrator.depth
         self.report.hint("integrator", "paths without a limit", f"{_ENDLESS} bounces")
         return _ENDLESS
 
     def window(self, half: float, mirrored: bool = False, shift: tuple[float, float] = (0.0, 0.0)) -> str:
-        """The screen window of an image whose shorter side is twice ``half``, its middle off the axis by ``shift``."""
+        """The screen window of an image whose shorter side is twice ``half`` and whose centre is offset from the axis
+        by ``shift``."""
         width, height = (half * side for side in self.aspect)
         width = -width if mirrored else width
         across, up = 2.0 * width * shift[0], 2.0 * height * shift[1]
         return f' "float screenwindow" {listed((across - width, across + width, up - height, up + height))}'
 
     def camera_line(self, camera: Camera) -> str:
-        """What a camera is, without its place."""
+        """The directive of a camera, without its placement."""
         if isinstance(camera, PerspectiveCamera):
             line = f'Camera "perspective" "float fov" [ {number(camera.fov_deg)} ]'
             if camera.lens_radius > 0.0:
@@ -124,7 +125,7 @@ class SceneWriter(SurfaceWriter):
         return line
 
     def object_line(self, instance: Instance) -> str:
-        """The line that places an object; the object is made where it is new."""
+        """The line that places an object; a new object is defined first."""
         key = part_key(instance)
         if key not in self._objects:
             made = self.part(instance)
@@ -134,7 +135,7 @@ class SceneWriter(SurfaceWriter):
         return f'ObjectInstance "{self._objects[key]}"'
 
     def mesh_line(self, mesh: Mesh, in_file: bool = False) -> str:
-        """A mesh: in the scene file where it is small, else in a file of its own."""
+        """The directive of a mesh: small meshes are written inline, others to their own file."""
         if len(mesh.faces) > INLINE_MAX or in_file:
             return f'Shape "plymesh" "string filename" [ "{self.output.mesh(mesh)}" ]'
         return f'Shape "trianglemesh" {_inline_mesh(mesh)}'
@@ -152,5 +153,5 @@ def _inline_mesh(mesh: Mesh) -> str:
 
 
 def quoted(text: str) -> str:
-    """A string of a file of directives; quotes in it are dropped."""
+    """A quoted string of a directive file; quotes in it are dropped."""
     return '"' + text.replace("\\", "/").replace('"', "") + '"'

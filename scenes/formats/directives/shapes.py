@@ -1,4 +1,4 @@
-"""Shapes of files of directives, into those of the canonical scene.
+"""Shapes of directive files, converted to the canonical scene.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on shapes.
 """
@@ -22,11 +22,11 @@ from scenes.formats.text.scene_files import SceneFiles
 
 @dataclass
 class ShapeReader:
-    """Makes shapes of parameters; each file of a mesh is read once.
+    """Creates shapes from parameters; each mesh file is read once.
 
     Attributes:
-        files: for meshes.
-        report: of what could not be kept.
+        files: source of mesh files.
+        report: receives the losses.
     """
 
     files: SceneFiles
@@ -34,7 +34,7 @@ class ShapeReader:
     _meshes: dict[Path, Mesh] = field(default_factory=dict)
 
     def made(self, kind: str, parameters: Parameters, turn_over: bool, beside: Path) -> tuple[Shape, Matrix] | None:
-        """A shape and its place in the current space, or None for a shape that is left out, which is reported."""
+        """A shape and its placement in the current space, or None for a shape that is left out, which is reported."""
         where = str(parameters.place)
         if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
             mesh = self._ply(parameters, beside) if kind == "plymesh" else self._triangles(parameters)
@@ -111,7 +111,7 @@ class ShapeReader:
         return self._meshes[path]
 
     def _indices(self, parameters: Parameters) -> np.ndarray | None:
-        """Corners of triangles; LuxRender's quads are two each."""
+        """Corners of triangles; each of LuxRender's quads is split into two."""
         found = [parameters.numbers(name) for name in ("indices", "triindices")]
         kept = [part for part in found if part is not None][:1]
         quads = parameters.numbers("quadindices")
@@ -122,7 +122,7 @@ class ShapeReader:
         return np.concatenate(kept) if kept else None
 
     def _patches(self, parameters: Parameters) -> Mesh:
-        """Bilinear patches, each as two triangles; that loses the form of those that are not flat."""
+        """Bilinear patches, each as two triangles, which changes the shape of patches that are not planar."""
         points, indices = parameters.numbers("P"), parameters.numbers("indices")
         where = str(parameters.place)
         if indices is None and points is not None and len(points) == 12:

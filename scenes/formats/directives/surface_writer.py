@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene as lines of directives: what PBRT and LuxRender share.
+"""Textures and materials of the canonical scene as directives, as far as PBRT and LuxRender share them.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
 """
@@ -32,12 +32,12 @@ Pair = tuple[float, float]
 
 @dataclass
 class SurfaceWriter:
-    """Lines of a scene, as they are made, and the names of what they define.
+    """Collects the lines of a scene, and the names that they define.
 
     Attributes:
-        color_texture: type of the textures that hold colours.
-        color: type of the parameters that hold colours.
-        checkerboard_end: parameters of every checkerboard.
+        color_texture: type of colour textures.
+        color: type of colour parameters.
+        checkerboard_end: additional parameters of every checkerboard.
     """
 
     color_texture: ClassVar[str]
@@ -55,11 +55,11 @@ class SurfaceWriter:
     # --- textures ------------------------------------------------------------------------------------------------
 
     def texture(self, texture: Texture, name: str, kind: Kind = "color") -> str:
-        """A parameter of a material or texture; its texture is written before.
+        """A parameter of a material or texture; its texture is written first.
 
         Args:
-            texture: what to write.
-            name: of the parameter.
+            texture: texture to write.
+            name: name of the parameter.
             kind: whether its values are colours or numbers.
         """
         if isinstance(texture, ConstantTexture):
@@ -73,7 +73,7 @@ class SurfaceWriter:
         return f'"texture {name}" [ "{self._textures[key][1]}" ]'
 
     def constant(self, name: str, value: Rgb, kind: Kind = "color") -> str:
-        """A colour, or its mean as a number."""
+        """A parameter with a constant colour, or with its mean as a number."""
         if kind == "float":
             return f'"float {name}" [ {number(sum(value) / 3.0)} ]'
         return f'"{self.color} {name}" {listed(value)}'
@@ -92,11 +92,11 @@ class SurfaceWriter:
         return f'"scale" {parts}'
 
     def image_line(self, texture: ImageTexture) -> str:
-        """The texture of a picture, by the rules of the dialect."""
+        """The directive of an image texture, by the rules of the dialect."""
         raise NotImplementedError
 
     def placed_image(self, file: str, texture: ImageTexture, more: str, scale: Pair, offset: Pair) -> str:
-        """The texture of a picture; ``more`` holds the parameters that the dialect alone has."""
+        """The directive of an image texture; ``more`` holds the parameters that are specific to the dialect."""
         return (
             f'"imagemap" "string filename" [ "{file}" ] "string wrap" [ "{texture.wrap}" ] {more}'
             f'"float uscale" [ {number(scale[0])} ] "float vscale" [ {number(scale[1])} ] '
@@ -106,8 +106,8 @@ class SurfaceWriter:
     # --- materials -----------------------------------------------------------------------------------------------
 
     def label(self, prefix: str, wanted: str = "") -> str:
-        """A name that nothing has yet: the wanted one where it is free and can be written."""
-        label, count = wanted or f"{prefix}1", self._counts.get(prefix, 1)  # lower ones are taken
+        """An unused name: the wanted one if it is free and can be written."""
+        label, count = wanted or f"{prefix}1", self._counts.get(prefix, 1)  # lower numbers are taken
         while label in self._taken or '"' in label or "\\" in label or "\n" in label:
             count += 1
             label = f"{prefix}{count}"
@@ -116,7 +116,7 @@ class SurfaceWriter:
         return label
 
     def material(self, material: Material, name: str = "") -> str:
-        """Name of a material, which is written before where it is new."""
+        """The name of a material; a new one is written first."""
         if id(material) not in self._materials:
             made = self.material_line(material, name or type(material).__name__)
             self.define(material, self.label("m", name), made)
@@ -128,7 +128,7 @@ class SurfaceWriter:
         self.lines.append(f'\tMakeNamedMaterial "{label}" {line}')
 
     def material_line(self, material: Material, name: str) -> str:
-        """What a material is, without its name; a dialect adds what it writes otherwise."""
+        """The definition of a material without its name; dialects override it for their own materials."""
         where = f"material {name!r}"
         if isinstance(material, HeightField):
             self.report.add(where, "a height field", "its material, flat")
@@ -137,7 +137,7 @@ class SurfaceWriter:
         return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
 
     def plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
-        """Kind and parameters of a material that holds no other one."""
+        """Kind and parameters of a material that contains no other material."""
         if isinstance(material, Matte):
             sigma = [f'"float sigma" [ {number(material.sigma_deg)} ]'] if material.sigma_deg else []
             return "matte", [self.texture(material.reflectance, "Kd"), *sigma]
@@ -150,12 +150,12 @@ class SurfaceWriter:
 
 
 def mixture_line(first: str, second: str, amount: str) -> str:
-    """A mixture of two materials by name."""
+    """The definition of a mixture of two materials, given by name."""
     return (
         f'"string type" [ "mix" ] "string namedmaterial1" [ "{first}" ] "string namedmaterial2" [ "{second}" ] {amount}'
     )
 
 
 def roughness_pair(alphas: Pair) -> str:
-    """Roughness along both directions of a surface."""
+    """Parameters of the roughness along both directions of a surface."""
     return f'"float uroughness" [ {number(alphas[0])} ] "float vroughness" [ {number(alphas[1])} ]'

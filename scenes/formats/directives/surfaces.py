@@ -1,4 +1,4 @@
-"""Materials of files of directives, into those of the canonical scene.
+"""Materials of directive files, converted to the canonical scene.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on materials.
 """
@@ -16,18 +16,18 @@ Maker = Callable[[Parameters], Material]
 
 
 class Surfaces(TextureReader):
-    """Makes textures and materials of parameters; a dialect adds its kinds of materials."""
+    """Creates textures and materials from parameters; a dialect adds its kinds of materials."""
 
     def makers(self) -> dict[str, Maker]:
-        """What makes the materials of each kind."""
+        """Functions that create the materials of each kind."""
         raise NotImplementedError
 
     def base_colors(self) -> dict[str, str]:
-        """Kinds of materials that become matte, and the parameters that hold their base colours."""
+        """Kinds of materials that become matte, with the parameters of their base colours."""
         raise NotImplementedError
 
     def material(self, kind: str, parameters: Parameters) -> Material:
-        """The material of a kind, bumped where it has a bump map; a kind that is not known is reported."""
+        """The material of a kind, with its bump map, if there is one; unknown kinds are reported."""
         made = self._plain(kind, parameters)
         if parameters.types.get("bumpmap") == "texture":
             return Bumped(made, self.texture(parameters, "bumpmap", grey(0.0), "float"))
@@ -52,12 +52,12 @@ class Surfaces(TextureReader):
         return Matte(self.texture(parameters, "Kd", grey(0.5)), self.scalar(parameters, "sigma", 0.0))
 
     def mixed(self, parameters: Parameters) -> list[Material]:
-        """The two materials that a mixture names."""
+        """The two materials of a mixture."""
         names = ("namedmaterial1", "namedmaterial2")
         return [self.named(parameters.text(name, ""), str(parameters.place)) for name in names]
 
     def named(self, name: str, where: str) -> Material:
-        """The material of a name; one that nothing defines is grey, which is reported."""
+        """The material of a name; an undefined one is grey, which is reported."""
         if name not in self.names.materials:
             self.report.add(where, f"material {name!r}, which nothing defines", "grey, matte")
             return Matte(ConstantTexture(grey(0.5)))

@@ -1,6 +1,6 @@
 """The syntax of PBRT and LuxRender files: directives with values and typed parameters.
 
-A list of numbers is one token, so that a file of millions of vertices takes no longer than its numbers do.
+A list of numbers is one token, so that the time to read millions of vertices is that of converting the numbers.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); LuxRender 1.x scene files use the same syntax.
 """
@@ -39,17 +39,18 @@ COMMENT: /#[^\n]*/
 %ignore COMMENT
 """
 
-_PIECE = 1 << 20  # characters of a list of numbers that are read at a time
+_PIECE = 1 << 20  # characters of a list of numbers that are converted at a time
 
 Values = NDArray[np.float64] | tuple[str, ...]
 
 Opener = Callable[[str, Place, tuple[Path, ...]], tuple[str, Path]]
-"""Text and path of an included file: its name, where it is named, and the files that are open, the innermost last."""
+"""``(name, place, open files) -> (text, path)`` of an included file; ``place`` is where it is named, and the innermost
+open file is the last."""
 
 
 @lru_cache(maxsize=1)
 def _lexer() -> lark.Lark:
-    """A lexer alone: a directive is a name and all values up to the next name."""
+    """The lexer. No parser is needed: a directive is a name and all values up to the next name."""
     import lark
 
     return lark.Lark(_GRAMMAR, parser=None, lexer="basic")
@@ -57,7 +58,7 @@ def _lexer() -> lark.Lark:
 
 @dataclass(frozen=True)
 class Directive:
-    """A directive: its name, its strings and numbers in their order, and the file that it begins in."""
+    """A directive: its name, its strings and numbers in order, and the file in which it begins."""
 
     name: str
     values: tuple[Values, ...]
@@ -67,12 +68,12 @@ class Directive:
 
 @dataclass
 class Parameters:
-    """Typed parameters of a directive. Those that nothing asked for can be listed.
+    """Typed parameters of a directive. Unused parameters can be listed.
 
     Attributes:
-        place: of the directive.
-        given: values by name.
-        types: the type that each was given with.
+        place: place of the directive.
+        given: values of the parameters by name.
+        types: declared types of the parameters by name.
     """
 
     place: Place
@@ -84,10 +85,10 @@ class Parameters:
         return name in self.given
 
     def numbers(self, name: str, count: int | None = None) -> NDArray[np.float64] | None:
-        """Numbers of a parameter, or None where it is not given.
+        """Numbers of a parameter, or None if it is not given.
 
         Raises:
-            SceneError: it holds strings, or another count of numbers than the given one.
+            SceneError: it holds strings, or a different count of numbers than ``count``.
         """
         self.asked.add(name)
         if name not in self.given:
@@ -103,16 +104,16 @@ class Parameters:
         """A single number.
 
         Raises:
-            SceneError: there are several.
+            SceneError: there are several numbers.
         """
         found = self.numbers(name, 1)
         return default if found is None else float(found[0])
 
     def whole(self, name: str, default: int, least: int, most: int) -> int:
-        """A whole number from ``least`` to ``most``.
+        """An integer from ``least`` to ``most``.
 
         Raises:
-            SceneError: it is another number.
+            SceneError: it is not such an integer.
         """
         value = self.number(name, default)
         if value != int(value) or not least <= value <= most:
@@ -137,7 +138,7 @@ class Parameters:
         """True or false, quoted or not.
 
         Raises:
-            SceneError: it is another word.
+            SceneError: it is a different word.
         """
         value = self.text(name, str(default).lower())
         if value not in ("true", "false"):
@@ -145,17 +146,17 @@ class Parameters:
         return value == "true"
 
     def unasked(self) -> list[str]:
-        """Names of the parameters that nothing asked for."""
+        """Names of the unused parameters."""
         return [name for name in self.given if name not in self.asked]
 
 
 def parse_directives(text: str, file: Path, opener: Opener) -> Iterator[Directive]:
-    """Directives of a text and of what it includes.
+    """Directives of a text and of its includes.
 
-    An included text stands in the place of ``Include``, so that parameters behind it belong to its last directive.
+    An included text replaces ``Include``, so parameters after it belong to its last directive.
 
     Raises:
-        SceneError: the text is not one of directives; the message has file, line and column.
+        SceneError: the text does not consist of directives; the message gives file, line and column.
     """
     head, begun, values = None, file, []
     for token, within in _spliced(text, (file,), opener):
@@ -173,7 +174,7 @@ def parse_directives(text: str, file: Path, opener: Opener) -> Iterator[Directiv
 
 
 def _spliced(text: str, inside: tuple[Path, ...], opener: Opener) -> Iterator[tuple[Any, Path]]:
-    """Tokens of a text and of what it includes, each with the file that it is in."""
+    """Tokens of a text and of its includes, each with its file."""
     file = inside[-1]
     tokens = _tokens(text, file.name)
     for token in tokens:
@@ -219,7 +220,7 @@ def _values(token: Any, file: str) -> Values:
         body = "[" + "\n".join(line.split("#")[0] for line in body[1:-1].splitlines()) + "]"
     start, end = (0, len(body)) if token.type == "NUMBER" else (1, len(body) - 1)
     parts = []
-    while start < end:  # piece by piece: the numbers of a large mesh are not copied as text
+    while start < end:  # in pieces, so that the numbers of a large mesh are not copied as text
         cut = start + _PIECE
         while cut < end and body[cut] not in " \t\r\n,":
             cut += 1
@@ -254,7 +255,7 @@ def _unquoted(token: Any) -> str:
 
 
 def parameters_of(directive: Directive, skip: int) -> Parameters:
-    """Parameters of a directive behind its first ``skip`` values: pairs of ``"type name"`` and values.
+    """Parameters of a directive after its first ``skip`` values: pairs of ``"type name"`` and values.
 
     Raises:
         SceneError: a declaration is malformed, or has no value.

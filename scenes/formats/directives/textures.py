@@ -1,4 +1,4 @@
-"""Colours and textures of files of directives, into those of the canonical scene.
+"""Colours and textures of directive files, converted to the canonical scene.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on textures.
 """
@@ -33,12 +33,12 @@ Pair = tuple[float, float]
 
 @dataclass
 class TextureReader:
-    """Makes textures of parameters.
+    """Creates textures from parameters.
 
     Attributes:
-        files: for images.
-        report: of what could not be kept.
-        names: of textures and materials; filled by the reader.
+        files: source of image files.
+        report: receives the losses.
+        names: names of textures and materials, defined by the reader.
     """
 
     files: SceneFiles
@@ -46,10 +46,10 @@ class TextureReader:
     names: Names
 
     def color(self, parameters: Parameters, name: str, default: Rgb) -> Rgb:
-        """A colour, given in any of the ways of the format.
+        """A colour, in any of the representations of the format.
 
         Raises:
-            SceneError: it cannot be read.
+            SceneError: the colour cannot be read.
         """
         if name not in parameters:
             parameters.asked.add(name)
@@ -94,7 +94,7 @@ class TextureReader:
         return sampled_rgb(values[:, 0], values[:, 1])
 
     def texture(self, parameters: Parameters, name: str, default: Rgb, of: Of = "color") -> Texture:
-        """A texture by name, of colours or of numbers, or a constant."""
+        """A colour or float texture, by name, or a constant."""
         if parameters.types.get(name) != "texture":
             return ConstantTexture(self.color(parameters, name, default))
         found = self.names.textures(of).get(parameters.text(name, ""))
@@ -105,7 +105,7 @@ class TextureReader:
         return found
 
     def scalar(self, parameters: Parameters, name: str, default: float) -> float:
-        """A number; a texture that is not everywhere alike becomes its mean, which is reported."""
+        """A number; a texture that is not constant becomes its mean, which is reported."""
         if parameters.types.get(name) != "texture":
             return parameters.number(name, default)
         found = self.texture(parameters, name, grey(default), "float")
@@ -115,7 +115,7 @@ class TextureReader:
         return value
 
     def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
-        """The texture that a ``Texture`` directive makes, of colours or of numbers."""
+        """The texture that a ``Texture`` directive defines, of colours or floats."""
         where = str(parameters.place)
         if kind == "constant":
             return self.texture(parameters, "value", (1.0, 1.0, 1.0), of)
@@ -149,11 +149,11 @@ class TextureReader:
         return ConstantTexture((0.5, 0.5, 0.5))
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
-        """The texture of a picture, by the rules of the dialect."""
+        """The texture of an image, by the rules of the dialect."""
         raise NotImplementedError
 
     def image_path(self, parameters: Parameters) -> tuple[Path | None, str]:
-        """The file of a picture, None where it is missing, and what lies beyond its edges."""
+        """The file of an image, None if it is missing, and the extension of the image beyond its edges."""
         where, name = str(parameters.place), parameters.text("filename", "")
         path = self.files.known(name, where, self.report, f"the picture {name!r}", "the constant 0.5")
         if path is None:

@@ -1,7 +1,7 @@
-"""The window of a camera of directives, which is stretched over the picture.
+"""The screen window of a camera in directive files, which is stretched over the picture.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on cameras; ``camera.cpp`` of PBRT v3, whose
-transform from the picture to the window scales each axis by itself.
+transform from the picture to the window scales each axis separately.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 from scenes.formats.losses import LossReport
 
-_ROUNDED = 3e-3  # relative error of aspects that count as those of the picture: 1.33 of 4 / 3 is 0.0025 off
+_ROUNDED = 3e-3  # relative tolerance of the aspect: 1.33 deviates from 4 / 3 by 0.0025
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class Window:
     """A window in the plane at distance one.
 
     Attributes:
-        where: place of the camera in its file.
-        sides: width and height, positive; None for those of the picture, the shorter one 2.
-        mirror: ``(4, 4)``, turns what runs from right to left or from top to bottom.
-        middle: in units of the window, along its own directions.
+        where: place of the camera in its file, for messages.
+        sides: width and height, positive; None for those of the picture, with a shorter side of 2.
+        mirror: ``(4, 4)``, reflects axes that run from right to left or from top to bottom.
+        middle: centre in units of the window, along its own directions.
     """
 
     where: str
@@ -45,7 +45,7 @@ class Window:
 
     @property
     def shift(self) -> Pair:
-        """The middle in widths and heights of the picture."""
+        """The centre in widths and heights of the picture."""
         sides = self.sides or (1.0, 1.0)
         return self.middle[0] / sides[0], self.middle[1] / sides[1]
 
@@ -54,7 +54,7 @@ def window_of(parameters: Parameters, where: str) -> Window:
     """The window of a camera.
 
     Raises:
-        SceneError: it has no width or no height.
+        SceneError: its width or height is zero.
     """
     window = parameters.numbers("screenwindow", 4)
     if window is None:
@@ -69,16 +69,16 @@ def window_of(parameters: Parameters, where: str) -> Window:
 
 
 def fitted(camera: Camera, window: Window, film: Film, report: LossReport) -> Camera:
-    """The camera of a window whose aspect may differ from the picture's: PBRT stretches what it sees.
+    """The camera of a window whose aspect may differ from the picture's, over which PBRT stretches it.
 
-    A parallel picture is stretched by the placing of its camera. A perspective one keeps the window's side along the
-    shorter side of the picture and takes the other from the picture's aspect, which is reported.
+    A parallel projection is stretched by the transform of its camera. A perspective one keeps the window's side along
+    the shorter side of the picture and takes the other from the picture's aspect, which is reported.
 
     Args:
-        camera: for a window of the aspect of the picture, whose shorter side counts.
-        window: of the camera.
-        film: of the picture.
-        report: gets what is lost.
+        camera: camera for a window with the aspect of the picture and the same shorter side.
+        window: window of the camera.
+        film: film of the picture.
+        report: receives the losses.
     """
     if window.sides is None or not isinstance(camera, PerspectiveCamera | OrthographicCamera):
         return camera

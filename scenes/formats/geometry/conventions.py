@@ -1,4 +1,4 @@
-"""Conventions that several formats share, and how they relate to those of the canonical scene."""
+"""Conventions that several formats share, and their relation to those of the canonical scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FAR = 1e6
 """Focal distance of a camera whose file gives none, scene units."""
 
 MAP_AXES = np.array([[0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-"""From the canonical axes of environment maps to those of PBRT and LuxRender: ``p = (-z, x, y)``."""
+"""Transform from the canonical axes of environment maps to those of PBRT and LuxRender: ``p = (-z, x, y)``."""
 
 
 def aspect_of(film: Film) -> tuple[float, float]:
@@ -23,7 +23,7 @@ def aspect_of(film: Film) -> tuple[float, float]:
 
 
 def duration_s(camera: Camera, instances: Sequence[Instance]) -> float:
-    """When the last motion ends, seconds; 0 where nothing moves."""
+    """End of the last motion, seconds; 0 if nothing moves."""
     tracks = [getattr(camera, "track", None), *(instance.track for instance in instances)]
     return max((track_times(track)[-1] for track in tracks if track is not None), default=0.0)
 
@@ -31,8 +31,8 @@ def duration_s(camera: Camera, instances: Sequence[Instance]) -> float:
 def first_row_below(
     scale: tuple[float, float], offset: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Scale and offset of texture coordinates where the first row of an image is at ``v = 0`` in place of ``v = 1``.
+    """Scale and offset of texture coordinates for images whose first row is at ``v = 0`` instead of ``v = 1``.
 
-    LuxRender and Mitsuba have it there. The function is its own inverse.
+    That is the convention of LuxRender and Mitsuba. The function is its own inverse.
     """
     return (scale[0], -scale[1]), (offset[0], 1.0 - offset[1])

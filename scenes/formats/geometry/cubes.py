@@ -1,4 +1,4 @@
-"""Meshes that are a cube under a transform."""
+"""Recognition of meshes that are a transformed cube."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from scenes.canonical.values import Matrix
 from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.orientation import area_normals
 
-_CLOSE = 1e-4  # of a side; files print six digits
+_CLOSE = 1e-4  # relative to a side; files print six digits
 
 
 def recognised_cube(mesh: Mesh) -> Matrix | None:
-    """The transform that makes a cube of a mesh of twelve triangles, None where it is none."""
+    """The transform from the cube to a mesh of twelve triangles; None if the mesh is not a cube."""
     points = mesh.vertices.astype(np.float64)
     if not 8 <= len(points) <= 36:
         return None
@@ -41,7 +41,7 @@ def recognised_cube(mesh: Mesh) -> Matrix | None:
         if mesh.uvs is None or np.abs(np.array(wanted) - mesh.uvs[mesh.faces.ravel()]).max() < _CLOSE:
             axes = box[:3, :3] @ turn
             relative = np.round(axes / np.abs(axes).max(), 4)
-            # of those that look alike always the same one: the least turned
+            # among equivalent transforms always the same one: that of least rotation
             rank = round(float(np.trace(relative)), 3), *relative.ravel()
             if best is None or rank > best[0]:
                 best = rank, axes
@@ -52,7 +52,7 @@ def recognised_cube(mesh: Mesh) -> Matrix | None:
 
 
 def _box(points: np.ndarray) -> Matrix | None:
-    """Centre and half edges of a parallelepiped's corners, right-handed; None where they make none."""
+    """Centre and right-handed half edges of a parallelepiped with these corners; None if they do not form one."""
     size = float(np.abs(points - points.mean(axis=0)).max())
     corners: list[np.ndarray] = []
     for point in points:
@@ -77,7 +77,7 @@ def _box(points: np.ndarray) -> Matrix | None:
 
 
 def _sides(mesh: Mesh, signs: np.ndarray) -> np.ndarray | None:
-    """The side that each of twelve triangles lies on, outward; None where they do not cover a cube's six."""
+    """The outward side on which each of twelve triangles lies; None if they do not cover the six sides of a cube."""
     corners = signs[mesh.faces]
     even = (corners == corners[:, :1]).all(axis=1)
     if (even.sum(axis=1) != 1).any():
@@ -86,7 +86,8 @@ def _sides(mesh: Mesh, signs: np.ndarray) -> np.ndarray | None:
     outward = area_normals(corners)
     if ((outward * sides).sum(axis=1) <= 0).any():
         return None
-    # what two triangles of a side lack are opposite corners: a triangle's sum is its middle corner and the side twice
+    # the missing corners of a side's two triangles are opposite: a triangle's sum is its middle corner and twice the
+    # side
     middles = corners.sum(axis=1) - 2 * sides
     for side in np.concatenate([np.eye(3, dtype=int), -np.eye(3, dtype=int)]):
         on = middles[(sides == side).all(axis=1)]
@@ -103,7 +104,7 @@ def _sides(mesh: Mesh, signs: np.ndarray) -> np.ndarray | None:
 
 @lru_cache(maxsize=1)
 def _cube_uvs() -> dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[float, ...]]:
-    """Texture coordinates of the cube by side and corner."""
+    """Texture coordinates of the cube, by side and corner."""
     mesh = as_mesh(Cube())
     assert mesh.uvs is not None and mesh.normals is not None
     sides, corners = (part.round().astype(int).tolist() for part in (mesh.normals, mesh.vertices))

@@ -1,4 +1,4 @@
-"""OBJ and Mitsuba's serialized meshes, from their content alone: no material library, no other file is read.
+"""OBJ and Mitsuba's serialized meshes, read from their content only: no material library or other file is read.
 
 Source: Mitsuba 0.5 documentation, section on the serialized shape; OBJ by the mesh library.
 """
@@ -22,10 +22,10 @@ _BYTES_MAX = 2 << 30
 
 
 def read_obj(content: bytes, name: str) -> Mesh:
-    """An OBJ file as one mesh; smooth normals where it has none, as Mitsuba makes them.
+    """An OBJ file as one mesh; without normals it gets smooth ones, as in Mitsuba.
 
     Raises:
-        SceneError: it cannot be read, or has no faces.
+        SceneError: the file cannot be read, or has no faces.
     """
     import trimesh  # slow
 
@@ -35,7 +35,7 @@ def read_obj(content: bytes, name: str) -> Mesh:
         uvs = getattr(mesh.visual, "uv", None)
         arrays = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.float64)
         normals = np.array(mesh.vertex_normals, np.float64)
-    except Exception as error:  # parsers raise what they like on broken files
+    except Exception as error:  # parsers raise arbitrary exceptions on broken files
         raise SceneError(f"{name}: cannot be read as OBJ: {one_line(error)[:200]}") from None
     if not len(arrays[1]):
         raise SceneError(f"{name}: expected faces, found none")
@@ -44,17 +44,18 @@ def read_obj(content: bytes, name: str) -> Mesh:
 
 
 def obj_materials(content: bytes) -> list[str]:
-    """Names behind ``usemtl`` of an OBJ file that faces follow, in their order; empty for faces before any."""
+    """Names after ``usemtl`` in an OBJ file that are used by faces, in order; an empty name stands for faces before the
+    first."""
     return list(dict.fromkeys(name for name, is_face, _ in _obj_lines(content) if is_face))
 
 
 def obj_part(content: bytes, names: Container[str]) -> bytes:
-    """An OBJ file with those faces alone that have a material of these names."""
+    """An OBJ file reduced to the faces whose material has one of these names."""
     return b"\n".join(line for name, is_face, line in _obj_lines(content) if not is_face or name in names)
 
 
 def _obj_lines(content: bytes) -> Iterator[tuple[str, bool, bytes]]:
-    """Lines with the material that they stand under, and whether they are faces."""
+    """Lines with their current material, and whether they are faces."""
     name = ""
     for line in content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
         words = line.split(maxsplit=1)
@@ -68,7 +69,7 @@ def read_serialized(content: bytes, index: int, name: str) -> Mesh:
     """One mesh of a serialized file.
 
     Raises:
-        SceneError: it is no such file, or not what its header says.
+        SceneError: it is not such a file, or does not match its header.
     """
     if len(content) < 8 or struct.unpack_from("<H", content)[0] != _MAGIC:
         raise SceneError(f"{name}: expected a serialized mesh")

@@ -1,8 +1,8 @@
-"""The canonical shapes as meshes, and when it matters how textures lie on them.
+"""The canonical shapes as meshes, and whether texture coordinates affect a material.
 
-Renderers agree on the texture coordinates of rectangles only. On spheres Mitsuba's ``v`` runs from +z to -z and PBRT's
-from -z to +z, as in the canonical scene; on disks and cubes all have coordinates of their own (measured with Mitsuba
-3.9). Where a material depends on them, such a shape goes from one to the other as a mesh.
+Renderers agree only on the texture coordinates of rectangles. On spheres Mitsuba's ``v`` runs from +z to -z and PBRT's
+from -z to +z, as in the canonical scene; on disks and cubes all renderers differ (measured with Mitsuba 3.9). If a
+material depends on the coordinates, such a shape is converted as a mesh.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ SQUARE_UV = 0.5 * SQUARE[:, :2] + 0.5
 
 
 def depends_on_uv(part: Material | Texture) -> bool:
-    """Whether a material looks different with other texture coordinates.
+    """Whether the appearance of a material depends on texture coordinates.
 
-    A texture makes it so, and so does a roughness that differs between the two directions of the surface.
+    It does if it has a texture, or a roughness that differs between the two directions of the surface.
     """
     return once_a_node(_depends, part)
 
@@ -75,7 +75,7 @@ def mitsuba_cube() -> Mesh:
 
 @lru_cache(maxsize=1)
 def mitsuba_disk() -> Mesh:
-    """The disk with Mitsuba's texture coordinates: from the middle outwards, and round."""
+    """The disk with Mitsuba's texture coordinates: u is the radius, v the angle."""
     mesh = as_mesh(Disk())
     assert mesh.uvs is not None
     uvs = np.stack([1.0 - mesh.uvs[:, 1], mesh.uvs[:, 0]], axis=1)
@@ -83,20 +83,20 @@ def mitsuba_disk() -> Mesh:
 
 
 def turned_over(instance: Instance) -> Instance:
-    """The instance with its inside out; a rectangle that has no texture stays one, turned about its y axis."""
+    """The instance with its inside out; a rectangle without texture stays a rectangle, rotated about its y axis."""
     if isinstance(instance.shape, Rectangle) and not depends_on_uv(instance.material):
         return dataclasses.replace(instance, to_world=product(instance.to_world, np.diag([-1.0, 1.0, -1.0, 1.0])))
     return dataclasses.replace(instance, shape=turned(as_mesh(instance.shape)))
 
 
 def as_mesh(shape: Shape) -> Mesh:
-    """A shape as triangles: exact for rectangle and cube, fine for sphere and disk."""
+    """A shape as triangles: exact for rectangle and cube, approximate for sphere and disk."""
     return shape if isinstance(shape, Mesh) else _meshed(shape)
 
 
 @lru_cache(maxsize=256)
 def _meshed(shape: Rectangle | Cube | Disk | Sphere) -> Mesh:
-    """One mesh for all shapes of a size, so that it is written once."""
+    """The shared mesh for all equal shapes, so that it is written once."""
     if isinstance(shape, Rectangle):
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
         normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))

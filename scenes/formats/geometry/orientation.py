@@ -1,4 +1,4 @@
-"""Which side of a mesh is its outside."""
+"""The orientation of meshes: which side is outside."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from scenes.arithmetic import product
 from scenes.canonical import Cube, Mesh, Shape, Sphere
 
 FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
-"""Mirrors z; a sphere stays, and its texture coordinate ``v`` is reversed."""
+"""Reflection in z, which leaves a sphere unchanged and reverses its texture coordinate ``v``."""
 
 
 def area_normals(corners: np.ndarray) -> np.ndarray:
-    """Vectors along the outward normals of triangles ``(n, 3, 3)``, as long as twice their areas, ``(n, 3)``."""
+    """Vectors ``(n, 3)`` along the outward normals of triangles ``(n, 3, 3)``, of twice their areas in length."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
@@ -26,7 +26,7 @@ def turned(mesh: Mesh) -> Mesh:
 
 @lru_cache(maxsize=64)
 def is_closed(shape: Shape) -> bool:
-    """Whether a shape has an inside that its faces turn their backs to, which are not seen from without."""
+    """Whether a shape is closed, so that the backs of its faces are not visible from outside."""
     if not isinstance(shape, Mesh):
         return isinstance(shape, Sphere | Cube)
     points, corner = np.unique(shape.vertices, axis=0, return_inverse=True)
@@ -39,7 +39,7 @@ def is_closed(shape: Shape) -> bool:
 
 
 def facing_normals(mesh: Mesh) -> Mesh:
-    """The mesh with every face counter-clockwise as seen from where its normals point."""
+    """The mesh with every face counter-clockwise as seen from the side of its normals."""
     if mesh.normals is None:
         return mesh
     corners = mesh.vertices[mesh.faces].astype(np.float64)
@@ -51,7 +51,7 @@ def facing_normals(mesh: Mesh) -> Mesh:
 
 
 def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
-    """A mesh and its transform; where the transform mirrors, the mesh is mirrored in its stead."""
+    """A mesh and its transform; if the transform is a reflection, the mesh is reflected instead."""
     if np.linalg.det(matrix[:3, :3]) > 0.0:
         return mesh, matrix
     away = np.array([1.0, 1.0, -1.0], np.float32)

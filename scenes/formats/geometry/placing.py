@@ -1,4 +1,4 @@
-"""Which shapes are written once and placed often, and the keys of motions: what all writers ask."""
+"""Shared functions of the writers: shapes that are written once and placed several times, and the keys of motions."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ PartKey = tuple[int, int, bool]
 
 
 def part_key(instance: Instance) -> PartKey:
-    """Equal for instances of one shape and one material with as many sides."""
+    """A key that is equal for instances of the same shape and material with equal sidedness."""
     return id(instance.shape), id(instance.material), instance.one_sided
 
 
 def shared_parts(scene: Scene) -> frozenset[PartKey]:
-    """Meshes that several instances place and that do not shine; lamps cannot be placed as objects."""
+    """Meshes that several instances use and that do not emit; lamps cannot be instances of objects."""
     counts = Counter(part_key(one) for one in scene.instances if isinstance(one.shape, Mesh) and not shines(one))
     return frozenset(key for key, count in counts.items() if count > 1)
 
 
 def lose_back(instance: Instance, report: LossReport) -> None:
-    """Reports a black back, where it can be seen: that of a closed shape lies inside."""
+    """Reports a black back if it is visible; that of a closed shape is not."""
     if instance.one_sided and not is_closed(instance.shape):
         report.add(instance.name or "shape", "a surface with a black back", "the same on both sides")
 
@@ -38,7 +38,7 @@ def shines(instance: Instance) -> bool:
 
 
 def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
-    """Radiance of the front of a lamp, or None for other shapes; a lamp that shines on both sides is reported."""
+    """Radiance of the front of a lamp, or None for other shapes; a lamp that emits on both sides is reported."""
     if isinstance(instance.material, Emissive):
         report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
         return instance.material.radiance
@@ -46,7 +46,7 @@ def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
 
 
 def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix], list[float]]:
-    """Poses at the keys of a motion and their times, seconds; one pose at time zero where nothing moves."""
+    """Poses at the keys of a motion and their times, seconds; one pose at time zero without motion."""
     if track is None or len(track.translation) == 1:
         return [placed(track, to_world)], [0.0]
     times_s = track_times(track)
@@ -54,11 +54,11 @@ def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix
 
 
 def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:
-    """Where something is at the first key of its motion."""
+    """The transform at the first key of a motion."""
     return to_world if track is None else product(pose_at(track, track.start_s), to_world)
 
 
 def tracks_of(scene: Scene) -> list[RigidTrack]:
-    """All motions of a scene, the camera's first."""
+    """All motions of a scene, beginning with the camera's."""
     found = [getattr(scene.camera, "track", None), *(one.track for one in scene.instances)]
     return [track for track in found if track is not None and len(track.translation) > 1]

@@ -1,7 +1,7 @@
-"""PLY meshes, read from files that are not trusted.
+"""Reader of PLY meshes from untrusted files.
 
-The mesh library also reads PLY, but it allocates what a header claims and makes normals where a file has none. Here
-counts are first compared with the length of the file, and a mesh without normals stays without them.
+The mesh library also reads PLY, but it allocates memory by the header's counts and adds normals if a file has none.
+Here counts are first compared with the length of the file, and no normals are added.
 
 Source: G. Turk, "The PLY Polygon File Format" (1994).
 """
@@ -34,20 +34,20 @@ _CORNERS_MAX = 64
 class _Element:
     name: str
     count: int
-    properties: tuple[tuple[str, str, str], ...]  # name, type, type of the count where it is a list
+    properties: tuple[tuple[str, str, str], ...]  # name, type, and type of the count for lists
 
 
 def read_ply(content: bytes, name: str) -> Mesh:
     """The mesh of a file's content; polygons are fans of triangles.
 
     Raises:
-        SceneError: it is no PLY file, or not what its header says.
+        SceneError: it is not a PLY file, or does not match its header.
     """
     return read_coloured_ply(content, name)[0]
 
 
 def read_coloured_ply(content: bytes, name: str) -> tuple[Mesh, NDArray[np.uint8] | None]:
-    """As :func:`read_ply`, with the colours ``(v, 3)`` of the vertices, eight bits a channel, where it has any."""
+    """Like :func:`read_ply`, with the colours ``(v, 3)`` of the vertices, eight bits per channel, if there are any."""
     tables = _tables(content, name)
     vertex, colors = tables.get("vertex", {}), None
     for names in _COLOURS:
@@ -60,7 +60,7 @@ def read_coloured_ply(content: bytes, name: str) -> tuple[Mesh, NDArray[np.uint8
 
 
 def _tables(content: bytes, name: str) -> dict[str, dict[str, NDArray]]:
-    """Columns of each element by name; those of the faces are their corners."""
+    """Columns of each element by name; for faces, their corners."""
     order, elements, body = _header(content, name)
     numbers = _numbers(body, name) if order == "" else None
     tables: dict[str, dict[str, NDArray]] = {}
@@ -113,7 +113,7 @@ def _with(element: _Element, added: tuple[str, str, str]) -> _Element:
 def _ascii_columns(
     numbers: NDArray[np.float64], at: int, element: _Element, name: str
 ) -> tuple[dict[str, NDArray], int]:
-    """Columns of an element without lists, and where the next begins."""
+    """Columns of an element without lists, and the start of the next element."""
     width = len(element.properties)
     end = at + element.count * width
     _enough(len(numbers), end, element, name)
@@ -124,7 +124,7 @@ def _ascii_columns(
 def _binary_columns(
     body: memoryview, at: int, element: _Element, order: str, name: str
 ) -> tuple[dict[str, NDArray], int]:
-    """The same of binary rows; columns are views of the content."""
+    """The same for binary rows; columns are views of the content."""
     row = np.dtype([(f"{column}", order + part[1]) for column, part in enumerate(element.properties)])
     end = at + element.count * row.itemsize
     _enough(len(body), end, element, name)
@@ -138,7 +138,7 @@ def _enough(there: int, wanted: int, element: _Element, name: str) -> None:
 
 
 def _numbers(body: memoryview, name: str) -> NDArray[np.float64]:
-    """All numbers of a text; raises SceneError where something else is among them."""
+    """All numbers of a text; raises SceneError if it contains anything else."""
     text = body.tobytes().strip()
     if not text:
         return np.zeros(0)
@@ -151,7 +151,7 @@ def _numbers(body: memoryview, name: str) -> NDArray[np.float64]:
 
 
 def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name: str) -> tuple[NDArray, int]:
-    """Triangles ``(n, 3)``; fast where all faces have as many corners, which is the rule."""
+    """Triangles ``(n, 3)``; fast if all faces have equally many corners, as usual."""
     lists = [part for part in element.properties if part[2]]
     wanted = next((part for part in lists if part[0].startswith("vertex_ind")), None)
     if wanted is None:
@@ -191,7 +191,7 @@ def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name
 def _ascii_faces(
     numbers: NDArray[np.float64], at: int, element: _Element, name: str
 ) -> tuple[NDArray[np.float64], int]:
-    """As :func:`_binary_faces`."""
+    """Like :func:`_binary_faces`, for text."""
     if len(element.properties) == 1 and element.count and at < len(numbers):
         corners = numbers[at]
         end = at + element.count * (int(corners) + 1) if 3 <= corners <= _CORNERS_MAX else len(numbers) + 1
@@ -214,7 +214,7 @@ def _places(
     count_at: Callable[[int, int], float],
     name: str,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-    """Where the wanted list of each face begins, how many corners it has, and where the next element begins."""
+    """Start of the wanted list of each face, its number of corners, and the start of the next element."""
     starts, counts = [], []
     for _ in range(element.count):
         for number, part in enumerate(element.properties):
@@ -236,7 +236,7 @@ def _places(
 def _triangles(
     starts: NDArray[np.int64], counts: NDArray[np.int64], polygons: Callable[[NDArray[np.int64], int], NDArray]
 ) -> NDArray:
-    """Triangles of polygons in their order, made of all that have as many corners at a time."""
+    """Triangles of polygons in their order; polygons with equally many corners are processed together."""
     order, parts = [], []
     for corners in np.unique(counts).tolist():
         here = np.flatnonzero(counts == corners)
@@ -273,7 +273,7 @@ def checked_mesh(
     """A mesh of numbers from a file.
 
     Raises:
-        SceneError: a number is not finite or too great, an index is none, or there is no face.
+        SceneError: a number is not finite or too great, an index is invalid, or there is no face.
     """
     for what, array in (("vertices", points), ("normals", normals), ("texture coordinates", uvs)):
         if array is not None and not (np.abs(array) < 1e30).all():

@@ -1,4 +1,4 @@
-"""PLY meshes, written in pieces.
+"""Writer of PLY meshes, in pieces.
 
 Source: G. Turk, "The PLY Polygon File Format" (1994).
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from scenes.canonical import Mesh
 
-_PIECE = 1 << 16  # rows that are written at a time
+_PIECE = 1 << 16  # number of rows that are written at a time
 
 
 def ply_parts(mesh: Mesh) -> Iterator[bytes | memoryview]:
@@ -23,7 +23,7 @@ def ply_parts(mesh: Mesh) -> Iterator[bytes | memoryview]:
         names += ["nx", "ny", "nz"]
     if mesh.uvs is not None:
         columns.append(mesh.uvs)
-        names += ["s", "t"]  # what LuxCore and PBRT both know
+        names += ["s", "t"]  # names that both LuxCore and PBRT accept
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
     lines += [f"property float {name}" for name in names]
     lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]

@@ -1,4 +1,4 @@
-"""Meshes that are one of the canonical shapes under a transform."""
+"""Recognition of meshes that are transformed canonical shapes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from scenes.formats.geometry.round_shapes import recognised_disk, recognised_sph
 from scenes.formats.losses import LossReport
 
 DISK_MIN, SPHERE_MIN = 32, 512
-"""Triangles of a mesh that may be a disk, or a sphere; what has fewer is meant to have corners."""
+"""Least number of triangles of a mesh that may be a disk, or a sphere; a mesh with fewer is meant to be angular."""
 
-_CLOSE = 1e-4  # of a side; files print six digits
+_CLOSE = 1e-4  # relative to a side; files print six digits
 
 
 def recognised_rectangle(mesh: Mesh) -> Matrix | None:
-    """The transform that makes a rectangle of a mesh of four corners and two triangles, None where it is none.
+    """The transform from the rectangle to a mesh of four corners and two triangles; None if the mesh is not a
+    rectangle.
 
-    Its texture coordinates, where it has any, must be those of the rectangle in some turn, and its normals even.
+    Its texture coordinates, if any, must be those of the rectangle up to a rotation, and its normals must be equal.
     """
     if mesh.vertices.shape[0] != 4 or mesh.faces.shape[0] != 2:
         return None
@@ -53,7 +54,7 @@ def recognised_rectangle(mesh: Mesh) -> Matrix | None:
 
 
 def _quad(mesh: Mesh) -> np.ndarray | None:
-    """The four corners in order round the quadrilateral that two triangles make, None where they make none."""
+    """The four corners, in order, of the quadrilateral that two triangles form; None if they do not form one."""
     first, second = (list(face) for face in mesh.faces.tolist())
     shared = [corner for corner in first if corner in second]
     if len(shared) != 2 or len(set(first) | set(second)) != 4:
@@ -69,9 +70,9 @@ def _quad(mesh: Mesh) -> np.ndarray | None:
 
 
 def recognised(mesh: Mesh) -> tuple[Shape, Matrix] | None:
-    """The canonical shape that a mesh is, and where it lies; None where it is none.
+    """The canonical shape that a mesh represents, and its transform; None if it is none.
 
-    Its texture coordinates, where it has any, must be those of the shape, and its normals too.
+    Its texture coordinates and normals, if any, must be those of the shape.
     """
     matrix = recognised_rectangle(mesh)
     if matrix is not None:
@@ -91,9 +92,9 @@ def recognised(mesh: Mesh) -> tuple[Shape, Matrix] | None:
 
 
 def shape_of(mesh: Mesh, material: Material, where: str, report: LossReport) -> tuple[Shape, Matrix]:
-    """The shape that a mesh is, and where it lies; the mesh itself where it is none. Round shapes are reported.
+    """The shape that a mesh represents, and its transform; the mesh itself if it is none. Round shapes are reported.
 
-    Its texture coordinates count only where the material depends on them.
+    Texture coordinates are compared only if the material depends on them.
     """
     textured = mesh.uvs is None or depends_on_uv(material)
     found = recognised(mesh) or (None if textured else recognised(dataclasses.replace(mesh, uvs=None)))

@@ -1,4 +1,4 @@
-"""Shapes that the canonical scene does not have, as meshes: quadrics and parts of spheres and disks."""
+"""Meshes for shapes that the canonical scene lacks: quadrics and parts of spheres and disks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scenes.canonical import Mesh
 from scenes.formats.geometry.orientation import area_normals
 
 AROUND, ALONG = 64, 16
-"""Quadrilaterals of a full turn, and along the profile where it is curved."""
+"""Number of quadrilaterals in a full turn, and along a curved profile."""
 
 Profile = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
@@ -23,10 +23,10 @@ def revolved(profile: Profile, along: int, turn_deg: float = 360.0, source: str 
 
     Args:
         profile: radius and z at parameters from 0 to 1.
-        along: quadrilaterals along it.
+        along: number of quadrilaterals along the profile.
         turn_deg: angle of the turn, from +x towards +y.
-        source: for messages.
-        full: quadrilaterals of a full turn.
+        source: name for messages.
+        full: number of quadrilaterals in a full turn.
     """
     around = max(3, math.ceil(full * turn_deg / 360.0))
     u, v = np.meshgrid(np.linspace(0.0, 1.0, around + 1), np.linspace(0.0, 1.0, along + 1))
@@ -34,7 +34,7 @@ def revolved(profile: Profile, along: int, turn_deg: float = 360.0, source: str 
     radius, z = profile(v)
     step = 1e-4
     (r0, z0), (r1, z1) = profile(np.clip(v - step, 0.0, 1.0)), profile(np.clip(v + step, 0.0, 1.0))
-    # the derivatives by u and v span the surface; their product points the way that PBRT's quadrics do
+    # the derivatives by u and v span the surface; their cross product points outwards as in PBRT's quadrics
     dr, dz = r1 - r0, z1 - z0
     normal = np.stack([dz * cos(phi), dz * sin(phi), -dr], axis=-1)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
@@ -74,7 +74,7 @@ def paraboloid(radius: float, z_min: float, z_max: float, turn_deg: float = 360.
 
 
 def hyperboloid(p1: NDArray[np.float64], p2: NDArray[np.float64], turn_deg: float = 360.0) -> Mesh:
-    """What the segment between two points sweeps."""
+    """The surface that the segment between two points sweeps."""
 
     def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         p = p1 + v[..., None] * (p2 - p1)
@@ -95,7 +95,7 @@ def partial_sphere(radius: float, z_min: float, z_max: float, turn_deg: float = 
 
 
 def lamp_sphere(radius: float) -> Mesh:
-    """A sphere of 224 triangles and of the area of the round one; LuxCore samples the light of 256 at most."""
+    """A sphere of 224 triangles with the area of the exact one; LuxCore samples the light of at most 256 triangles."""
 
     def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return sin(math.pi * v), -cos(math.pi * v)
@@ -106,7 +106,7 @@ def lamp_sphere(radius: float) -> Mesh:
 
 
 def area(mesh: Mesh, axes: NDArray[np.float64] | None = None) -> float:
-    """Area of all triangles; of the mesh under a linear map ``(3, 3)`` where one is given."""
+    """Total area of the triangles, after a linear map ``(3, 3)`` if one is given."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     placed = corners if axes is None else product(corners, axes.T)
     return 0.5 * float(np.linalg.norm(area_normals(placed), axis=1).sum())

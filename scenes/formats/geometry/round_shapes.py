@@ -1,4 +1,4 @@
-"""Meshes that are a disk or a sphere under a transform."""
+"""Recognition of meshes that are a transformed disk or sphere."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from scenes.canonical import Mesh
 from scenes.canonical.values import Matrix
 from scenes.formats.geometry.orientation import area_normals
 
-_ROUND_OFF = 1e-4  # of the size: how far off a round shape vertices may be
-_AREA_OFF = 0.02  # of the area, which triangles cut off
-_PROBE = 256  # vertices that suffice to reject a large mesh
+_ROUND_OFF = 1e-4  # tolerance of vertices on a round shape, relative to its size
+_AREA_OFF = 0.02  # tolerance of the area, which triangles reduce
+_PROBE = 256  # number of vertices that suffices to reject a large mesh
 
 
 def recognised_disk(mesh: Mesh) -> Matrix | None:
-    """The transform that makes a disk of a flat mesh with its texture coordinates, None where it is none."""
+    """The transform from the disk to a flat mesh with its texture coordinates; None if the mesh is not a disk."""
     if mesh.uvs is None:
         return None
     turn, inward = 2.0 * np.pi * mesh.uvs[:, 0].astype(np.float64), mesh.uvs[:, 1].astype(np.float64)
@@ -41,7 +41,7 @@ def recognised_disk(mesh: Mesh) -> Matrix | None:
 
 
 def recognised_sphere(mesh: Mesh) -> Matrix | None:
-    """The transform that makes a unit sphere of a closed mesh with smooth normals, None where it is none."""
+    """The transform from the unit sphere to a closed mesh with smooth normals; None if the mesh is not a sphere."""
     if mesh.normals is None:
         return None
     points = mesh.vertices.astype(np.float64)
@@ -76,9 +76,9 @@ def recognised_sphere(mesh: Mesh) -> Matrix | None:
 
 
 def _ellipsoid(points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """A symmetric matrix and a centre that take points to the unit sphere; None where they do not lie on an ellipsoid.
+    """A symmetric matrix and a centre that take points to the unit sphere; None if they do not lie on an ellipsoid.
 
-    The quadric through them by least squares: ``xᵀ A x + b·x = 1``, about their mean and scaled to their size.
+    The quadric ``xᵀ A x + b·x = 1`` is fitted by least squares, about the mean of the points and scaled to their size.
     """
     middle = points.mean(axis=0)
     size = float(np.abs(points - middle).max())
@@ -103,7 +103,7 @@ def _ellipsoid(points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _closed(mesh: Mesh, unit: np.ndarray) -> bool:
-    """Whether the triangles cover the unit sphere, but for what they cut off."""
+    """Whether the triangles cover the unit sphere, up to the area that they cut off."""
     corners = unit[mesh.faces]
     areas = 0.5 * np.linalg.norm(area_normals(corners), axis=1)
     volume = np.einsum("fx,fx->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0

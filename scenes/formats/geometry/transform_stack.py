@@ -15,25 +15,25 @@ from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.losses import LossReport
 
 KEYS_MAX = 1024
-"""Most keys of a motion."""
+"""Maximum number of keys of a motion."""
 
 _RIGID = 1e-4
 
 
 def translation(x: float, y: float, z: float) -> Matrix:
-    """A shift."""
+    """A translation."""
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
     return matrix
 
 
 def scaling(x: float, y: float, z: float) -> Matrix:
-    """A change of size along the axes."""
+    """A scaling along the axes."""
     return np.diag([x, y, z, 1.0])
 
 
 def rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
-    """A turn about an axis, counter-clockwise seen from its tip; identity for an axis of no length."""
+    """A rotation about an axis, counter-clockwise seen from its tip; the identity for a zero axis."""
     return _rotation(angle_deg, x, y, z).copy()
 
 
@@ -48,7 +48,7 @@ def _rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
 
 
 def invertible(matrix: Matrix) -> bool:
-    """Whether a transform is finite and keeps a volume."""
+    """Whether a transform is finite and invertible."""
     part = matrix[:3, :3]
     size = np.abs(part).max(initial=0.0)
     return bool(np.isfinite(matrix).all() and abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0)
@@ -57,10 +57,11 @@ def invertible(matrix: Matrix) -> bool:
 def looking(
     eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64], left_handed: bool
 ) -> Matrix | None:
-    """Camera to world of a camera that looks along +z with y up; None where the three points are on one line.
+    """The camera-to-world transform of a camera that looks along +z with y up; None if the upward direction is parallel
+    to the line of sight.
 
-    Its x axis lies to the right in a left-handed world (PBRT, where Mitsuba says that it lies to the left of a
-    right-handed one), or to the right in a right-handed world (LuxRender).
+    Its x axis points to the right in a left-handed world (PBRT; in Mitsuba's terms, to the left in a right-handed one),
+    or to the right in a right-handed world (LuxRender).
     """
     forward = target - eye
     side = np.cross(up, forward) if left_handed else np.cross(forward, up)
@@ -74,9 +75,9 @@ def looking(
 
 
 def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack | None:
-    """The track that, applied outside the first key, passes through all; None where the motion is not rigid.
+    """The track that, applied outside the first key, passes through all keys; None if the motion is not rigid.
 
-    Keys at uneven times are sampled at even ones, no further apart than the nearest two, ``KEYS_MAX`` at most.
+    Keys at non-uniform times are resampled at uniform ones, with the least interval between keys, at most ``KEYS_MAX``.
     """
     gaps = np.diff(times_s)
     if not (gaps > 0.0).all():
@@ -104,7 +105,7 @@ def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack
 
 
 def motion(keys: Sequence[Matrix], times_s: Sequence[float], where: str, report: LossReport) -> RigidTrack | None:
-    """The motion through keys, outside the first of them, or None where nothing moves; a motion that is not rigid is
+    """The motion through keys, applied outside the first of them, or None without motion; a motion that is not rigid is
     reported and becomes None."""
     if all(np.array_equal(keys[0], key) for key in keys[1:]):
         return None
@@ -120,19 +121,19 @@ def track_times(track: RigidTrack) -> list[float]:
 
 
 def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
-    """A motion as seen from outside a space that ``matrix`` places, or None where it is not rigid there."""
+    """A motion within a space placed by ``matrix``, as seen from outside; None if it is not rigid there."""
     times_s = track_times(track)
     return rigid_motion([products(matrix, pose_at(track, time_s), inverse(matrix)) for time_s in times_s], times_s)
 
 
 class TransformStack:
-    """The current transform at the keys of a motion, the saved transforms, and the named ones.
+    """The current transform at the keys of a motion, the saved transforms, and the named transforms.
 
     Attributes:
-        current: one matrix a key.
-        active: keys that transforms apply to.
-        times_s: of the keys, seconds.
-        named: coordinate systems.
+        current: one matrix per key.
+        active: keys to which transforms apply.
+        times_s: times of the keys, seconds.
+        named: coordinate systems by name.
     """
 
     def __init__(self) -> None:
@@ -147,7 +148,7 @@ class TransformStack:
         self._saved.append(([matrix.copy() for matrix in self.current], self.active, self.times_s))
 
     def pop(self) -> bool:
-        """Restores the state that was saved last; False where none is saved."""
+        """Restores the state that was saved last; False if none is saved."""
         if not self._saved:
             return False
         self.current, self.active, self.times_s = self._saved.pop()
@@ -162,13 +163,14 @@ class TransformStack:
         self.current = [product(old, matrix) if on else old for on, old in zip(self.active, self.current, strict=True)]
 
     def take(self, name: str) -> None:
-        """Sets the transform at all keys to a named one; one with another count of keys is held at its first."""
+        """Sets the transform at all keys to a named one; one with a different count of keys is replaced by its first
+        key."""
         found = self.named[name]
         same = len(found) == len(self.current)
         self.current = [part.copy() for part in (found if same else [found[0]] * len(self.current))]
 
     def retime(self, times_s: Sequence[float]) -> None:
-        """Sets other keys, all with the transform of the first."""
+        """Sets new key times, all with the transform of the first key."""
         self.current = [self.current[0].copy() for _ in times_s]
         self.active, self.times_s = (True,) * len(times_s), tuple(times_s)
 

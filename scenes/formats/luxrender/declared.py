@@ -1,4 +1,4 @@
-"""LuxRender among the formats."""
+"""Declaration of the LuxRender format."""
 
 from scenes.formats.luxrender.read import load_luxrender
 from scenes.formats.luxrender.write import save_luxrender

@@ -1,7 +1,7 @@
-"""LuxRender 1.x scenes into the canonical scene.
+"""Reader of LuxRender 1.x scenes.
 
-LuxRender shares its syntax and much of its meaning with PBRT. It differs in these: ``LookAt`` is right-handed, images
-have their first row at ``v = 0``, lights have a gain and may be given by their power, and materials have other names.
+LuxRender shares its syntax and much of its semantics with PBRT. It differs as follows: ``LookAt`` is right-handed,
+images begin at ``v = 0``, lights have a gain and may be given by their power, and materials have other names.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
 ch. 4.
@@ -50,13 +50,13 @@ _SAMPLERS = {"lowdiscrepancy": "sobol", "random": "independent", "metropolis": "
 _NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
 _MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
 SPHERE_SR = 4.0 * math.pi
-"""``L`` of LuxCore's point light over its intensity (measured: 10 gives 0.0314 from a floor of albedo 0.5 two units
-below it)."""
+"""Ratio of ``L`` of LuxCore's point light to its intensity (measured: 10 gives 0.0314 from a floor of albedo 0.5 two
+units below)."""
 
 SKY_UNIT, SUN_UNIT = 72_922.0, 66_000.0
-"""Radiance of LuxCore 2.10's sky2 and sun at a gain of 1 over that of Mitsuba 3 at a scale of 1. The sky is the same
-model, in luminous units (683 lm/W); the sun is another, and dimmer in haze. Held to 1 % and 15 % at a turbidity of 3 in
-``tests/scripts/test_conversion_check.py``."""
+"""Ratio of the radiance of LuxCore 2.10's sky2 and sun at a gain of 1 to that of Mitsuba 3 at a scale of 1. The sky
+model is the same, in luminous units (683 lm/W); the sun model differs and is dimmer in haze. Checked to 1 % and 15 % at
+a turbidity of 3 in ``tests/scripts/test_conversion_check.py``."""
 _TRANSFORMS = (
     "Identity",
     "Translate",
@@ -71,7 +71,7 @@ _LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 
 
 def cone_sr(angle_deg: float) -> float:
-    """Irradiance that a cone of radiance 1 and this full angle gives a surface facing it: ``π sin²(angle / 2)``.
+    """Irradiance on a facing surface from a cone of radiance 1 and this full angle: ``π sin²(angle / 2)``.
 
     LuxCore's distant lights with ``theta`` (half the angle, degrees) have a radiance, others an irradiance (measured).
     """
@@ -80,7 +80,7 @@ def cone_sr(angle_deg: float) -> float:
 
 @dataclass
 class LuxReader(SceneReader):
-    """State of a LuxRender file while it is read."""
+    """State of reading a LuxRender file."""
 
     left_handed: bool = False
     _halt_samples: int = 0
@@ -107,7 +107,7 @@ class LuxReader(SceneReader):
         }
 
     def _do(self, directive: Directive) -> None:
-        """Inside a motion each transform is that of the next key."""
+        """Executes a directive; inside a motion each transform belongs to the next key."""
         key = self._motion_key
         if key is None or directive.name == "MotionEnd":
             super()._do(directive)
@@ -175,14 +175,14 @@ class LuxReader(SceneReader):
         name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place, kind not in SAME_PICTURE)
         depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
         parameters.whole("lightdepth", depth, 0, 1 << 20)
-        # edges of a path, as measured with LuxCore
+        # number of edges of a path, as measured with LuxCore
         self.integrator = Integrator(name, max(depth - 1, 0))  # type: ignore[arg-type]
         self.left_over(parameters, f"integrator {kind!r}")
 
     # --- lights --------------------------------------------------------------------------------------------------
 
     def _strength(self, parameters: Parameters) -> Rgb:
-        """``L`` times the gain; a power is reported where it cannot be met."""
+        """``L`` times the gain; a power that is not supported is reported."""
         gain = parameters.number("gain", 1.0)
         if parameters.types.get("L") == "texture":
             color = self._light_texture(parameters)
@@ -272,7 +272,7 @@ class LuxReader(SceneReader):
         self.left_over(parameters, "area light")
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
-        """Keeps a shape; a lamp shines to where its faces, as they are placed, are counter-clockwise."""
+        """Keeps a shape; a lamp emits towards the side from which its placed faces are counter-clockwise."""
         if instance.emission is not None and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
             instance = turned_over(instance)
         super()._keep(instance, directive)
@@ -295,6 +295,6 @@ def load_luxrender(path: Path, root: Path | None, report: LossReport) -> Scene:
     """Reads a scene; see :data:`scenes.formats.text.format.Read`.
 
     Raises:
-        SceneError: something cannot be read; the message has file, line and column.
+        SceneError: the scene cannot be read; the message gives file, line and column.
     """
     return scene_of(LuxReader(SceneFiles(path, root), report), path)

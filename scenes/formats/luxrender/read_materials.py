@@ -1,4 +1,4 @@
-"""Textures and materials of LuxRender 1.x, into those of the canonical scene.
+"""Textures and materials of LuxRender 1.x, converted to the canonical scene.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender), sections on materials and textures.
 """
@@ -37,7 +37,7 @@ from scenes.formats.geometry.conventions import first_row_below
 
 
 class LuxSurfaces(Surfaces):
-    """Textures and materials of LuxRender."""
+    """Reader of textures and materials of LuxRender."""
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         where = str(parameters.place)
@@ -53,7 +53,7 @@ class LuxSurfaces(Surfaces):
         return ImageTexture(image, size, start, wrap, kinds[kind], str(path))  # type: ignore[arg-type]
 
     def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
-        """A texture; in LuxRender the spectra of lamps are textures too."""
+        """A texture; in LuxRender the spectra of lamps are textures as well."""
         if kind == "blackbody":
             return ConstantTexture(blackbody_rgb(min(max(parameters.number("temperature", 6500.0), 100.0), 1e6), 1.0))
         if kind == "equalenergy":
@@ -61,7 +61,7 @@ class LuxSurfaces(Surfaces):
         return super().made_texture(kind, parameters, of)
 
     def make_fresnel(self, kind: str, parameters: Parameters) -> tuple[Rgb, Rgb]:
-        """Index of refraction of a fresnel texture."""
+        """Refractive index of a fresnel texture."""
         where = str(parameters.place)
         if kind == "preset":
             name = parameters.text("name", "")
@@ -153,7 +153,7 @@ class LuxSurfaces(Surfaces):
 
 
 def lux_image(path: Path, gamma: float, gain: float, where: str) -> np.ndarray:
-    """An image by LuxRender's rule: values to the power of ``gamma``; 1 takes them as they are."""
+    """An image by LuxRender's rule: encoded values raised to ``gamma``, times ``gain``."""
     if not 0.1 <= gamma <= 10.0:
         raise SceneError(f"{where}: gamma: expected 0.1 to 10, got {gamma:g}")
     image = loading.read_image(path)

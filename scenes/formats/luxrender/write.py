@@ -1,4 +1,4 @@
-"""The canonical scene as a LuxRender 1.x file, in the part of the format that LuxCore 2.10 reads as well.
+"""Writer of LuxRender 1.x files, in the subset of the format that LuxCore 2.10 reads as well.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender); conventions measured with LuxCore 2.10; Hagemann 2018,
 ch. 4.
@@ -53,14 +53,14 @@ _INTEGRATORS = {"path": "path", "whitted": "directlighting", "direct": "directli
 
 
 class LuxWriter(LuxSurfaceWriter, SceneWriter):
-    """Lines of a LuxRender scene."""
+    """Collects the lines of a LuxRender scene."""
 
     def write_settings(self, scene: Scene) -> None:
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
         kind = _INTEGRATORS[integrator.kind]
         if integrator.kind in ("whitted", "metropolis"):
             self.report.add("integrator", integrator.kind, kind, integrator.kind != "metropolis")
-        edges = depth + 1  # LuxCore counts the edges of a path
+        edges = depth + 1  # LuxCore counts edges of a path
         limit = f'"integer eyedepth" [ {edges} ] "integer lightdepth" [ {edges} ]'
         if kind != "bidirectional":
             limit = f'"integer maxdepth" [ {edges} ]'
@@ -82,7 +82,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         self.lines.append(f'Film "fleximage" {size} "string filename" [ {name} ] "integer haltspp" [ {count} ] {tone}')
 
     def write_camera(self, camera: Camera) -> None:
-        """Writes the camera with ``LookAt``, which alone LuxCore knows; a window from right to left mirrors it."""
+        """Writes the camera with ``LookAt``, the only placement that LuxCore supports; a window from right to left
+        mirrors it."""
         poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
         size = power(abs(np.linalg.det(poses[0][:3, :3])), 1.0 / 3.0)
         axes = poses[0][:3, :3] / size
@@ -99,7 +100,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
             plain = dataclasses.replace(camera, half_width=1.0)
         elif isinstance(camera, PerspectiveCamera):
             plain = dataclasses.replace(camera, shift=(0.0, 0.0))
-        # without a window LuxCore takes the field of view across, not along the shorter side
+        # without a window LuxCore applies the field of view to the width, not to the shorter side
         self.lines.append(self.camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0), shift))
 
     # --- lights --------------------------------------------------------------------------------------------------
@@ -128,7 +129,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         self.lines.append(f'\tLightSource {line} "float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]')
 
     def _daylight(self, light: SunSky) -> None:
-        """Writes sun and sky. The zenith of LuxCore is z whatever the transform; a sky that is turned becomes a map."""
+        """Writes sun and sky. The zenith of LuxCore is z for any transform; a sky with another zenith becomes a map."""
         if light.part != "sky":
             self._sun_or_sky("sun", light.sun_direction, light.turbidity, light.scale / SUN_UNIT)
         if light.part == "sun":
@@ -164,7 +165,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     # --- shapes --------------------------------------------------------------------------------------------------
 
     def write_instance(self, instance: Instance) -> None:
-        """Writes a shape in its place. LuxCore makes objects of mesh files only and shows the last key of a motion."""
+        """Writes a shape with its placement. LuxCore supports objects only for mesh files, and shows the last key of a
+        motion."""
         mirrored = np.linalg.det(instance.to_world[:3, :3]) < 0.0
         if mirrored and (isinstance(instance.shape, Sphere) or shines(instance)):
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
@@ -184,7 +186,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         return [*lines, self._shape(instance)]
 
     def _meshed(self, instance: Instance) -> Mesh:
-        """A shape as triangles: LuxCore leaves spheres and disks out."""
+        """A shape as triangles, because LuxCore ignores spheres and disks."""
         shape = instance.shape
         mesh = lamp_sphere(shape.radius) if isinstance(shape, Sphere) and shines(instance) else as_mesh(shape)
         if mesh is not shape and not isinstance(shape, Rectangle | Cube):
@@ -204,14 +206,14 @@ def _looking(pose: Matrix) -> str:
 
 
 def _in_motion(lines: list[str], times_s: list[float]) -> list[str]:
-    """Transforms as the keys of a motion; a single one stays as it is."""
+    """Transforms as the keys of a motion; a single one is unchanged."""
     if len(lines) == 1:
         return lines
     return [f"MotionBegin [ {' '.join(repr(time_s) for time_s in times_s)} ]", *lines, "MotionEnd"]
 
 
 def save_luxrender(scene: Scene, output: Output, report: LossReport) -> None:
-    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    """Writes a scene and its files; they are not in place before the output is placed."""
     writer = LuxWriter(output, report)
     writer.write(scene)
     output.text(output.path.name, "\n".join(writer.lines) + "\n")

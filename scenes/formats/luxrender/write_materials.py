@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene as lines of a LuxRender 1.x file.
+"""Writer of textures and materials of LuxRender 1.x files.
 
 Source: LuxRender scene file format 1.0 (wiki of LuxRender); Hagemann 2018, ch. 4.
 """
@@ -38,7 +38,7 @@ _METAL_NAMES = {"Ag": "silver", "Al": "aluminium", "Au": "gold", "Cu": "copper"}
 
 
 class LuxSurfaceWriter(SurfaceWriter):
-    """Lines of textures and materials."""
+    """Collects the lines of textures and materials."""
 
     color_texture = "color"
     color = "color"
@@ -71,7 +71,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         return super().material_line(material, name)
 
     def _nothing(self) -> Material:
-        """A surface that is not there."""
+        """An invisible surface."""
         if self._null is None:
             self._null = Matte(ConstantTexture((0.0, 0.0, 0.0)))
             self.define(self._null, self.label("m", "nothing"), '"string type" [ "null" ]')
@@ -83,7 +83,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         if isinstance(material, Metal):
             return self._metal(material, where)
         if isinstance(material, Translucent):
-            # LuxCore takes it for energy conserving whatever the file says
+            # LuxCore assumes energy conservation whatever the file says
             kept = 1.0 - np.array(mean_of(material.reflectance))
             if isinstance(material.reflectance, ConstantTexture) and (kept > 1e-6).all():
                 through = product_of(material.transmittance, ConstantTexture(rgb(1.0 / kept)))
@@ -97,7 +97,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         return super().plain_material(material, where)
 
     def _coated(self, material: Glossy | Plastic | Phong, where: str) -> tuple[str, list[str]]:
-        """A material that is a coat over a diffuse base, or becomes one."""
+        """A material that is, or is replaced by, a coat over a diffuse base."""
         if isinstance(material, Glossy):
             parts = material.diffuse, material.specular, material.roughness
         elif isinstance(material, Plastic):
@@ -126,7 +126,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         return "glass", [*parts, f'"bool architectural" [ "{str(material.thin).lower()}" ]']
 
     def _metal(self, material: Metal, where: str) -> tuple[str, list[str]]:
-        """A preset where the metal is one, else the colour that it reflects at normal incidence."""
+        """A metal: a preset if it is one, else by its colour at normal incidence."""
         label = self.label("t")
         known = (_METAL_NAMES.get(name) for name, index in METALS.items() if index == (material.eta, material.k))
         preset, plain = next(known, ""), mean_of(material.reflectance_scale) == (1.0, 1.0, 1.0)
@@ -143,5 +143,5 @@ class LuxSurfaceWriter(SurfaceWriter):
 
 
 def _even(scale: Texture) -> bool:
-    """Whether a factor is less than one and the same for all colours."""
+    """Whether a factor is below one and equal for all colours."""
     return isinstance(scale, ConstantTexture) and len(set(scale.value)) == 1 and scale.value[0] < 1.0

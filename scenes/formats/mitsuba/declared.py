@@ -1,4 +1,4 @@
-"""Mitsuba among the formats."""
+"""Declaration of the Mitsuba formats."""
 
 from scenes.formats.mitsuba.dictionaries import load_dictionary
 from scenes.formats.mitsuba.read import load_mitsuba

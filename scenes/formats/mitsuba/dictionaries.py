@@ -1,4 +1,5 @@
-"""Trees of dictionaries, as ``mitsuba.load_dict`` takes them, as elements of Mitsuba 3; in Python or as a JSON file.
+"""Conversion of trees of dictionaries, as ``mitsuba.load_dict`` takes them, to elements of Mitsuba 3; in Python or as a
+JSON file.
 
 Source: Mitsuba 3 documentation, "Scene description using Python dictionaries".
 """
@@ -44,14 +45,14 @@ _TAGS = {kind: tag for tag, kinds in _KINDS.items() for kind in kinds.split()}
 
 @dataclass(frozen=True)
 class Key(Place):
-    """A place in a tree: the keys that lead to it."""
+    """A place in a tree, given by the keys that lead to it."""
 
     def __str__(self) -> str:
         return self.file
 
 
 class _Converter:
-    """Makes elements of dictionaries, and counts them."""
+    """Creates elements from dictionaries, and counts them."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -73,14 +74,14 @@ class _Converter:
         return self._numbers(getattr(value, "matrix", value), named, place)
 
     def _numbers(self, value: Any, named: dict[str, str], place: Place) -> Node:
-        """A vector, a transform, or a list of numbers as a text."""
+        """A vector, a transform, or a list of numbers as text."""
         try:
             found = np.array(value, np.float64)
         except (TypeError, ValueError, OverflowError):
             raise SceneError(f"{place}: expected a number, text, vector, transform or dictionary") from None
         text = " ".join(repr(float(part)) for part in found.ravel())
         if found.ndim == 2 and found.shape in ((4, 4), (3, 3)):
-            if found.shape == (3, 3):  # of texture coordinates
+            if found.shape == (3, 3):  # transform of texture coordinates
                 full = np.eye(4)
                 full[:2, :2], full[:2, 3] = found[:2, :2], found[:2, 2]
                 text = " ".join(repr(float(part)) for part in full.ravel())
@@ -128,13 +129,13 @@ def scene_of_dictionary(tree: Mapping[str, Any], folder: Path, report: LossRepor
     """The canonical scene of a tree of dictionaries.
 
     Args:
-        tree: as ``mitsuba.load_dict`` takes it, with ``"type": "scene"``; matrices may be arrays, lists or transforms.
-        folder: that names of files are relative to, and that nothing is read outside of.
-        report: receives what could not be kept.
-        name: of the scene, for messages.
+        tree: tree as for ``mitsuba.load_dict``, with ``"type": "scene"``; matrices may be arrays, lists or transforms.
+        folder: folder to which file names are relative, and outside of which nothing is read.
+        report: receives the losses.
+        name: name of the scene, for messages.
 
     Raises:
-        SceneError: something cannot be read; the message has the keys that lead to it.
+        SceneError: the scene cannot be read; the message gives the keys that lead to the error.
     """
     return _scene(tree, Path(folder) / name, None, report)
 
@@ -143,7 +144,7 @@ def load_dictionary(path: Path, root: Path | None, report: LossReport) -> Scene:
     """Reads a tree from a JSON file; see :data:`scenes.formats.text.format.Read`.
 
     Raises:
-        SceneError: something cannot be read; the message has the keys that lead to it.
+        SceneError: the scene cannot be read; the message gives the keys that lead to the error.
     """
     files = SceneFiles(path, root)
     if not (files.folder / Path(path).name).is_file():

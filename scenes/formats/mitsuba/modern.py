@@ -1,9 +1,9 @@
-"""Elements of Mitsuba 2 and 3 in the words of Mitsuba 0.5, so that one reader reads both.
+"""Translation of elements of Mitsuba 2 and 3 to those of Mitsuba 0.5, so that one reader reads both.
 
-Properties have other names, a few plugins another default, spectra may be plugins, and textures are placed by a
+Properties have other names, some plugins have other defaults, spectra may be plugins, and textures are placed by a
 transform.
 
-Source: Mitsuba 3 documentation, plugin reference; what Mitsuba 3.9.1 makes of its own files.
+Source: Mitsuba 3 documentation, plugin reference; behaviour of Mitsuba 3.9.1.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ _SAMPLERS = {"multijitter": "stratified", "orthogonal": "stratified"}
 _INTEGRATORS = {"volpathmis": "volpath", "prb": "path", "prb_basic": "path", "prbvolpath": "volpath",
                 "prb_projective": "path", "direct_projective": "direct"}  # fmt: skip
 _WRAPPERS = ("aov", "moment", "stokes")
-"""Integrators that write more about what the one inside them does."""
+"""Integrators that write additional outputs of a nested integrator."""
 
 
 def is_modern(version: str, root: Node) -> bool:
-    """Whether a file is one of Mitsuba 2 or 3: by its version, and without one by the name of its transforms."""
+    """Whether a file belongs to Mitsuba 2 or 3: by its version or, without one, by the name of its transforms."""
     if re.fullmatch(r"0(\.\d+)*", version):
         return False
     if re.fullmatch(r"[23](\.\d+)*", version):
@@ -51,7 +51,7 @@ def _speaks_modern(node: Node) -> bool:
 
 
 def in_old_words(node: Node, report: LossReport) -> None:
-    """Changes an element and all within it, in place; their parameters are filled in."""
+    """Translates an element and its descendants in place, after their parameters have been filled in."""
     if "name" in node.attributes:
         node.attributes["name"] = old_name(node.attributes["name"])
     if node.tag == "integrator":
@@ -78,7 +78,7 @@ def in_old_words(node: Node, report: LossReport) -> None:
 
 
 def old_name(name: str) -> str:
-    """A property's name in Mitsuba 0.5: ``to_world`` is ``toWorld``."""
+    """The name of a property in Mitsuba 0.5: ``to_world`` is ``toWorld``."""
     return _OLD_NAMES.get(name) or re.sub(r"(?<=[a-z0-9])_([a-z0-9])", lambda found: found[1].upper(), name)
 
 
@@ -94,7 +94,7 @@ def _value(node: Node, name: str, default: str) -> str:
 
 
 def _spectrum(node: Node, report: LossReport) -> None:
-    """A spectrum that is a plugin as one that is a value."""
+    """Converts a spectrum plugin to a spectrum value."""
     kind = node.attributes.pop("type")
     node.tag = "spectrum"
     if kind == "blackbody":
@@ -127,7 +127,8 @@ def _spectrum(node: Node, report: LossReport) -> None:
 
 
 def _placed_by_numbers(node: Node, report: LossReport) -> None:
-    """The transform of texture coordinates as two scales and two offsets, and what is not encoded by its gamma."""
+    """Converts the transform of texture coordinates to two scales and two offsets, and the flag for linear values to a
+    gamma."""
     for child in [part for part in node.children if part.get("name") == "toUv"]:
         node.children.remove(child)
         matrix = transform_of(child) if len(child.children) else np.eye(4)
@@ -143,7 +144,7 @@ def _placed_by_numbers(node: Node, report: LossReport) -> None:
 
 
 def _zenith_along_y(node: Node) -> None:
-    """Turns daylight whose zenith is z, as in Mitsuba 3, to that of Mitsuba 0.5, whose zenith is y."""
+    """Rotates daylight with the zenith z, as in Mitsuba 3, to the zenith y of Mitsuba 0.5."""
     turn = Node("rotate", {"x": "1", "angle": "90"}, node.place)
     placed = [child for child in node.children if child.get("name") == "toWorld"]
     if placed:
@@ -153,7 +154,7 @@ def _zenith_along_y(node: Node) -> None:
 
 
 def _integrator(node: Node, report: LossReport) -> None:
-    """The integrator that makes the picture, in the place of those around it."""
+    """Replaces wrapping integrators by the nested one that computes the picture."""
     inside = [child for child in node.children if child.tag == "integrator"]
     if node.get("type") in _WRAPPERS and len(inside) == 1:
         report.hint(str(node.place), f"integrator {node.get('type')!r}", "the one inside it")

@@ -1,7 +1,7 @@
-"""The principled material of Mitsuba 3, as mixtures of those of the canonical scene.
+"""The principled material of Mitsuba 3, as mixtures of materials of the canonical scene.
 
 Source: Mitsuba 3 documentation, plugin reference, "principled"; Burley 2012, "Physically based shading at Disney", for
-what its parameters mean.
+the meaning of its parameters.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ _PLAIN = ("anisotropic", "specTint", "sheen", "sheenTint", "flatness", "clearcoa
 
 
 def principled(properties: Properties, textures: MitsubaTextures) -> Material:
-    """A base with a coat that adds to it, metal where it is metallic, and glass where light passes.
+    """A mixture of a base with an added coat, metal for the metallic share, and glass for the transmissive share.
 
-    Deviation: the coat follows Fresnel's equations and its facets have one roughness; sheen, tint, clear coat and
-    flatness are left out, which is reported where they are given.
+    Deviation: the coat follows Fresnel's equations and its facets have one roughness. Sheen, tint, clear coat and
+    flatness are left out, which is reported if they are given.
     """
     base = textures.texture(properties, "baseColor", grey(0.5))
     roughness = _mean(properties, textures, "roughness", 0.5)
@@ -47,7 +47,7 @@ def principled(properties: Properties, textures: MitsubaTextures) -> Material:
 
 
 def _metal(base: Texture, alpha: float) -> Material:
-    """A metal that reflects the base colour straight back; of a texture, the same at all angles."""
+    """A metal with the base colour at normal incidence; with a texture, the colour is the same at all angles."""
     if isinstance(base, ConstantTexture):
         return Metal(*index_of_reflectance(base.value), (alpha, alpha))
     return Metal(grey(0.0), grey(1.0), (alpha, alpha), base)
@@ -58,7 +58,7 @@ def _mixed(first: Material, second: Material, amount: Texture) -> Material:
 
 
 def _amount(properties: Properties, textures: MitsubaTextures, name: str) -> Texture | None:
-    """How much of a part there is, None where there is none."""
+    """The share of a part, None if it is absent."""
     found = textures.texture(properties, name, grey(0.0))
     return None if found == ConstantTexture(grey(0.0)) else found
 

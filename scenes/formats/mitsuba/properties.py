@@ -54,7 +54,7 @@ class Properties:
         return numbers(self.given[name], self.given[name].get("value"), 1)[0]
 
     def whole(self, name: str, default: int, least: int, most: int) -> int:
-        """A whole number within bounds."""
+        """An integer within bounds."""
         value = self.number(name, default)
         if value != int(value) or not least <= value <= most:
             what = f"{self.given[name].place}: {name}"
@@ -79,7 +79,7 @@ class Properties:
         return np.array(default) if name not in self.given else np.array(triple(self.given[name], 0.0))
 
     def color(self, name: str, default: Rgb) -> Rgb:
-        """A colour, however it is given."""
+        """A colour, in any representation."""
         self.asked.add(name)
         if name not in self.given:
             return default
@@ -94,7 +94,7 @@ class Properties:
         return keys[0]
 
     def motion(self, name: str = "toWorld") -> tuple[list[Matrix], list[float]]:
-        """Transforms of an animation and their times, seconds; one at time zero where nothing moves."""
+        """Transforms of an animation and their times, seconds; a single one at time zero without animation."""
         self.asked.add(name)
         if name not in self.given:
             return [np.eye(4)], [0.0]
@@ -110,7 +110,7 @@ class Properties:
         return [transform_of(step) for step in steps], times_s
 
     def left_over(self) -> None:
-        """Reports properties, and textures with a name, that nothing asked for."""
+        """Reports unused properties and unused named textures."""
         for name in self.given:
             if name not in self.asked:
                 what = f"{self.node.get('type')}: property {name!r}"
@@ -121,10 +121,10 @@ class Properties:
 
 
 def numbers(node: Node, text: str, count: int | None) -> list[float]:
-    """Numbers of a text, separated by commas or blanks.
+    """Numbers of a text, separated by commas or spaces.
 
     Raises:
-        SceneError: a word is not a number or too great a one, or there is another count than the given one.
+        SceneError: a word is not a number or is too great, or the count differs from ``count``.
     """
     words = text.replace(",", " ").split()
     try:
@@ -152,7 +152,7 @@ def color_of(node: Node) -> Rgb:
     """The colour of an element.
 
     Raises:
-        SceneError: it cannot be read.
+        SceneError: the colour cannot be read.
     """
     text = node.get("value").strip()
     if node.tag == "blackbody":
@@ -184,7 +184,7 @@ def color_of(node: Node) -> Rgb:
 
 
 def transform_of(node: Node) -> Matrix:
-    """The product of the steps of a transform, each of which is applied after those before it."""
+    """The product of the steps of a transform; each step is applied after those before it."""
     matrix = np.eye(4)
     for step in node.children:
         if step.tag == "translate":
@@ -207,7 +207,7 @@ def transform_of(node: Node) -> Matrix:
 
 
 def _looked_along(step: Node) -> Matrix:
-    """Camera to world by two points and an upward direction."""
+    """Camera-to-world transform from two points and an upward direction."""
     origin, target = (np.array(numbers(step, step.get(name), 3)) for name in ("origin", "target"))
     if "up" in step.attributes:
         up = np.array(numbers(step, step.get("up"), 3))
@@ -226,11 +226,11 @@ IORS = {
     "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544, "amber": 1.55, "pet": 1.575,
     "diamond": 2.419,
 }  # fmt: skip
-"""Indices of refraction by the names that Mitsuba 0.5 knows (documentation, section on dielectrics)."""
+"""Refractive indices by their names in Mitsuba 0.5 (documentation, section on dielectrics)."""
 
 
 def ior(properties: Properties, name: str, default: str) -> float:
-    """An index of refraction by name or number."""
+    """A refractive index by name or number."""
     node = properties.given.get(name)
     if node is not None and node.tag != "string":
         return properties.number(name, 1.5)

@@ -1,4 +1,4 @@
-"""Mitsuba scenes into the canonical scene: those of 0.5, and those of 2 and 3 in its words.
+"""Reader of Mitsuba scenes: those of 0.5, and those of 2 and 3 after translation to 0.5.
 
 Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation; conventions measured with Mitsuba 3; Hagemann 2018, ch. 4.
 """
@@ -25,15 +25,15 @@ from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.text.xml_tree import Node, parse_xml
 
 TEXT_MAX = 1 << 16
-"""Most characters of a value with its parameters."""
+"""Maximum number of characters of a value with its parameters."""
 
 
 _NAME_MAX = 256
-"""Most characters of a parameter's name."""
+"""Maximum number of characters of a parameter's name."""
 
 
 class MitsubaReader(MitsubaSettings):
-    """State of a Mitsuba file while it is read."""
+    """State of reading a Mitsuba file."""
 
     def __init__(self, files: SceneFiles, report: LossReport) -> None:
         super().__init__(report)
@@ -51,17 +51,17 @@ class MitsubaReader(MitsubaSettings):
     # --- the tree ------------------------------------------------------------------------------------------------
 
     def read(self, path: Path) -> None:
-        """Reads a file and what it includes."""
+        """Reads a file and its includes."""
         for node in self._nodes(path, []):
             self._node(node)
 
     def read_tree(self, root: Node, path: Path) -> None:
-        """Reads the elements of a tree that has been parsed; ``path`` is for messages and includes."""
+        """Reads the elements of a parsed tree; ``path`` is used for messages and includes."""
         for node in self._within(root, path, []):
             self._node(node)
 
     def _nodes(self, path: Path, inside: list[Path]) -> list[Node]:
-        """Elements of the scene with those of included files; fills in parameters and notes names."""
+        """Elements of the scene and of included files; fills in parameters and collects names."""
         where = str(inside[-1]) if inside else str(path)
         if path in inside:
             raise SceneError(f"{where}: expected files that do not include themselves, {path.name} does")
@@ -92,7 +92,7 @@ class MitsubaReader(MitsubaSettings):
         return found
 
     def _filled(self, node: Node) -> None:
-        """Replaces ``$name`` by the parameter, and notes elements with names."""
+        """Replaces ``$name`` by the parameter, and collects named elements."""
         for key, value in node.attributes.items():
             if "$" in value:
                 node.attributes[key] = self._with_parameters(value, node)
@@ -104,8 +104,8 @@ class MitsubaReader(MitsubaSettings):
             self._filled(child)
 
     def _with_parameters(self, text: str, node: Node) -> str:
-        """A value with its parameters, wherever they stand in it; of two that fit the longer one is meant."""
-        for _ in range(DEPTH_MAX):  # what stands in a parameter's place may name others
+        """A value with its parameters inserted; of two matching names the longer one is used."""
+        for _ in range(DEPTH_MAX):  # the value of a parameter may contain further parameters
             found = [self._parameter(part) for part in text.split("$")[1:]]
             if not any(name for name, _ in found):
                 break
@@ -118,14 +118,14 @@ class MitsubaReader(MitsubaSettings):
         return text
 
     def _parameter(self, text: str) -> tuple[str, str]:
-        """The longest parameter that a text begins with, empty where there is none, and what follows."""
+        """The longest parameter name at the beginning of a text, empty if there is none, and the rest of the text."""
         for length in range(min(len(text), self._longest), 0, -1):
             if text[:length] in self.defaults:
                 return text[:length], text[length:]
         return "", text
 
     def _sample(self, node: Node) -> None:
-        """Puts the samples of a spectrum's file in the place of its name; none where it is missing."""
+        """Replaces the name of a spectrum file by its samples, or by none if the file is missing."""
         name, where = node.attributes.pop("filename"), str(node.place)
         path = self.files.known(name, where, self.report, f"the spectrum {name!r}", "the constant 0.5")
         if path is None:
@@ -142,7 +142,7 @@ class MitsubaReader(MitsubaSettings):
         return self.names[name]
 
     def find(self, reference: Node) -> Node:
-        """The element that a reference names; where nothing has the name, a grey one, which is reported."""
+        """The element to which a reference refers; for an unknown name a grey one, which is reported."""
         name = reference.get("id")
         if name in self.names:
             return self.names[name]
@@ -174,7 +174,7 @@ def load_mitsuba(path: Path, root: Path | None, report: LossReport) -> Scene:
     """Reads a scene; see :data:`scenes.formats.text.format.Read`.
 
     Raises:
-        SceneError: something cannot be read; the message has file, line and column.
+        SceneError: the scene cannot be read; the message gives file, line and column.
     """
     reader = MitsubaReader(SceneFiles(path, root), report)
     main = reader.files.folder / Path(path).name
@@ -185,7 +185,7 @@ def load_mitsuba(path: Path, root: Path | None, report: LossReport) -> Scene:
 
 
 def scene_of(reader: MitsubaReader, path: Path) -> Scene:
-    """The scene that has been read."""
+    """The scene that a reader has read."""
     report = reader.report
     if reader.camera is None:
         report.add(str(path), "no sensor", "one that sees the shapes along z")

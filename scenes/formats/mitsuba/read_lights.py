@@ -1,4 +1,4 @@
-"""Lights of Mitsuba 0.5, into those of the canonical scene.
+"""Lights of Mitsuba 0.5, converted to the canonical scene.
 
 Source: Mitsuba 0.5 documentation, section on emitters.
 """
@@ -30,14 +30,14 @@ _TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude
 
 
 class MitsubaLights:
-    """Makes lights of elements."""
+    """Creates lights from elements."""
 
     def __init__(self, files: SceneFiles, report: LossReport) -> None:
         self.files, self.report = files, report
         self.lights: list[Light] = []
 
     def read(self, node: Node) -> None:
-        """Reads an emitter that stands by itself."""
+        """Reads an emitter outside of shapes."""
         kind, properties = node.get("type"), Properties(node, self.report)
         matrix = properties.transform()
         if kind == "point":
@@ -102,7 +102,7 @@ class MitsubaLights:
             self.lights.append(SunSky(unit, turbidity, scale * share, part, up, albedo))  # type: ignore[arg-type]
 
     def _by_time(self, properties: Properties) -> np.ndarray:
-        """Towards the sun, by date and place; east is x, north -z."""
+        """Direction towards the sun, from date and location; east is x, north is -z."""
         names = zip(_TIME_AND_PLACE, (2010, 7, 10, 15, 0, 0, 35.6894, 139.6917, 9), strict=True)
         values = {name: properties.number(name, default) for name, default in names}
         hour = values["hour"] + values["minute"] / 60.0 + values["second"] / 3600.0

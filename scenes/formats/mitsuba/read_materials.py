@@ -1,4 +1,4 @@
-"""Materials of Mitsuba 0.5, into those of the canonical scene.
+"""Materials of Mitsuba 0.5, converted to the canonical scene.
 
 Source: Mitsuba 0.5 documentation, sections on scattering models and textures.
 """
@@ -42,14 +42,14 @@ _AROUND = ("mask", "blendbsdf", "mixturebsdf", "bump", "bumpmap", "coating", "ro
 
 @dataclass
 class MitsubaSurfaces(MitsubaTextures):
-    """Makes textures and materials of elements."""
+    """Creates textures and materials from elements."""
 
     made: dict[int, Material] = field(default_factory=dict)
     _sides: dict[int, bool] = field(default_factory=dict)
     _deep: int = 0
 
     def material(self, node: Node) -> Material:
-        """The material of an element, made once; one that Mitsuba does not have is reported."""
+        """The material of an element, created once; an unknown kind is reported."""
         if id(node) in self.made:
             return self.made[id(node)]
         makers = {
@@ -81,7 +81,8 @@ class MitsubaSurfaces(MitsubaTextures):
         return made
 
     def one_sided(self, node: Node, deep: int = 0) -> bool:
-        """Whether what an element makes is black behind: what is opaque has one side in Mitsuba, unless it is told."""
+        """Whether the material of an element is black on the back: opaque materials are one-sided in Mitsuba unless
+        stated otherwise."""
         if id(node) not in self._sides:
             self._sides[id(node)] = self._one_sided(node, deep)
         return self._sides[id(node)]
@@ -95,7 +96,7 @@ class MitsubaSurfaces(MitsubaTextures):
         return all(self.one_sided(part, deep + 1) for part in parts if part.tag == "bsdf")
 
     def inner(self, properties: Properties) -> list[Material]:
-        """Materials inside a material, of elements or references."""
+        """Materials nested in a material, given as elements or references."""
         found = []
         for child in properties.rest:
             node = self.find(child) if child.tag == "ref" else child
@@ -104,10 +105,10 @@ class MitsubaSurfaces(MitsubaTextures):
         return found
 
     def one_inner(self, properties: Properties) -> Material:
-        """The material inside; of two, the first.
+        """The nested material; of two, the first.
 
         Raises:
-            SceneError: there is none, or more than two.
+            SceneError: there is no nested material, or more than two.
         """
         found = self.inner(properties)
         if len(found) not in (1, 2):
@@ -115,7 +116,7 @@ class MitsubaSurfaces(MitsubaTextures):
         return found[0]
 
     def _scalar(self, properties: Properties, name: str, default: float) -> float:
-        """A number; a texture that is not everywhere alike becomes its mean, which is reported."""
+        """A number; a texture that is not constant becomes its mean, which is reported."""
         if not any(child.tag in ("texture", "ref") and child.get("name") == name for child in properties.rest):
             return properties.number(name, default)
         found = self.texture(properties, name, grey(default))
@@ -141,7 +142,7 @@ class MitsubaSurfaces(MitsubaTextures):
         name = "diffuseReflectance" if "diffuseReflectance" in properties else "reflectance"
         sigma = 0.0
         if properties.node.get("type") == "roughdiffuse":
-            # alpha is sqrt(2) times the slopes' deviation that sigma is the angle of
+            # alpha is sqrt(2) times the slopes' standard deviation, the tangent of sigma
             sigma = math.degrees(arctan(self._scalar(properties, "alpha", 0.2) / math.sqrt(2.0)))
             properties.truth("useFastApprox", False)
         return Matte(self.texture(properties, name, grey(0.5)), sigma)

@@ -1,4 +1,4 @@
-"""Cameras, films, samplers and integrators of Mitsuba 0.5, into those of the canonical scene.
+"""Cameras, films, samplers and integrators of Mitsuba 0.5, converted to the canonical scene.
 
 Source: Mitsuba 0.5 documentation, and ``orthographic.cpp`` of its source; conventions measured with Mitsuba 3;
 Hagemann 2018, ch. 4.
@@ -30,7 +30,7 @@ from scenes.formats.text.xml_tree import Node
 _FILE_SETTINGS = ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod",
                   "key", "burn", "sampleBorder", "compensate")  # fmt: skip
 FORWARD = np.diag([-1.0, 1.0, -1.0, 1.0])
-"""From a camera that looks along +z with x to the left to the canonical one."""
+"""Transform from a camera that looks along +z with x to the left to the canonical one."""
 
 FILTERS = {"box": "box", "tent": "tent", "gaussian": "gaussian", "mitchell": "mitchell", "catmullrom": "mitchell",
            "lanczos": "sinc"}  # fmt: skip
@@ -44,7 +44,7 @@ INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "dir
 
 
 class MitsubaSettings:
-    """How a scene is seen and computed."""
+    """Reader of cameras, films, samplers and integrators."""
 
     def __init__(self, report: LossReport) -> None:
         self.report = report
@@ -62,7 +62,7 @@ class MitsubaSettings:
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
         for child in properties.rest:
             self.report.add(str(child.place), f"{child.tag} {child.get('type')!r} inside an integrator")
-        # it counts the edges of a path, the canonical scene its bounces
+        # Mitsuba counts the edges of a path, the canonical scene its bounces
         self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
         properties.left_over()
 
@@ -121,7 +121,7 @@ class MitsubaSettings:
                 lens, focus = 0.0, FAR
             self.camera = PerspectiveCamera(to_world, self._field(properties), lens, focus, track, shutter, shift)
         elif kind == "orthographic":
-            # its window is [-1, 1] across, whatever the aspect
+            # its window is [-1, 1] horizontally for any aspect
             half = min(self.film.width_px, self.film.height_px) / self.film.width_px
             self.camera = OrthographicCamera(to_world, half, track)
             if shift != (0.0, 0.0):
@@ -134,7 +134,7 @@ class MitsubaSettings:
         properties.left_over()
 
     def _field(self, properties: Properties) -> float:
-        """Field of view of the shorter side, degrees."""
+        """Field of view along the shorter side, degrees."""
         width, height = self.film.width_px, self.film.height_px
         axis = properties.text("fovAxis", "x")
         sides = {"x": width, "y": height, "smaller": min(width, height), "larger": max(width, height),

@@ -1,4 +1,4 @@
-"""Shapes of Mitsuba 0.5, into instances of the canonical scene.
+"""Shapes of Mitsuba 0.5, converted to instances of the canonical scene.
 
 Source: Mitsuba 0.5 documentation, section on shapes.
 """
@@ -52,7 +52,7 @@ _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
 
 class MitsubaShapes:
-    """Makes instances of elements; each file of a mesh is read once."""
+    """Creates instances from elements; each mesh file is read once."""
 
     def __init__(
         self, files: SceneFiles, report: LossReport, surfaces: MitsubaSurfaces, find: Callable[[Node], Node]
@@ -65,12 +65,12 @@ class MitsubaShapes:
         self._used: dict[Path, list[str]] = {}
 
     def read(self, node: Node) -> list[Instance]:
-        """Instances of a shape: one, those of a group, or none where it is left out, which is reported."""
+        """Instances of a shape: one, those of a group, or none if it is left out, which is reported."""
         kind, properties = node.get("type"), Properties(node, self.report)
         if kind == "shapegroup":
             parts = []
             for part in (child for child in properties.rest if child.tag == "shape"):
-                if part.get("type") in ("instance", "shapegroup"):  # as in Mitsuba; groups in groups would multiply
+                if part.get("type") in ("instance", "shapegroup"):  # as in Mitsuba; nested groups would multiply
                     self.report.add(str(part.place), f"{part.get('type')} inside a shapegroup")
                 else:
                     parts.append(part)
@@ -130,10 +130,10 @@ class MitsubaShapes:
         raise SceneError(f"{properties.where}: instance: expected a reference to a shapegroup before it")
 
     def _materials_of(self, properties: Properties) -> list[str]:
-        """Materials that the faces of an OBJ file name and Mitsuba 0.5 knows; those of Mitsuba 3 have one a shape.
+        """Material names used by the faces of an OBJ file, for Mitsuba 0.5; in Mitsuba 3 a shape has one material.
 
-        Source: Mitsuba 0.5 documentation, section on the shape ``obj``: a bsdf with a name is that of the faces which
-        use a material of this name.
+        Source: Mitsuba 0.5 documentation, section on the shape ``obj``: a named bsdf applies to the faces that use a
+        material of this name.
         """
         if self.modern or not any(child.tag in ("bsdf", "ref") and child.get("name") for child in properties.rest):
             return []
@@ -150,7 +150,7 @@ class MitsubaShapes:
     ) -> tuple[dict[str | None, tuple[Material, bool]], Rgb | None]:
         """Materials of a shape, each with whether its back is black, and its emission.
 
-        The material None is that of all faces which have none by their names; a shape with a medium alone is not there.
+        The key None has the material of all faces without a named one; a shape with only a medium is invisible.
         """
         named: dict[str | None, tuple[Material, bool]] = {}
         material, emission, one_sided, default = None, None, True, _DEFAULT
@@ -164,7 +164,7 @@ class MitsubaShapes:
             elif node.tag == "bsdf" and name and by_name:
                 self.report.hint(str(node.place), f"the material {name!r} of a mesh, which no face has")
             elif node.tag == "bsdf":
-                named.clear()  # it is that of all faces
+                named.clear()  # it applies to all faces
                 if material is not None:
                     self.report.add(str(node.place), "several materials for one mesh", "the last")
                 material, one_sided = self.surfaces.material(node), self.surfaces.one_sided(node)
@@ -225,7 +225,7 @@ class MitsubaShapes:
         return mesh, place
 
     def _file(self, kind: str, properties: Properties, faces: set[str] | None, bare: bool) -> Mesh | None:
-        """The mesh of a file, or None where it is missing; ``faces`` are the materials of the faces that count."""
+        """The mesh of a file, or None if it is missing; ``faces`` are the materials of the faces to keep."""
         name = properties.text("filename", "")
         path = self.files.known(name, properties.where, self.report, f"the mesh {name!r}", "left out")
         if path is None:
@@ -253,7 +253,8 @@ class MitsubaShapes:
 
 
 def seeing_all(instances: list[Instance]) -> PerspectiveCamera:
-    """The camera of a scene that has none: along z, 45 degrees, as far away as the shapes are wide."""
+    """The camera of a scene without one: it looks along z with 45 degrees, at a distance equal to the width of the
+    shapes."""
     corners = [
         product(as_mesh(one.shape).vertices.astype(np.float64), one.to_world[:3, :3].T) + one.to_world[:3, 3]
         for one in instances

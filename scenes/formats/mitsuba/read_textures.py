@@ -1,4 +1,4 @@
-"""Textures of Mitsuba 0.5, into those of the canonical scene.
+"""Textures of Mitsuba 0.5, converted to the canonical scene.
 
 Source: Mitsuba 0.5 documentation, section on textures.
 """
@@ -24,19 +24,19 @@ from scenes.formats.text.xml_tree import Node
 
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "zero": "black", "mirror": "repeat", "one": "clamp"}
 MISSING = "missing"
-"""Kind of a texture that stands in the place of one that is not there; it has been reported."""
+"""Kind of a texture that replaces a missing one, which has been reported."""
 
 _FILTERS = {"nearest": "nearest", "bilinear": "bilinear", "trilinear": "mipmap", "ewa": "mipmap"}
 
 
 @dataclass
 class MitsubaTextures:
-    """Makes textures of elements.
+    """Creates textures from elements.
 
     Attributes:
-        files: for images.
-        report: of what could not be kept.
-        find: the element that a reference names.
+        files: source of image files.
+        report: receives the losses.
+        find: returns the element to which a reference refers.
     """
 
     files: SceneFiles
@@ -46,7 +46,7 @@ class MitsubaTextures:
     _inside: int = 0
 
     def texture(self, properties: Properties, name: str, default: Rgb) -> Texture:
-        """A texture, a reference to one, or a colour."""
+        """The texture of a property, which may be a texture, a reference to one, or a colour."""
         for child in properties.rest:
             if child.tag in ("texture", "ref") and child.get("name") == name:
                 properties.asked.add(name)
@@ -57,7 +57,7 @@ class MitsubaTextures:
         return ConstantTexture(properties.color(name, default))
 
     def made_texture(self, node: Node) -> Texture:
-        """The texture of an element, made once."""
+        """The texture of an element, created once."""
         if id(node) not in self.textures:
             properties = Properties(node, self.report)
             self._inside += 1
@@ -78,7 +78,7 @@ class MitsubaTextures:
             if offset != (0.0, 0.0):
                 self.report.add(properties.where, "offset of a checkerboard", "none")
             parts = self.texture(properties, "color0", grey(0.4)), self.texture(properties, "color1", grey(0.2))
-            # a square of its checks is half a unit wide
+            # a square of the checkerboard is half a unit wide
             return CheckerboardTexture(*parts, (2.0 * scale[0], 2.0 * scale[1]))
         if kind == "scale":
             inner = next((child for child in properties.rest if child.tag in ("texture", "ref")), None)

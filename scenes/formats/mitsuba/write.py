@@ -1,4 +1,4 @@
-"""The canonical scene as a Mitsuba 0.5 file, or in the names and plugins of Mitsuba 3.
+"""Writer of Mitsuba 0.5 files, or with the names and plugins of Mitsuba 3.
 
 Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Hagemann 2018, ch. 4.
 """
@@ -46,7 +46,7 @@ _INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidire
 
 @dataclass
 class MitsubaWriter(MitsubaLightWriter):
-    """Elements of a scene, as they are made; ``modern`` is Mitsuba 3."""
+    """Collects the elements of a scene; ``modern`` selects Mitsuba 3."""
 
     shared: frozenset[PartKey] = frozenset()
     _groups: dict[PartKey, str] = field(default_factory=dict)
@@ -112,7 +112,7 @@ class MitsubaWriter(MitsubaLightWriter):
             self.put(rfilter, "float", "radius", number(film.filter_radius_px))
 
     def _camera(self, camera: Camera, across: float) -> Element:
-        """A camera with its place; the picture is ``across`` shorter sides wide."""
+        """A camera with its placement; the picture is ``across`` shorter sides wide."""
         keys, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
         local = FORWARD
         if isinstance(camera, PerspectiveCamera):
@@ -139,7 +139,8 @@ class MitsubaWriter(MitsubaLightWriter):
         return made
 
     def _shift(self, made: Element, camera: PerspectiveCamera) -> None:
-        """Where the axis meets the picture, from its middle, to the right and down, with the sign turned."""
+        """Writes the offset of the principal point from the centre of the picture, to the right and down, with inverted
+        sign."""
         if camera.shift == (0.0, 0.0):
             return
         if not self.modern or camera.lens_radius > 0.0:
@@ -151,7 +152,8 @@ class MitsubaWriter(MitsubaLightWriter):
     # --- shapes ------------------------------------------------------------------------------------------------------
 
     def _instance(self, instance: Instance) -> None:
-        """Writes a shape in its place; shared and moving shapes are instances of a group, which alone may move."""
+        """Writes a shape with its placement; shared and moving shapes are instances of a group, because only these may
+        move."""
         keys, times_s = motion_keys(instance.track, instance.to_world)
         where, shared = instance.name or "shape", part_key(instance) in self.shared
         if shines(instance) or not (shared or (len(keys) > 1 and not self.modern)):
@@ -188,7 +190,8 @@ class MitsubaWriter(MitsubaLightWriter):
             self.matrix(made, "toWorld", keys[0])
 
     def _as_triangles(self, instance: Instance) -> bool:
-        """Whether a shape is not one of Mitsuba's: by its texture coordinates, or as a sphere that is stretched."""
+        """Whether a shape must be written as triangles, because of its texture coordinates or as a non-uniformly scaled
+        sphere."""
         shape, textured = instance.shape, depends_on_uv(instance.material)
         if isinstance(shape, Cube | Disk):
             return textured
@@ -200,7 +203,7 @@ class MitsubaWriter(MitsubaLightWriter):
         return bool(stretched) or (textured and float(np.linalg.det(axes)) > 0.0)
 
     def _shape(self, instance: Instance) -> tuple[Element, Matrix]:
-        """A shape's element without its place, and the transform of its own size."""
+        """The element of a shape without its placement, and the transform of its own size."""
         shape, material = instance.shape, instance.material
         if self._as_triangles(instance):
             if isinstance(shape, Disk | Sphere):
@@ -213,7 +216,7 @@ class MitsubaWriter(MitsubaLightWriter):
         made = self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):
             if shines(instance) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
-                # a lamp shines to where its faces, as they are placed, are counter-clockwise
+                # a lamp emits towards the side from which its placed faces are counter-clockwise
                 shape, local = upright(shape, instance.to_world)[0], FLIPPED
             self.put(made, "string", "filename", self.output.mesh(shape))
             if shape.normals is None:
@@ -231,7 +234,7 @@ class MitsubaWriter(MitsubaLightWriter):
 
 
 def save_mitsuba(scene: Scene, output: Output, report: LossReport, modern: bool = False) -> None:
-    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    """Writes a scene and its files; they are not in place before the output is placed."""
     writer = MitsubaWriter(output, report, modern)
     writer.write(scene)
     ElementTree.indent(writer.root, "\t")

@@ -1,4 +1,4 @@
-"""Elements, properties and textures of a Mitsuba file.
+"""Writer of elements, properties and textures of Mitsuba files.
 
 Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference.
 """
@@ -24,7 +24,7 @@ _NEW_NAMES = {"toWorld": "to_world", "intIOR": "int_ior", "extIOR": "ext_ior"}
 
 @dataclass
 class ElementWriter:
-    """Elements of a scene, as they are made; ``modern`` is Mitsuba 3."""
+    """Collects the elements of a scene; ``modern`` selects Mitsuba 3."""
 
     output: Output
     report: LossReport
@@ -36,33 +36,33 @@ class ElementWriter:
     _counts: dict[str, int] = field(default_factory=dict)
 
     def name(self, text: str) -> str:
-        """A property's name in the flavour that is written."""
+        """The name of a property in the version that is written."""
         if not self.modern:
             return text
         return _NEW_NAMES.get(text) or re.sub(r"(?<!^)(?=[A-Z])", "_", text).lower()
 
     def plugin(self, tag: str, kind: str, parent: Element | None = None, **named: str) -> Element:
-        """An element of a kind."""
+        """Creates an element of a kind."""
         made = Element(tag, {"type": kind, **named})
         if parent is not None:
             parent.append(made)
         return made
 
     def put(self, parent: Element, tag: str, name: str, value: str) -> None:
-        """A property."""
+        """Writes a property."""
         ElementTree.SubElement(parent, tag, {"name": self.name(name), "value": value})
 
     def matrix(self, parent: Element, name: str, matrix: Matrix) -> None:
-        """A transform."""
+        """Writes a transform."""
         holder = ElementTree.SubElement(parent, "transform", {"name": self.name(name)})
         ElementTree.SubElement(holder, "matrix", {"value": spaced(matrix.ravel())})
 
     def color(self, parent: Element, name: str, value: Rgb) -> None:
-        """A colour, linear."""
+        """Writes a linear colour."""
         self.put(parent, "rgb", name, ", ".join(number(part) for part in value))
 
     def texture(self, parent: Element, texture: Texture, name: str) -> None:
-        """A texture or colour as a property."""
+        """Writes a texture or colour as a property."""
         if id(texture) not in self._folded:
             self._folded[id(texture)] = texture, folded(texture)
         texture = self._folded[id(texture)][1]
@@ -91,7 +91,7 @@ class ElementWriter:
             self.color(parent, name, mean_of(texture))
 
     def _part(self, made: Element, texture: Texture, name: str) -> None:
-        """A texture inside a texture: by name, so that one that several share is written once."""
+        """Writes a texture nested in a texture, by name, so that a shared one is written once."""
         if id(texture) not in self._parts:
             holder = Element("part")
             self.texture(holder, texture, name)
@@ -118,8 +118,8 @@ class ElementWriter:
                 self.put(made, "float", name, number(value))
 
     def label(self, wanted: str) -> str:
-        """An identifier that nothing has yet."""
-        label, count = wanted, self._counts.get(wanted, 1)  # lower ones are taken
+        """An unused identifier."""
+        label, count = wanted, self._counts.get(wanted, 1)  # lower numbers are taken
         while label in self._taken:
             count += 1
             label = f"{wanted}{count}"

@@ -1,4 +1,4 @@
-"""Lights of the canonical scene as elements of a Mitsuba file.
+"""Writer of lights of Mitsuba files.
 
 Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference.
 """
@@ -19,7 +19,7 @@ from scenes.formats.text.numbers import number
 
 
 class MitsubaLightWriter(MitsubaSurfaceWriter):
-    """Elements of lights, materials and textures."""
+    """Collects the elements of lights, materials and textures."""
 
     def emitter(self, light: Light) -> None:
         """Writes a light."""
@@ -59,7 +59,7 @@ class MitsubaLightWriter(MitsubaSurfaceWriter):
             self.matrix(made, "toWorld", light.to_world)
 
     def _daylight(self, light: SunSky) -> None:
-        """Writes sun and sky in directions of the world; the transform turns the zenith (y, in Mitsuba 3 z)."""
+        """Writes sun and sky in world directions; the transform rotates the zenith (y, or z in Mitsuba 3)."""
         kind = "sunsky" if self.modern or light.part == "both" else light.part
         made = self.plugin("emitter", kind, self.root)
         way = {axis: number(value) for axis, value in zip("xyz", light.sun_direction, strict=True)}

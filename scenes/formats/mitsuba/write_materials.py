@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene as elements of a Mitsuba file.
+"""Writer of textures and materials of Mitsuba files.
 
 Source: Mitsuba 0.5 documentation; Mitsuba 3 documentation, plugin reference; Hagemann 2018, ch. 4.
 """
@@ -40,18 +40,18 @@ from scenes.formats.mitsuba.write_elements import Element, ElementWriter
 from scenes.formats.text.numbers import number
 
 BLUNT = 0.002
-"""Alpha of mirrors in mixtures for Mitsuba 3."""
+"""Alpha that replaces perfect mirrors in mixtures for Mitsuba 3."""
 
 
 @dataclass
 class MitsubaSurfaceWriter(ElementWriter):
-    """Elements of a scene, as they are made."""
+    """Collects the elements of textures and materials."""
 
     _materials: dict[tuple[int, bool], tuple[Material, str]] = field(default_factory=dict)
     _one_sided: bool = False
 
     def material(self, material: Material, name: str = "", one_sided: bool = False) -> str:
-        """Identifier of a material, written before where it is new."""
+        """The identifier of a material; a new one is written first."""
         key = id(material), one_sided
         if key not in self._materials:
             label = self.label(re.sub(r"[^\w.-]", "_", name) or "m")
@@ -64,7 +64,7 @@ class MitsubaSurfaceWriter(ElementWriter):
         return self._materials[key][1]
 
     def bsdf(self, material: Material, where: str) -> Element:
-        """The element of a material; opaque ones have two sides, unless an instance has one."""
+        """The element of a material; opaque ones are two-sided unless an instance is one-sided."""
         if isinstance(material, Masked):
             made = self.plugin("bsdf", "mask")
             self.texture(made, material.opacity, "opacity")
@@ -77,14 +77,14 @@ class MitsubaSurfaceWriter(ElementWriter):
         if isinstance(material, MixMaterial):
             made = self.plugin("bsdf", "blendbsdf")
             amount = material.amount
-            if isinstance(amount, ConstantTexture):  # a number: Mitsuba 0.5 takes no colour here
+            if isinstance(amount, ConstantTexture):  # a number, because Mitsuba 0.5 accepts no colour here
                 if len(set(amount.value)) > 1:
                     self.report.add(where, "a mixture of each colour by itself", "by their mean")
                 self.put(made, "float", "weight", number(float(np.mean(amount.value))))
             else:
                 self.texture(made, amount, "weight")
             for part in (material.first, material.second):
-                if isinstance(part, MixMaterial):  # by name: it may have been written before
+                if isinstance(part, MixMaterial):  # by name, as it may have been written before
                     ElementTree.SubElement(made, "ref", {"id": self.material(part, "", self._one_sided)})
                 else:
                     made.append(self.bsdf(self._blunt(part, where) if self.modern else part, where))
@@ -110,7 +110,8 @@ class MitsubaSurfaceWriter(ElementWriter):
         return both
 
     def _blunt(self, material: Material, where: str) -> Material:
-        """A sharp mirror or glass with facets of a small alpha: Mitsuba 3.9's blend of a sharp one loses light."""
+        """A perfect mirror or glass, replaced by facets of a small alpha, because Mitsuba 3.9's blend with a perfect
+        one loses light."""
         made = material
         if isinstance(material, Mirror):
             made = Metal((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (BLUNT, BLUNT), material.reflectance)
@@ -165,11 +166,11 @@ class MitsubaSurfaceWriter(ElementWriter):
         return self._plastic(material, where)
 
     def _plastic(self, material: Material, where: str) -> Element:
-        """A dielectric coat over a diffuse base, or what comes nearest to it."""
+        """A dielectric coat over a diffuse base, or its closest approximation."""
         if isinstance(material, Plastic):
             parts = material.diffuse, material.specular, material.ior, material.roughness
         elif isinstance(material, Glossy):
-            # Fresnel's equations of an index reflect at normal incidence what the coat does
+            # the index whose Fresnel reflectance at normal incidence is that of the coat
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
             coat = np.array(mean_of(material.specular))
             most = float(np.clip(coat.max(), 1e-4, 0.25))

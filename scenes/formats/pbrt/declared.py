@@ -1,4 +1,4 @@
-"""PBRT among the formats."""
+"""Declaration of the PBRT formats."""
 
 from scenes.formats.pbrt.load import load_pbrt
 from scenes.formats.pbrt.v4_write import save_pbrt4

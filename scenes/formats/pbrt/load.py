@@ -1,4 +1,4 @@
-"""PBRT scenes of version 3 and 4, each by its own reader."""
+"""Reader of PBRT scenes of versions 3 and 4."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def load_pbrt(path: Path, root: Path | None, report: LossReport) -> Scene:
     """Reads a scene; see :data:`scenes.formats.text.format.Read`.
 
     Raises:
-        SceneError: something cannot be read; the message has file, line and column.
+        SceneError: the scene cannot be read; the message gives file, line and column.
     """
     files = SceneFiles(path, root)
     main = files.folder / Path(path).name

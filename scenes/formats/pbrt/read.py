@@ -1,4 +1,4 @@
-"""PBRT v3 scenes into the canonical scene.
+"""Reader of PBRT v3 scenes.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
 """
@@ -26,11 +26,11 @@ _DEPTH = 5
 
 @dataclass
 class PbrtReader(SceneReader):
-    """State of a PBRT file while it is read.
+    """State of reading a PBRT file.
 
     Attributes:
-        samplers, integrators: canonical names by those of the dialect.
-        same_picture: integrators that differ in time alone.
+        samplers, integrators: canonical names by the names of the dialect.
+        same_picture: integrators that compute the same picture.
         sampler_hints, integrator_hints: parameters that are hints to the renderer.
     """
 

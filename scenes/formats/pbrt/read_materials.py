@@ -1,4 +1,4 @@
-"""Textures and materials of PBRT v3, into those of the canonical scene.
+"""Textures and materials of PBRT v3, converted to the canonical scene.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), sections on materials and textures; Pharr, Jakob and
 Humphreys 2016, ch. 8 to 10.
@@ -33,7 +33,7 @@ from scenes.formats.directives.textures import Pair
 
 
 def alpha_of_roughness(roughness: float) -> float:
-    """Microfacet alpha of PBRT's perceptual roughness ``r``: a polynomial of fourth degree in ``ln r``.
+    """Microfacet alpha of PBRT's perceptual roughness ``r``, a polynomial of fourth degree in ``ln r``.
 
     Source: ``RoughnessToAlpha``, Pharr et al. 2016, sec. 8.4.2.
     """
@@ -42,7 +42,7 @@ def alpha_of_roughness(roughness: float) -> float:
 
 
 class PbrtSurfaces(Surfaces):
-    """Makes the textures and materials of PBRT."""
+    """Creates the textures and materials of PBRT."""
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         path, wrap = self.image_path(parameters)
@@ -90,7 +90,7 @@ class PbrtSurfaces(Surfaces):
         return Glass(*parts, ior, remapped if rough and not smooth else (0.0, 0.0))
 
     def _ior(self, parameters: Parameters) -> float:
-        """``eta``, or ``index``, which older files have."""
+        """The refractive index: ``eta``, or ``index`` in older files."""
         return self.scalar(parameters, "eta", self.scalar(parameters, "index", 1.5))
 
     def _metal(self, parameters: Parameters) -> Material:
@@ -123,5 +123,5 @@ class PbrtSurfaces(Surfaces):
 
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)
-        # PBRT's amount is that of the first
+        # PBRT's amount is the share of the first material
         return mixture_of(second, first, self.texture(parameters, "amount", grey(0.5)))

@@ -1,7 +1,7 @@
-"""Lights of PBRT v4, into those of the canonical scene.
+"""Lights of PBRT v4, converted to the canonical scene.
 
-A light's colour times its ``scale`` is what it sends; ``power`` (lumens) and ``illuminance`` (lux) scale it so that a
-white one sends as much.
+A light emits its colour times its ``scale``; ``power`` (lumens) and ``illuminance`` (lux) scale it so that a white
+light emits that amount.
 
 Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4), sections on lights and area lights; Pharr, Jakob and
 Humphreys 2023, ch. 12.
@@ -31,13 +31,13 @@ Placed = Callable[[Any, tuple[float, float, float]], Rgb]
 
 
 class V4Lights:
-    """Makes lights of parameters."""
+    """Creates lights from parameters."""
 
     def __init__(self, surfaces: PbrtV4Surfaces, files: SceneFiles, report: LossReport) -> None:
         self.surfaces, self.files, self.report = surfaces, files, report
 
     def read(self, kind: str, parameters: Parameters, matrix: Matrix, placed: Placed) -> list[Light]:
-        """The lights of a directive; one of a kind that is not known is reported."""
+        """The lights of a directive; an unknown kind is reported."""
         where = str(parameters.place)
         if "portal" in parameters:
             parameters.asked.add("portal")
@@ -49,7 +49,7 @@ class V4Lights:
         if kind == "spot":
             outer = parameters.number("coneangle", 30.0)
             inner = max(outer - parameters.number("conedeltaangle", 5.0), 0.0)
-            # π times the sum of what the two cones leave of 1, as its fall-off is even in the cosine
+            # π ((1 - cos inner) + (1 - cos outer)), as the mean of the fall-off in the cosine is 1/2
             whole = math.pi * (2.0 - cos(math.radians(inner)) - cos(math.radians(outer)))
             strength = self._strength(parameters, "I", whole)
             end = placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
@@ -68,14 +68,14 @@ class V4Lights:
         return []
 
     def _strength(self, parameters: Parameters, name: str, whole: float, by: str = "power") -> Rgb:
-        """The colour times its scale; where the power is given, divided by the power of a light of 1."""
+        """The colour times its scale; if the power is given, scaled to it by the power of a unit light."""
         factor, given = parameters.number("scale", 1.0), parameters.number(by, -1.0)
         if given > 0.0:
             factor *= given / whole
         return rgb(factor * np.array(self.surfaces.light(parameters, name)))
 
     def area(self, parameters: Parameters) -> tuple[Rgb, float]:
-        """Radiance of an area light, and the power that it is scaled to, 0 for none."""
+        """Radiance of an area light, and the power to which it is scaled, 0 for none."""
         where = str(parameters.place)
         strength = rgb(parameters.number("scale", 1.0) * np.array(self.surfaces.light(parameters, "L")))
         both = parameters.truth("twosided", False)

@@ -1,4 +1,4 @@
-"""Materials, textures and spectra of PBRT v4, into those of the canonical scene.
+"""Materials, textures and spectra of PBRT v4, converted to the canonical scene.
 
 Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4), sections on materials, textures and spectra; Pharr,
 Jakob and Humphreys 2023, ch. 9 and 10.
@@ -38,17 +38,17 @@ from scenes.formats.directives.textures import Pair
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
 
 PBRT_LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
-"""Of linear Rec. 709."""
+"""Luminance weights of linear Rec. 709."""
 
 _GLASSES = {"BK7": 1.5168, "BAF10": 1.67003, "FK51A": 1.48656, "LASF9": 1.85025, "F5": 1.60342, "SF5": 1.6727,
             "SF10": 1.72825, "SF11": 1.78472}  # fmt: skip
-"""Indices of refraction at 587.6 nm, from Schott's catalogue of optical glass."""
+"""Refractive indices at 587.6 nm, from Schott's catalogue of optical glass."""
 
 _FILTERS = {"bilinear": "bilinear", "point": "nearest", "trilinear": "mipmap", "ewa": "mipmap", "EWA": "mipmap"}
 
 
 class PbrtV4Surfaces(PbrtSurfaces):
-    """Makes the textures and materials of PBRT v4."""
+    """Creates the textures and materials of PBRT v4."""
 
     def makers(self) -> dict[str, Maker]:
         return {
@@ -73,7 +73,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
     # --- spectra -------------------------------------------------------------------------------------------------
 
     def light(self, parameters: Parameters, name: str) -> Rgb:
-        """The colour of a light: as it is where it is given in RGB, else its spectrum of luminance 1.
+        """The colour of a light: unchanged if it is given in RGB, else that of its spectrum normalised to luminance 1.
 
         Source: PBRT v4, ``SpectrumToPhotometric``: lights are divided by the luminance of their spectrum.
         """
@@ -100,7 +100,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
         return rgb(np.array(color) / luminance) if luminance > 0.0 else color
 
     def _index(self, parameters: Parameters, name: str = "eta") -> float:
-        """An index of refraction, as a number or by the name of a glass."""
+        """A refractive index, as a number or by the name of a glass."""
         given = parameters.given.get(name)
         if isinstance(given, tuple) and parameters.types.get(name) == "spectrum":
             glass = parameters.text(name, "").removeprefix("glass-")
@@ -113,7 +113,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
     # --- materials -----------------------------------------------------------------------------------------------
 
     def alphas(self, parameters: Parameters, prefix: str = "", default: float = 0.0) -> Pair:
-        """Alphas of the facets: roots of the roughness, unless it is taken as it is."""
+        """Alphas of the facets: square roots of the roughness, unless it is not remapped."""
         even = self.scalar(parameters, f"{prefix}roughness", default)
         pair = [self.scalar(parameters, f"{prefix}{axis}roughness", even) for axis in "uv"]
         if min(pair) < 0.0:
@@ -126,7 +126,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
         return Matte(self.texture(parameters, "reflectance", grey(0.5)))
 
     def _layers(self, parameters: Parameters, prefix: str, thickness: float) -> None:
-        """Asks for what says how the random walk between two layers is done, and reports what it passes through."""
+        """Reads the parameters of the random walk between two layers, and reports those of the medium between them."""
         parameters.number(f"{prefix}thickness", thickness)
         for name, default in (("maxdepth", 10.0), ("nsamples", 1.0)):
             if parameters.number(name, default) != default:
@@ -147,7 +147,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
         return Plastic(base, ior=ior, roughness=alpha)
 
     def _metal_index(self, parameters: Parameters, prefix: str) -> tuple[Rgb, Rgb, Texture]:
-        """Complex index, and what multiplies its reflection: a texture of what is reflected straight back."""
+        """Complex index, and the factor of its reflection: a texture of the reflectance at normal incidence."""
         name, white = f"{prefix}reflectance", ConstantTexture(grey(1.0))
         if name not in parameters:
             eta, k = METALS["Cu"]

@@ -1,4 +1,4 @@
-"""PBRT v4 scenes into the canonical scene.
+"""Reader of PBRT v4 scenes.
 
 Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4); Pharr, Jakob and Humphreys 2023, ch. 12 and
 appendix C.
@@ -31,12 +31,12 @@ _TARGETS = {"Shape": "shape", "LightSource": "light", "AreaLightSource": "light"
             "MakeNamedMaterial": "material", "Texture": "texture", "MakeNamedMedium": "medium"}  # fmt: skip
 _PICTURE_OPTIONS = ("forcediffuse", "disablepixeljitter", "disabletexturefiltering", "rendercoordsys")
 _ASSUMED_MAX = 32
-_DEVIATION = 0.5  # of the Gaussian filter, pixels
+_DEVIATION = 0.5  # standard deviation of the Gaussian filter, pixels
 
 
 @dataclass
 class PbrtV4Reader(PbrtReader):
-    """State of a PBRT v4 file while it is read."""
+    """State of reading a PBRT v4 file."""
 
     samplers: ClassVar = {
         "zsobol": "sobol", "sobol": "sobol", "paddedsobol": "sobol", "pmj02bn": "sobol", "halton": "halton",
@@ -82,7 +82,8 @@ class PbrtV4Reader(PbrtReader):
         super()._do(directive)
 
     def left_over(self, parameters: Parameters, what: str) -> None:
-        """Reports what nothing asked for; what ``Attribute`` gave to all shapes or lights may not fit each of them."""
+        """Reports unused parameters; those that ``Attribute`` set for all shapes or lights are hints, as they need not
+        apply to each."""
         assumed = {name for _, name in self.attributes.assumed}
         for name in parameters.unasked():
             if name in assumed:
@@ -114,7 +115,7 @@ class PbrtV4Reader(PbrtReader):
             self.report.add(str(directive.place), f"colours in {word(directive)!r}", "in sRGB")
 
     def _import(self, directive: Directive) -> None:
-        """Reads a file whose attributes and transforms end with it."""
+        """Reads a file; its attributes and transforms end with it."""
         place = str(directive.place)
         path = self.files.path(word(directive), place, self.beside)
         if path in self._imported or len(self._imported) >= 16:
@@ -191,7 +192,7 @@ class PbrtV4Reader(PbrtReader):
         self.left_over(parameters, "area light")
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
-        """Keeps a shape; that of a lamp of a given power shines as its area needs: ``L power / (π area)``."""
+        """Keeps a shape; a lamp of a given power gets the radiance ``L power / (π area)``."""
         power, emission = self.attributes.power, instance.emission
         if emission is not None and power > 0.0:
             corners = as_mesh(instance.shape).vertices[as_mesh(instance.shape).faces].astype(np.float64)

@@ -1,4 +1,4 @@
-"""The canonical scene as a PBRT v4 file.
+"""Writer of PBRT v4 files.
 
 Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4).
 """
@@ -33,7 +33,7 @@ _FILTERS = {"box": "box", "tent": "triangle", "gaussian": "gaussian", "mitchell"
 
 @dataclass
 class PbrtV4Writer(PbrtV4SurfaceWriter, PbrtWriter):
-    """Lines of a PBRT v4 scene."""
+    """Collects the lines of a PBRT v4 scene."""
 
     def write(self, scene: Scene) -> None:
         super().write(scene)
@@ -83,7 +83,7 @@ class PbrtV4Writer(PbrtV4SurfaceWriter, PbrtWriter):
 
 
 def _square_of(light: EnvironmentLight) -> tuple[np.ndarray, str]:
-    """The map of equal area: the file that the light was read from, where it is one, or a resampled one."""
+    """The equal-area map of a light: the square file from which it was read, or a resampled one."""
     if light.source and Path(light.source).is_file():
         found = loading.read_image(Path(light.source))
         if found.shape[0] == found.shape[1] and np.array_equal(latitude_longitude(found), light.image):
@@ -92,13 +92,13 @@ def _square_of(light: EnvironmentLight) -> tuple[np.ndarray, str]:
 
 
 def _exposed_s(camera: Camera) -> float:
-    """How long the shutter is open, as PBRT v4 takes it: 1 where nothing is said, or it opens for no time."""
+    """Exposure time by the rule of PBRT v4, seconds: 1 if no shutter times are given, or they are equal."""
     times = camera.shutter_s if isinstance(camera, PerspectiveCamera) else (0.0, 0.0)
     return times[1] - times[0] if times[1] > times[0] else 1.0
 
 
 def save_pbrt4(scene: Scene, output: Output, report: LossReport) -> None:
-    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    """Writes a scene and its files; they are not in place before the output is placed."""
     writer = PbrtV4Writer(output, report)
     writer.write(scene)
     text = "\n".join(writer.lines) + "\n"

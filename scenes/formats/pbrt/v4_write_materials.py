@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene as lines of a PBRT v4 file.
+"""Writer of textures and materials of PBRT v4 files.
 
 Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4), sections on materials and textures.
 """
@@ -39,13 +39,13 @@ from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter, unm
 from scenes.formats.text.numbers import number
 
 V4_PICTURES = (*PICTURES, ".hdr", ".qoi")
-"""Endings of pictures that PBRT v4 reads."""
+"""Endings of image files that PBRT v4 reads."""
 
 _MIRROR = grey(0.0), grey(1.0)
 
 
 class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
-    """Lines of textures and materials."""
+    """Collects the lines of textures and materials."""
 
     def image_line(self, texture: ImageTexture) -> str:
         file = self.output.picture(texture.image, texture.source, V4_PICTURES)
@@ -109,7 +109,7 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         return self._coated(material, where)
 
     def _mirror(self, reflectance: Texture, alphas: tuple[float, float], where: str) -> tuple[str, list[str]]:
-        """A metal by what it reflects straight back: it whitens towards the edge."""
+        """A metal given by its reflectance at normal incidence, which becomes white at grazing angles."""
         if mean_of(reflectance) != (1.0, 1.0, 1.0):
             self.report.add(where, "a mirror of one colour", "a metal of that colour, white at the edge")
         return "conductor", [self.texture(reflectance, "reflectance"), unmapped_roughness(alphas)]
@@ -127,7 +127,7 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         return "dielectric", [index, unmapped_roughness(material.roughness)]
 
     def _coated(self, material: Material, where: str) -> tuple[str, list[str]]:
-        """A base under a coat; what comes nearest to materials that PBRT v4 has not."""
+        """A base under a coat, or the closest approximation of a material that PBRT v4 lacks."""
         if isinstance(material, Plastic):
             base, ior, alpha = material.diffuse, material.ior, material.roughness
             if material.specular != WHITE:

@@ -1,4 +1,4 @@
-"""Whether a PBRT file is one of version 4: its words are told apart from those of version 3.
+"""Detection of PBRT version 4 by the words of a file.
 
 Source: PBRT v4 file format (https://www.pbrt.org/fileformat-v4).
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-_LOOKED_AT = 1 << 22  # characters of a file: what follows is geometry
+_LOOKED_AT = 1 << 22  # number of characters that are searched: what follows is geometry
 _MATERIALS = (
     "coateddiffuse|coatedconductor|diffuse|conductor|dielectric|thindielectric|diffusetransmission|interface|measured"
 )
@@ -25,6 +25,6 @@ _OLD_SIGNS = re.compile(r'^[ \t]*WorldEnd\b|^[ \t]*Film\s+"image"', re.MULTILINE
 
 
 def is_v4(text: str) -> bool:
-    """Whether a text has words that version 4 alone has, and no end of the world, which version 3 alone has."""
+    """Whether a text has words of version 4 only, and no ``WorldEnd`` or other word of version 3 only."""
     head = text[:_LOOKED_AT]
     return _SIGNS.search(head) is not None and _OLD_SIGNS.search(text) is None

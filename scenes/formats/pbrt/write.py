@@ -1,4 +1,4 @@
-"""The canonical scene as a PBRT v3 file.
+"""Writer of PBRT v3 files.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
 """
@@ -49,7 +49,7 @@ _SAMPLERS = {**first_of(PbrtReader.samplers), "hammersley": "halton"}
 
 @dataclass
 class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
-    """Lines of a PBRT scene."""
+    """Collects the lines of a PBRT scene."""
 
     times_s: tuple[float, float] = (0.0, 1.0)
 
@@ -83,7 +83,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         self.lines.append(f'Film "image" {size} "string filename" [ {name} ]')
 
     def stratified_line(self, count: int) -> str:
-        """A stratified sampler of a number of samples, as nearly square as can be."""
+        """A stratified sampler of ``count`` samples, as close to square as possible."""
         across = _most_even(count)
         return f'Sampler "stratified" "integer xsamples" [ {across} ] "integer ysamples" [ {count // across} ]'
 
@@ -94,7 +94,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         self.lines.append(self.camera_line(camera))
 
     def keys(self, track: RigidTrack | None, to_world: Matrix, where: str) -> list[Matrix]:
-        """Where something is at the two times of the file; one matrix where it rests."""
+        """Transforms at the two times of the file; a single one without motion."""
         poses, times_s = motion_keys(track, to_world)
         if track is None or len(poses) == 1:
             return poses
@@ -133,7 +133,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
             self.infinite(light)
 
     def _daylight(self, light: SunSky) -> None:
-        """The sky as a picture, the sun as a light from one direction."""
+        """Writes the sky as an image and the sun as a directional light."""
         if light.part != "sun":
             sky = sky_map(light)
             self.report.add("light", "the analytic sky", f"a map of {sky.image.shape[0]} rows")
@@ -162,14 +162,14 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     # --- shapes --------------------------------------------------------------------------------------------------
 
     def write_instance(self, instance: Instance) -> None:
-        """Writes a shape, or an object that was made before, in its place."""
+        """Writes a shape, or a reference to an object, with its placement."""
         where = instance.name or "shape"
         made = self.part(instance) if part_key(instance) not in self.shared else [self.object_line(instance)]
         placing = self.moved(self.keys(instance.track, instance.to_world, where))
         self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
 
     def part(self, instance: Instance) -> list[str]:
-        """Lines of a shape and what it is made of, without its place."""
+        """Lines of a shape and its material, without its placement."""
         material = instance.material
         emission = radiance_of(instance, self.report)
         named = self.material(material.base if isinstance(material, Masked) else material)
@@ -197,14 +197,14 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
 
 
 def _most_even(count: int) -> int:
-    """The divisor of a number nearest to its root, from above."""
+    """The least divisor of a number that is at least its square root."""
     return next(
         size for size in range(max(1, math.isqrt(count - 1) + 1 if count > 1 else 1), count + 1) if count % size == 0
     )
 
 
 def save_pbrt(scene: Scene, output: Output, report: LossReport) -> None:
-    """Writes a scene and what belongs to it; nothing is in place until the output is."""
+    """Writes a scene and its files; they are not in place before the output is placed."""
     writer = PbrtWriter(output, report)
     writer.write(scene)
     output.text(output.path.name, "\n".join(writer.lines) + "\n")

@@ -1,4 +1,4 @@
-"""Textures and materials of the canonical scene as lines of a PBRT v3 file.
+"""Writer of textures and materials of PBRT v3 files.
 
 Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018, ch. 4.
 """
@@ -33,11 +33,11 @@ from scenes.formats.directives.surface_writer import Pair, SurfaceWriter, mixtur
 from scenes.formats.text.numbers import number
 
 PICTURES = (".exr", ".png", ".tga", ".pfm")
-"""Endings of pictures that PBRT v3 reads."""
+"""Endings of image files that PBRT v3 reads."""
 
 
 class PbrtSurfaceWriter(SurfaceWriter):
-    """Lines of textures and materials."""
+    """Collects the lines of textures and materials."""
 
     color_texture = "spectrum"
     color = "rgb"
@@ -90,7 +90,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
         return super().plain_material(material, where)
 
     def _plastic(self, material: Plastic, where: str) -> tuple[str, list[str]]:
-        """PBRT's coat adds to the base; ``uber`` has other indices than 1.5 and smooth coats."""
+        """A plastic. PBRT adds the coat to the base; ``uber`` supports indices other than 1.5 and smooth coats."""
         diffuse = material.diffuse
         if material.layered and material.ior > 1.0:
             kept = 1.0 - mean_reflectance(material.ior)
@@ -114,7 +114,8 @@ class PbrtSurfaceWriter(SurfaceWriter):
         return "glass", parts + ([unmapped_roughness(material.roughness)] if material.roughness != (0.0, 0.0) else [])
 
     def _phong(self, material: Phong, where: str) -> tuple[str, list[str]]:
-        """Highlights as wide: ``alpha² = 2 / (exponent + 2)`` (Walter et al. 2007, sec. 5.2)."""
+        """Phong as ``uber`` with a highlight of equal width: ``alpha² = 2 / (exponent + 2)`` (Walter et al. 2007, sec.
+        5.2)."""
         alpha = math.sqrt(2.0 / (material.exponent + 2.0))
         became = f"uber with a highlight of alpha {alpha:.3g}"
         self.report.add(where, "Phong reflection with a Fresnel-weighted mirror", became)
@@ -125,5 +126,5 @@ class PbrtSurfaceWriter(SurfaceWriter):
 
 
 def unmapped_roughness(alphas: Pair) -> str:
-    """Alphas along both directions of a surface, as they are."""
+    """Parameters of the alphas along both directions of a surface, without remapping."""
     return f'{roughness_pair(alphas)} "bool remaproughness" [ "false" ]'

@@ -1,4 +1,4 @@
-"""What a format of scene files is."""
+"""The description of a format of scene files."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from scenes.formats.losses import LossReport
 from scenes.formats.text.output import Output
 
 Read = Callable[[Path, Path | None, LossReport], Scene]
-"""Reads a file: its path, the folder that nothing is read outside of (None for its own), and who hears of losses."""
+"""``(path, root, report) -> scene``: reads a file. Nothing is read outside of the folder ``root`` (None for the file's
+own), and losses are reported."""
 
 Write = Callable[[Scene, Output, LossReport], None]
-"""Writes a scene into an output, with its meshes and pictures; reports what could not be kept."""
+"""Writes a scene into an output, with its meshes and images; losses are reported."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,11 @@ class Format:
     """A format of scene files.
 
     Attributes:
-        name: in words, for messages.
-        endings: of the names of its files, in lower case and with the dot. The first format that has an ending is
-            taken for it; one without endings is chosen by its name.
-        read: reads a file, or None where files are only written.
-        write: writes a scene, or None where files are only read.
+        name: name for messages.
+        endings: endings of its file names, in lower case and with the dot. The first format with an ending is used for
+            it; a format without endings is selected by name.
+        read: reads a file; None if the format can only be written.
+        write: writes a scene; None if the format can only be read.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Numbers as text: how they are written, and the bound on those that are read."""
+"""Numbers as text: their format, and the bound of numbers that are read."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ NUMBER_MAX = 1e30
 
 
 def number(value: float) -> str:
-    """A number with nine significant digits, which float32 needs."""
+    """A number with nine significant digits, as float32 needs."""
     return f"{float(value):.9g}"
 
 
 def spaced(values: Iterable[float]) -> str:
-    """Numbers of float64 with all their digits, separated by blanks."""
+    """Float64 numbers with all digits, separated by spaces."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def listed(values: Iterable[float]) -> str:
-    """Numbers in brackets, nine digits each."""
+    """Numbers in brackets, with nine digits each."""
     return f"[ {' '.join(number(value) for value in values)} ]"
 
 
 def written_matrix(matrix: Matrix) -> str:
-    """Sixteen numbers in brackets, column by column, with all their digits."""
+    """Sixteen numbers in brackets, column by column, with all digits."""
     return f"[ {spaced(matrix.T.ravel())} ]"

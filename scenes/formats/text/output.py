@@ -1,4 +1,4 @@
-"""The files of a converted scene: its text, meshes and pictures, which are put in place together or not at all."""
+"""The files of a converted scene: its text, meshes and images, which are put in place together or not at all."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _OF_CONTENT = re.compile(r"-[0-9a-f]{8}$")
 class Output:
     """Files of a scene that is being written.
 
-    They are written to a folder of their own beside the target and moved when :meth:`place` is called.
+    They are written to a temporary folder beside the target and moved when :meth:`place` is called.
     """
 
     def __init__(self, path: Path) -> None:
-        """Raises SceneError where the folder cannot be written to."""
+        """Raises SceneError if the folder is not writable."""
         self.path = Path(path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -38,7 +38,8 @@ class Output:
         self._pictures: dict[int, tuple[NDArray[np.float32], str]] = {}
 
     def _named(self, folder: str, stem: str, ending: str, parts: Iterable[bytes | memoryview]) -> str:
-        """Writes a file whose name holds a hash of its content, so that scenes in one folder keep their files apart."""
+        """Writes a file whose name contains a hash of its content, so that the files of several scenes in one folder do
+        not collide."""
         (self._work / folder).mkdir(exist_ok=True)
         partial, digest = self._work / folder / "partial", hashlib.blake2b(digest_size=4)
         with partial.open("wb") as file:
@@ -50,7 +51,7 @@ class Output:
         return name
 
     def mesh(self, mesh: Mesh) -> str:
-        """Writes a mesh once, as PLY.
+        """Writes a mesh as PLY; the same mesh is written once.
 
         Returns:
             Its name, relative to the folder of the scene.
@@ -63,12 +64,12 @@ class Output:
     def picture(
         self, image: NDArray[np.float32], source: str, endings: tuple[str, ...] = (".exr", ".png", ".jpg", ".jpeg")
     ) -> str:
-        """Copies the file of a picture, or writes an EXR file where its format does not fit or the picture has changed.
+        """Copies the file of an image, or writes an EXR file if its format is not supported or the image has changed.
 
         Args:
             image: linear RGB.
-            source: the file of the picture, or empty.
-            endings: of the files that may be copied.
+            source: file of the image, or empty.
+            endings: endings of files that may be copied.
         """
         if id(image) not in self._pictures:
             path = Path(source)
@@ -90,7 +91,7 @@ class Output:
         return content
 
     def text(self, name: str, content: str) -> None:
-        """Writes a text beside the others; the scene's own is that of :attr:`path`."""
+        """Writes a text file; the scene's own has the name of :attr:`path`."""
         (self._work / name).write_text(content, encoding="utf-8")
 
     def place(self) -> None:
@@ -112,7 +113,7 @@ class Output:
             self.discard()
 
     def discard(self) -> None:
-        """Removes what was not placed."""
+        """Removes the files that were not placed."""
         shutil.rmtree(self._work, ignore_errors=True)
 
 

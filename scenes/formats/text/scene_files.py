@@ -1,7 +1,7 @@
-"""Files that a scene file names.
+"""The files to which a scene file refers.
 
-A scene file is not trusted. Its names are relative; names that lead out of the allowed folder, also through links, are
-refused. The bytes that are read and the depth of includes are bounded.
+A scene file is not trusted. File names must be relative; names that lead out of the allowed folder, including through
+links, are rejected. The number of bytes read and the depth of includes are bounded.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
 
 DEPTH_MAX = 16
-"""Greatest depth of files that include each other."""
+"""Maximum depth of nested includes."""
 
 BYTES_MAX = 2 << 30
-"""Most bytes of text and meshes that one scene reads."""
+"""Maximum number of bytes of text and meshes that one scene reads."""
 
 
 class SceneFiles:
     """The files of one scene."""
 
     def __init__(self, main: Path, root: Path | None = None, bytes_max: int = BYTES_MAX) -> None:
-        """Opens nothing yet.
+        """Sets the folder; no file is opened.
 
         Args:
-            main: the scene's first file.
-            root: folder that no file may lie outside of; by default that of ``main``.
-            bytes_max: bytes that are read at most.
+            main: main file of the scene.
+            root: folder outside of which no file may lie; by default that of ``main``.
+            bytes_max: maximum number of bytes that are read.
         """
         self.main = Path(main)
         self.folder = self.main.resolve().parent
@@ -39,12 +39,12 @@ class SceneFiles:
             raise SceneError(f"{main}: expected a scene inside {self.root}")
 
     def path(self, name: str, where: str, beside: Path | None = None) -> Path:
-        """The file of a name.
+        """The path of a file name.
 
         Args:
-            name: as the scene gives it, relative.
+            name: relative file name, as in the scene.
             where: place of the name, for the message.
-            beside: another file; the name is looked up in its folder where the folder of the first file lacks it.
+            beside: another file; the name is searched in its folder if the folder of the main file lacks it.
 
         Raises:
             SceneError: the name is absolute, leads outside, or names no file.
@@ -58,7 +58,7 @@ class SceneFiles:
     def known(
         self, name: str, where: str, report: LossReport, what: str, became: str, beside: Path | None = None
     ) -> Path | None:
-        """The file of a name, or None where it is missing, which is reported.
+        """The path of a file name, or None if the file is missing, which is reported.
 
         Raises:
             SceneError: the name is absolute or leads outside.
@@ -82,10 +82,10 @@ class SceneFiles:
         return None
 
     def read(self, path: Path, where: str) -> bytes:
-        """Content of a file, decompressed where its name ends in ``.gz``.
+        """Content of a file, decompressed if its name ends in ``.gz``.
 
         Raises:
-            SceneError: it cannot be read, or is more than may be read.
+            SceneError: the file cannot be read, or exceeds the number of bytes that may be read.
         """
         try:
             if path.stat().st_size > self._left:
@@ -103,7 +103,7 @@ class SceneFiles:
         return content
 
     def text(self, path: Path, where: str) -> str:
-        """Content of a text file: UTF-8, UTF-16 with a mark of its byte order, or else Latin-1."""
+        """Content of a text file in UTF-8, UTF-16 with a byte order mark, or else Latin-1."""
         content = self.read(path, where)
         try:
             marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))

@@ -1,4 +1,4 @@
-"""XML documents as plain trees with places; entities, document types and outside references are refused."""
+"""XML documents as plain trees with places; entities, document types and external references are rejected."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NODES_MAX = 2_000_000
 
 @dataclass
 class Node:
-    """An element: its tag, attributes, children, and where it begins."""
+    """An element: its tag, attributes, children, and its place."""
 
     tag: str
     attributes: dict[str, str]
@@ -61,7 +61,8 @@ def parse_xml(content: bytes, file: str) -> Node:
     """The tree of a document.
 
     Raises:
-        SceneError: it is not well-formed, or declares entities or a document type; file, line, column.
+        SceneError: the document is not well-formed, or declares entities or a document type; the message gives file,
+            line and column.
     """
     import defusedxml
     import defusedxml.expatreader
@@ -70,7 +71,7 @@ def parse_xml(content: bytes, file: str) -> Node:
     if not content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and b"encoding" not in content[:200]:
         try:
             content.decode("utf-8")
-        except UnicodeDecodeError:  # not declared: most often Latin-1
+        except UnicodeDecodeError:  # undeclared, so mostly Latin-1
             content = content.decode("latin-1").encode()
     parser = defusedxml.expatreader.create_parser(forbid_dtd=True)
     parser.setContentHandler(builder)
