@@ -128,8 +128,8 @@ def in_group(
     direction: wp.vec3,
     t_max: wp.float32,
 ):
-    """Whether a world ray misses all of a group before ``t_max``; and its origin and direction in the space of the
-    group's track, where it does not."""
+    """Whether a world ray misses a whole group before ``t_max``; otherwise also its origin and direction in the space
+    of the group's track."""
     start = wp.vec3(origin[0], origin[1], origin[2])
     towards = wp.vec3(direction[0], direction[1], direction[2])
     missed = wp.bool(False)

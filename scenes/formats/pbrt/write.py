@@ -155,7 +155,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         ]
 
     def map_of(self, light: EnvironmentLight) -> str:
-        """The picture of an environment light, and its strength."""
+        """The image of an environment light, and its factor."""
         file = self.output.picture(light.image, light.source, PICTURES)
         return f'"string mapname" [ "{file}" ] "rgb L" {listed((light.scale,) * 3)}'
 
