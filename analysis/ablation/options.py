@@ -45,7 +45,7 @@ class AblationOptions:
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
-    """Where in the animation the measurement starts, seconds."""
+    """Animation time at which the measurement starts, seconds."""
     markdown: bool = False
     """Print the tables as Markdown."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)

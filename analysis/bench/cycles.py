@@ -18,7 +18,7 @@ from tsar.stages import Stages
 from tsar.types import Densities, Errors, FrameletBatch, SampleBatch, StepRecord, Trace
 
 CYCLE_S = 0.02
-"""Animation time of a cycle, seconds: about that of the cost model at the defaults."""
+"""Animation time of a cycle of ``thesis``, seconds: about that of the cost model at the defaults."""
 _TILINGS_PER_CALL = 20
 
 

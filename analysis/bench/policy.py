@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from renderer.trace import Renderer
 
 CYCLE_S = 0.005
-"""Animation time of a cycle, seconds: about that of the cost model at the defaults."""
+"""Animation time of a cycle of ``tsar``, seconds: about that of the cost model at the defaults."""
 MEASURED_CYCLES = 240
 ALL_ELSE_LIMIT = 0.60
 NAMES = {

@@ -52,7 +52,7 @@ class RunOptions:
     seconds: float = 2.0
     """Animation time to measure, seconds."""
     start_s: float = 0.0
-    """Where in the animation the measurement starts, seconds."""
+    """Animation time at which the measurement starts, seconds."""
     phase: float = 0.0
     """Phase of the animation, in [0, 1), for repetitions."""
     camera_path: Literal["", "turntable", "fly-through"] = ""

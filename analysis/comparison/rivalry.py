@@ -14,12 +14,9 @@ from analysis.metrics import METRICS
 from analysis.metrics.quality import Floats, ratio_statistics
 from analysis.metrics.rivals import BEST, Standing, best_of, best_shares, standing
 from analysis.page.video import REFERENCE
+from analysis.study.cases import is_framed
 
 Picture = TypeVar("Picture")
-
-
-FRAMED = "framed"
-"""Name of the framed renderer; the names of its variants begin with it and a hyphen."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Panels:
     @classmethod
     def of(cls, mse: Mapping[str, Floats], own: str) -> Panels:
         """Chooses the panels by the errors of all runs."""
-        framed = [name for name in mse if name != own and (name == FRAMED or name.startswith(f"{FRAMED}-"))]
+        framed = [name for name in mse if name != own and is_framed(name)]
         best = min(framed, key=lambda name: float(np.median(mse[name])), default=None)
         others = [name for name in mse if name != own and name not in framed]
         hidden = tuple(name for name in framed if name != best)

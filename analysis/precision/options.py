@@ -35,7 +35,7 @@ class PrecisionOptions:
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The pipeline of all runs; batch and resolution come from the row, the seed from the repetition."""
     start_s: float = 0.0
-    """Where in the animation the measurement starts, seconds."""
+    """Animation time at which the measurement starts, seconds."""
     tolerance: float = 0.01
     """A format is safe if no run breaks an invariant and the mean error of all runs grows by at most this share."""
     markdown: bool = False

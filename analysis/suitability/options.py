@@ -51,7 +51,7 @@ class SuitabilityOptions:
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model."""
     start_s: float = 0.0
-    """Where in the animation the measurement starts, seconds."""
+    """Animation time at which the measurement starts, seconds."""
     stride: int = 6
     """Interval, in reference images, at which FLIP, SSIM and the causes of the error are taken. At thesis scale they
     cost more than the runs themselves."""
