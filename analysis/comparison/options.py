@@ -54,7 +54,7 @@ class RunOptions:
     start_s: float = 0.0
     """Animation time at which the measurement starts, seconds."""
     phase: float = 0.0
-    """Phase of the animation, in [0, 1), for repetitions."""
+    """Phase of the animation, in [0, 1], for repetitions."""
     camera_path: Literal["", "turntable", "fly-through"] = ""
     """Camera motion for a scene file without one."""
     clock: Literal["simulated", "wall"] = "simulated"
