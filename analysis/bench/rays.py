@@ -45,6 +45,7 @@ class Rays:
 
     @property
     def count(self) -> int:
+        """Number of rays."""
         return len(self.origin)
 
 

@@ -107,6 +107,7 @@ def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> li
 
 
 def new_figure(width: float, height: float, rows: int = 1, **kwargs) -> tuple[Figure, NDArray]:
+    """A figure of a size in inches, and its ``rows`` axes with grids, one below the other."""
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(rows, 1, squeeze=False, **kwargs)[:, 0]
     for axis in axes:

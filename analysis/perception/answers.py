@@ -79,6 +79,7 @@ class Answers:
         self._rows.append(dict(row))
 
     def close(self) -> None:
+        """Closes the store."""
         self._connection.close()
 
     def _read(self) -> tuple[Any, str, int, str, list[dict[str, Any]]]:

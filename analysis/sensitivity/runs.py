@@ -29,10 +29,12 @@ class Setting:
 
     @classmethod
     def of(cls, tsar: TsarConfig) -> Setting:
+        """The setting of a configuration."""
         e = tsar.error
         return cls(e.spatial_slope, e.temporal_slope, e.spatial_offset, e.temporal_offset, tsar.response.bias)
 
     def changed(self, **values: float) -> Setting:
+        """The setting with some values replaced."""
         # adding zero turns -0.0 into 0.0: equal settings must not have two names
         return dataclasses.replace(self, **{name: float(value) + 0.0 for name, value in values.items()})
 
@@ -77,6 +79,7 @@ class Run:
 
     @property
     def place(self) -> tuple[str, Setting | None, int]:
+        """Input, setting and repetition."""
         return self.input, self.setting, self.repetition
 
 

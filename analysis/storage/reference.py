@@ -69,11 +69,12 @@ class ReferenceSpec:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
+        """Shape ``(count, height, width, 3)`` of the images."""
         return self.count, self.height_px, self.width_px, 3
 
     @property
     def bytes(self) -> int:
-        """Size on disk."""
+        """Size on disk, bytes."""
         return 2 * int(np.prod(self.shape))
 
 

@@ -60,6 +60,7 @@ class Results:
         self.rows = sorted({one.run.row for one in self.all if one.run.label == "thesis" and one.run.row is not None})
 
     def get(self, label: str, name: str, row: int | None, side_px: int, repetition: int) -> Result | None:
+        """The result at a place; None if the run failed."""
         return self._by.get((label, name, row, side_px, repetition))
 
     def pairs(self, name: str, row: int) -> list[tuple[Result, Result]]:

@@ -77,11 +77,17 @@ def point_set(name: str, count: int, seed: int = 0) -> Points:
 
 
 def hammersley(count: int, _rng: np.random.Generator) -> Points:
+    """Hammersley points ``(i / n, Φ_2(i), Φ_3(i))`` with the radical inverses ``Φ``. Source: blur thesis, ch. 2."""
     inverses = qmc.Halton(2, scramble=False).random(count)
     return np.column_stack([np.arange(count) / count, inverses])
 
 
 def stratified(count: int, rng: np.random.Generator) -> Points:
+    """One random point in each cell of a cubic grid.
+
+    Raises:
+        ValueError: the count is not a cube.
+    """
     side = round(power(count, 1.0 / 3.0))
     if math.prod((side,) * 3) != count:
         below = math.floor(power(count, 1.0 / 3.0) + 1e-9)
@@ -123,10 +129,12 @@ def toroidal_distance(
 
 
 def halton(count: int, rng: np.random.Generator) -> Points:
+    """Halton points in bases 2, 3 and 5 with scrambled digits (SciPy)."""
     return qmc.Halton(3, scramble=True, rng=rng).random(count)
 
 
 def sobol(count: int, rng: np.random.Generator) -> Points:
+    """Sobol points with linear matrix scrambling and a digital shift (SciPy)."""
     return qmc.Sobol(3, scramble=True, rng=rng).random_base2(max(count - 1, 0).bit_length())[:count]
 
 
@@ -173,6 +181,7 @@ def cell_counts(count: int, density_ratio: float) -> tuple[int, int, int]:
 
 
 def random(count: int, rng: np.random.Generator) -> Points:
+    """Independent uniform points."""
     return rng.random((count, 3))
 
 
