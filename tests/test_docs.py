@@ -8,6 +8,7 @@ import runpy
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -88,6 +89,27 @@ def test_the_tutorial_runs_small(tmp_path: Path) -> None:
     assert drawn == {path.name for path in (ROOT / "docs/pictures").glob("tutorial-*")} and len(drawn) == 5
 
 
+def result_tables() -> dict[str, Any]:
+    return runpy.run_path(str(ROOT / "docs/result_tables.py"))
+
+
+def test_tables_of_a_study_replace_those_of_its_page() -> None:
+    page = "# Page\n\n| a | b |\n|---|---|\n| old | 1 |\n\nSaid.\n\n| c |\n| --- |\n| stays |\n"
+    written = "**A title**\n\n| a | b |\n| --- | --- |\n| new | 2 |\n| newer | 3 |\n\n| d |\n| --- |\n| other |\n"
+    made, common = result_tables()["replaced"](page, written)
+    assert common == ["a | b"]
+    assert made == page.replace("|---|---|\n| old | 1 |\n", "| --- | --- |\n| new | 2 |\n| newer | 3 |\n")
+    with pytest.raises(ValueError, match=r"a \| b: expected 1 tables of these columns, got 2"):
+        result_tables()["replaced"](page + "\n| a | b |\n|---|---|\n", written)
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/results").glob("*.md")), ids=lambda page: page.stem)
+def test_tables_of_a_page_are_found_and_nothing_else_changes(page: Path) -> None:
+    text = page.read_text()
+    made, common = result_tables()["replaced"](text, text)
+    assert made == text and len(common) == len(result_tables()["tables_of"](text))
+
+
 @pytest.mark.slow
 def test_the_tutorial_prints_what_its_page_says(tmp_path: Path) -> None:
     assert tutorial(tmp_path) == (ROOT / "docs/tutorial.md").read_text()
@@ -98,4 +120,4 @@ def test_figures_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(sys, "argv", ["figures.py", str(tmp_path)])
     runpy.run_path(str(ROOT / "docs/figures.py"), run_name="__main__")
     drawn = {path.name for path in tmp_path.iterdir()}
-    assert drawn == {path.name for path in (ROOT / "docs/pictures").glob("*.png")}
+    assert drawn == set(re.findall(r"pictures/(\S+\.png)", (ROOT / "docs/concepts.md").read_text()))

@@ -114,7 +114,7 @@ def _require_port(address: str) -> None:
 
 async def _greeted(address: str) -> None:
     """Raises OSError if what listens at an address does not speak Dask's protocol: a client would wait forever."""
-    from distributed.comm import connect
+    from distributed.comm.core import connect
 
     comm = await asyncio.wait_for(connect(address, timeout=WAIT_S), WAIT_S)
     await comm.close()
