@@ -23,4 +23,4 @@ def main() -> None:
 
     summary, broken = study(options)
     show(*shown_tables(summary["optima"]))
-    end_study(summary, broken, options.out, "tables/, figures/")
+    end_study(summary, broken, options.out, "tables/, tables.md, figures/")

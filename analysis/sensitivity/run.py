@@ -11,11 +11,11 @@ from analysis.command.cli import bad_input, full_disk
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.plots import write_all
 from analysis.sensitivity.runs import runs, sweeps
-from analysis.sensitivity.tables import optimum_table, setting_table
+from analysis.sensitivity.tables import optimum_table, setting_table, shown_tables
 from analysis.storage.summary import write_summary
 from analysis.study.evaluation import broken
 from analysis.study.farm import describe_failures, run_study
-from analysis.study.written import write_tables
+from analysis.study.written import WRITTEN, write_tables
 
 
 def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
@@ -29,7 +29,7 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
     """
     with bad_input():
         planned = runs(options)
-    outcomes = run_study(options, [run.case for run in planned], ("tables/*.csv", "figures/*.png"))
+    outcomes = run_study(options, [run.case for run in planned], (*WRITTEN, "figures/*.png"))
     out, summaries = options.out.resolve(), outcomes.summaries()
     done = [run for run in planned if run.case in summaries]
     failed = {
@@ -45,7 +45,8 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
     stills = {run.setting: outcomes.keys[run.case] for run in shown}
     head = {"runs": len(planned), "runs_done": len(done), "failures": failed, "ledger": options.ledger}
     with full_disk(out):
-        write_tables(out, {name: pd.DataFrame(lines) for name, lines in tables.items()})
+        frames = {name: pd.DataFrame(lines) for name, lines in tables.items()}
+        write_tables(out, frames, shown_tables(tables["optima"]))
         write_all(out / "figures", options, tables["settings"], sweeps(options)["slopes"], stills, outcomes.place)
         seeds = list(range(options.repetitions))
         summary = write_summary(out, {**head, **tables}, options, device="cpu", seeds=seeds)

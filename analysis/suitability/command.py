@@ -23,4 +23,4 @@ def main() -> None:
 
     summary, tables = study(options)
     show(*shown_tables(tables))
-    end_study(summary, summary["broken_invariants"], options.out, "tables/, figures/, report.html")
+    end_study(summary, summary["broken_invariants"], options.out, "tables/, tables.md, figures/, report.html")

@@ -18,7 +18,7 @@ from analysis.study.outcomes import Outcomes
 from analysis.study.written import write_tables
 from analysis.suitability import plots
 from analysis.suitability.options import SuitabilityOptions
-from analysis.suitability.page import write_page
+from analysis.suitability.page import shown_tables, write_page
 from analysis.suitability.rivalry import groups_of, lead_table, metric_table, rival_table
 from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import (
@@ -49,14 +49,14 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     """
     with bad_input():
         planned = runs(options)
-    written = ("report.html", "timing.csv", "tables/*.csv", "figures/*.png")
+    written = ("report.html", "timing.csv", "tables/*.csv", "tables.md", "figures/*.png")
     outcomes = run_study(options, [run.case for run in planned], written)
     outcomes.tell()
     out, done = options.out.resolve(), outcomes.summaries()
     results = Results([Result(run, done[run.case], outcomes.times(run.case)) for run in planned if run.case in done])
     tables, measured = tables_of(options, results), timing(done)
     with full_disk(out):
-        write_tables(out, tables)
+        write_tables(out, tables, shown_tables(tables))
         write_table(out / "timing.csv", measured)
         pictures = plots.write_all(out / "figures", options, results, outcomes.keys, outcomes.place)
         summary = _summary(options, planned, outcomes, measured, tables)
