@@ -64,7 +64,7 @@ def translate(mitsuba: Any, scene: Scene, time_s: float) -> dict[str, Any]:
     """Sensor, shapes and lights as a dictionary for ``mitsuba.load_dict``.
 
     Args:
-        mitsuba: the module, with a variant in force.
+        mitsuba: the module, with a variant selected.
         scene: ours.
         time_s: animation time of the still.
 

@@ -184,7 +184,7 @@ class RunOptions:
 
     @property
     def counted(self) -> Ledger:
-        """The ledger in force."""
+        """The ledger in use."""
         return "wall" if self.clock == "wall" else self.ledger
 
     @property

@@ -1,4 +1,4 @@
-"""Figures of a comparison; computes nothing but positions on the paper."""
+"""Figures of a comparison; computes only positions on the paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of the cost report; computes nothing but positions on the paper."""
+"""Figures of the cost report; computes only positions on the paper."""
 
 from __future__ import annotations
 

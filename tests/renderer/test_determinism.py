@@ -1,4 +1,4 @@
-"""The same bits whatever the threads, the order of the batch, or the way a picture is asked for."""
+"""The same bits for any number of threads, order of the batch, and way of requesting a picture."""
 
 import numpy as np
 import pytest

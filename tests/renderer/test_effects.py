@@ -1,4 +1,4 @@
-"""What lenses, glossy surfaces and glass do to a picture, against what optics says they do."""
+"""Effects of lenses, glossy surfaces and glass on a picture, compared with optics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cannot be rendered is refused in one clear line."""
+"""Input that cannot be rendered is refused in one clear line."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""First hits: taken back to the image by the poses of their time, they land on the samples that made them."""
+"""First hits: projected onto the image with the poses of their time, they land on the samples that made them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def parts(hits: Hits) -> tuple[Tensor, ...]:
 
 
 def distance_px(view: Viewpoint, instance: Tensor, point: Tensor, position: Tensor) -> Tensor:
-    """How far from their samples hits land, pixels; one that is behind the camera is infinitely far."""
+    """Distance of projected hits from their samples, pixels; infinite for a hit behind the camera."""
     found, depth = project(view, instance, point)
     away = (found - position).abs().amax(dim=-1) * PIXELS
     return torch.where(depth > 0.0, away, torch.inf)

@@ -1,4 +1,4 @@
-"""What keeps the first light from what is seen, beside shadows worked out by hand."""
+"""Occluders of the first light, compared with shadows computed by hand."""
 
 from __future__ import annotations
 

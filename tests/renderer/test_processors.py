@@ -1,7 +1,7 @@
 """The same bits on processors without the instructions of this one.
 
-Torch, NumPy, BLAS and the C library are told to leave their newer code alone, each in its own way, in a process of its
-own; kernels are compiled for other registers. What a processor of another maker does differently is not seen here.
+Torch, NumPy, BLAS and the C library are told not to use newer instructions, each in its own way, in a separate process;
+kernels are compiled for other registers. Differences between makers of processors are not covered here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NO_AVX = "-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX_Usable,-AVX2_Usable,-FMA_Usable"
 
 
 def plain_paths() -> dict[str, str]:
-    """Environment in which libraries use what every x86-64 processor has."""
+    """Environment in which libraries use only instructions that every x86-64 processor has."""
     newer = " ".join(np._core._multiarray_umath.__cpu_dispatch__)  # type: ignore[attr-defined]
     return {
         "ATEN_CPU_CAPABILITY": "default",
@@ -33,7 +33,7 @@ def plain_paths() -> dict[str, str]:
 
 
 def printed_hashes(code: str, *arguments: str, **environment: str) -> dict[str, str]:
-    """What a process prints as JSON, with the libraries' choices changed."""
+    """The JSON output of a process in which the libraries use other instructions."""
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code, *arguments],
         capture_output=True, text=True, cwd=ROOT, timeout=500,

@@ -1,4 +1,4 @@
-"""Pictures in rounds: errors that are known, tiles that stop, runs that go on; and the layers beside them."""
+"""Pictures in rounds: known errors, tiles that stop, runs that continue; and their layers."""
 
 from __future__ import annotations
 

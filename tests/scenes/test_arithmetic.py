@@ -1,4 +1,4 @@
-"""Functions that round alike on every processor, and that what builds scenes has no others."""
+"""Functions that round the same on every processor, and a check that code that builds scenes uses no others."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NAMES = {"Slerp", "gaussian_filter", "kornia"}
 
 
 def breaches(source: str) -> list[str]:
-    """What in a file has a last bit that is up to the processor, a line each."""
+    """Calls in a file whose last bit depends on the processor, a line each."""
     found = []
     for node in ast.walk(ast.parse(source)):
         what = ""

@@ -1,4 +1,4 @@
-"""Scenes and formats of scene files that others bring, from Python and from installed packages."""
+"""Scenes and formats of scene files that programs and installed packages add."""
 
 from __future__ import annotations
 

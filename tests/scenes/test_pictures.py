@@ -1,4 +1,4 @@
-"""Pictures of every kind are what their files say."""
+"""Pictures of every kind are read correctly."""
 
 from __future__ import annotations
 

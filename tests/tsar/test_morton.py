@@ -89,7 +89,7 @@ def test_integrals_over_a_field_that_spans_twelve_decades():
         index = torch.arange(4**level)
         ours = curves.tile_integral(prefix, torch.full_like(index, level), index, 7)
         exact = field.to(torch.float32).to(torch.float64).reshape(4**level, -1).sum(1)
-        # What a prefix sum in float64 can lose: half a unit in the last place of the total for every element added.
+        # Greatest loss of a prefix sum in float64: half a unit in the last place of the total for every added element.
         half_unit = math.ulp(float(field.sum())) / 2
         assert (ours - exact).abs().max() <= half_unit * (4 ** (7 - level) + 1)
     # The same in float32 loses small tiles altogether: the reason for float64.

@@ -72,7 +72,7 @@ BROKEN = {
     "a batch one short": (dict(selected=torch.tensor([0, 1, 2])), "batch_not_full"),
     "a batch one over": (dict(tiling=random_tiling(3), selected=torch.arange(5)), "batch_not_full"),
     "a tile that is not there": (dict(tiling=tiling(*FOUR), selected=torch.tensor([0, 1, 2, 4])), "batch_not_full"),
-    "an error that is no number": (dict(errors=Errors(torch.full((ELEMENTS,), math.nan), ZERO)), "nonfinite"),
+    "a NaN error": (dict(errors=Errors(torch.full((ELEMENTS,), math.nan), ZERO)), "nonfinite"),
     "an infinite error": (dict(errors=Errors(ZERO, torch.full((ELEMENTS,), -math.inf))), "nonfinite"),
     "a negative tile": (dict(selected=torch.tensor([-1, 1, 2, 3])), "batch_not_full"),
 }

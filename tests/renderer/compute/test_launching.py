@@ -1,4 +1,4 @@
-"""Recorded launches: arguments of every kind arrive, whatever stays and whatever varies."""
+"""Recorded launches: arguments of every kind arrive, both constant and varying ones."""
 
 from __future__ import annotations
 

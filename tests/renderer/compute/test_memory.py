@@ -1,4 +1,4 @@
-"""Memory that is used again, and never while a tensor lies in it."""
+"""Memory that is reused, but never while a tensor uses it."""
 
 from __future__ import annotations
 

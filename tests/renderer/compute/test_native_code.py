@@ -1,4 +1,4 @@
-"""What a user sees when kernels are compiled for the first time, on every kind of processor."""
+"""The output when kernels are compiled for the first time, on every kind of processor."""
 
 from __future__ import annotations
 

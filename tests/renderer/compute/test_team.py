@@ -1,4 +1,4 @@
-"""Launches side by side: everything is run once, whoever runs it."""
+"""Launches in parallel: every item is run exactly once."""
 
 from __future__ import annotations
 

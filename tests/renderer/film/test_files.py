@@ -1,4 +1,4 @@
-"""Image files hold the values they were given, appear whole or not at all, and refuse what they cannot hold."""
+"""Image files keep their values, appear complete or not at all, and refuse values that they cannot hold."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_exr_float_keeps_every_bit(tmp_path: Path) -> None:
 
 
 def test_exr_half_rounds_and_never_overflows(tmp_path: Path) -> None:
-    """Values beyond the range become its greatest; what was infinite stays so and is counted."""
+    """Values beyond the range become its greatest; infinite values stay infinite and are counted."""
     image = torch.randn(5, 7, 3)
     image[0, 0] = torch.tensor([1e9, -1e9, 65505.0])
     image[0, 1] = torch.tensor([math.inf, -math.inf, math.nan])

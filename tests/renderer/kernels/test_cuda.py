@@ -1,4 +1,4 @@
-"""The kernels that a GPU runs compile for one; running them takes a GPU."""
+"""The kernels for GPUs compile; running them needs a GPU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lights against what radiometry says: irradiance, fall-off, half-shadows."""
+"""Lights compared with radiometry: irradiance, fall-off, penumbras."""
 
 from __future__ import annotations
 
@@ -211,7 +211,7 @@ def test_a_lamp_lights_from_where_it_is_at_the_time() -> None:
 
 
 def test_samples_of_a_group_share_the_lamp_out_among_them() -> None:
-    """Their mean is nearer the truth than that of as many samples that know nothing of each other."""
+    """Their mean is nearer to the truth than that of the same number of independent samples."""
     light = lamp(Rectangle(), below(1.0, 1.0, 1.0))
     x = np.full(64, 1.5)
     together = np.array([irradiance(light, x=x[:1], samples=64, seed=seed)[0] for seed in range(24)])

@@ -1,4 +1,4 @@
-"""Light along paths: energy in closed surroundings, closed forms, and what threads must not change.
+"""Path tracing: energy in closed surroundings, closed forms, and independence of threads.
 
 All scenes share one set of features, everything, so that kernels are compiled once.
 """
@@ -159,7 +159,8 @@ def test_direct_light_is_that_of_the_tree_of_rays(light) -> None:
 
 
 def test_lamps_of_both_shapes_are_as_bright_as_their_solid_angle() -> None:
-    """However the chances of both ways to find a lamp compare: near and far, rough and nearly a mirror."""
+    """For all ratios of the densities of both sampling strategies: lamps near and far, surfaces rough and nearly
+    specular."""
     for shape, size in ((Sphere(), 0.4), (Rectangle(), 0.5)):
         lamp = Instance(shape, Matte(grey(0.0)), place((0.0, 0.0, 3.0), (np.pi, 0, 0), (size,) * 3), emission=(1, 1, 1))
         scene = wall(Matte(grey(1.0)))

@@ -1,4 +1,4 @@
-"""Draws of a group: every part of the unit square as often, for any number of samples."""
+"""Random numbers of a group: uniform over the unit square, for any number of samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernels hold what a scene requires: each addition switches on its own feature and no other."""
+"""Kernels have the features that a scene requires: each addition switches on its own feature and no other."""
 
 from __future__ import annotations
 

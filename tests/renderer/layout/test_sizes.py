@@ -1,4 +1,4 @@
-"""Numbers that Python and C++ share stand in Python alone."""
+"""Numbers that Python and C++ share are written in Python alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rays through one mesh: against brute force, watertight, and whatever their company."""
+"""Rays through one mesh: compared with brute force, watertight, and independent of the other rays of a packet."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_ray_does_not_depend_on_its_company(subdivisions: int) -> None:
     for name in ("face", "t", "u", "v"):
         assert np.array_equal(getattr(together, name)[order], getattr(apart, name)), name
         assert np.array_equal(getattr(together, name), getattr(threads, name)), name
-        met = alone.face >= 0  # of a miss the weights are anything
+        met = alone.face >= 0  # the weights of a miss are undefined
         assert np.array_equal(getattr(together, name)[met], getattr(alone, name)[met]), name
     assert np.array_equal(together.face, alone.face)
     reach = np.random.default_rng(2).uniform(0.0, 4.0, len(origin)).astype(np.float32)

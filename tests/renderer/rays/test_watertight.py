@@ -1,4 +1,4 @@
-"""Closed meshes let nothing through: rays aimed at their very edges, corners and faces, from near and from far."""
+"""Closed meshes let no ray through: rays aimed exactly at edges, corners and faces, from near and from far."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Points = NDArray[np.float64]
 FACING = 0.1
 """Least cosine at which all faces around a place look at a ray's origin: beyond, the ray may pass it by rounding."""
 SLACK = 4e-6
-"""By how much a hit may lie behind its place, in distances of the origin: some steps of float32."""
+"""Greatest distance of a hit behind its place, relative to the distance of the origin: a few steps of float32."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ RANGES = {"near": (1.0, 10.0), "far": (10.0, 300.0), "farther": (300.0, 1e4), "b
 
 
 def leaks(trace, solid: Solid, count: int, seed: int, farthest: str = "beyond") -> tuple[int, int]:
-    """How many rays were traced, and how many missed the surface that they were aimed at."""
+    """Number of rays, and of those that missed the surface at which they were aimed."""
     rng, traced, lost = np.random.default_rng(seed), 0, 0
     for name, distance in RANGES.items():
         for share in (None, 0.0, 0.5):
@@ -100,7 +100,7 @@ def test_a_closed_mesh_lets_nothing_through(kind: str) -> None:
 
 
 def test_a_hole_is_found() -> None:
-    """The check above sees what it is there for: a face that is missing."""
+    """The check above detects a missing face."""
     solid = Solid.made(2)
     trace = RayQueries(solid.vertices, solid.faces[1:]).closest
     _, lost = leaks(trace, solid, 20_000, seed=2, farthest="near")
@@ -158,7 +158,7 @@ def test_rays_from_a_surface_leave_it_and_grazing_ones_are_not_lost() -> None:
 
 
 def test_coincident_faces_and_needles() -> None:
-    """Of faces in the same place the first is met; needles and points neither hide others nor turn up as no number."""
+    """Of coincident faces the first is hit; needles and points neither hide other faces nor give NaN."""
     rng = np.random.default_rng(6)
     quad = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
     faces = np.concatenate([np.tile([[0, 1, 2], [0, 2, 3]], (50, 1))])

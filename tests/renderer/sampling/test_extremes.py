@@ -1,4 +1,4 @@
-"""Point sets and warps at the ends of the numbers that they are made of."""
+"""Point sets and warps at the extremes of their random numbers."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_words_of_kernels_as_numbers() -> None:
 
 
 def test_box_and_muller_at_their_ends() -> None:
-    """At 0 the centre; just below 1 the farthest, ``sqrt(2 ln 2^53)`` deviations away; never what is no number."""
+    """At 0 the centre; just below 1 the farthest, ``sqrt(2 ln 2^53)`` deviations away; never NaN."""
     farthest = np.sqrt(2.0 * 53.0 * np.log(2.0))
     x, y = gaussian_warp(np.array([0.0, 5e-324, BELOW_ONE]), np.zeros(3), 1.0)
     np.testing.assert_allclose(x, [0.0, np.sqrt(2.0 * 5e-324), farthest], rtol=1e-12)

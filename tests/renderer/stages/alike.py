@@ -1,4 +1,4 @@
-"""What the comparisons of two sets of stages share: what counts as the same, and what both start from."""
+"""Shared by comparisons of two sets of stages: tolerances, and common initial states."""
 
 from __future__ import annotations
 

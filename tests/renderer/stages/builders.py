@@ -1,4 +1,4 @@
-"""What the tests of the compiled stages share: configurations of every kind, and runs to take states from."""
+"""Shared by tests of the compiled stages: configurations of every kind, and runs that provide states."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ CONFIGS = {
     "no smoothing": small(reconstruction=ReconstructionConfig(1)),
     "wide smoothing": small(reconstruction=ReconstructionConfig(65)),
 }
-"""By what is particular about each."""
+"""Configurations by their special property."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A cycle by the reference: the state before it with a copy of its cache, what came of it, and the state after."""
+    """A cycle by the reference: the state before it with a copy of its cache, its results, and the state after it."""
 
     number: int
     before: State

@@ -1,6 +1,6 @@
-"""Memory between pages that nobody may touch: native code that reads or writes beyond an array ends the process.
+"""Memory between inaccessible pages: native code that reads or writes beyond an array crashes the process.
 
-What is not written yet holds a pattern, so that a result that hangs on it differs from one pattern to the next.
+Unwritten memory holds a pattern, so a result that depends on it changes with the pattern.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _CACHE = "level", "index", "time_s", "dead", "color", "coefficients", "slot_of_n
 
 
 class Fences:
-    """Makes arrays that end, or begin, right at a page that cannot be accessed.
+    """Makes arrays that end, or begin, right at an inaccessible page.
 
     Attributes:
         at_end: whether arrays end at such a page, so that the first byte behind them is out of bounds; otherwise it is

@@ -139,7 +139,7 @@ def test_stages_refuse_another_configuration_than_theirs() -> None:
 
 
 def test_a_set_of_stages_serves_several_runs_at_once() -> None:
-    """Nothing of a run stays in it: two that take turns come out as one after the other."""
+    """The stages keep no state of a run: two interleaved runs equal two consecutive ones."""
     config = small(warmup_cycles=4)
     shared = compiled_stages(config)
     kinds = (pictures.textured_motion, pictures.static_stripes)

@@ -1,4 +1,4 @@
-"""What the reference learns the compiled stages do not ignore: a choice or a field that they do not know goes there."""
+"""The compiled stages ignore nothing that the reference supports: unknown choices and fields run in the reference."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def replay(config: TsarConfig, stages: Stages, cycles: int = 3) -> list[Cycle[St
 
 
 def assert_handed_over(config: TsarConfig, known: TsarConfig, stage: StageName, exact: bool = True) -> None:
-    """The compiled stages do with a configuration what the reference does, and that is another thing than with one that
-    they know."""
+    """The compiled stages agree with the reference on a configuration, and its result differs from that of a known
+    one."""
     assert not covers(config, stage) and covers(known, stage)
     ours, theirs, other = (replay(*case) for case in ((config, compiled_stages(config)), (config, REFERENCE),
                                                       (known, compiled_stages(known))))  # fmt: skip
@@ -145,7 +145,7 @@ def test_a_field_that_no_stage_knows_goes_to_the_reference_throughout(config: Ts
 
 @pytest.mark.parametrize("name", CONFIGS)
 def test_everything_that_there_is_today_is_compiled(name: str) -> None:
-    """But for the solvers that are not; so that a new field does not make all runs slow unnoticed."""
+    """Except for solvers that are not compiled; a new field must not make all runs slow unnoticed."""
     assert all(covers(CONFIGS[name], stage) for stage in STAGES)
     for solver in SOLVERS:
         config = replace(CONFIGS[name], response=replace(CONFIGS[name].response, solver=solver))

@@ -1,4 +1,4 @@
-"""Arrays that cross into native code: what is not as it must be is refused by name, before anything is written."""
+"""Arrays that cross into native code: invalid ones are refused by name, before anything is written."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def a_batch(count: int) -> FrameletBatch:
 
 
 def spoilt(values: Tensor) -> list[tuple[str, Tensor]]:
-    """An array in every way that native code would misread, and what the error says of it."""
+    """An array in every form that native code would misread, and the message about it."""
     other = torch.float32 if values.dtype is torch.float64 else torch.float64
     return [
         (str(other), values.to(other)),
@@ -60,7 +60,7 @@ def test_numpy_arrays_are_refused_alike() -> None:
 
 
 def test_memory_is_shared_or_refused() -> None:
-    """Warp by itself would fill a copy, which nobody reads."""
+    """Warp itself would fill a copy that is never read."""
     points = np.zeros((4, 3), np.float32)
     assert shared(points, wp.vec3).ptr == points.ctypes.data
     for wrong in (points.astype(np.float64), np.zeros((4, 6), np.float32)[:, ::2], np.zeros((8, 3), np.float32)[::2]):
@@ -128,7 +128,7 @@ def test_a_batch_with_another_array_leaves_the_cache_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["level", "index", "time_s", "dead", "color", "coefficients", "slot_of_node"])
 def test_a_cache_of_another_configuration_is_refused(name: str) -> None:
-    """Also one that was right when it was seen first."""
+    """Also an array that was valid at its first use."""
     stages, cache = compiled_stages(CONFIG), FrameletCache(CONFIG)
     stages.reconstruct(cache, CONFIG, 1.0)
     batch = a_batch(4)
@@ -143,7 +143,7 @@ def test_a_cache_of_another_configuration_is_refused(name: str) -> None:
 
 
 def test_a_cache_that_is_given_another_tensor_is_read_anew() -> None:
-    """What was recorded for it would read memory that is free."""
+    """A launch recorded for it would read freed memory."""
     stages, cache = compiled_stages(CONFIG), FrameletCache(CONFIG)
     batch = a_batch(16)
     stages.observe(batch, torch.ones(16, 256, 3), cache, CONFIG, StageTimer())

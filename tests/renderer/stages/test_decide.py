@@ -84,7 +84,7 @@ def test_what_is_not_a_temporal_density_is_refused(bad: float) -> None:
 
 
 def test_a_batch_that_the_tiling_cannot_fill_is_refused() -> None:
-    """Nothing is requested that was not chosen, whatever let such a configuration through."""
+    """Only chosen tiles are requested, even if such a configuration is let through."""
     config = small()
     object.__setattr__(config.tiling, "tile_count_max", 31)
     even = torch.ones(128**2, dtype=torch.float64)
@@ -101,7 +101,7 @@ def test_a_batch_that_the_tiling_cannot_fill_is_refused() -> None:
     bias=st.sampled_from([0.0, 0.5, -2.0]),
 )
 def test_decisions_agree(seed: int, kind: str, surplus_max: float, bias: float) -> None:
-    """From states that decisions before them made, some at the walls, with much or no surplus."""
+    """From states made by earlier decisions, some at the bounds, with much or no surplus."""
     config = small(sdf_side=32, resolution_px=128, response=ResponseConfig(surplus_max=surplus_max, bias=bias))
     control, g = Control(config), torch.Generator().manual_seed(seed)
     densities, history = initial_densities(config), initial_history(config)

@@ -1,4 +1,4 @@
-"""Native code keeps to its arrays and reads nothing that was not written, over whole cycles of the pipeline."""
+"""Native code stays within its arrays and reads no unwritten memory, over whole cycles of the pipeline."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PLACES = {"before the end": (True, 0xFF), "after the start": (False, 0x00)}
 
 
 def replay(config: TsarConfig, fences: Fences | None, cycles: int = 10) -> str:
-    """Some cycles by the compiled stages; a hash of all that they made. With non-finite samples in the last ones."""
+    """A hash of all results of some cycles by the compiled stages, with non-finite samples in the last cycles."""
     if fences is not None:
         fence(fences)
     keep = fences.tensor if fences is not None else lambda values: values
@@ -57,7 +57,7 @@ def replay(config: TsarConfig, fences: Fences | None, cycles: int = 10) -> str:
 
 
 def fence(fences: Fences) -> None:
-    """From now on the stages make their arrays between fences."""
+    """Makes the stages allocate their arrays between fences from now on."""
     for module in (control, display, memory):
         module.torch = Replaced(torch, empty=fences.empty, zeros=fences.zeros)  # type: ignore[attr-defined]
     for module in (control, display):
@@ -67,7 +67,7 @@ def fence(fences: Fences) -> None:
 
 
 def in_a_process(name: str, place: str) -> str:
-    """Runs a configuration between fences, where touching them ends a process of its own."""
+    """Runs a configuration between fences, in a separate process that crashes if they are touched."""
     command = [sys.executable, "-X", "faulthandler", "-m", "tests.renderer.stages.test_fences", name, place]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=300)
     assert done.returncode == 0, f"{name}, {place}: status {done.returncode}\n{done.stderr[-2000:]}"

@@ -1,4 +1,4 @@
-"""Whatever configuration is accepted: compiled and reference stages neither crash nor hang, and agree."""
+"""For every accepted configuration compiled and reference stages neither crash nor hang, and agree."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def outcomes(first: int, count: int, cycles: int) -> tuple[Counter[str], list[st
 
 
 def _lines(stream: TextIO | None) -> queue.Queue[str | None]:
-    """Lines as they come, then None."""
+    """Lines as they arrive, then None."""
     said: queue.Queue[str | None] = queue.Queue()
 
     def read() -> None:

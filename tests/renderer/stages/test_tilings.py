@@ -1,4 +1,4 @@
-"""Tilings at their ends, by both sets of stages: the coarsest, the deepest, and every finest tile at once."""
+"""Extreme tilings, by both sets of stages: the coarsest, the deepest, and every finest tile at once."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def decided(densities: Densities, history: torch.Tensor, config: TsarConfig):
 
 @pytest.mark.parametrize("element", [0, 4**9 - 1, 123_457])
 def test_the_greatest_depth(element: int) -> None:
-    """One element asks for all there is: tiles of every level stand around it, those of one element among them."""
+    """One element asks for all density: tiles of every level surround it, including tiles of one element."""
     spatial = torch.full((512**2,), DEEP.spatial_bounds[0], dtype=torch.float64)
     spatial[element] = 1e6
     densities, history = Densities(spatial, torch.full_like(spatial, 1e-6)), initial_history(DEEP)

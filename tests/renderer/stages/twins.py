@@ -29,7 +29,7 @@ CYCLE_S = 1 / 60
 
 
 def differences(config: TsarConfig, number: int, cycles: int) -> Iterator[str]:
-    """What the two sets of stages do not have in common over some cycles, or what an invariant says against either."""
+    """Differences between the two sets of stages over some cycles, or an invariant that either breaks."""
     stages, state = compiled_stages(config, 1 + number % 2), runs.made("thesis", config).start()
     for cycle in range(cycles):
         batch = state.due.at(cycle * CYCLE_S, cycle, config)
@@ -81,7 +81,7 @@ def tolerance(config: TsarConfig, axis: str) -> float:
 
 
 def _color(batch: FrameletBatch, number: int) -> torch.Tensor:
-    """A moving picture, a still one, a plain one; now and then with samples that are no numbers."""
+    """A moving, a still or a plain picture, sometimes with NaN samples."""
     moving = pictures.textured_motion
     picture = (moving, pictures.static_stripes, moving, pictures.constant)[number % 4]
     color = pictures.tracer(picture)(batch).color.contiguous()

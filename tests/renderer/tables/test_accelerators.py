@@ -1,4 +1,4 @@
-"""A kd-tree, a tree of boxes and no structure at all find the same, and say what it took."""
+"""A kd-tree, a tree of boxes and no structure find the same hits, and count their work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meshes that move together are traced as one, and look as if they were not."""
+"""Meshes that move together are traced as one, with the same picture."""
 
 import dataclasses
 

@@ -61,7 +61,7 @@ def _track(at: np.ndarray, along: tuple[float, float, float]) -> RigidTrack:
 
 
 def _still_life(at: np.ndarray) -> Scene:
-    """All that has a place: shapes, a relief, what moves, a moving camera, lamps."""
+    """Everything with a position: shapes, a relief, moving objects, a moving camera, lamps."""
     relief = HeightField(Matte(ImageTexture(np.ones((1, 1, 3), np.float32))), np.tile([0.2, 0.9], (8, 4)), 0.2, 32)
     glow = (4.0, 4.0, 3.0)
     sideways = (-np.pi / 2, 0, 0)

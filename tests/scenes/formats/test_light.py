@@ -1,4 +1,4 @@
-"""Light that other renderers make of converted scenes is the light of the source, in their own pictures."""
+"""Brightness of converted scenes in the pictures of other renderers is that of the source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in the place of what a format does not have: it shines, reflects and looks alike."""
+"""Replacements for features that a format lacks: they emit, reflect and look the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that are not to be trusted: each makes a scene or one clear line."""
+"""Hostile files: each makes a scene or one clear line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models with their materials: what real files hold, and one line for what is wrong with others."""
+"""Models with their materials: the content of real files, and one line for each fault in others."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def broken(folder: Path, kind: str) -> Path:
     path = folder / f"{kind.replace(' ', '-')}.obj"
     text = {
         "no faces": SQUARE,
-        "no number": SQUARE.replace("v 2 3 0", "v 2 nan 0") + FACES,
+        "NaN": SQUARE.replace("v 2 3 0", "v 2 nan 0") + FACES,
         "no library": "mtllib gone.mtl\n" + SQUARE + FACES,
         "nothing": "",
         "index beyond": SQUARE + "f 1 2 9\n",
@@ -141,7 +141,7 @@ def broken(folder: Path, kind: str) -> Path:
     ("kind", "message"),
     [
         ("no faces", "at least one face"),
-        ("no number", "vertices hold non-finite values"),
+        ("NaN", "vertices hold non-finite values"),
         ("no library", "gone.mtl"),
         ("no texture", "gone.png"),
         ("nothing", "cannot be read|at least one face"),

@@ -71,7 +71,7 @@ def test_cycles_of_any_length_give_pictures(policy: str, kind: StagesName, cycle
 
 @pytest.mark.parametrize("start_s", [1e6, 1e9, -1e9])
 def test_a_clock_that_time_does_not_feel_is_refused(start_s: float) -> None:
-    """Not played for ever: at 1e9 s the times of float64 are 1.2e-7 s apart."""
+    """Refused, not played forever: at 1e9 s the times of float64 are 1.2e-7 s apart."""
     screen = moving(0.0, 0.0)
     found = made("frameless", "reference", screen)
     with pytest.raises(ValueError, match=r"clock: expected cycles that move .* got 1e-12 s"):

@@ -17,7 +17,7 @@ from tsar.response.transport import fill
 from tsar.types import Densities, Errors
 
 ROUNDING = 1e-12
-"""Of sums of some hundred elements: a hundred times what float64 rounds by for each."""
+"""Tolerance of sums over a few hundred elements: a hundred times the float64 rounding of each."""
 RESPONSES = [
     ResponseConfig(gain=gain, bias=bias, surplus_max=surplus, temporal_min=floor)
     for gain, bias, surplus, floor in (

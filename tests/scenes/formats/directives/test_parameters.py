@@ -1,6 +1,6 @@
-"""No parameter that a reader of directives asks for is lost in silence: each is changed in turn.
+"""No parameter that a reader of directives asks for is lost silently: each is changed in turn.
 
-A change shows in the scene, in the report, or as an error; or the parameter is on the list of those that mean nothing.
+A change shows in the scene, in the report, or as an error; or the parameter is on the list of those without effect.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def made(text: str, file: Path) -> tuple[Scene, list[str]] | None:
 
 
 def silent(dialect: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Directives and their parameters whose change nothing shows."""
+    """Directives and parameters whose change has no effect."""
     names: set[str] = set()
     for method in ("numbers", "text", "__contains__"):
         real = getattr(Parameters, method)

@@ -1,4 +1,4 @@
-"""The text of PBRT-like files: what parses, and where what does not is."""
+"""The text of PBRT-like files: valid text, and the place of errors."""
 
 from __future__ import annotations
 

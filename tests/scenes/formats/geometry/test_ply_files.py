@@ -1,4 +1,4 @@
-"""PLY files: what is read, and what lies is refused before anything is allocated."""
+"""PLY files: valid files are read, and false headers are refused before anything is allocated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What LuxRender files say, in the canonical scene."""
+"""LuxRender files, read into the canonical scene."""
 
 from __future__ import annotations
 

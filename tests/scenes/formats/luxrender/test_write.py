@@ -1,4 +1,4 @@
-"""What is written for LuxRender."""
+"""Files written for LuxRender."""
 
 from __future__ import annotations
 

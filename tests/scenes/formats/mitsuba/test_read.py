@@ -1,4 +1,4 @@
-"""Mitsuba scenes into the canonical scene and out again; XML that is not to be trusted."""
+"""Mitsuba scenes into the canonical scene and out again; hostile XML."""
 
 from __future__ import annotations
 

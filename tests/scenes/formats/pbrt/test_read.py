@@ -1,4 +1,4 @@
-"""What PBRT files say, in the canonical scene."""
+"""PBRT files, read into the canonical scene."""
 
 from __future__ import annotations
 
