@@ -260,7 +260,7 @@ def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
 
     Returns:
         Each figure with its 95 % interval (bootstrap over tiles, because the rates of a tile are not independent), and
-        its value by chance (``dealt``): with the estimates permuted among the tiles at the same rate, which preserves
+        its value by chance (``permuted``): with the estimates permuted among the tiles at the same rate, which preserves
         the frequency of each sign. Also quartiles of the angle, tables of signs, and correlations. Pairs whose true
         vector is zero are counted and left out.
     """
@@ -269,14 +269,14 @@ def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
     figures = _figures(phi, true)
     value = _summary(figures)
     resampled = np.stack([_summary(figures[rng.integers(0, tiles, tiles)]) for _ in range(_RESAMPLES)])
-    dealt = np.stack([_summary(_figures(phi[rng.permutation(tiles)], true)) for _ in range(_SHUFFLES)])
+    permuted = np.stack([_summary(_figures(phi[rng.permutation(tiles)], true)) for _ in range(_SHUFFLES)])
     low, high = np.nanpercentile(resampled, INTERVAL, axis=0)
-    chance_low, chance_high = np.percentile(dealt, INTERVAL, axis=0)
+    chance_low, chance_high = np.percentile(permuted, INTERVAL, axis=0)
     found: dict[str, Any] = {
         name: {
             "value": value[i],
             "interval": (low[i], high[i]),
-            "dealt": dealt[:, i].mean(),
+            "permuted": permuted[:, i].mean(),
             "dealt_interval": (chance_low[i], chance_high[i]),
             "isotropic": ISOTROPIC[name],
         }

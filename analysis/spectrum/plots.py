@@ -210,7 +210,7 @@ def agreement_figure(tiles: Mapping[str, Tiles], found: Mapping[str, Any], tau: 
         median, low, high = row["angle_median_deg"]["value"], *row["angle_quartiles_deg"][::2]
         axes[0].plot([low, high], [place, place], color=FRAMED, linewidth=5, alpha=0.35, solid_capstyle="butt")
         axes[0].plot(median, place, "o", color=FRAMED)
-        axes[0].plot(row["angle_median_deg"]["dealt"], place, "x", color="0.3")
+        axes[0].plot(row["angle_median_deg"]["permuted"], place, "x", color="0.3")
     axes[0].plot([], [], "o", color=FRAMED, label="median (bar: quartiles)")
     axes[0].plot([], [], "x", color="0.3", linestyle="", label="median, estimates permuted among tiles")
     axes[0].axvline(90.0, color="0.5", linewidth=0.9, linestyle=":", label="median, random directions")

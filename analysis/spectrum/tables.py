@@ -32,5 +32,5 @@ def tables(summary: dict[str, Any]) -> list[Table]:
 
 def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     angle, within, quadrant = row["angle_median_deg"], row["share_within_45_deg"], row["share_same_quadrant"]
-    percent = [f"{100 * share[key]:.0f} %" for share in (within, quadrant) for key in ("value", "dealt")]
-    return f"{angle['value']:.0f}", f"{angle['dealt']:.0f}", *percent
+    percent = [f"{100 * share[key]:.0f} %" for share in (within, quadrant) for key in ("value", "permuted")]
+    return f"{angle['value']:.0f}", f"{angle['permuted']:.0f}", *percent

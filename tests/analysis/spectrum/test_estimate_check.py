@@ -95,7 +95,7 @@ def test_perfect_opposite_and_random_estimates() -> None:
         assert found["angle_median_deg"]["value"] == pytest.approx(angle, abs=1e-6)
         assert found["share_within_45_deg"]["value"] == found["share_same_quadrant"]["value"] == share
         assert found["share_sign_space"]["value"] == found["share_sign_time"]["value"] == share
-        assert found["angle_median_deg"]["dealt"] == pytest.approx(90.0, abs=4.0)
+        assert found["angle_median_deg"]["permuted"] == pytest.approx(90.0, abs=4.0)
         assert found["space"]["pearson"] == pytest.approx(2 * share - 1)
         assert found["time"]["spearman"] == pytest.approx(2 * share - 1)
     for name in ("angle_median_deg", "share_within_45_deg", "share_same_quadrant", "share_sign_space"):
@@ -112,8 +112,8 @@ def test_dealing_keeps_how_often_each_sign_occurs() -> None:
     true = np.abs(vectors(100, 2))
     found = agreement(np.ones_like(true), true)
     assert found["share_same_quadrant"]["value"] == 1.0
-    assert found["share_same_quadrant"]["dealt"] == 1.0
-    assert found["angle_median_deg"]["dealt"] == pytest.approx(found["angle_median_deg"]["value"])
+    assert found["share_same_quadrant"]["permuted"] == 1.0
+    assert found["angle_median_deg"]["permuted"] == pytest.approx(found["angle_median_deg"]["value"])
     assert np.isnan(found["space"]["spearman"])
 
 
@@ -134,7 +134,7 @@ def test_intervals_are_of_95_percent() -> None:
     true = np.array([[[1.0, 1.0]], [[1.0, 1.0]], [[1.0, -1.0]]])
     for sign, ends in ((1.0, (0.0, 1.0)), (-1.0, (0.0, 1.0))):
         assert agreement(np.abs(true) * sign, true)["share_sign_time"]["interval"] == ends
-    # of 28 tiles one may be dealt to itself or to 27 others: right with a chance of 1/28, which is 3.6 %
+    # of 28 tiles one may get its own estimate or one of 27 others: right with a chance of 1/28, which is 3.6 %
     lone = np.ones((28, 1, 2))
     lone[0, 0, 1] = -1.0
     low, high = agreement(lone, lone)["share_sign_time"]["dealt_interval"]
