@@ -260,7 +260,7 @@ def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
 
     Returns:
         Each figure with its 95 % interval (bootstrap over tiles, because the rates of a tile are not independent), and
-        its value by chance (``permuted``): with the estimates permuted among the tiles at the same rate, which preserves
+        its value by chance (``permuted``): with the estimates permuted among the tiles at the same rate, which keeps
         the frequency of each sign. Also quartiles of the angle, tables of signs, and correlations. Pairs whose true
         vector is zero are counted and left out.
     """
