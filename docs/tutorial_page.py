@@ -24,7 +24,7 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = ROOT / "docs/tutorial.py"
 SETTINGS = "SECONDS, SIDE_PX, BATCH = 1.0, 256, 64"
-SMALL = "SECONDS, SIDE_PX, BATCH = 0.2, 64, 16"
+SMALL = "SECONDS, SIDE_PX, BATCH = 0.6, 64, 4"
 PICTURE = re.compile(r'"(out/[\w/-]+\.png)"')
 
 

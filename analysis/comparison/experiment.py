@@ -173,7 +173,7 @@ def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, 
     with first_imports():
         from analysis.study.runs import Machine, begin
 
-    machine = Machine(options.counted, options.capacity, options.cost)
+    machine = Machine(options.counted, options.machine_flops, options.cost)
     span_s = options.start_s, options.start_s + options.seconds
     with bad_input():
         return {
@@ -285,10 +285,10 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
     derived = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}
     summary = {
         "ledger": options.counted,
-        "capacity_flops": options.capacity,
+        "capacity_flops": options.machine_flops,
         **summarise(measured),
         **best_rival(measured),
-        "choice": what_came(chosen, measured, options.capacity, options.seconds) if chosen else None,
+        "choice": what_came(chosen, measured, options.machine_flops, options.seconds) if chosen else None,
         "start": {"first_cycle_s": first_cycle_s},
         "cost_parameters": options.cost,
         "config": {**config, "resolved": derived},

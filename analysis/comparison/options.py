@@ -61,8 +61,9 @@ class RunOptions:
     """Simulated time by the cost model, or measured time (the same as the ledger wall)."""
     ledger: Ledger = "thesis"
     """How cost is counted."""
-    capacity: float = CAPACITY_DEFAULT
-    """Speed of the simulated machine, FLOP/s. The default gives 8 framed images a second at 512²."""
+    capacity: float | None = None
+    """Speed of the simulated machine, FLOP/s. None means 8.7e10 at 512², in proportion to the pixels at other sizes: 8
+    framed images a second."""
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
     policy: str = DEFAULT_POLICY
@@ -134,10 +135,10 @@ class RunOptions:
         if self.counted != "wall":
             priced = expected_ledger(self.counted)
             if not set(ADAPTIVE_STAGES).isdisjoint(runs):
-                cycle_s = float(adaptive_flops(self.cost, priced)) / self.capacity
-                limits.require_pace("capacity", self.capacity, cycle_s, self.start_s, self.seconds, warmup)
-            frame_s = float(nonadaptive_flops(self.cost, priced)) / self.capacity
-            limits.require_count("capacity", self.capacity, self.seconds / frame_s, "framed images")
+                cycle_s = float(adaptive_flops(self.cost, priced)) / self.machine_flops
+                limits.require_pace("capacity", self.machine_flops, cycle_s, self.start_s, self.seconds, warmup)
+            frame_s = float(nonadaptive_flops(self.cost, priced)) / self.machine_flops
+            limits.require_count("capacity", self.machine_flops, self.seconds / frame_s, "framed images")
 
     def _check_choice(self) -> None:
         """Checks that at most one option chooses a point, and that no other option sets the same values."""
@@ -145,14 +146,18 @@ class RunOptions:
         for name in asked[:1]:
             require(len(asked) == 1, name, f"only one of {', '.join(CHOICES)}", getattr(self, name))
             require(self.policy == DEFAULT_POLICY, "policy", f"{DEFAULT_POLICY} beside a {name}", self.policy)
-            require(
-                self.capacity == CAPACITY_DEFAULT, "capacity", f"none beside a {name}, which sets it", self.capacity
-            )
+            require(self.capacity is None, "capacity", f"none beside a {name}, which sets it", self.capacity)
             batch, default = self.tsar.batch_size, TsarConfig.batch_size
             require(batch == default, "batch_size", f"none beside a {name}, which sets it", batch)
             require(self.counted != "wall", "ledger", f"a modelled one beside a {name}", self.counted)
         limits.within(self, budget_flops=(1.0, 1e18), budget_seconds=(1e-6, 1e9), error_target=(1e-12, 1.0))
         require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
+
+    @property
+    def machine_flops(self) -> float:
+        """Speed of the simulated machine, FLOP/s."""
+        default = CAPACITY_DEFAULT * self.tsar.pixels / RESOLUTION_DEFAULT**2
+        return default if self.capacity is None else self.capacity
 
     @property
     def size(self) -> str:
@@ -165,15 +170,14 @@ class RunOptions:
     @property
     def pace(self) -> str:
         """What a size other than the default changes in the experiment, in words; empty if it changes nothing."""
-        default = CAPACITY_DEFAULT * self.tsar.pixels / RESOLUTION_DEFAULT**2
-        if self.capacity != CAPACITY_DEFAULT or self.tsar.pixels == RESOLUTION_DEFAULT**2 or self.counted == "wall":
+        if self.capacity is not None or self.tsar.pixels == RESOLUTION_DEFAULT**2 or self.counted == "wall":
             return ""
         if any(getattr(self, name) not in ("", None) for name in CHOICES):
             return ""
-        rate = self.capacity / float(nonadaptive_flops(self.cost, expected_ledger(self.counted)))
+        rate = self.machine_flops / float(nonadaptive_flops(self.cost, expected_ledger(self.counted)))
         return (
-            f"{self.size}: this machine of {self.capacity:.3g} FLOP/s shows {rate:.3g} framed images a second; "
-            f"--capacity {default:.3g} shows as many as at {RESOLUTION_DEFAULT}²"
+            f"{self.size}: the machine has {self.machine_flops:.3g} FLOP/s, for {rate:.3g} framed images a second, "
+            f"as at {RESOLUTION_DEFAULT}² (--capacity sets it)"
         )
 
     @property

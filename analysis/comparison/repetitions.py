@@ -14,7 +14,7 @@ from analysis.command import limits
 from analysis.command.console import Table
 from analysis.command.options import Unprefixed
 from analysis.comparison.options import DEFAULT_POLICY, RunOptions
-from analysis.metrics.cost_model import CAPACITY_DEFAULT, Ledger
+from analysis.metrics.cost_model import Ledger
 from analysis.study.cases import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 
@@ -41,8 +41,8 @@ class InputsOptions:
     """Animation time to measure, seconds."""
     ledger: Ledger = "thesis"
     """How cost is counted."""
-    capacity: float = CAPACITY_DEFAULT
-    """Speed of the simulated machine, FLOP/s."""
+    capacity: float | None = None
+    """Speed of the simulated machine, FLOP/s. None gives 8 framed images a second at every size."""
     reference_rate_hz: float = 30.0
     """Reference images per simulated second; half as many as run.py has, because references take most of the time."""
     out: Path = Path("out/inputs")

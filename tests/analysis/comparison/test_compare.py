@@ -19,7 +19,13 @@ from tsar import POLICIES, ConfigError
 from tsar.morton import raster_to_morton
 from tsar.policies.framed import Framed
 
-SMALL: dict[str, Any] = {"resolution_px": 64, "batch_size": 16, "warmup_cycles": 8, "reference_samples_per_axis": 1}
+SMALL: dict[str, Any] = {
+    "resolution_px": 64,
+    "batch_size": 16,
+    "warmup_cycles": 8,
+    "reference_samples_per_axis": 1,
+    "capacity": 8.7e10,
+}
 
 
 class Late(Framed):

@@ -19,14 +19,16 @@ from tsar.config import ConfigError, TsarConfig
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def test_a_size_says_what_it_does_to_the_framed_renderer() -> None:
+def test_the_machine_follows_the_size_unless_its_capacity_is_given() -> None:
     small = RunOptions("fly-by", tsar=TsarConfig(resolution_px=128))
+    assert small.machine_flops == RunOptions("fly-by").machine_flops / 16.0 == 8.7e10 / 16.0
     assert small.pace == (
-        "resolution_px: 128: this machine of 8.7e+10 FLOP/s shows 128 framed images a second; "
-        "--capacity 5.44e+09 shows as many as at 512²"
+        "resolution_px: 128: the machine has 5.44e+09 FLOP/s, for 8.03 framed images a second, as at 512² "
+        "(--capacity sets it)"
     )
-    followed = dataclasses.replace(small, capacity=5.44e9)
-    assert followed.pace == RunOptions("fly-by").pace == dataclasses.replace(small, clock="wall").pace == ""
+    given = dataclasses.replace(small, capacity=8.7e10)
+    assert given.machine_flops == 8.7e10
+    assert given.pace == RunOptions("fly-by").pace == dataclasses.replace(small, clock="wall").pace == ""
 
 
 def test_unknown_scenes_are_refused_by_name_before_anything_loads() -> None:

@@ -50,7 +50,17 @@ def run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, dict[str, A
     """Exit status and summary of a small run."""
     small = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", str(BATCH), "--warmup-cycles", "4")
     reference = ("--reference-samples-per-axis", "1", "--reference-rate-hz", "20", "--cache", str(folder / "cache"))
-    rest = ("--policy", "thesis", "--rivals", *RIVALS, "--no-film", "--out", str(folder / "out"))
+    rest = (
+        "--capacity",
+        "8.7e10",
+        "--policy",
+        "thesis",
+        "--rivals",
+        *RIVALS,
+        "--no-film",
+        "--out",
+        str(folder / "out"),
+    )
     status = call_script("run.py", monkeypatch, "fly-by", *small, *reference, *rest)
     return status, json.loads((folder / "out" / "summary.json").read_text())
 
