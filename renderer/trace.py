@@ -141,7 +141,7 @@ class Renderer:
 
         Returns:
             Linear radiance ``(n, samples, 3)`` float32 on the device of the batch, ray counts, and hits if requested.
-                Hits do not change the bits of colours.
+            Hits do not change the bits of colours.
 
         Raises:
             ValueError: if shapes do not match, times are not float64 or not finite, or a footprint is not finite and

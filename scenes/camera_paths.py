@@ -36,7 +36,7 @@ def on_a_path(scene: Scene, path: CameraPath) -> Scene:
     if not isinstance(camera, PerspectiveCamera):
         raise SceneError(f"camera_path: expected a perspective camera, got {type(camera).__name__}")
     if camera.track is not None:
-        raise SceneError("camera_path: expected a scene whose camera stands still, this one moves")
+        raise SceneError("camera_path: expected a scene with a static camera, this one moves")
     eye = camera.to_world[:3, 3]
     forward = -camera.to_world[:3, 2] / norm(camera.to_world[:3, 2])
     way = looked_at_distance(scene, eye, forward)

@@ -104,7 +104,7 @@ def _clamped(pixels: Picture, path: Path) -> Picture:
     if not infinite.any():
         return pixels
     count = int(infinite.any(axis=-1).sum())
-    warnings.warn(f"texture {path}: {count} pixels of infinite light became {RADIANCE_MOST:g}", stacklevel=4)
+    warnings.warn(f"texture {path}: {count} pixels of infinite radiance became {RADIANCE_MOST:g}", stacklevel=4)
     return np.where(infinite, np.float32(RADIANCE_MOST), pixels)
 
 

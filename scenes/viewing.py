@@ -109,7 +109,7 @@ def framed(instances: tuple[Instance, ...], up: Up, name: str = "") -> Scene:
     """
     points = np.concatenate([_points(instance) for instance in instances]) if instances else np.zeros((0, 3))
     if not len(points):
-        raise SceneError(f"{name or 'scene'}: expected something to look at, found nothing")
+        raise SceneError(f"{name or 'scene'}: expected at least one instance, got none")
     turn = turned_up(up)[:3, :3]
     back = product(turn, np.array(_FROM) / norm(np.array(_FROM)))
     axes = camera_at(back, (0.0, 0.0, 0.0), up)[:3, :3]

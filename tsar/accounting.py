@@ -42,7 +42,7 @@ def account(
     Args:
         densities, errors: after the response, Morton order.
         newest_s: time of the newest sample shown in each finest tile, seconds, raster order.
-        config: of the run.
+        config: configuration of the run.
     """
     fields = densities.spatial, densities.temporal, errors.spatial, errors.temporal
     nonfinite = sum(int((~torch.isfinite(field)).sum()) for field in fields)
@@ -59,7 +59,7 @@ def _age_spread(newest_s: Float64[Tensor, "side side"], densities: Densities, co
 
 @dataclass(frozen=True)
 class Movement:
-    """What a decision did to the elements of the field.
+    """The effect of a decision on the elements of the field.
 
     Attributes:
         elements: number of elements whose densities changed.

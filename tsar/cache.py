@@ -31,7 +31,8 @@ class FrameletCache:
         time_s: animation time of each slot, ``-inf`` in an unused one.
         slot_of_node: slot of the newest framelet of each quadtree node, coarser levels first; ``EMPTY`` where there is
             none.
-        dead: set by reconstruction; a dead framelet can never contribute again, for the age field only gets newer.
+        dead: set by reconstruction; a dead framelet can never contribute again, because the age field never becomes
+            older.
     """
 
     def __init__(self, config: TsarConfig) -> None:

@@ -34,8 +34,8 @@ def end_of_cycle(time_s: float, cycle_s: float) -> float:
     """The time at the end of a cycle.
 
     Args:
-        time_s: at its start, seconds.
-        cycle_s: its length, seconds.
+        time_s: start of the cycle, seconds.
+        cycle_s: length of the cycle, seconds.
 
     Raises:
         ValueError: the cycle is too short to change the time in float64: the run would never end.

@@ -1,4 +1,4 @@
-"""From a batch of framelets to signed sample-rate errors on the field.
+"""Signed sample-rate errors on the field from a batch of framelets.
 
 Source: Stephens 2011, sec. 5.3.2–5.3.4.
 """

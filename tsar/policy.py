@@ -46,10 +46,10 @@ class Price:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a policy is created from.
+    """The inputs from which a policy is created.
 
     Attributes:
-        config: of the run.
+        config: configuration of the run.
         stages_of: creates the stages of the adaptive pipeline around tracing, when they are needed.
         truth: true picture at any time; None where no policy may use it.
         trace: renderer that is not charged, for policies that use the truth.
@@ -232,7 +232,7 @@ def run(
         start_s, end_s: span of animation time to cover, seconds.
 
     Raises:
-        ValueError: the clock returned a value that is not finite and positive, or so small that time stands still.
+        ValueError: the clock returned a value that is not finite and positive, or too small to advance the time.
     """
     cycle_s = checked(cycle_seconds, *policy.probe(trace, start_s))
     state, cycle = policy.start(), -policy.warmup_cycles

@@ -30,7 +30,7 @@ def predicted(known: Sequence[Viewpoint], time_s: float) -> Viewpoint:
 
     Returns:
         The newest view with the poses of ``time_s``. Matrices are extrapolated entry by entry, so they are rotations up
-            to the square of the angle between views.
+        to the square of the angle between views.
     """
     now = known[-1]
     if len(known) < 3 or not now.time_s > known[-2].time_s:
@@ -59,7 +59,7 @@ def mid_display_s(now_s: float, cycle_s: float, latency_cycles: int = 1) -> floa
     Args:
         now_s: start of the cycle, seconds.
         cycle_s: its length, seconds.
-        latency_cycles: from the start of a cycle to the display of its picture.
+        latency_cycles: cycles from the start of a cycle to the display of its picture.
     """
     return now_s + (latency_cycles + 0.5) * cycle_s
 

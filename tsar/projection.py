@@ -24,14 +24,15 @@ def project(
     Args:
         view: camera and poses.
         instance: number of the instance, -1 for a hit at infinity.
-        point: in the space of the instance's track, scene units; for a hit at infinity, a direction in the world.
+        point: hit point in the space of the instance's track, scene units; for a hit at infinity, a direction in the
+            world.
 
     Returns:
         Position on the image plane, ``(x, y)`` from the top left corner, in ``[0, 1)`` where the picture shows it; and
-            depth along the axis of the camera, in scene units (times the scale of the camera's placement), ``inf`` at
-            infinity. A point behind the camera has a depth of at most 0, ``-inf`` at infinity, and with a perspective
-            camera the position NaN. With parallel rays a point at infinity is visible everywhere or nowhere, so its
-            position is NaN.
+        depth along the axis of the camera, in scene units (times the scale of the camera's placement), ``inf`` at
+        infinity. A point behind the camera has a depth of at most 0, ``-inf`` at infinity, and with a perspective
+        camera the position NaN. With parallel rays a point at infinity is visible everywhere or nowhere, so its
+        position is NaN.
 
     Raises:
         ValueError: the view is a panorama, whose angles would differ in the last bit between processors.

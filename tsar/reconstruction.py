@@ -1,4 +1,4 @@
-"""From cached framelets of many ages and sizes to an image.
+"""Reconstruction of an image from cached framelets of many ages and sizes.
 
 Source: Stephens 2011, sec. 4.2.
 

@@ -1,4 +1,4 @@
-"""From a density field to a non-overlapping tiling.
+"""Construction of a non-overlapping tiling from a density field.
 
 Source: Stephens 2011, sec. 4.1.6.
 

@@ -187,7 +187,7 @@ class MapShown:
     Attributes:
         values: raster order; the parts are equal squares.
         bounds: least and greatest value of the colour scale.
-        unit: of the values, in words.
+        unit: unit of the values, in words.
     """
 
     values: Float[Tensor, "rows columns"]
@@ -214,7 +214,7 @@ class Spent:
 
 @dataclass(frozen=True)
 class ShownImage:
-    """An image as it goes onto the display.
+    """An image for the display.
 
     Attributes:
         display_time_s: time at which it appears, seconds.

@@ -68,7 +68,7 @@ def require_same(config: TsarConfig, own: TsarConfig) -> None:
         ValueError: if the configurations differ.
     """
     if config is not own and config != own:
-        raise ValueError("compiled stages: expected the configuration that they were made for, got another")
+        raise ValueError("compiled stages: expected the configuration for which they were made, got another")
 
 
 class Command:

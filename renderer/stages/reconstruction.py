@@ -60,7 +60,8 @@ class Reconstructor:
         self._per_cache = PerCache(self._record)
 
     def reconstruct(self, cache: FrameletCache, config: TsarConfig, cycle_s: float) -> Reconstruction:
-        """As :func:`tsar.reconstruction.reconstruct`, to which an image with holes is left, and what is not covered."""
+        """Like :func:`tsar.reconstruction.reconstruct`, which is called for an image with holes and for configurations
+        that are not covered."""
         require_same(config, self.config)
         if not self._covered:
             return REFERENCE.reconstruct(cache, config, cycle_s)

@@ -132,7 +132,7 @@ class _Builder:
                 f"Instance {name!r}: HeightField: expected a Rectangle, got {type(instance.shape).__name__}"
             )
         if instance.emission is not None:
-            raise SceneError(f"Instance {name!r}: expected no emission of a HeightField, got {instance.emission}")
+            raise SceneError(f"Instance {name!r}: expected no emission from a HeightField, got {instance.emission}")
         planes = material.height if material.height.ndim == 3 else material.height[..., None]
         level, _ = self.materials.add_image(np.repeat(planes[..., :1], 3, axis=2), mipmap=False)
         row |= {"shape": Shape.RELIEF, "relief": len(self.reliefs)}

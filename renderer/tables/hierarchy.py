@@ -43,7 +43,7 @@ def box_tree(lower: Boxes, upper: Boxes, enclosing: float) -> list[Node]:
 
     Returns:
         One leaf for each item, and inner nodes where they save more tests than they cost. Of two siblings the one with
-            the greater surface area comes first: a near hit in it saves the test of the other.
+        the greater surface area comes first: a near hit in it saves the test of the other.
     """
     nodes: list[Node] = []
     pending: list[tuple[Items, float] | Node] = [(np.arange(len(lower)), enclosing)]

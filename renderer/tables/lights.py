@@ -80,7 +80,7 @@ class LightTable:
             return
         stretch = np.linalg.svd(linear, compute_uv=False)
         if stretch[0] > stretch[2] * (1.0 + 1e-6):
-            raise SceneError(f"{name}: emission: expected a Sphere scaled alike along all axes, got {stretch.tolist()}")
+            raise SceneError(f"{name}: emission: expected a uniformly scaled Sphere, got {stretch.tolist()}")
         self.rows.append({**row, "kind": LightKind.SPHERE, "radius": instance.shape.radius * norm(linear[:, 0])})
 
     def place_environment(self, data: SceneData, materials: MaterialTable, seen: EnvironmentLight | None) -> None:
@@ -100,7 +100,7 @@ class LightTable:
         if self.environment is not None:
             turn = np.asarray(self.environment.to_world, np.float64)[:3, :3]
             if not np.allclose(product(turn, turn.T), np.eye(3), atol=1e-5):
-                raise SceneError("EnvironmentLight.to_world: expected a rotation, got a matrix that stretches")
+                raise SceneError("EnvironmentLight.to_world: expected a rotation, got a matrix that scales")
             data.lighting_level, data.lighting_to_map, data.lighting_scale = _map(self.environment, materials)
             if data.lighting_scale > 0.0 and self.environment.image.max() > 0.0:
                 rows, columns = summed_chances(self.environment.image)
@@ -172,13 +172,13 @@ def _spot_row(light: SpotLight) -> dict:
     axis = np.subtract(light.target, light.position)
     length = norm(axis)
     if length == 0.0:
-        raise SceneError(f"SpotLight.target: expected another place than its position, got {light.target}")
+        raise SceneError(f"SpotLight.target: expected a point other than its position, got {light.target}")
     if not 0.0 <= light.inner_deg <= light.outer_deg < 180.0:
         raise SceneError(
             f"SpotLight: expected 0 <= inner_deg <= outer_deg < 180, got {light.inner_deg}, {light.outer_deg}"
         )
     if light.profile != "hermite":
-        raise SceneError(f"SpotLight.profile: expected hermite, which the renderer draws, got {light.profile}")
+        raise SceneError(f"SpotLight.profile: expected hermite (all that the renderer supports), got {light.profile}")
     cosines = cos(np.radians([light.inner_deg, light.outer_deg]))
     row = {"kind": LightKind.SPOT, "place": light.position, "color": light.intensity, "across": axis / length}
     return row | {"cos_inner": cosines[0], "cos_outer": cosines[1]}

@@ -143,7 +143,7 @@ def _too_coarse(scene: Scene, shift: Vector, half: Vector) -> list[str]:
         size = float(np.ptp(mesh.vertices, axis=0).max()) / 2.0
         step = float(np.abs(mesh.vertices).max()) * float(np.finfo(mesh.vertices.dtype).eps) / 2.0
         if step > _COARSE * size:
-            lines.append(f"mesh {mesh.source!r} of size {2.0 * size:.3g} is known to {step:.2g} only, as it is stored")
+            lines.append(f"mesh {mesh.source!r} of size {2.0 * size:.3g} is stored with a precision of only {step:.2g}")
             break
     return lines
 

@@ -71,7 +71,7 @@ def explanation(scene: Scene) -> list[str]:
     lines = [
         f"{'yes' if feature in found else ' - '}  {MEANING[feature]:44} {found.get(feature, '')}" for feature in Feature
     ]
-    alone = "one by one, by kernels of their own" if required(scene) & ~PACKETS else "in packets of sixteen"
+    alone = "one by one, by separate kernels" if required(scene) & ~PACKETS else "in packets of sixteen"
     kept = f"kernels for {kept_count()} sets of features are kept on this machine"
     return [*(line.rstrip() for line in lines), f"samples are traced {alone}; {kept}"]
 

@@ -95,7 +95,9 @@ def _glass(material: Glass, textures: Textures, where: str) -> Row:
 def _metal(material: Metal, textures: Textures, where: str) -> Row:
     alpha = mean_alpha(material.roughness)
     if material.distribution != "ggx" and alpha > 0.0:
-        raise SceneError(f"{where}: Metal.distribution: expected ggx, which paths draw, got {material.distribution}")
+        raise SceneError(
+            f"{where}: Metal.distribution: expected ggx (all that paths support), got {material.distribution}"
+        )
     return {
         "kind": ScatterKind.METAL,
         "specular": textures.add_texture(material.reflectance_scale, where),
@@ -107,7 +109,7 @@ def _metal(material: Metal, textures: Textures, where: str) -> Row:
 
 def _plastic(material: Plastic, textures: Textures, where: str) -> Row:
     if not material.layered:
-        raise SceneError(f"{where}: Plastic.layered: expected True, which paths draw, got False")
+        raise SceneError(f"{where}: Plastic.layered: expected True (all that paths support), got False")
     return {
         "kind": ScatterKind.COATED,
         "base": textures.add_texture(material.diffuse, where),
@@ -210,7 +212,7 @@ def mean_alpha(roughness: tuple[float, float]) -> float:
 def thrown_back(ior: float) -> float:
     """Internal diffuse reflectance of a smooth dielectric: ``1 - (1 - r) / ior²`` with the external one ``r``.
 
-    By Simpson's rule over the sine of the angle outside, 0 to 90 degrees.
+    ``r = ∫ 2 F sin cos`` over the external angle from 0 to 90 degrees, by Simpson's rule.
     """
     angle = np.linspace(0.0, np.pi / 2.0, 2049)
     s, c = sin(angle), sin(np.pi / 2.0 - angle)

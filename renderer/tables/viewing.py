@@ -30,7 +30,9 @@ def check_camera(scene: Scene) -> ViewingCamera:
     if isinstance(camera, PerspectiveCamera):
         check_finite((camera.lens_radius, camera.focal_distance), "PerspectiveCamera.lens_radius, focal_distance")
         if camera.shift != (0.0, 0.0):
-            raise SceneError(f"PerspectiveCamera.shift: expected none, which the renderer draws, got {camera.shift}")
+            raise SceneError(
+                f"PerspectiveCamera.shift: expected none, as the renderer supports none, got {camera.shift}"
+            )
     if isinstance(camera, OrthographicCamera) and not 0.0 < camera.half_width < math.inf:
         raise SceneError(f"OrthographicCamera.half_width: expected a positive number, got {camera.half_width}")
     check_affine(camera.to_world, f"{name}.to_world")

@@ -83,7 +83,7 @@ def _sky(*states: FileState | None) -> EnvironmentLight:
     horizon, tall = height // 2, round(_HORIZON_DEG / 180.0 * height)
     picture = read_image(asset("sky.exr"))
     scale = height // len(picture)
-    above = clamp_radiance(picture[: horizon // scale + 1], SKY_LIMIT)  # what the last row above the horizon is made of
+    above = clamp_radiance(picture[: horizon // scale + 1], SKY_LIMIT)  # the last row needs one more
     image = np.empty((height, width, 3), np.float32)
     image[:horizon] = _resized(above, scale * len(above), width)[:horizon]
     hills = np.ascontiguousarray(_resized(read_image(asset("landscape_band.jpg"))[:190], tall, width // 2))

@@ -135,7 +135,7 @@ class Approximation:
             scaled = product(instance.to_world, np.diag([side, side, 1.0, 1.0]))
             return [dataclasses.replace(made, shape=Rectangle(), to_world=scaled)]
         if not self.paths:  # paths find it by chance
-            self.report.add(name, "a lamp of triangles", "a surface that is seen and gives no light")
+            self.report.add(name, "a lamp of triangles", "a surface that glows and lights nothing")
         return [dataclasses.replace(made, material=Emissive(instance.emission), emission=None)]
 
     def texture(self, texture: Texture, where: str) -> Texture:
@@ -183,7 +183,7 @@ class Approximation:
             share = float(np.mean(mean_of(material.amount)))
             kept = material.second if share > 0.5 else material.first
             self.report.add(
-                where, "a mixture of materials", f"the one of which there is more ({max(share, 1 - share):.2g})"
+                where, "a mixture of materials", f"the one with the greater share ({max(share, 1 - share):.2g})"
             )
             return self.material(kept, where)
         if isinstance(material, Masked | Bumped | NormalMapped):

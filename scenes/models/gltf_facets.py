@@ -61,7 +61,7 @@ class FacetMaterials:
         else:
             coat = extensions.get("KHR_materials_clearcoat", {})
             for name in sorted(name for name in coat if name.endswith("Texture")):
-                self.report.add(where, f"a picture of its clear coat ({name})")
+                self.report.add(where, f"a texture of its clear coat ({name})")
             metallic, rough = (float(np.clip(parts.get(f"{name}Factor", 1.0), 0.0, 1.0)) for name in PARTS)
             beside, glow = pictures.get("metallicRoughnessTexture"), pictures.get("emissiveTexture")
             strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
@@ -86,7 +86,7 @@ class FacetMaterials:
     def _alike(self, name: str, lookup: Lookup, shared: Lookup | None, where: str) -> Lookup | None:
         if shared is not None and lookup.place == shared.place:
             return lookup
-        self.report.add(where, f"{name}, which is looked up in another way than its other pictures")
+        self.report.add(where, f"{name}, whose coordinates differ from those of its other textures")
         return None
 
     def _picture(self, lookup: Lookup, where: str, numbers: bool = False) -> Texture:

@@ -81,7 +81,7 @@ class GltfMaterials:
         elif colors is not None:
             mean = colors.reshape(-1, 3).mean(axis=0)
             if (colors != 1.0).any():
-                self.report.add(where, "colours of vertices beside a texture", "their mean times the texture")
+                self.report.add(where, "vertex colours in addition to a texture", "their mean times the texture")
             tint = ConstantTexture(rgb(mean))
         shared = lookup
         if self._facets is not None and lookup is None and uvs is None:
@@ -111,7 +111,7 @@ class GltfMaterials:
         if "KHR_materials_unlit" in extensions:
             if isinstance(base, ConstantTexture):
                 return Emissive(base.value)
-            self.report.add(where, "a picture that no light changes", "a diffuse one")
+            self.report.add(where, "a surface without lighting", "a diffuse one")
             return Phong(base)
         if through.get("transmissionFactor", 0.0) > 0.5:
             return self._glass(given, base, extensions, where)
@@ -122,7 +122,7 @@ class GltfMaterials:
             alpha = _rough(given).get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3]
             solid = seen_through(material, float(alpha), where, self.report)
         elif mode in ("BLEND", "MASK"):
-            self.report.add(where, f"transparency of its picture ({mode})", "opaque")
+            self.report.add(where, f"opacity in its texture ({mode})", "opaque")
         return self._glowing(given, solid, where)
 
     def _base(self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None) -> Texture:
@@ -144,7 +144,7 @@ class GltfMaterials:
         if beside is not None:
             numbers = np.clip(self.textures.picture(beside, numbers=True), 0.0, 1.0)
             if np.ptp(numbers[..., 1]) > 0.0:
-                self.report.add(where, "a picture of the roughness", "its mean")
+                self.report.add(where, "a texture of the roughness", "its mean")
             roughness = float(roughness * numbers[..., 1].mean(dtype=np.float64))
             share = 1.0 - metallic * numbers[..., 2:3] * (1.0 - diffuse_share(1.0, roughness))
             metallic = float(metallic * numbers[..., 2].mean(dtype=np.float64))
@@ -154,7 +154,7 @@ class GltfMaterials:
                     factor = _factor(given, "baseColorFactor").astype(np.float32)
                     diffuse = self.textures.texture(lookup, image * factor, where)
                 else:
-                    self.report.add(where, "a picture of what is metal", "its mean")
+                    self.report.add(where, "a texture of the metallic share", "its mean")
         if diffuse is None:
             diffuse = scaled(base, diffuse_share(metallic, roughness))
         return metallic_rough(base, diffuse, metallic, roughness)
@@ -163,10 +163,10 @@ class GltfMaterials:
         """Glass of the mean base colour, thin unless it has a volume; for path tracing with its roughness."""
         thickness = extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0)
         if "KHR_materials_volume" in extensions:
-            self.report.add(where, "colour by the length of the way in glass")
+            self.report.add(where, "absorption in glass")
         ior = float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5))
         if not isinstance(base, ConstantTexture):
-            self.report.add(where, "a picture on glass", "its mean")
+            self.report.add(where, "a texture of glass", "its mean")
         color = rgb(np.clip(mean_of(base), 0.0, 1.0))
         alpha = float(np.clip(_rough(given).get("roughnessFactor", 1.0), 0.0, 1.0)) ** 2
         rough = (alpha, alpha) if self._facets is not None and thickness > 0.0 else (0.0, 0.0)
@@ -179,7 +179,7 @@ class GltfMaterials:
             lookup = lookup_of(given["emissiveTexture"])
             picture = self.textures.picture(lookup or _EVERYWHERE)
             if np.ptp(picture.reshape(-1, 3), axis=0).max() > 0.0:
-                self.report.add(where, "a picture of what glows")
+                self.report.add(where, "a texture of the emission")
                 return material
             emission = emission * picture[0, 0]
         return glowing(material, rgb(np.maximum(emission, 0.0)), where, self.report)

@@ -121,7 +121,7 @@ class GltfTextures:
                 offset[axis] = 0.5 * axis  # the first half of rows is the upper one
         kinds = {wrap == _CLAMP for wrap in wraps}
         if len(kinds) > 1:
-            self.report.add(where, "a texture that ends along one axis and repeats along the other", "one that repeats")
+            self.report.add(where, "a texture clamped along one axis and repeated along the other", "one that repeats")
         wrap: Literal["clamp", "repeat"] = "clamp" if kinds == {True} else "repeat"
         kind: Literal["nearest", "mipmap"] = "nearest" if sampler.get("magFilter") == _NEAREST else "mipmap"
         source = str(self.data.sources.path)

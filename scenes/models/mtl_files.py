@@ -149,7 +149,7 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport) 
             report.add(where, keyword)
     diffuse = entry.color("kd", (0.8, 0.8, 0.8))
     if diffuse is None:
-        report.add(where, "a diffuse colour that is no RGB", "grey")
+        report.add(where, "a diffuse colour that is not RGB", "grey")
         diffuse = (0.5, 0.5, 0.5)
     texture: Texture = ConstantTexture(rgb(np.clip(diffuse, 0.0, 1.0)))
     if "map_kd" in entry.lines:
@@ -171,7 +171,7 @@ def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport)
     if kind == 0:
         if isinstance(texture, ConstantTexture):
             return Emissive(texture.value)
-        report.add(where, "a picture that no light changes (illum 0)", "a diffuse one")
+        report.add(where, "a surface without lighting (illum 0)", "a diffuse one")
         return Phong(texture)
     filtered = rgb(np.clip(entry.color("tf", (1.0, 1.0, 1.0)) or (1.0, 1.0, 1.0), 0.0, 1.0))
     if kind in (4, 6, 7, 9):

@@ -77,7 +77,7 @@ def glowing(material: Material, radiance: Rgb, where: str, report: LossReport) -
     """A surface with uniform emission, which replaces its other properties."""
     if max(radiance) <= 0.0:
         return material
-    became = "a surface that is seen and gives no light"
+    became = "a surface that glows and lights nothing"
     if isinstance(material, Phong) and max(mean_of(material.diffuse)) > 0.0:
         became += ", without its other colours"
     report.add(where, "emission", became)

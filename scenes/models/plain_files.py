@@ -31,7 +31,7 @@ def read_plain(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
     texture, uvs = coloured(decode_srgb(colors)[mesh.faces], str(path))
     if uvs is not None:
         if mesh.uvs is not None:
-            report.add(name, "texture coordinates beside colours of vertices")
+            report.add(name, "texture coordinates in addition to vertex colours")
         normals = None if mesh.normals is None else mesh.normals[mesh.faces]
         mesh = with_corners(mesh.vertices[mesh.faces], normals, uvs, str(path))
     return (Instance(mesh, Phong(texture), name=name),)

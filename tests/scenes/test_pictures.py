@@ -126,7 +126,7 @@ def test_a_ramp_of_16_bits_is_a_ramp() -> None:
 
 
 def test_a_sun_that_overflows_is_clamped_with_a_word() -> None:
-    with pytest.warns(UserWarning, match=r"infinite-sun\.exr: \d+ pixels of infinite light became 65504"):
+    with pytest.warns(UserWarning, match=r"infinite-sun\.exr: \d+ pixels of infinite radiance became 65504"):
         found = read_image(OWN / "infinite-sun.exr")
     assert np.isfinite(found).all() and found.max() == 65504.0
 

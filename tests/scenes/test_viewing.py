@@ -59,7 +59,7 @@ def test_light_comes_from_the_cameras_side() -> None:
     lights = [light for light in scene.lights if isinstance(light, DirectionalLight)]
     assert len(lights) == 2 and all(np.dot(light.direction, back) < 0.0 for light in lights)
     assert scene.background is not None and max(scene.ambient) > 0.0 and scene.name == "ball"
-    with pytest.raises(SceneError, match="expected something to look at"):
+    with pytest.raises(SceneError, match="expected at least one instance"):
         framed((), "z", "nothing")
 
 

@@ -57,7 +57,7 @@ def taken_in(
         estimates, surfels: moved and aged to the start of the cycle. A compiled set of stages overwrites them.
         known: change observed before the batch.
         traced: the batch.
-        options: of the filter.
+        options: options of the filter.
         picture: height and width of the part of the plane beyond which samples are left out; None for all of it.
     """
     side, now_s, hits, view = estimates.color.shape[-1], traced.now_s, traced.hits, traced.view

@@ -65,7 +65,7 @@ def observed(
         elapsed_s: time between the new samples of a pixel and the samples before them, seconds.
         compared: pixels that have both new and earlier samples.
         now_s, cycle_s: start of the cycle and length of the one before, seconds.
-        options: of the filter.
+        options: options of the filter.
     """
     nothing = torch.zeros_like(residual)
     excess = _summed(torch.where(compared, residual - expected, nothing))

@@ -123,7 +123,7 @@ class Surfels:
     """The surface element of every pixel, for estimates that move. A surfel may lie up to a pixel outside its pixel.
 
     Attributes:
-        instance: of the first hit, -1 at infinity, :data:`UNSEEN` where there is none.
+        instance: instance of the first hit, -1 at infinity, :data:`UNSEEN` where there is none.
         point: first hit in the space of the instance's track, or the direction to infinity.
         position: position on the image, pixels.
         step: its displacement on the image in the last cycle, pixels.

@@ -125,7 +125,7 @@ def updated(
         now_s: start of the cycle, seconds.
         replaced: pixels whose estimates are discarded.
         least_share: the least ``K`` of each pixel.
-        options: of the filter.
+        options: options of the filter.
     """
     hit, known = seen.hit, estimates.known
     elapsed_s = (seen.time_s - now_s).to(torch.float32)
@@ -151,7 +151,7 @@ class Met:
     """Surfels of the newest samples of a batch, and their relation to the surfels before it.
 
     Attributes:
-        surfels: of the samples.
+        surfels: surfels of the newest samples.
         same: pixels in which both surfels belong to one instance.
         replaced: pixels in which another surface is seen that moves against the one before.
         least_share: the least share of new samples.

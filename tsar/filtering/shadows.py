@@ -1,4 +1,4 @@
-"""Shadows of moving objects: where they lie, the picture will change although the visible surface stands still."""
+"""Shadows of moving objects: where they lie, the picture will change although the visible surface is static."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def drifted(
     """Speed of the shadows over each element after a batch, image sides per second, as observed by its newest samples.
 
     Args:
-        before: as it was.
-        position: of the samples on the image plane, in ``[0, 1)``.
-        hits: of the samples.
+        before: speed before the batch, image sides per second.
+        position: positions of the samples on the image plane, in ``[0, 1)``.
+        hits: first hits of the samples.
         view, earlier: poses of one time and of an earlier one.
         cycle_s: seconds between the two.
     """
@@ -50,7 +50,7 @@ def drift(hits: Hits, view: Viewpoint, earlier: Viewpoint) -> Float64[Tensor, " 
 
     Returns:
         The greater distance of both axes, as a share of the image's side; 0 without a shadow and where object and
-            surface move together. Always finite.
+        surface move together. Always finite.
     """
     instance, occluder = hits.instance.reshape(-1).to(torch.int64), hits.occluder.reshape(-1).to(torch.int64)
     track = view.track_of_instance
@@ -79,8 +79,8 @@ def last_seen(
     """Speed of the fastest shadow that the newest samples of each element have hit, image sides per second.
 
     Args:
-        before: as it was, in image sides per second.
-        drift_s: of each sample, likewise.
+        before: speed before the batch, image sides per second.
+        drift_s: speed of the shadow on each sample, image sides per second.
         element: raster index of the element under each sample.
     """
     nothing = torch.full((before.numel(),), -1.0)

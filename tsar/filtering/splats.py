@@ -23,7 +23,7 @@ from tsar.types import Viewpoint
 def advanced(
     estimates: Estimates, surfels: Surfels, rate: Float[Tensor, "1 e e"], seconds: float, view: Viewpoint
 ) -> tuple[Estimates, Surfels]:
-    """As :func:`tsar.filtering.motion.advanced`, with each surfel as a point."""
+    """Like :func:`tsar.filtering.motion.advanced`, with each surfel as a point."""
     return moved(estimates.later(rate, seconds), surfels, view, points=True)
 
 
@@ -40,13 +40,13 @@ def drawn(
     bilinear weights over their variances.
 
     Only surfels within 1/16 of the depth of the pixel's own surfel count; in a hole, those within 1/16 of the farthest.
-    A surfel that stands still gathers samples from its whole pixel, so it is drawn in the centre. Uncertain pixels are
-    blended with their surroundings, as in :mod:`tsar.filtering.display`; a hole without surfels takes the colour of its
+    A static surfel gathers samples from its whole pixel, so it is drawn in the centre. Uncertain pixels are blended
+    with their surroundings, as in :mod:`tsar.filtering.display`; a hole without surfels takes the colour of its
     surroundings alone.
 
     Args:
-        estimates, surfels: of the pixels.
-        depth: of the surfels, scene units.
+        estimates, surfels: estimates and surfels of all pixels.
+        depth: depth of the surfels, scene units.
     """
     side = depth.shape[-1]
     seen = depth.isfinite() | estimates.known

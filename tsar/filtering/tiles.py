@@ -30,7 +30,7 @@ EDGE_GROWTH = 0.35  # growth of the distance from a pixel without a sample to th
 
 
 def spacings(side: int) -> tuple[float, ...]:
-    """Those of :data:`tsar.filtering.records.SPACINGS` whose tiles fit into the image."""
+    """The spacings of :data:`tsar.filtering.records.SPACINGS` whose tiles fit into the image."""
     return tuple(spacing for spacing in SPACINGS if side >= TILE_SIDE * spacing)
 
 
@@ -56,7 +56,7 @@ def gains(
         rate: rate of change ``q``, variance per second.
         speed: speed of surfaces over the image, pixels per second.
         cycle_s: length of a cycle, seconds.
-        options: of the filter.
+        options: options of the filter.
     """
     p = (variance + rate * cycle_s).clamp(max=VARIANCE_MAX)
     crossed_s = options.reach * variance.shape[-1] / speed.clamp(min=SPEED_LEAST)

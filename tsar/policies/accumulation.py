@@ -77,7 +77,7 @@ def accumulated(
         now: poses of the frame.
         before: poses of the previous frame; None for the first.
         history: after the previous frame; None for the first.
-        constants: of the accumulation.
+        constants: constants of the accumulation.
     """
     color = color.clamp(-BRIGHTEST, BRIGHTEST)
     if history is None or before is None:

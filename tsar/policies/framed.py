@@ -142,7 +142,7 @@ def frame_image(
 
     Args:
         color: samples of a raster of ``shape``, linear RGB.
-        shape: of the samples.
+        shape: height and width of the samples.
         picture: height and width of the image. Its pixels are box averages of several samples, or bilinear
             interpolations where there are fewer samples than pixels.
         samples_per_axis: number of samples along a pixel's side.

@@ -57,7 +57,7 @@ class Oracle(Policy[Foresight]):
         super().__init__(setting)
         require_square(self.config, "oracle")
         if setting.truth is None or setting.trace is None:
-            raise ValueError("oracle: expected a truth to look at and a renderer that is not charged, got none")
+            raise ValueError("oracle: expected a setting with the truth and a renderer that is not charged, got none")
         self._truth, self._trace = setting.truth, setting.trace
 
     @property

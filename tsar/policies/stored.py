@@ -67,7 +67,7 @@ class Stored(Policy[Any]):
         state = self._policy.start()
         for name in formats:
             kept = name in ("samples", "picture", ALL) or any(_has(state, field) for field in (*FIELDS[name], name))
-            require(kept, f"formats.{name}", "something that the policy keeps", type(self._policy).__name__.lower())
+            require(kept, f"formats.{name}", "a field that the policy has", type(self._policy).__name__.lower())
 
     def _stages_of(self, stages_of: Callable[[TsarConfig], Stages], config: TsarConfig) -> Stages:
         stages = stages_of(config)

@@ -37,7 +37,7 @@ def seen(surfaces: Surfaces, view: Viewpoint) -> tuple[Float64[Tensor, "h w 2"],
 
     Returns:
         Positions in pixels, as in :mod:`tsar.policies.resampling`, and depths, scene units. Where the view does not
-            show it, the position is NaN and the depth at most 0.
+        show it, the position is NaN and the depth at most 0.
     """
     height, width = surfaces.instance.shape
     position, depth = project(view, surfaces.instance, surfaces.point)

@@ -1,6 +1,6 @@
 """The policy of the dissertation, ``thesis``: its pipeline as a recipe.
 
-Contains no mathematics; every stage is a function of its own module.
+This module contains no mathematics: every stage is a function of its own module.
 
 Source: Stephens 2011, sec. 3.4.4 and fig. 3.13.
 

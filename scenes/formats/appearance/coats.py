@@ -38,6 +38,6 @@ def with_bounces(base: Texture, ior: float, where: str, report: LossReport) -> T
 def _recoloured(base: Texture, change: Change, where: str, report: LossReport) -> Texture:
     made = changed(base, change)
     if made is None:
-        report.add(where, "colours of a texture under a coat", "that of their mean")
+        report.add(where, "a texture under a coat", "that of their mean")
         return ConstantTexture(rgb(change(np.array(mean_of(base)))))
     return made

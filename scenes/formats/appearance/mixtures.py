@@ -83,7 +83,7 @@ def sum_of(lobes: list[Lobe], where: str, report: LossReport) -> Material:
     found = [lobe for lobe in lobes if lobe.greatest > 0.0]
     total = sum(lobe.greatest for lobe in found)
     if total > 1.0 + 1e-6:
-        report.add(where, f"lobes that reflect {total:.3g} together", "1")
+        report.add(where, f"lobes that reflect {total:.3g} in total", "1")
     made, share = BLACK, max(1.0 - total, 0.0)
     for lobe in found:
         scaled = {name: _scaled(getattr(lobe.material, name), 1.0 / lobe.greatest) for name in lobe.colors}
@@ -130,7 +130,7 @@ def added_metal(material: Plastic, where: str, report: LossReport) -> Material:
         return Matte(material.diffuse)
     share = coat_share(material)
     if greatest_of(material.specular) > share + 1e-6:
-        report.add(where, "a coat and a base that reflect more than all together", "the coat less")
+        report.add(where, "a coat and a base that reflect more than the incident light", "a darker coat")
     coat = _capped(material.specular, 1.0 / share)
     metal = Metal(grey(material.ior), grey(0.0), (material.roughness, material.roughness), coat)
     return MixMaterial(Matte(_scaled(material.diffuse, 1.0 / (1.0 - share))), metal, ConstantTexture(grey(share)))

@@ -79,7 +79,7 @@ def read_job(path: Path) -> Job:
     except OSError as error:
         raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"{path}: expected UTF-8 text, byte {error.start} is none") from None
+        raise SceneError(f"{path}: expected UTF-8 text, byte {error.start} is invalid") from None
     numbered = [(number, line.split("#")[0].split()) for number, line in enumerate(text.splitlines(), 1)]
     lines = [(number, words) for number, words in numbered if words]
     if len(lines) != len(_LINES):

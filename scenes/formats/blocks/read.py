@@ -124,7 +124,7 @@ class _Loader:
             if block.kind == kind and (required or key in block.values):
                 name = block.require(key)
                 if name in named:
-                    raise SceneError(f"{block.where}: {kind} {name!r} stands twice")
+                    raise SceneError(f"{block.where}: {kind} {name!r} occurs twice")
                 named[name] = block
         return named
 

@@ -151,7 +151,7 @@ def read_blocks(path: Path) -> list[Block]:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise SceneError(f"{path}: expected UTF-8 text, byte {error.start} is none") from None
+        raise SceneError(f"{path}: expected UTF-8 text, byte {error.start} is invalid") from None
     except OSError as error:
         raise SceneError(f"{path}: cannot be read ({error.strerror})") from None
     return parse_blocks(text, str(path))
@@ -188,7 +188,7 @@ def _block(tree: lark.Tree, name: str) -> Block:
         if key not in ALLOWED[kind]:
             raise SceneError(f"{line}: {kind}: expected one of {', '.join(ALLOWED[kind])}, got {key!r}")
         if key in values:
-            raise SceneError(f"{line}: {kind}: {key} stands twice")
+            raise SceneError(f"{line}: {kind}: {key} occurs twice")
         values[key] = _value(ALLOWED[kind][key], words, f"{line}: {kind}.{key}")
     return Block(kind, values, where)
 

@@ -37,7 +37,7 @@ def facing(block: Block, place: NDArray[np.float64], target: NDArray[np.float64]
     """The transform of a rectangle whose outside faces a target."""
     aim = target - place
     if not aim.any():
-        raise SceneError(f"{block.where}: light.target: expected another place than its location, got {tuple(target)}")
+        raise SceneError(f"{block.where}: light.target: expected a point other than its location, got {tuple(target)}")
     helper = np.array([0.0, 1.0, 0.0]) if abs(aim[1]) < 0.9 * norm(aim) else np.array([1.0, 0.0, 0.0])
     normal = aim / norm(aim)
     across = np.cross(helper, normal)

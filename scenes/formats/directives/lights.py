@@ -21,7 +21,7 @@ def lamp(kind: str, parameters: Parameters, start: Rgb, strength: Rgb, report: L
     """A point light; other kinds become isotropic point lights, which is reported."""
     if kind != "point":
         parameters.asked.update(parameters.given)
-        report.add(str(parameters.place), f"light {kind!r}", "a point light as bright in all directions")
+        report.add(str(parameters.place), f"light {kind!r}", "a point light of equal intensity in all directions")
     return PointLight(start, strength)
 
 

@@ -153,7 +153,7 @@ class DirectiveReader:
     def _take_system(self, directive: Directive) -> None:
         name = word(directive)
         if name not in self.transforms.named:
-            self.report.add(str(directive.place), f"coordinate system {name!r}, which nothing defines")
+            self.report.add(str(directive.place), f"coordinate system {name!r}, which is not defined")
         else:
             self.transforms.take(name)
 

@@ -241,7 +241,7 @@ class SceneReader(DirectiveReader):
             parameters.asked.add("shadowalpha")
             self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
         if is_nothing(material) and self.attributes.emission is None:
-            self.report.hint(str(directive.place), "the border of a medium, which is not seen")
+            self.report.hint(str(directive.place), "the border of a medium, which is invisible")
             self.left_over(parameters, f"shape {kind!r}")
             return
         if isinstance(shape, Mesh):

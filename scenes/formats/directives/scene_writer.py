@@ -76,7 +76,7 @@ class SceneWriter(SurfaceWriter):
 
     def _environment_only_seen(self, scene: Scene) -> None:
         if scene.background is not None:
-            self.report.add(scene.name or "scene", "a background that is seen and does not light", "an infinite light")
+            self.report.add(scene.name or "scene", "a background that lights nothing", "an infinite light")
             self.write_light(scene.background)
         if scene.ambient != (0.0, 0.0, 0.0):
             self.report.add(scene.name or "scene", "constant ambient light")

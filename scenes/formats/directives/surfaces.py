@@ -59,6 +59,6 @@ class Surfaces(TextureReader):
     def named(self, name: str, where: str) -> Material:
         """The material of a name; an undefined one is grey, which is reported."""
         if name not in self.names.materials:
-            self.report.add(where, f"material {name!r}, which nothing defines", "grey, matte")
+            self.report.add(where, f"material {name!r}, which is not defined", "grey, matte")
             return Matte(ConstantTexture(grey(0.5)))
         return self.names.materials[name]

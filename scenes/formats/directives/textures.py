@@ -99,7 +99,7 @@ class TextureReader:
             return ConstantTexture(self.color(parameters, name, default))
         found = self.names.textures(of).get(parameters.text(name, ""))
         if found is None:
-            wanted = f"{name}: texture {parameters.text(name, '')!r} of type {of}, which nothing defines"
+            wanted = f"{name}: texture {parameters.text(name, '')!r} of type {of}, which is not defined"
             self.report.add(str(parameters.place), wanted, f"the constant {default}")
             return ConstantTexture(default)
         return found

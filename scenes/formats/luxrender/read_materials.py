@@ -122,7 +122,7 @@ class LuxSurfaces(Surfaces):
         name = parameters.text("fresnel", "")
         index = self.names.indices.get(name)
         if index is None:
-            self.report.add(str(parameters.place), f"fresnel texture {name!r}, which nothing defines", "aluminium")
+            self.report.add(str(parameters.place), f"fresnel texture {name!r}, which is not defined", "aluminium")
             index = metal("Al")
         assert index is not None
         return Metal(*index, self._alphas(parameters, 0.001))

@@ -66,7 +66,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         if isinstance(material, MixMaterial):
             first, second = self.material(material.first), self.material(material.second)
             if isinstance(material.amount, ConstantTexture) and len(set(material.amount.value)) > 1:
-                self.report.add(where, "a mixture of each colour by itself", "by their mean")
+                self.report.add(where, "a mixture with a share for each colour", "by their mean")
             return mixture_line(first, second, self.texture(material.amount, "amount", "float"))
         return super().material_line(material, name)
 

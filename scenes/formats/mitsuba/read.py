@@ -146,7 +146,7 @@ class MitsubaReader(MitsubaSettings):
         name = reference.get("id")
         if name in self.names:
             return self.names[name]
-        self.report.add(str(reference.place), f"{name!r}, which nothing is named before it", "grey")
+        self.report.add(str(reference.place), f"{name!r}, which no earlier element has as its name", "grey")
         if name not in self._missing:
             tag = "texture" if reference.get("name") else "bsdf"
             self._missing[name] = Node(tag, {"type": MISSING if tag == "texture" else "diffuse"}, reference.place)

@@ -94,7 +94,7 @@ class MitsubaShapes:
         found = []
         for name, (material, one_sided) in surfaces.items():
             if is_nothing(material) and emission is None:
-                self.report.hint(properties.where, "the border of a medium, which is not seen")
+                self.report.hint(properties.where, "the border of a medium, which is invisible")
                 continue
             faces = {name} if name is not None else set(used) - set(surfaces)
             made = self._made(kind, properties, material, faces if len(surfaces) > 1 else None)
@@ -162,7 +162,7 @@ class MitsubaShapes:
             if node.tag == "bsdf" and name and name in used:
                 named[name] = self.surfaces.material(node), self.surfaces.one_sided(node)
             elif node.tag == "bsdf" and name and by_name:
-                self.report.hint(str(node.place), f"the material {name!r} of a mesh, which no face has")
+                self.report.hint(str(node.place), f"the material {name!r} of a mesh, which no face uses")
             elif node.tag == "bsdf":
                 named.clear()  # it applies to all faces
                 if material is not None:

@@ -64,7 +64,7 @@ class MitsubaWriter(MitsubaLightWriter):
         for light in (*scene.lights, *([scene.background] if scene.background is not None else [])):
             self.emitter(light)
         if scene.background is not None:
-            self.report.add(scene.name or "scene", "a background that is seen and does not light", "one that lights")
+            self.report.add(scene.name or "scene", "a background that lights nothing", "one that lights")
         if scene.ambient != (0.0, 0.0, 0.0):
             self.report.add(scene.name or "scene", "constant ambient light")
         self.shared = shared_parts(scene)

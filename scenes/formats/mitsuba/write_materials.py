@@ -79,7 +79,7 @@ class MitsubaSurfaceWriter(ElementWriter):
             amount = material.amount
             if isinstance(amount, ConstantTexture):  # a number, because Mitsuba 0.5 accepts no colour here
                 if len(set(amount.value)) > 1:
-                    self.report.add(where, "a mixture of each colour by itself", "by their mean")
+                    self.report.add(where, "a mixture with a share for each colour", "by their mean")
                 self.put(made, "float", "weight", number(float(np.mean(amount.value))))
             else:
                 self.texture(made, amount, "weight")
@@ -118,7 +118,7 @@ class MitsubaSurfaceWriter(ElementWriter):
         elif isinstance(material, Metal | Glass) and material.roughness == (0.0, 0.0):
             made = dataclasses.replace(material, roughness=(BLUNT, BLUNT))
         if made is not material:
-            self.report.add(where, "a sharp mirror or glass in a mixture", f"one of alpha {BLUNT:g}")
+            self.report.add(where, "a perfect mirror or glass in a mixture", f"one of alpha {BLUNT:g}")
         return made
 
     def _opaque(self, material: Material, where: str) -> Element:
@@ -232,7 +232,7 @@ class MitsubaSurfaceWriter(ElementWriter):
             made = self.plugin("bsdf", "difftrans")
             self.texture(made, material.transmittance, "transmittance")
             return made
-        self.report.add(where, "diffuse reflection beside transmission", "a mixture of both")
+        self.report.add(where, "diffuse reflection and transmission", "a mixture of both")
         made = self.plugin("bsdf", "mixturebsdf")
         self.put(made, "string", "weights", "0.5, 0.5")
         both = self.plugin("bsdf", "twosided", made)

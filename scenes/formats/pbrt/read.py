@@ -126,6 +126,6 @@ class PbrtReader(SceneReader):
         scale = np.array(self.surfaces.color(parameters, "scale", (1.0, 1.0, 1.0)))
         self.attributes.emission = rgb(scale * self.surfaces.color(parameters, "L", (1.0, 1.0, 1.0)))
         if parameters.truth("twosided", False):
-            self.report.add(str(directive.place), "an area light of two sides", "its front")
+            self.report.add(str(directive.place), "a two-sided area light", "its front")
         lights.lose_hints(parameters, self.report)
         self.left_over(parameters, "area light")

@@ -80,10 +80,10 @@ class V4Lights:
         strength = rgb(parameters.number("scale", 1.0) * np.array(self.surfaces.light(parameters, "L")))
         both = parameters.truth("twosided", False)
         if both:
-            self.report.add(where, "an area light of two sides", "its front")
+            self.report.add(where, "a two-sided area light", "its front")
         if "filename" in parameters:
             parameters.asked.add("filename")
-            self.report.add(where, "a lamp with a picture", "as bright all over")
+            self.report.add(where, "a lamp with a texture", "a constant radiance")
         return strength, max(parameters.number("power", 0.0), 0.0) / (2.0 if both else 1.0)
 
     def _infinite(self, parameters: Parameters, matrix: Matrix, where: str) -> EnvironmentLight:

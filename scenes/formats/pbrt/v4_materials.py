@@ -65,7 +65,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
         made = self._plain(kind, parameters)
         if "normalmap" in parameters:
             parameters.asked.add("normalmap")
-            self.report.add(str(parameters.place), "a map of normals", "none")
+            self.report.add(str(parameters.place), "a normal map", "none")
         if parameters.types.get("displacement") == "texture":
             return Bumped(made, self.texture(parameters, "displacement", grey(0.0), "float"))
         return made
@@ -134,7 +134,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
         for name in ("albedo", "g"):
             if name in parameters:
                 parameters.asked.add(name)
-                self.report.add(str(parameters.place), f"{name} of what is between layers", "clear")
+                self.report.add(str(parameters.place), f"{name} of the medium between layers", "clear")
 
     def _coated(self, parameters: Parameters) -> Material:
         where, ior = str(parameters.place), self._index(parameters)
@@ -158,7 +158,7 @@ class PbrtV4Surfaces(PbrtSurfaces):
             )
         found = self.texture(parameters, name, grey(1.0))
         if not isinstance(found, ConstantTexture):
-            self.report.add(str(parameters.place), "a metal by a texture", "as bright at all angles")
+            self.report.add(str(parameters.place), "a metal with a textured reflectance", "constant over all angles")
             return grey(0.0), grey(1.0), found
         r = np.clip(found.value, 0.0, 0.9999)
         return grey(1.0), rgb(2.0 * np.sqrt(r) / np.sqrt(1.0 - r)), white

@@ -87,7 +87,7 @@ class PbrtV4Reader(PbrtReader):
         assumed = {name for _, name in self.attributes.assumed}
         for name in parameters.unasked():
             if name in assumed:
-                self.report.hint("Attribute", f"parameter {name!r}, which not all have that it is for")
+                self.report.hint("Attribute", f"parameter {name!r}, which does not apply to all")
                 parameters.asked.add(name)
         super().left_over(parameters, what)
 
@@ -151,7 +151,7 @@ class PbrtV4Reader(PbrtReader):
                 self.report.add(str(directive.place), f"{name} of the film")
         parameters.number("diagonal", 35.0)
         if parameters.truth("savefp16", True) is False:
-            self.report.hint(str(directive.place), "numbers of 32 bits in the picture's file")
+            self.report.hint(str(directive.place), "32-bit numbers in the picture's file")
         self.left_over(parameters, f"film {kind!r}")
 
     def finish(self) -> None:

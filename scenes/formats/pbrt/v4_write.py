@@ -77,7 +77,7 @@ class PbrtV4Writer(PbrtV4SurfaceWriter, PbrtWriter):
     def map_of(self, light: EnvironmentLight) -> str:
         square, source = _square_of(light)
         if not source:
-            self.report.add("light", "an environment map by latitude and longitude", "one of equal area, resampled")
+            self.report.add("light", "a latitude–longitude environment map", "one of equal area, resampled")
         file = self.output.picture(square, source, V4_PICTURES)
         return f'"string filename" [ "{file}" ] "float scale" [ {number(light.scale)} ]'
 

@@ -79,7 +79,7 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
             names = " ".join(f'"{self.material(part)}"' for part in (material.first, material.second))
             amount = self.texture(material.amount, "amount", "float")
             if isinstance(material.amount, ConstantTexture) and len(set(material.amount.value)) > 1:
-                self.report.add(where, "a mixture of each colour by itself", "by their mean")
+                self.report.add(where, "a mixture with a share for each colour", "by their mean")
             return f'"string type" [ "mix" ] "string materials" [ {names} ] {amount}'
         return super().material_line(material, name)
 

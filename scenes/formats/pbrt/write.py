@@ -183,7 +183,7 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         opacity = material.opacity
         if isinstance(opacity, ConstantTexture):
             if len(set(opacity.value)) > 1:
-                self.report.add("shape", "holes of each colour by themselves", "by their mean")
+                self.report.add("shape", "an opacity for each colour", "by their mean")
             return f'"float alpha" [ {number(float(np.mean(opacity.value)))} ]'
         return self.texture(opacity, "alpha", "float")
 

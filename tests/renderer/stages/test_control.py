@@ -130,9 +130,9 @@ def test_the_stages_are_chosen_by_name() -> None:
 def test_stages_refuse_another_configuration_than_theirs() -> None:
     ours, state = compiled_stages(small()), runs.made("thesis", small()).start()
     other, none = small(seed=1), Errors(*torch.zeros(2, 128**2).unbind(0))
-    with pytest.raises(ValueError, match="expected the configuration that they were made for"):
+    with pytest.raises(ValueError, match="expected the configuration for which they were made"):
         ours.decide(state.densities, none, state.due.history, other, StageTimer())
-    with pytest.raises(ValueError, match="expected the configuration that they were made for"):
+    with pytest.raises(ValueError, match="expected the configuration for which they were made"):
         ours.reconstruct(state.cache, other, CYCLE_S)
     again = ours.decide(state.densities, none, state.due.history, small(), StageTimer())
     assert again.due.selected.numel() == 32

@@ -134,7 +134,7 @@ def test_what_is_too_far_from_everything_else_is_named() -> None:
 def test_a_mesh_that_has_lost_its_form_is_named() -> None:
     mesh = Mesh((BOX.vertices + 1e5).astype(np.float32), BOX.faces, source="box.ply")
     camera = PerspectiveCamera(place((1e5, 1e5, 1e5 + 5)))
-    with pytest.warns(UserWarning, match=r"mesh 'box.ply' of size 2 is known to 0\.0\d+ only"):
+    with pytest.warns(UserWarning, match=r"mesh 'box.ply' of size 2 is stored with a precision of only 0\.0\d+"):
         Renderer(Scene(camera, (Instance(mesh, Matte(WHITE)),)))
 
 

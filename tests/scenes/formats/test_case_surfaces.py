@@ -50,7 +50,7 @@ def test_textures_are_upright_on_meshes_and_rectangles(file: str, tmp_path: Path
 def test_borders_of_media_are_not_seen(name: str, file: str) -> None:
     scene, lost = case(name, file)
     assert reflectances(scene) == [(0.9, 0.1, 0.1)] and scene.instances[0].shape == Sphere(0.6)
-    assert sum("the border of a medium, which is not seen: left out" in loss for loss in lost) == 1
+    assert sum("the border of a medium, which is invisible: left out" in loss for loss in lost) == 1
 
 
 def test_a_border_that_shines_is_kept(tmp_path: Path) -> None:

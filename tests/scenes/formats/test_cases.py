@@ -49,7 +49,7 @@ def test_names_end_with_every_block_that_keeps_attributes(block: str, tmp_path: 
     """
     scene, lost = pbrt(tmp_path, body)
     assert reflectances(scene) == [(0.2,) * 3, (0.1,) * 3, (0.5,) * 3]
-    assert len(lost) == 1 and "material 'n', which nothing defines: grey, matte" in lost[0]
+    assert len(lost) == 1 and "material 'n', which is not defined: grey, matte" in lost[0]
     assert list(scene.materials) == ["m"]
 
 
@@ -64,7 +64,7 @@ def test_textures_of_numbers_and_colours_have_tables_of_their_own() -> None:
 def test_a_texture_of_the_other_kind_is_none(tmp_path: Path) -> None:
     body = 'Texture "t" "float" "constant" "float value" 0.9\nMaterial "matte" "texture Kd" "t"\nShape "sphere"\n'
     scene, lost = pbrt(tmp_path, body)
-    assert reflectances(scene) == [(0.5,) * 3] and "texture 't' of type color, which nothing defines" in lost[0]
+    assert reflectances(scene) == [(0.5,) * 3] and "texture 't' of type color, which is not defined" in lost[0]
 
 
 def test_parameters_behind_an_include_are_those_of_its_last_directive(tmp_path: Path) -> None:
@@ -84,9 +84,9 @@ def test_materials_that_nothing_defines_are_grey_and_said_so(tmp_path: Path) -> 
     scene, lost = case("undefined-named-material")
     first, both = (one.material for one in scene.instances)
     assert first == Matte(ConstantTexture((0.5,) * 3)) and isinstance(both, MixMaterial)
-    assert [loss.split(": ", 1)[1] for loss in lost] == ["material 'gone', which nothing defines: grey, matte"] * 2
+    assert [loss.split(": ", 1)[1] for loss in lost] == ["material 'gone', which is not defined: grey, matte"] * 2
     scene, lost = mitsuba(tmp_path, '<shape type="sphere"><ref id="gone"/></shape>')
-    assert reflectances(scene) == [(0.5,) * 3] and "'gone', which nothing is named before it: grey" in lost[0]
+    assert reflectances(scene) == [(0.5,) * 3] and "'gone', which no earlier element has as its name: grey" in lost[0]
     body = '<shape type="sphere"><bsdf type="diffuse"><ref id="gone" name="reflectance"/></bsdf></shape>'
     assert reflectances(mitsuba(tmp_path, body)[0]) == [(0.5,) * 3]
 
@@ -238,7 +238,7 @@ def test_holes_of_each_colour_are_a_loss_in_pbrt(tmp_path: Path) -> None:
     body = f'<shape type="rectangle"><bsdf type="mask">{opacity}<bsdf type="diffuse"/></bsdf></shape>'
     report = LossReport()
     save_scene_file(mitsuba(tmp_path, body)[0], tmp_path / "b.pbrt", None, report)
-    assert "holes of each colour by themselves" in report.text()
+    assert "an opacity for each colour" in report.text()
 
 
 @pytest.mark.parametrize(("kind", "value"), [("constant", 0.2), ("checkerboard", 0.3)])

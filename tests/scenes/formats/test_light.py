@@ -259,5 +259,5 @@ def test_uber_is_a_mixture_that_sums_to_one_at_most() -> None:
     report = LossReport()
     made = lobes_of(Uber(even(0.9), even(0.9), even(0.0), even(0.0)), "uber", report)
     assert isinstance(made, MixMaterial) and isinstance(made.second, Metal)
-    assert [loss.what for loss in report.losses] == ["lobes that reflect 1.8 together"]
+    assert [loss.what for loss in report.losses] == ["lobes that reflect 1.8 in total"]
     assert BLUNT < 0.01

@@ -79,7 +79,7 @@ def test_base_colour_is_factor_times_texture_times_vertices(tmp_path: Path) -> N
     image = read_model(file.written(), report)[0].material.diffuse.image
     expected = np.array([linear(188) * 0.5, linear(64) * 0.25, 1.0]) * 128 / 255  # colours of vertices are linear
     assert image[0, 0] == pytest.approx(expected, rel=1e-4)
-    assert "colours of vertices beside a texture" in report.text()
+    assert "vertex colours in addition to a texture" in report.text()
 
 
 def test_colours_of_vertices_are_interpolated(tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ def test_sparse_and_strided_accessors(tmp_path: Path) -> None:
         ({"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1]}},
          Emissive, ""),
         ({"emissiveFactor": [1, 0, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3.0}}},
-         Emissive, "gives no light"),
+         Emissive, "lights nothing"),
         ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}}}, Glass, ""),
         ({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2]}}, Glass, "opacity"),
         ({"normalTexture": {"index": 0}}, Phong, "normalTexture"),

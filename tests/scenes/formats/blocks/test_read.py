@@ -187,7 +187,7 @@ def test_the_scenes_of_the_study(name: str, instances: int) -> None:
         ("radius 3", "radius", r"object.radius: expected 1 numbers, got none"),
         ("radius 3", "radius three", r"object.radius: expected a number, got 'three'"),
         ("radius 3", "radius inf", r"object.radius: expected a finite number, got 'inf'"),
-        ("radius 3", "radius 3\n  radius 4", r"radius stands twice"),
+        ("radius 3", "radius 3\n  radius 4", r"radius occurs twice"),
         ("location 1 2 3", "location 1 2", r"scene.txt:24: object.location: expected 3 numbers, got 1 2"),
         ("materialname paint\n  radius", "materialname pain\n  radius", r"materialname: expected paint, got 'pain'"),
         ("type sphere", "type spear", r"object.type: expected one of model, sphere, .*got 'spear'"),

@@ -140,7 +140,7 @@ def test_materials(tmp_path: Path) -> None:
     assert isinstance(made, Matte) and len(losses) == 1
     made, losses = of(tmp_path, '"diffuse" "float sigma" 3 "string normalmap" "n.png"')
     assert [loss.split(": ", 1)[1] for loss in losses] == [
-        "a map of normals: none", "material 'diffuse': parameter 'sigma': left out"
+        "a normal map: none", "material 'diffuse': parameter 'sigma': left out"
     ]  # fmt: skip
     body = 'Texture "t" "float" "checkerboard" "float uscale" 4\nMaterial "diffuse" "texture displacement" "t"\n'
     scene, losses = read(tmp_path, body + 'Shape "sphere"')
