@@ -17,6 +17,7 @@ from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
 from analysis.comparison.stored import FILES, Recording, added_by, content_of, write_summary
+from analysis.metrics import METRICS, require_extras
 from analysis.storage.results import SUMMARY, own_results
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
     with first_imports():
         from scenes import catalog
 
+        require_extras(options.metrics)
     with bad_input():
         scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
@@ -203,7 +205,6 @@ def _compare(
     from analysis.comparison.rivalry import Panels
     from analysis.comparison.summary import Measured
     from analysis.comparison.viewers import EXACT, Filming, Steps
-    from analysis.metrics import METRICS
     from analysis.page.video import Scales
     from analysis.study.displays import Measuring, watch
     from renderer.film.files import Mp4Writer, write_exr
@@ -241,8 +242,6 @@ def _compare(
 def _scored(options: RunOptions, metric: str, seen: dict[str, Seen]) -> dict[str, float]:
     """A metric of sequences for every run."""
     import numpy as np
-
-    from analysis.metrics import METRICS
 
     measured, found = METRICS[metric], {}
     for name, one in seen.items():

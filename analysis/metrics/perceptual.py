@@ -85,6 +85,6 @@ def ssim(test: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"]) -> flo
         return float(measure(*planes, window_size=11).mean(dtype=torch.float64))
 
 
-FLIP = Metric("lower", image=flip)
+FLIP = Metric("lower", image=flip, extra="perception")
 SSIM = Metric("higher", image=ssim)
-JOD = Metric("higher", sequence=jod, unit="JOD")
+JOD = Metric("higher", sequence=jod, unit="JOD", extra="perception")

@@ -30,6 +30,8 @@ LACKING = [
     ("trade.py", ("--trials", "0"), "distributed", "study"),
     ("suitability.py", (), "pycvvdp", "perception"),
     ("sensitivity.py", (), "flip_evaluator", "perception"),
+    ("run.py", ("fly-by", "--metrics", "flip"), "flip_evaluator", "perception"),
+    ("run.py", ("fly-by", "--metrics", "ssim", "jod"), "pycvvdp", "perception"),
     ("tiles.py", ("glass",), "dask", "study"),
     ("perception.py", ("adaptive", "fly-by"), "distributed", "study"),
     ("perception.py", ("simulate", "stimuli"), "torchvision", "perception"),
