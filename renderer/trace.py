@@ -47,7 +47,7 @@ class Renderer:
         footprint_resolution_px: number of pixels along the shorter image axis for which :meth:`trace` filters textures.
         features: features for which kernels are compiled.
         packets: whether sixteen samples are traced at a time.
-        scene: scene that is traced, moved near the origin.
+        scene, buffers: scene that is traced, moved near the origin, and its tables on the device.
     """
 
     def __init__(
@@ -117,10 +117,10 @@ class Renderer:
         self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
         # before the buffers are built, which takes those of packets too: they are compiled side by side
         devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)
-        self._buffers = build_buffers(scene, self.device, own)
+        self.buffers = build_buffers(scene, self.device, own)
         if not self.packets:  # these are compiled for the scene, now that it is known to be supported
             devices.load_kernels(self._kernels.module, self.device)
-        data = self._buffers.data
+        data = self.buffers.data
         data.throughput_cutoff, data.seed = float(throughput_cutoff), wp.uint32(seed)
         self._work = np.zeros(2, np.int64) if count_work else None
         self._stack_size = stack_size(self.features, data.depth, data.reflection_rays, data.refraction_rays)
@@ -154,7 +154,7 @@ class Renderer:
 
     def change_texels(self, change: Callable[[Tensor], Tensor]) -> None:
         """Replaces the colours of all textures, at every level, ``(texels, 3)`` float32."""
-        texels = wp.to_torch(self._buffers.data.texels)
+        texels = wp.to_torch(self.buffers.data.texels)
         texels.copy_(change(texels))
 
     def viewpoint(self, time_s: float, aspect: float = 1.0) -> Viewpoint:
@@ -174,7 +174,7 @@ class Renderer:
             raise ValueError(f"time_s: expected a finite time, got {time_s}")
         view = self._view(aspect, self.footprint_resolution_px)
         self._pose(view, float(time_s))
-        return viewpoint_of(self._buffers, view, float(time_s))
+        return viewpoint_of(self.buffers, view, float(time_s))
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
         """Renders a whole picture.
@@ -209,7 +209,7 @@ class Renderer:
         """The scene, and the camera at one time, for launches of other kernels."""
         view = self._view(aspect, footprint_px)
         self._pose(view, time_s)
-        return self._buffers.data, view
+        return self.buffers.data, view
 
     @property
     def shutter_s(self) -> tuple[float, float]:
@@ -252,7 +252,7 @@ class Renderer:
         key = aspect, footprint_px
         if key not in self._batches:
             still, moving = (self._view(*key) for _ in range(2))
-            self._batches[key] = PacketBatches(self._buffers, still, moving, self.threads)
+            self._batches[key] = PacketBatches(self.buffers, still, moving, self.threads)
         return self._batches[key]
 
     def _launch(self, kernel: wp.Kernel, view: ViewData, shared: tuple[object, ...], count: int) -> None:
@@ -263,14 +263,14 @@ class Renderer:
         """
         if self.packets:
             taken = wp.zeros(1, dtype=wp.int32, device="cpu")
-            inputs = [self._buffers.data, view, taken, *shared]
+            inputs = [self.buffers.data, view, taken, *shared]
             command = wp.launch(kernel, dim=1, inputs=inputs, device="cpu", record_cmd=True)
             list((map if self._pool is None else self._pool.map)(lambda _: command.launch(), range(self.threads)))
             return
 
         def run(first: int, dim: int) -> None:
             stack = wp.empty((dim if self._stack_size > 1 else 1, self._stack_size), Ray, self.device)
-            wp.launch(kernel, dim=dim, inputs=[self._buffers.data, view, stack, first, *shared], device=self.device)
+            wp.launch(kernel, dim=dim, inputs=[self.buffers.data, view, stack, first, *shared], device=self.device)
 
         if self.device != "cpu":
             torch.cuda.synchronize()  # Warp launches on its own stream
@@ -283,16 +283,16 @@ class Renderer:
             pass
 
     def _view(self, aspect: float, footprint_px: float) -> ViewData:
-        view = camera_view(self._camera, self._buffers.tracks, aspect, footprint_px)
+        view = camera_view(self._camera, self.buffers.tracks, aspect, footprint_px)
         if self._work is not None:
             view.work = shared(self._work, wp.int64)
         return view
 
     def _pose(self, view: ViewData, time_s: float) -> None:
         """Adds the poses of all tracks at the common time of all samples."""
-        count = len(self._buffers.tracks.tracks)
+        count = len(self.buffers.tracks.tracks)
         poses = wp.empty(count, wp.vec3, self.device), wp.empty(count, wp.quat, self.device)
-        inputs = [self._buffers.data, view, *poses, wp.float64(time_s)]
+        inputs = [self.buffers.data, view, *poses, wp.float64(time_s)]
         wp.launch(kernels.pose_tracks, dim=count, inputs=inputs, device=self.device)
         view.pose_translation, view.pose_rotation = poses
         view.single_time = 1

@@ -16,6 +16,7 @@ from scenes.driving import animations
 from scenes.effects import report_images as report
 from scenes.effects import scenes as effects
 from scenes.loading import asset
+from scenes.sessions import ENDING as SESSION_ENDING
 from tsar.named import Named
 
 if TYPE_CHECKING:
@@ -191,7 +192,8 @@ def load_any(
     """A scene by its name, that of a file, or the scene itself; and the losses.
 
     Args:
-        scene: as in :func:`load`, or a file whose name has an ending.
+        scene: as in :func:`load`, or a file whose name has an ending; a session file stands for its scene as it was
+            driven through (:mod:`scenes.sessions`).
         phase: as in :func:`load`; files have none.
         camera_path: as in :func:`load_file`, for files only.
         integrator: as in :func:`load_file`; a given scene keeps its own unless path tracing is requested.
@@ -200,6 +202,12 @@ def load_any(
         ConfigError: no scene has this name.
         SceneError: the file cannot be read, or the scene does not have the phase or does not support a camera path.
     """
+    if not isinstance(scene, Scene) and str(scene) not in SCENES and Path(scene).suffix.lower() == SESSION_ENDING:
+        from scenes.sessions import load_session
+
+        if phase or camera_path:
+            raise SceneError(f"{scene}: expected no phase and no camera_path of a session, which has its own")
+        return load_session(Path(scene), integrator=integrator)
     if not isinstance(scene, Scene) and str(scene) not in SCENES and Path(scene).suffix:
         return load_file(str(scene), camera_path, integrator)
     if camera_path:

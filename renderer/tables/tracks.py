@@ -11,7 +11,8 @@ from scenes.canonical import RigidTrack
 _STILL = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))
 
 
-def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def angles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angles between quaternions ``(n, 4)``, radians."""
     # from the chord, which is well conditioned for close keys, unlike an arc cosine
     return 2.0 * arcsin(np.clip(np.linalg.norm(b - a, axis=-1) / 2.0, 0.0, 1.0))
 
@@ -49,7 +50,7 @@ class TrackTable:
         rotation = np.concatenate([track.rotation for track in self.tracks]).astype(np.float64)
         # the angle between the last key of a track and the first of the next is meaningless, but only read with
         # fraction zero
-        angle = np.append(_angle(rotation[:-1], rotation[1:]), 0.0)
+        angle = np.append(angles_between(rotation[:-1], rotation[1:]), 0.0)
         return (
             wp.array(translation, dtype=wp.vec3d, device=self.device),
             wp.array(rotation.astype(np.float32), dtype=wp.quat, device=self.device),

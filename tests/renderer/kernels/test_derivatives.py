@@ -31,7 +31,7 @@ def test_slopes_are_those_of_the_heights(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(5)
     relief = HeightField(Matte(ConstantTexture((1.0, 1.0, 1.0))), rng.random(shape), 0.1, 16)
     renderer = Renderer(Scene(PerspectiveCamera(), (Instance(Rectangle(), relief),)))
-    scene, step = renderer._buffers.data, 1.0 / 512.0
+    scene, step = renderer.buffers.data, 1.0 / 512.0
     rows, columns = shape
     # the middle half of patches, so that a step does not leave them; bilinear within, a difference is then exact
     x = (rng.integers(0, columns, 500) + rng.uniform(0.75, 1.25, 500)) / columns * 2.0 - 1.0

@@ -1,0 +1,122 @@
+"""Sessions: how a camera was driven through a scene and its animation was run through, kept in a file.
+
+A session file stands for a scene with that motion: what one saw can be rendered again, and measured.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+from numpy.typing import NDArray
+
+from scenes.canonical import Scene, SceneError
+from scenes.loading import one_line
+from scenes.retiming import retimed
+
+ENDING = ".session"
+"""Of the names of session files."""
+KIND = "tsar session 1"
+"""What such a file begins with, as its field ``kind``."""
+KEYS_MOST = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """A camera's drive through a scene.
+
+    Attributes:
+        scene: its name, or that of its file.
+        phase, camera_path: as :func:`scenes.catalog.load_any` takes them.
+        interval_s: from one key to the next, seconds; the first is at 0.
+        animation_s: the scene's own time at each key, seconds.
+        translation, rotation: of the camera's rigid motion at each key, which is applied outside its ``to_world``;
+            quaternions ``(x, y, z, w)``.
+        seen: options under which it was seen, by name, for people.
+    """
+
+    scene: str
+    phase: float
+    camera_path: str
+    interval_s: float
+    animation_s: Float64[NDArray, " keys"]
+    translation: Float64[NDArray, "keys 3"]
+    rotation: Float64[NDArray, "keys 4"]
+    seen: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        count = len(self.animation_s)
+        if not 1 <= count <= KEYS_MOST:
+            raise SceneError(f"session: expected 1 to {KEYS_MOST} keys, got {count}")
+        shapes = self.animation_s.shape, self.translation.shape, self.rotation.shape
+        if shapes != ((count,), (count, 3), (count, 4)):
+            raise SceneError(f"session: expected animation_s (k,), translation (k, 3), rotation (k, 4), got {shapes}")
+        if not np.isfinite(self.animation_s).all():
+            raise SceneError("session: animation_s holds non-finite values")
+
+    @property
+    def seconds(self) -> float:
+        """From its first key to its last."""
+        return self.interval_s * (len(self.animation_s) - 1)
+
+    def facts(self, scene: str = "") -> dict[str, Any]:
+        """What its file holds; ``scene`` in place of the scene's name, if given."""
+        return {
+            "kind": KIND,
+            "scene": scene or self.scene,
+            "phase": self.phase,
+            "camera_path": self.camera_path,
+            "interval_s": self.interval_s,
+            "seen": dict(self.seen),
+            "animation_s": self.animation_s.tolist(),
+            "translation": self.translation.tolist(),
+            "rotation": self.rotation.tolist(),
+        }
+
+
+def read_session(path: Path) -> Session:
+    """A session from its file.
+
+    Raises:
+        SceneError: it cannot be read; the message names the file.
+    """
+    try:
+        facts = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(facts, dict) or facts.get("kind") != KIND:
+            raise SceneError(f"expected a session of the kind {KIND!r}")
+        keys = (np.array(facts[name], np.float64) for name in ("animation_s", "translation", "rotation"))
+        named = str(facts["scene"]), float(facts["phase"]), str(facts["camera_path"]), float(facts["interval_s"])
+        return Session(*named, *keys, seen=dict(facts.get("seen", {})))
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        missing = f"expected a field {error}" if isinstance(error, KeyError) else one_line(error)
+        raise SceneError(f"session {path}: cannot be read: {missing[:200]}") from error
+
+
+def load_session(path: Path, **how: Any) -> tuple[Scene, tuple[str, ...]]:
+    """The scene of a session as it was driven through, and what was lost in reading its file.
+
+    Args:
+        path: of the session; a scene's file is looked for beside it.
+        how: further arguments of :func:`scenes.catalog.load_any`.
+
+    Raises:
+        SceneError, ConfigError: the session or its scene cannot be had.
+    """
+    from scenes import catalog
+
+    session = read_session(path)
+    if Path(session.scene).suffix.lower() == ENDING:
+        raise SceneError(f"session {path}: expected a scene, got another session, {session.scene}")
+    file = session.scene not in catalog.SCENES and bool(Path(session.scene).suffix)
+    named = path.parent / session.scene if file else session.scene
+    scene, losses = catalog.load_any(named, session.phase, session.camera_path, **how)
+    camera = session.translation, session.rotation
+    try:
+        return retimed(scene, session.interval_s, session.animation_s, camera), losses
+    except SceneError as error:
+        raise SceneError(f"session {path}: {error}") from error
