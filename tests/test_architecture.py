@@ -21,7 +21,7 @@ DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks")
 OTHERS = ("renderer", "scenes", "tsar")
 QUESTIONS = (
     "comparison suitability ablation trade precision sensitivity spectrum cost_report conversion bench tracer "
-    "perception workloads"
+    "perception workloads live"
 ).split()
 
 # What the modules of a room may import of the project, beside the room itself. A room that is not named has the rule of

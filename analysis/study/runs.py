@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from analysis.command import limits
 from analysis.metrics.cost_model import CostParameters, Ledger, cycle_seconds, expected_ledger, measured_parameters
@@ -22,11 +22,17 @@ from tsar.error import count_nonfinite
 from tsar.policies import POLICIES
 from tsar.policies.stored import Stored
 from tsar.policy import Policy, Price, Setting, run
-from tsar.types import FrameletBatch, SampleBatch, Spent, StepRecord, Trace
+from tsar.types import FrameletBatch, SampleBatch, Spent, StepRecord, Trace, Viewpoint
 
 if TYPE_CHECKING:
-    from renderer.trace import Renderer
     from tsar.policy import Truth
+
+
+class Traced(Protocol):
+    """A renderer as runs see it: :class:`renderer.trace.Renderer`, or what stands for one."""
+
+    def trace(self, batch: FrameletBatch, aspect: float = ...) -> SampleBatch: ...
+    def viewpoint(self, time_s: float, aspect: float = ...) -> Viewpoint: ...
 
 
 @dataclass
@@ -173,7 +179,7 @@ class PolicyRun:
 def begin(
     name: str,
     config: TsarConfig,
-    renderer_of: Callable[[float], Renderer],
+    renderer_of: Callable[[float], Traced],
     machine: Machine,
     span_s: tuple[float, float],
     truth: Truth | None = None,
@@ -202,6 +208,29 @@ def begin(
     Raises:
         ConfigError: no policy has that name, its cycles do not fit into the span, or it keeps no such values.
     """
+    policy, trace = made(name, config, renderer_of, truth, stages, threads, parts, formats)
+    meter, totals = Meter(trace, [] if formats else None), Totals(config)
+    clock = machine.clock(policy.price)
+    require_pace(name, policy.price, machine, span_s, config.warmup_cycles)
+    images = _noted(policy, meter, clock, span_s, totals, on_record)
+    return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)
+
+
+def made(
+    name: str,
+    config: TsarConfig,
+    renderer_of: Callable[[float], Traced],
+    truth: Truth | None = None,
+    stages: StagesName = "compiled",
+    threads: int = 1,
+    parts: Mapping[str, bool | int | float] | None = None,
+    formats: Mapping[str, str] | None = None,
+) -> tuple[Policy[Any], Trace]:
+    """A policy, and the renderer that it is to be given; arguments as of :func:`begin`.
+
+    Raises:
+        ConfigError: no policy has that name, or it keeps no such numbers.
+    """
     from renderer.stages.control import stages as stages_of
 
     height, width = config.shape
@@ -216,11 +245,7 @@ def begin(
     make: Callable[[Setting], Policy[Any]] = partial(_changed, parts=parts) if parts else POLICIES[name]
     policy = Stored(setting, make, formats) if formats else make(setting)
     renderer = renderer_of(policy.footprint)
-    meter, totals = Meter(lambda batch: renderer.trace(batch, aspect), [] if formats else None), Totals(config)
-    clock = machine.clock(policy.price)
-    require_pace(name, policy.price, machine, span_s, config.warmup_cycles)
-    images = _noted(policy, meter, clock, span_s, totals, on_record)
-    return PolicyRun(policy.price, policy.latency_cycles, meter, totals, images)
+    return policy, lambda batch: renderer.trace(batch, aspect)
 
 
 def require_pace(name: str, price: Price, machine: Machine, span_s: tuple[float, float], warmup_cycles: int) -> None:

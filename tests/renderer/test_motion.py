@@ -1,6 +1,4 @@
-"""Motion that is replaced while a scene is rendered gives the pictures of a scene that had it from the start."""
-
-from __future__ import annotations
+"""Rigid motion at each sample's own time."""
 
 import dataclasses
 
@@ -9,89 +7,73 @@ import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
-from renderer.motion import Motion, tracks_of
 from renderer.trace import Renderer
-from scenes import catalog
-from scenes.animation import camera_to_world
-from scenes.canonical import (
-    ConstantTexture,
-    DirectionalLight,
-    Instance,
-    Mesh,
-    PerspectiveCamera,
-    Phong,
-    RigidTrack,
-    Scene,
-    Sphere,
-)
-
-KEYS = 4
+from scenes.canonical import Instance, Matte, PerspectiveCamera, RigidTrack, Scene, Sphere
+from tests.oracles.brute_force_tracer import track_matrix
+from tests.renderer.builders import WHITE, batch, driving_scene, grid, turning_track
 
 
-def motion(seed: int) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    turns = Rotation.from_rotvec(0.1 * rng.normal(size=(KEYS, 3))).as_quat()
-    return 0.3 * rng.normal(size=(KEYS, 3)), turns * np.sign(turns[:, 3:])
+@pytest.mark.parametrize("time_s", [-5.0, -0.2, 0.1, 0.25, 0.9999, 1.0, 3.0])
+def test_poses_are_scipys(time_s: float) -> None:
+    tracks = [turning_track(5, keys=1), turning_track(4)]
+    renderer = Renderer(Scene(PerspectiveCamera(), tuple(Instance(Sphere(), Matte(WHITE), track=t) for t in tracks)))
+    view = renderer._view(1.0, 64.0)
+    renderer._pose(view, time_s)
+    for number, track in enumerate(tracks, start=1):
+        matrix = track_matrix(track, time_s)
+        np.testing.assert_allclose(view.pose_translation.numpy()[number], matrix[:3, 3], atol=1e-6)
+        turn = Rotation.from_quat(view.pose_rotation.numpy()[number]).as_matrix()
+        np.testing.assert_allclose(turn, matrix[:3, :3], atol=1e-6)
 
 
-def scene(seed: int, place: float = 0.0, start_s: float = 0.0) -> Scene:
-    """Two spheres and a mesh that move, two of them together, seen by a camera that moves."""
-    tracks = [RigidTrack(start_s, 0.5, t + [place, 0.0, 0.0], q) for t, q in (motion(seed + i) for i in range(3))]
-    corners = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0.5]], np.float32)
-    mesh = Mesh(corners, np.array([[0, 1, 2]], np.int32))
-    at = np.eye(4)
-    at[:3, 3] = 0.4, 0.2, 0.1
-    parts = (
-        Instance(Sphere(0.5), Phong(ConstantTexture((0.8, 0.2, 0.1))), track=tracks[0], name="a"),
-        Instance(mesh, Phong(ConstantTexture((0.2, 0.8, 0.1))), track=tracks[1], name="b"),
-        Instance(Sphere(0.3), Phong(ConstantTexture((0.2, 0.2, 0.9))), at, track=tracks[0], name="c"),
+def _frozen(time_s: float):
+    """The driving scene with every track replaced by its pose."""
+    scene = driving_scene()
+    still = tuple(
+        dataclasses.replace(i, to_world=track_matrix(i.track, time_s) @ i.to_world, track=None) for i in scene.instances
     )
-    eye = PerspectiveCamera(camera_to_world(np.array([0.0, -4.0, 1.0]), np.zeros(3)), track=tracks[2])
-    return Scene(eye, parts, (DirectionalLight((0.3, 1.0, -0.5), (1.0, 1.0, 1.0)),), ambient=(0.2, 0.2, 0.2))
+    camera = scene.camera
+    camera = dataclasses.replace(camera, to_world=track_matrix(camera.track, time_s) @ camera.to_world, track=None)
+    return dataclasses.replace(scene, instances=still, camera=camera)
 
 
-def replaced(motion: Motion, wanted: Scene) -> None:
-    tracks = tracks_of(wanted)
-    keys = (np.stack([getattr(track, name) for track in tracks]) for name in ("translation", "rotation"))
-    motion.replace(tracks[0].start_s, *keys)
+@pytest.mark.parametrize("time_s", [-1.0, 0.0, 0.33, 2.0])
+def test_moving_scene_is_the_still_scene_at_its_pose(driving, time_s: float) -> None:
+    moving, still = driving.render_frame(time_s, 64, 64), Renderer(_frozen(time_s)).render_frame(0.0, 64, 64)
+    differing = (moving - still).abs().amax(-1) > 1e-3
+    assert differing.float().mean() < 0.01
+    assert (moving - driving.render_frame(0.7, 64, 64)).abs().amax(-1).gt(1e-3).float().mean() > 0.2
 
 
-@pytest.mark.parametrize("place", [0.0, 4096.0], ids=["near", "far from the origin"])
-def test_replaced_keys_are_those_of_another_scene(place: float) -> None:
-    given, wanted = scene(1, place), scene(7, place, start_s=10.0)
-    moving, fresh = (Renderer(one, threads=1) for one in (given, wanted))
-    before = moving.render_frame(10.6, 32, 32)
-    replaced(Motion(moving, given), wanted)
-    for time_s in (9.0, 10.6, 11.2, 20.0):
-        image = moving.render_frame(time_s, 32, 32)
-        assert torch.equal(image, fresh.render_frame(time_s, 32, 32))
-        a, b = (one.viewpoint(time_s) for one in (moving, fresh))
-        assert torch.equal(a.translation, b.translation) and torch.equal(a.rotation, b.rotation)
-    assert not torch.equal(before, moving.render_frame(10.6, 32, 32))
+@pytest.mark.parametrize("in_turn", [False, True], ids=["one time a packet", "times in turn"])
+def test_a_sample_does_not_depend_on_the_times_of_others(driving, in_turn: bool) -> None:
+    """Poses found once for a batch, once for a packet, and by each sample are the same bits."""
+    position = grid(32)
+    times = np.array([0.05, 0.4, 0.81])
+    order = np.arange(3 * len(position)).reshape(3, -1)
+    order = order.T.reshape(-1) if in_turn else order.reshape(-1)
+    place, at = np.concatenate([position] * 3), np.repeat(times, len(position))
+    mixed = driving.trace(batch(place[order], at[order])).color.reshape(-1, 3)
+    single = torch.cat([driving.trace(batch(position, time_s)).color.reshape(-1, 3) for time_s in times])
+    assert torch.equal(mixed, single[torch.from_numpy(order)])
 
 
-def test_driving_scenes_take_their_own_keys_back() -> None:
-    from scenes.retiming import Motions, instance_tracks, with_keys
-
-    plain = catalog.load("fly-by")
-    times_s, own = np.arange(8) / 8.0, instance_tracks(plain)
-    camera = tuple(one[0] for one in Motions([RigidTrack(0.0, 1.0, *(k[:2] for k in motion(3)))]).at(times_s))
-    wanted = with_keys(plain, 0.0, 1 / 8, camera, Motions(own).at(times_s))  # type: ignore[arg-type]
-    other = with_keys(plain, 0.0, 1 / 8, camera, Motions(own).at(times_s + 1.0))  # type: ignore[arg-type]
-    moving, fresh = (Renderer(one, threads=1) for one in (other, wanted))
-    replaced(Motion(moving, other), wanted)
-    assert torch.equal(moving.render_frame(0.3, 32, 32), fresh.render_frame(0.3, 32, 32))
-
-
-def test_keys_of_other_numbers_are_refused() -> None:
-    given = scene(1)
-    renderer = Renderer(given, threads=1)
-    motion = Motion(renderer, given)
-    with pytest.raises(ValueError, match=r"expected keys \(3, 4, 3\)"):
-        motion.replace(0.0, np.zeros((3, 5, 3)), np.zeros((3, 5, 4)))
-    track = given.instances[1].track
-    assert track is not None
-    longer = RigidTrack(0.0, 1.0, track.translation[:2], track.rotation[:2])
-    mixed = (given.instances[0], dataclasses.replace(given.instances[1], track=longer))
-    with pytest.raises(ValueError, match="one number of keys"):
-        Motion(renderer, dataclasses.replace(given, instances=mixed))
+def test_long_times_keep_their_precision() -> None:
+    """A fast wheel after an hour: the key and the fraction are found in float64."""
+    keys = 36001
+    turns = np.arange(keys) * 0.4
+    sign = np.stack([np.zeros(keys), np.zeros(keys), np.sin(turns / 2), np.cos(turns / 2)], -1)
+    track = RigidTrack(0.0, 0.1, np.zeros((keys, 3)), sign)
+    scene = driving_scene()
+    moving = dataclasses.replace(scene.instances[2], track=track)
+    scene = dataclasses.replace(scene, instances=(*scene.instances[:2], moving))
+    renderer = Renderer(scene)
+    time_s = 3599.9517
+    times = np.full(32 * 32, time_s)
+    times[0] = 0.0  # forces poses per sample
+    got = renderer.trace(batch(grid(32), times)).color.reshape(-1, 3)[1:]
+    at_its_pose = dataclasses.replace(moving, to_world=track_matrix(track, time_s) @ moving.to_world, track=None)
+    still = dataclasses.replace(scene, instances=(*scene.instances[:2], at_its_pose))
+    expected = Renderer(still).trace(batch(grid(32), time_s)).color.reshape(-1, 3)[1:]
+    assert ((got - expected).abs().amax(-1) > 1e-3).float().mean() < 0.005
+    assert torch.isfinite(got).all()
