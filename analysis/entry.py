@@ -35,6 +35,7 @@ COMMANDS = {
     "perception": "analysis.perception.command",
     "convert": "analysis.conversion.convert_command",
     "conversion_check": "analysis.conversion.check_command",
+    "live": "analysis.live.command",
     "bench": "analysis.bench.command",
     "same": "analysis.storage.command",
 }

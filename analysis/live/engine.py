@@ -17,7 +17,7 @@ import numpy as np
 
 from analysis.live.options import NOTHING, Controls, LiveOptions
 from analysis.live.runner import Runner, Seen, SessionTime
-from analysis.live.timeline import Timeline
+from analysis.live.timeline import INTERVAL_S, Timeline
 from analysis.live.turns import Turns
 from analysis.storage.files import write_json
 from analysis.study.runs import made
@@ -168,6 +168,11 @@ class Engine:
     def record(self) -> None:
         """Keeps what happens from now on."""
         self._begin, self.recording = self.timeline.count - 1, True
+
+    @property
+    def recorded_s(self) -> float:
+        """Seconds that would be saved now."""
+        return INTERVAL_S * (self.timeline.count - 1 - (self._begin if self.recording else 0))
 
     def save(self, path: Path) -> float:
         """Writes what happened since :meth:`record`, or else since the beginning, to a session file.

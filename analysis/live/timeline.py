@@ -46,7 +46,7 @@ class Animation:
     repeats: bool = True
     speed: float = 1.0
 
-    def ahead(self, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ahead(self, seconds: NDArray[np.floating]) -> NDArray[np.float64]:
         """Its times so many seconds from now."""
         if not self.playing or self.duration_s <= 0.0:
             return np.full(seconds.shape, self.at_s)
@@ -112,8 +112,10 @@ class Timeline:
         """What a renderer sees now: time of the first key, seconds, translations ``(tracks, keys, 3)`` and rotations
         ``(tracks, keys, 4)`` of the camera and of all instances."""
         with self._lock:
-            both = (np.concatenate([a[None], b]) for a, b in zip(self._camera, self._instances, strict=True))
-            return self._first * INTERVAL_S, *both
+            translation, rotation = (
+                np.concatenate([a[None], b]) for a, b in zip(self._camera, self._instances, strict=True)
+            )
+            return self._first * INTERVAL_S, translation, rotation
 
     def change(self, change: Callable[[Drive], Drive]) -> None:
         """Drives the camera otherwise from now on."""

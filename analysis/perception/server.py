@@ -10,8 +10,6 @@ import asyncio
 import concurrent.futures
 import hmac
 import json
-import logging
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,21 +17,11 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from tornado.httpserver import HTTPServer
-from tornado.iostream import IOStream
-from tornado.netutil import bind_sockets
-from tornado.web import Application, HTTPError, RequestHandler
+from tornado.web import HTTPError
 
 from analysis.command.cli import InputError
-from analysis.command.cluster import LOOPBACK
+from analysis.command.pages import Answering, served
 from analysis.perception.protocol import Session
-
-BODY_MAX = 1 << 16
-"""Most bytes of an answer."""
-CONNECTIONS_MAX = 64
-"""Most open connections; one more closes the oldest, so that idle connections block no others."""
-TIMEOUT_S = 30.0
-"""Seconds within which a whole request must arrive."""
 
 _HERE = Path(__file__).parent
 _THREADS = 4
@@ -43,35 +31,17 @@ _THREADS = 4
 class _Service:
     session: Session
     break_every: int
-    hosts: frozenset[str]
     threads: concurrent.futures.Executor
 
 
-class _Handler(RequestHandler):
-    """Refuses requests that do not come from the page of this session."""
+class _Handler(Answering):
+    """Answers requests from the page of this session."""
 
-    def initialize(self, service: _Service) -> None:
-        self.service = service
+    @property
+    def service(self) -> _Service:
+        return self.state
 
-    def prepare(self) -> None:
-        hosts, headers = self.service.hosts, self.request.headers
-        if headers.get("Host") not in hosts:
-            raise HTTPError(HTTPStatus.MISDIRECTED_REQUEST)
-        origin = headers.get("Origin")
-        if origin is not None and origin not in {f"http://{host}" for host in hosts}:
-            raise HTTPError(HTTPStatus.FORBIDDEN, "the request comes from the page of another server")
-
-    def write_error(self, status_code: int, **facts: Any) -> None:
-        """Answers an error with one line of text."""
-        error = facts.get("exc_info", (None, None))[1]
-        said = error.log_message % error.args if isinstance(error, HTTPError) and error.log_message else None
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(f"{said or self._reason}\n")
-
-    def log_exception(self, *error: Any) -> None:
-        """Logs nothing, because the page shows the error."""
-
-    def state(self) -> None:
+    def send_state(self) -> None:
         self.set_header("Cache-Control", "no-store")
         self.finish(_state(self.service.session, self.service.break_every))
 
@@ -99,7 +69,7 @@ class _Guarded(_Handler):
 
 class _State(_Guarded):
     def get(self) -> None:
-        self.state()
+        self.send_state()
 
 
 class _Answer(_Guarded):
@@ -114,7 +84,7 @@ class _Answer(_Guarded):
             raise HTTPError(HTTPStatus.BAD_REQUEST, "%s", str(error)[:200]) from None
         except OSError as error:
             raise HTTPError(HTTPStatus.INSUFFICIENT_STORAGE, "%s", error.strerror or str(error)) from None
-        self.state()
+        self.send_state()
 
 
 class _Frame(_Guarded):
@@ -132,21 +102,6 @@ class _Frame(_Guarded):
         self.set_header("Cache-Control", "private, max-age=3600")
         self.set_header("Vary", "X-Token")
         self.finish(content)
-
-
-class _Bounded(HTTPServer):
-    """A server with a bounded number of connections, all of them served by one thread."""
-
-    def initialize(self, *arguments: Any, **options: Any) -> None:
-        super().initialize(*arguments, **options)
-        self._open: list[IOStream] = []
-
-    def handle_stream(self, stream: IOStream, address: tuple) -> None:
-        self._open = [one for one in self._open if not one.closed()]
-        while len(self._open) >= CONNECTIONS_MAX:
-            self._open.pop(0).close()
-        self._open.append(stream)
-        super().handle_stream(stream, address)
 
 
 def _state(session: Session, break_every: int) -> dict[str, Any]:
@@ -177,48 +132,15 @@ def serving(session: Session, port: int = 0, break_every: int = 24) -> Iterator[
     Raises:
         InputError: the port is not available.
     """
-    logging.getLogger("tornado").setLevel(logging.CRITICAL)  # no log: the terminal shows the progress
-    try:
-        (listener,) = bind_sockets(port, LOOPBACK)
-    except OSError as error:
-        raise InputError(f"port: expected a free one, got {port} ({error.strerror})") from None
-    port = listener.getsockname()[1]
-    hosts = frozenset(
-        f"{name}{end}" for name in (LOOPBACK, "localhost") for end in [f":{port}", *([""] * (port == 80))]
-    )
-    loop, over = asyncio.new_event_loop(), asyncio.Event()
-
-    async def serve(service: _Service) -> None:
-        given = {"service": service}
-        paths = [
-            (r"/(|trial_page\.js)", _Asset, given),
-            ("/state", _State, given),
-            ("/answer", _Answer, given),
-            ("/frame/([0-9]{1,9})/([0-9]{1,9})", _Frame, given),
-        ]
-        server = _Bounded(
-            Application(paths, default_handler_class=_Missing, default_handler_args=given, log_function=lambda _: None),
-            max_body_size=BODY_MAX, max_header_size=BODY_MAX, idle_connection_timeout=TIMEOUT_S, body_timeout=TIMEOUT_S,
-        )  # fmt: skip
-        server.add_socket(listener)
-        await over.wait()
-        server.stop()
-        await server.close_all_connections()
-
+    paths = {
+        r"/(|trial_page\.js)": _Asset,
+        "/state": _State,
+        "/answer": _Answer,
+        "/frame/([0-9]{1,9})/([0-9]{1,9})": _Frame,
+    }
     with concurrent.futures.ThreadPoolExecutor(_THREADS) as threads:
-        service = _Service(session, break_every, hosts, threads)
-        thread = threading.Thread(target=lambda: loop.run_until_complete(serve(service)), daemon=True)
-        thread.start()
         try:
-            yield f"http://{LOOPBACK}:{port}/"
+            with served(paths, _Service(session, break_every, threads), port) as address:
+                yield address
         finally:
-            loop.call_soon_threadsafe(over.set)
-            thread.join()
-            loop.close()
             session.export()
-
-
-class _Missing(_Handler):
-    def prepare(self) -> None:
-        super().prepare()
-        raise HTTPError(HTTPStatus.NOT_FOUND)

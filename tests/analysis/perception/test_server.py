@@ -16,8 +16,9 @@ import psutil
 import pytest
 
 from analysis.command.cli import InputError
+from analysis.command.pages import BODY_MAX, CONNECTIONS_MAX
 from analysis.perception.protocol import TABLE, Session
-from analysis.perception.server import BODY_MAX, CONNECTIONS_MAX, serving
+from analysis.perception.server import serving
 from tests.analysis.perception.builders import write_stimuli
 
 

@@ -1,0 +1,84 @@
+"""A moment that is held, and compared with the truth."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.command.extras import EXTRAS
+from analysis.live.overlays import codes
+from analysis.metrics import METRICS
+from analysis.metrics.quality import encode, pixel_errors
+from analysis.page.pictures import Pixels, palette
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from analysis.live.engine import Engine
+
+TRUTH, SIGNED, SQUARED = "truth", "signed error", "squared error"
+VIEWS = (TRUTH, SIGNED, SQUARED)
+"""What a side can show in place of its picture while a moment is held."""
+_SIGNED, _SQUARED = 0.25, (1e-5, 0.1)  # bounds of their colour scales
+SAID = {SIGNED: "luminance of the error, −0.25 to 0.25", SQUARED: "sum over channels, 1e-5 to 0.1"}
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """A moment.
+
+    Attributes:
+        time_s: of the live view, seconds.
+        pictures: of each side, and of the truth, linear RGB.
+        errors: of each side, by name.
+        missing: metrics that were not taken, and why.
+    """
+
+    time_s: float
+    pictures: Mapping[str, Tensor]
+    errors: Mapping[str, Mapping[str, float]]
+    missing: tuple[str, ...]
+
+    def drawn(self, side: str, view: str) -> Pixels:
+        """``(h, w, 3)`` uint8 of one of :data:`VIEWS`."""
+        if view == TRUTH:
+            return codes(self.pictures[TRUTH])
+        apart = (encode(self.pictures[side]) - encode(self.pictures[TRUTH])).numpy()
+        if view == SIGNED:
+            share = (apart @ np.array([0.2126, 0.7152, 0.0722]) + _SIGNED) / (2 * _SIGNED)
+            return palette("RdBu_r")[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
+        low, high = np.log(_SQUARED)
+        share = (np.log(np.maximum(np.square(apart).sum(axis=-1), _SQUARED[0])) - low) / (high - low)
+        return palette("inferno")[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
+
+
+def held(engine: Engine) -> Frozen:
+    """Holds the engine, renders the truth of this moment, and measures both sides against it."""
+    engine.rest()
+    look = engine.look()
+    shown = {side: seen.shown[1].image for side, seen in look.sides.items() if seen is not None}
+    truth = engine.truth()
+    names, missing = _metrics()
+    errors = {side: measured(image, truth, names) for side, image in shown.items() if image.shape == truth.shape}
+    return Frozen(look.time_s, {**shown, TRUTH: truth}, errors, missing)
+
+
+def measured(shown: Tensor, truth: Tensor, names: list[str]) -> dict[str, float]:
+    """All errors of an image, by name: mean squares, and metrics of images."""
+    found, encoded = pixel_errors(shown, truth)
+    of_metrics: dict[str, Any] = {name: METRICS[name].of_image(encoded, encode(truth)) for name in names}
+    return {"mse": found.mse, "log_mse": found.log_mse, **of_metrics}
+
+
+def _metrics() -> tuple[list[str], tuple[str, ...]]:
+    """Names of metrics of images whose packages are installed, and of those that are not taken."""
+    absent = {d for module, d in EXTRAS["perception"].items() if importlib.util.find_spec(module) is None}
+    names = [name for name in METRICS if METRICS[name].image is not None]
+    without = [name for name in names if name == "flip" and "flip-evaluator" in absent]
+    said = [f"{name} (the extra perception installs it)" for name in without]
+    said += [f"{name} (of sequences: replay a session)" for name in METRICS if METRICS[name].image is None]
+    return [name for name in names if name not in without], tuple(said)

@@ -1,0 +1,261 @@
+"""Who watches a live view and who drives it: what pages are told, and what they ask for. Knows no network."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from analysis.live import camera as cameras
+from analysis.live.engine import SIDES, Engine
+from analysis.live.freeze import SAID, VIEWS, Frozen, held
+from analysis.live.overlays import PLAIN, age_ms, codes, laid_over, overlays, predicted_error
+from analysis.live.runner import Runner, Seen
+from analysis.page.pictures import Pixels
+from scenes.sessions import ENDING
+from tsar.checks import require
+
+FASTEST = 16.0
+"""Greatest speed of the animation, and of the camera in distances to what it looks at a second."""
+
+
+@dataclass
+class Watcher:
+    """A page that is open. Changes in place.
+
+    Attributes:
+        number: of those that came.
+        sent: what was sent of each side last.
+        note: what its page is told once.
+    """
+
+    number: int
+    sent: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
+
+
+@dataclass
+class _Display:
+    """How the sides are shown, by side. Changes in place."""
+
+    overlay: dict[str, str] = field(default_factory=lambda: dict.fromkeys(SIDES, PLAIN))
+    strength: float = 0.6
+
+
+class Hub:
+    """The one live view of all pages. Changes in place; calls from several threads take turns.
+
+    Attributes:
+        engine: what is seen.
+        frozen: the moment that is held; None while the view goes on.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self.frozen: Frozen | None = None
+        self._watchers: dict[int, Watcher] = {}
+        self._driver, self._came = 0, 0
+        self._display, self._lock = _Display(), threading.RLock()
+        self._drawn: dict[str, tuple[Any, tuple[Pixels, str]]] = {}
+
+    def came(self) -> Watcher:
+        """A page was opened; it drives if no other does. While any is open the engine goes on."""
+        with self._lock:
+            self._came += 1
+            self._watchers[self._came] = watcher = Watcher(self._came)
+            self._driver = self._driver or watcher.number
+            if self.frozen is None:
+                self.engine.wake()
+            return watcher
+
+    def left(self, watcher: Watcher) -> None:
+        """A page was closed, or its connection was lost; if it drove, the one that came first drives now."""
+        with self._lock:
+            self._watchers.pop(watcher.number, None)
+            if self._driver == watcher.number:
+                self.engine.timeline.change(_standing)
+                self._driver = min(self._watchers, default=0)
+            if not self._watchers:
+                self.engine.rest()
+
+    def heard(self, watcher: Watcher, text: str) -> None:
+        """Does what a page asks for, if it drives; what is wrong with that its page is told."""
+        try:
+            message = json.loads(text)
+            require(isinstance(message, dict), "message", "an object", type(message).__name__)
+            asked = message.pop("do", None)
+            with self._lock:
+                if asked == "drive":
+                    self.engine.timeline.change(_standing)
+                    self._driver = watcher.number
+                elif self._driver == watcher.number:
+                    watcher.note = self._do(asked, message) or ""
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OSError) as error:
+            watcher.note = " ".join(f"{error}".split())[:300] or type(error).__name__
+
+    def frame(self, watcher: Watcher) -> bytes:
+        """What a page is sent: the length of a header, four bytes, the header, and what pictures are new."""
+        with self._lock:
+            look, frozen, driver = self.engine.look(), self.frozen, self._driver
+            display = replace(self._display, overlay=dict(self._display.overlay))
+            note, watcher.note = watcher.note, ""
+        sides: dict[str, Any] = {}
+        pictures: list[bytes] = []
+        for side in SIDES:
+            run, seen = look.runs[side], look.sides[side]
+            facts = _facts(run, seen, look.time_s)
+            if seen is not None and run is not None:
+                config = self.engine.controls.config()
+                known = overlays(seen, config, look.time_s)
+                views = [view for view in VIEWS if frozen is not None and side in frozen.errors]
+                facts["overlays"] = [PLAIN, *known, *views]
+                overlay = display.overlay[side]
+                moment = look.time_s if overlay in known and overlay.startswith("age") else 0.0
+                key = run, seen.number, overlay, display.strength, frozen, moment
+                if watcher.sent.get(side) != key:
+                    watcher.sent[side] = key
+                    pixels, facts["scale"] = self._pixels(side, key, seen, known, frozen)
+                    facts |= {"height": pixels.shape[0], "width": pixels.shape[1], "bytes": pixels.nbytes}
+                    pictures.append(pixels.tobytes())
+            sides[side] = facts
+        header = json.dumps(
+            {
+                "drives": watcher.number == driver,
+                "watchers": len(self._watchers),
+                "note": note,
+                "sides": sides,
+                **self._state(look.time_s, display, frozen),
+            },
+            allow_nan=False,
+        ).encode()
+        return b"".join((len(header).to_bytes(4, "little"), header, *pictures))
+
+    def _pixels(
+        self, side: str, key: Any, seen: Seen, known: Mapping[str, Any], frozen: Frozen | None
+    ) -> tuple[Pixels, str]:
+        """Pixels of a side, and what their colours mean; those that another page was sent are not made again."""
+        overlay, strength = key[2], key[3]
+        before = self._drawn.get(side)
+        if before is not None and before[0] == key:
+            return before[1]
+        if frozen is not None and overlay in VIEWS and side in frozen.errors:
+            found = frozen.drawn(side, overlay), SAID.get(overlay, "")
+        elif overlay in known:
+            one = known[overlay]()
+            found = laid_over(codes(seen.shown[1].image), one, strength), _scale(one.scale)
+        else:
+            found = codes(seen.shown[1].image), ""
+        self._drawn[side] = key, found
+        return found
+
+    def _state(self, time_s: float, display: _Display, frozen: Frozen | None) -> dict[str, Any]:
+        engine = self.engine
+        animation, timeline = engine.timeline.animation, engine.timeline
+        held_at = None if frozen is None else {"errors": frozen.errors, "missing": frozen.missing}
+        return {
+            "time_s": time_s,
+            "animation": asdict(animation),
+            "rides": timeline.drive.rides,
+            "recording": engine.recorded_s if engine.recording else None,
+            "controls": asdict(engine.controls),
+            "overlay": display.overlay,
+            "strength": display.strength,
+            "frozen": held_at,
+        }
+
+    def _do(self, asked: Any, given: dict[str, Any]) -> str | None:
+        """What a page asks for; what it is told of that."""
+        engine, timeline = self.engine, self.engine.timeline
+        animation = timeline.animation
+        if asked == "turn":
+            left, up = _number(given, "left", 100.0), _number(given, "up", 100.0)
+            distance = engine.distance if given.get("orbit") else 0.0
+            timeline.change(lambda drive: cameras.turned(drive, left, up, distance))
+        elif asked == "step":
+            ahead = _number(given, "ahead", 100.0) * engine.distance
+            timeline.change(lambda drive: cameras.moved(drive, (0.0, 0.0, ahead)))
+        elif asked == "go":
+            x, y, z = (_number(given, name, FASTEST) * engine.distance for name in ("right", "up", "ahead"))
+            turning = _number(given, "turn_left", 10.0), _number(given, "turn_up", 10.0)
+            timeline.change(lambda drive: replace(drive, velocity=(x, y, z), turning=turning))
+        elif asked == "set":
+            engine.change(given["name"], given["value"])
+        elif asked == "overlay":
+            require(given["side"] in SIDES, "side", " or ".join(SIDES), given["side"])
+            self._display.overlay[given["side"]] = str(given["label"])
+        elif asked == "strength":
+            self._display.strength = min(max(_number(given, "value", 1.0), 0.0), 1.0)
+        elif asked in ("playing", "repeats"):
+            setattr(animation, asked, bool(given["value"]))
+        elif asked == "speed":
+            animation.speed = abs(_number(given, "value", FASTEST))
+        elif asked == "scrub":
+            timeline.scrub(_number(given, "at_s", 1e9))
+        elif asked == "ride":
+            timeline.ride(bool(given["value"]))
+        elif asked == "reset":
+            timeline.reset()
+        elif asked == "record":
+            engine.record()
+        elif asked == "save":
+            return self._save()
+        elif asked == "freeze":
+            self.frozen = self.frozen or held(engine)
+        elif asked == "go_on":
+            self.frozen = None
+            self._display.overlay = {s: PLAIN if o in VIEWS else o for s, o in self._display.overlay.items()}
+            engine.wake()
+        else:
+            require(False, "do", "something that a page can ask for", asked)
+        return None
+
+    def _save(self) -> str:
+        """Writes the session under a name that is free."""
+        folder, number = self.engine.options.out, 1
+        while (path := folder / f"drive-{number}{ENDING}").exists():
+            number += 1
+        seconds = self.engine.save(path)
+        return f"{seconds:.1f} s written to {path}; replay: {replay(self.engine, path, seconds)}"
+
+
+def replay(engine: Engine, path: Path, seconds: float) -> str:
+    """The command that measures a session as it was seen."""
+    c = engine.controls
+    named = f"--policy {c.sides[-1]}" + (f" --rivals {c.sides[0]}" if len(c.sides) > 1 else "") if c.sides else ""
+    rest = f"--batch-size {c.batch_size} --resolution-px {c.resolution_px}"
+    return f"python scripts/run.py {path} --seconds {max(seconds - 0.05, 0.05):.2f} {named} {rest}"
+
+
+def _standing(drive: cameras.Drive) -> cameras.Drive:
+    return replace(drive, velocity=(0.0, 0.0, 0.0), turning=(0.0, 0.0))
+
+
+def _number(given: Mapping[str, Any], name: str, most: float) -> float:
+    """A number of a message, 0 where it is not there."""
+    value = given.get(name, 0.0)
+    fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
+    require(fits, name, f"a number of at most {most:g}", value)
+    return float(value)
+
+
+def _facts(run: Runner | None, seen: Seen | None, time_s: float) -> dict[str, Any]:
+    """What a page is told of a side."""
+    if run is None:
+        return {"name": ""}
+    found: dict[str, Any] = {"name": run.name, "cycles": run.cycles, "busy_s": run.busy_s, "error": run.error}
+    if seen is not None and seen.shown[1].spent is not None:
+        found |= {
+            "number": seen.number,
+            "cycle_ms": 1e3 * seen.shown[1].spent.cost_s,
+            "age_ms": age_ms(seen, time_s),
+            "predicted": predicted_error(seen),
+        }
+    return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in found.items()}
+
+
+def _scale(scale: Any) -> str:
+    return f"{scale.shown[0]:.3g} to {scale.shown[1]:.3g} {scale.unit}"

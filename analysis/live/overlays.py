@@ -1,0 +1,96 @@
+"""What can be laid over the picture of a side, and the pixels of both together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache, partial
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from numpy.typing import NDArray
+from torch import Tensor
+
+from analysis.live.runner import Seen
+from analysis.metrics.quality import encode
+from analysis.page.pictures import RATE_MAP, ColorScale, Map, Pixels, age_map, density_map, enlarge, stored, tiling_map
+from analysis.page.video import AGES, Scales
+from tsar.config import TsarConfig
+
+PLAIN = "none"
+TILING, SPATIAL, TEMPORAL = "tiling by refresh rate", "spatial density", "temporal density"
+EXPECTED = "expected error"
+"""The map of :class:`tsar.policies.filter.Filter` from which the curve of predicted error comes."""
+LABELS = (PLAIN, TILING, SPATIAL, TEMPORAL, AGES, EXPECTED, "rate of change")
+"""What some policy has; a policy has some of them."""
+_AGES_S = 1e-3, 10.0
+
+
+@lru_cache(maxsize=1)
+def _codes() -> NDArray[np.uint8]:
+    linear = torch.linspace(0.0, 1.0, 1 << 16)[:, None, None].expand(-1, 1, 3)
+    return (encode(linear)[:, 0, 0] * 255.0 + 0.5).byte().numpy()
+
+
+def codes(image: Float[Tensor, "h w 3"]) -> Pixels:
+    """``(h, w, 3)`` uint8 sRGB of linear RGB, by a table of 65536 entries; not a number is black."""
+    clipped = image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0).clamp(0.0, 1.0)
+    return _codes()[(clipped.numpy() * 65535.0 + 0.5).astype(np.uint16)]
+
+
+def overlays(seen: Seen, config: TsarConfig, time_s: float) -> Mapping[str, Callable[[], Map]]:
+    """Maps that can be drawn of what stands on a display, by label; each is made when it is called.
+
+    Args:
+        seen: record and image.
+        config: of the run.
+        time_s: now.
+    """
+    record, display = seen.shown
+    found: dict[str, Callable[[], Map]] = {}
+    scales = Scales(config.spatial_bounds, config.temporal_bounds)
+    if record is not None:
+        densities = record.densities
+        rate = "refreshes per cycle"
+        found[TILING] = partial(tiling_map, record.tiling, densities.temporal, max(config.shape), scales.temporal)
+        found[SPATIAL] = partial(density_map, densities.spatial, scales.spatial, "samples per element")
+        found[TEMPORAL] = partial(density_map, densities.temporal, scales.temporal, rate, RATE_MAP)
+    if display.sample_map is not None:
+        found[AGES] = partial(age_map, display.sample_map.newest_s, time_s, _AGES_S)
+    for label in display.maps:
+        found[label] = partial(_of_policy, seen, label)
+    return found
+
+
+def _of_policy(seen: Seen, label: str) -> Map:
+    one = seen.shown[1].maps[label]
+    return Map(stored(one.values.numpy().astype(np.float64), one.bounds), ColorScale.of(one.bounds, one.unit, RATE_MAP))
+
+
+def laid_over(picture: Pixels, one: Map, strength: float) -> Pixels:
+    """A map over a picture.
+
+    Args:
+        picture: ``(h, w, 3)``.
+        one: the map, at any size.
+        strength: share of the map's colours, in [0, 1].
+    """
+    colours = enlarge(one.pixels(), picture.shape[1], picture.shape[0])
+    return (picture + strength * (colours.astype(np.float32) - picture) + 0.5).astype(np.uint8)
+
+
+def age_ms(seen: Seen, time_s: float) -> float | None:
+    """Mean age of what is shown, milliseconds; None where the policy cannot tell."""
+    samples = seen.shown[1].sample_map
+    if samples is None:
+        return None
+    newest = samples.newest_s.numpy()
+    known = newest[np.isfinite(newest)]
+    return 1e3 * (time_s - float(known.mean())) if known.size else None
+
+
+def predicted_error(seen: Seen) -> float | None:
+    """Root of the mean square that the policy takes its errors to have; None where it does not tell."""
+    if EXPECTED not in seen.shown[1].maps:
+        return None
+    return float(np.sqrt(np.square(seen.shown[1].maps[EXPECTED].values.numpy(), dtype=np.float64).mean()))
