@@ -7,7 +7,7 @@ BASE := $(VENV)/.base
 STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 
-.PHONY: demo test test-fast test-slow lint bench study-quick solvers docs constraints clean
+.PHONY: demo live test test-fast test-slow lint bench study-quick solvers docs constraints clean
 
 # the base alone, which is enough for the demo
 $(BASE): pyproject.toml constraints.txt
@@ -26,6 +26,9 @@ $(DOCS): $(BASE)
 
 demo: $(BASE)
 	$(PY) scripts/run.py fly-by --out out/demo
+
+live: $(BASE)
+	$(PY) scripts/live.py fly-by
 
 lint: $(STAMP)
 	$(VENV)/bin/ruff check .

@@ -88,6 +88,11 @@ class _Bounded(HTTPServer):
         self._open.append(stream)
         super().handle_stream(stream, address)
 
+    def close_streams(self) -> None:
+        """Closes all connections, web sockets among them."""
+        for stream in self._open:
+            stream.close()
+
 
 @contextmanager
 def served(paths: dict[str, type[RequestHandler]], state: Any, port: int, host: str = LOOPBACK) -> Iterator[str]:
@@ -128,6 +133,8 @@ def served(paths: dict[str, type[RequestHandler]], state: Any, port: int, host: 
         await over.wait()
         server.stop()
         await server.close_all_connections()
+        server.close_streams()
+        await asyncio.sleep(0)
 
     thread = threading.Thread(target=lambda: loop.run_until_complete(serve()), daemon=True)
     thread.start()

@@ -50,17 +50,17 @@ def cycle_rates(options: LiveOptions) -> list[Table | str]:
     pairs = [(name, NOTHING) for name in names] + ([names] if len(names) == 2 else [])
     found = [rate for side in SIZES for pair in pairs for rate in driven(options, side, pair)]
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    header = ("side, px", "policy", "beside", "cycles/s", "own ms a cycle", "cores used")
-    rows = [
-        (
-            str(one.resolution_px), one.policy, one.beside or "–", f"{one.cycles / one.wall_s:.1f}",
-            f"{1e3 * one.own_s / max(one.cycles, 1):.1f}", f"{one.cpu_s / one.wall_s:.2f}",
-        )
-        for one in found
-    ]  # fmt: skip
+    header = ("side, px", "policy", "beside", "cycles/s", "own ms a cycle", "CPU ms a cycle", "cores used")
+    rows = [_row(one) for one in found]
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     said = f"{cores} cores, load of the machine at the end {load}; batch {options.controls.batch_size}, {options.input}"
     return [Table("cycle rates of the live view", header, rows, words=3), said]
+
+
+def _row(one: Rate) -> tuple[str, ...]:
+    cpu_ms = "–" if one.beside else f"{1e3 * one.cpu_s / max(one.cycles, 1):.1f}"
+    pace = f"{one.cycles / one.wall_s:.1f}", f"{1e3 * one.own_s / max(one.cycles, 1):.1f}"
+    return str(one.resolution_px), one.policy, one.beside or "–", *pace, cpu_ms, f"{one.cpu_s / one.wall_s:.2f}"
 
 
 def driven(options: LiveOptions, resolution_px: int, pair: tuple[str, ...]) -> list[Rate]:

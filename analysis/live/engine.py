@@ -26,6 +26,7 @@ from scenes.animation import pose_at
 from scenes.arithmetic import norm, product
 from scenes.camera_paths import looked_at_distance
 from scenes.canonical import Scene
+from scenes.sessions import ENDING, read_session
 from tsar.config import require
 
 if TYPE_CHECKING:
@@ -187,13 +188,21 @@ class Engine:
             OSError: it cannot be written.
             ConfigError: nothing has happened yet.
         """
-        options, name = self.options, self.options.input
-        is_file = name not in catalog.SCENES and bool(Path(name).suffix)
-        if is_file:
-            name = Path(os.path.relpath(Path(name).resolve(), path.resolve().parent)).as_posix()
-        seen = dataclasses.asdict(self.controls)
-        facts = {"scene": name, "phase": options.phase, "camera_path": options.camera_path, "seen": seen}
-        session = self.timeline.session(self._begin if self.recording else 0, **facts)
+        options, seen = self.options, dataclasses.asdict(self.controls)
+        base, folder = None, Path()
+        facts = {"scene": options.input, "phase": options.phase, "camera_path": options.camera_path}
+        if Path(options.input).suffix.lower() == ENDING and options.input not in catalog.SCENES:
+            base, folder = read_session(Path(options.input)), Path(options.input).parent
+            facts = {"scene": base.scene, "phase": base.phase, "camera_path": base.camera_path}
+        if facts["scene"] not in catalog.SCENES and Path(facts["scene"]).suffix:
+            file = (folder / facts["scene"]).resolve()
+            facts["scene"] = Path(os.path.relpath(file, path.resolve().parent)).as_posix()
+        session = self.timeline.session(self._begin if self.recording else 0, seen=seen, **facts)
+        if base is not None:  # what its scene's time was at this session's
+            times_s = base.interval_s * np.arange(len(base.animation_s))
+            session = dataclasses.replace(
+                session, animation_s=np.interp(session.animation_s, times_s, base.animation_s)
+            )
         require(session.seconds > 0.0, "session", "one of more than a moment", session.seconds)
         write_json(path, session.facts())
         self.recording = False

@@ -15,7 +15,7 @@ from analysis.live.engine import SIDES, Engine
 from analysis.live.freeze import SAID, VIEWS, Frozen, held
 from analysis.live.overlays import PLAIN, age_ms, codes, laid_over, overlays, predicted_error
 from analysis.live.runner import Runner, Seen
-from analysis.page.pictures import Pixels
+from analysis.page.pictures import ColorScale, Pixels, number
 from scenes.sessions import ENDING
 from tsar.checks import require
 
@@ -257,5 +257,5 @@ def _facts(run: Runner | None, seen: Seen | None, time_s: float) -> dict[str, An
     return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in found.items()}
 
 
-def _scale(scale: Any) -> str:
-    return f"{scale.shown[0]:.3g} to {scale.shown[1]:.3g} {scale.unit}"
+def _scale(scale: ColorScale) -> str:
+    return f"{number(scale.shown[0])} to {number(scale.shown[1])} {scale.unit}"

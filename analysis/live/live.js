@@ -3,10 +3,12 @@
 const root = document.getElementById("live");
 const part = (id) => document.getElementById(id);
 const token = document.querySelector("meta[name=token]").content;
+const SILENCE_MS = 30000;
 const rates = { left: null, right: null };
 let socket = null;
 let state = null;
 let lost = 0;
+let heard = performance.now();
 
 function tell(message) {
   if (socket && socket.readyState === WebSocket.OPEN && state && state.drives) socket.send(JSON.stringify(message));
@@ -16,8 +18,10 @@ function connect() {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   socket = new WebSocket(`${scheme}://${location.host}/watch?token=${encodeURIComponent(token)}`);
   socket.binaryType = "arraybuffer";
+  socket.onopen = () => { heard = performance.now(); };
   socket.onmessage = (event) => {
     lost = 0;
+    heard = performance.now();
     take(event.data);
     socket.send("drawn");
   };
@@ -29,6 +33,11 @@ function connect() {
     setTimeout(again, 400);
   };
 }
+
+// A server that has gone without a word is given up; a live view always has something to say.
+setInterval(() => {
+  if (performance.now() - heard > SILENCE_MS && socket.readyState === WebSocket.OPEN && !document.hidden) socket.close();
+}, 1000);
 
 // A server that was begun anew knows nothing of this page's token: the page is asked for anew.
 async function again() {

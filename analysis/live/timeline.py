@@ -50,8 +50,8 @@ class Animation:
         """Its times so many seconds from now."""
         if not self.playing or self.duration_s <= 0.0:
             return np.full(seconds.shape, self.at_s)
-        times = self.at_s + self.speed * seconds
-        return times % self.duration_s if self.repeats else np.minimum(times, self.duration_s)
+        times = np.asarray(self.at_s + self.speed * seconds, np.float64)
+        return np.mod(times, self.duration_s) if self.repeats else np.minimum(times, self.duration_s)
 
 
 class Timeline:

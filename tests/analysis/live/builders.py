@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from analysis.live.options import Controls, LiveOptions
@@ -13,9 +14,9 @@ SMALL = Controls(batch_size=16, resolution_px=64)
 """Both sides, at a size that takes a millisecond."""
 
 
-def options(scene: str = "chase", **controls: Any) -> LiveOptions:
+def options(scene: str = "chase", out: Path = Path("out/live"), **controls: Any) -> LiveOptions:
     """Of a live view on one thread."""
-    return LiveOptions(scene, replace(SMALL, **controls), threads=1, port=0)
+    return LiveOptions(scene, replace(SMALL, **controls), threads=1, port=0, out=out)
 
 
 def until(happened: Callable[[], Any], patience_s: float = 60.0) -> Any:

@@ -182,11 +182,11 @@ def test_parts_of_a_batch_give_the_same_bits() -> None:
 
 
 def replayed(scene: str | Path) -> np.ndarray:
-    """All that a policy shows, as ``run.py`` runs it, on a machine of 8 framed images a second."""
-    found, config = catalog.load_any(scene)[0], TsarConfig(batch_size=16, resolution_px=64)
-    machine = Machine("thesis", CAPACITY_DEFAULT / 64, parameters_of(config, 4.0))
+    """All that a policy shows, as ``run.py`` runs it."""
+    found, config = catalog.load_any(scene)[0], TsarConfig(batch_size=16, resolution_px=64, warmup_cycles=8)
+    machine = Machine("thesis", CAPACITY_DEFAULT / 8, parameters_of(config, 4.0))
     renderer = Renderer(found, threads=1)
-    run = begin("tsar", config, lambda axis: renderer, machine, (0.0, 0.1))
+    run = begin("thesis", config, lambda axis: renderer, machine, (0.0, 0.1))
     return np.stack([display.image.numpy() for _, display in run.images if display.display_time_s > 0.0])
 
 
@@ -208,6 +208,63 @@ def test_a_session_is_replayed_to_the_same_bits(engine: Engine, tmp_path: Path) 
     assert not np.array_equal(images[0][0], images[0][-1]), "the camera moves"
     assert not np.array_equal(images[0], replayed("chase"))
     assert json.loads(path.read_text())["scene"] == "chase"
+
+
+PBRT = """
+LookAt 0 -5 1  0 0 0  0 0 1
+Camera "perspective" "float fov" 40
+WorldBegin
+LightSource "distant" "point from" [1 -2 3] "point to" [0 0 0] "rgb L" [3 3 3]
+Material "matte" "rgb Kd" [0.7 0.3 0.2]
+Shape "sphere" "float radius" 0.7
+Translate 1 1 0
+Shape "sphere" "float radius" 0.5
+WorldEnd
+"""
+
+
+def drives(scene: str, folder: Path) -> tuple[Engine, Path]:
+    """A live view of any scene after a drive of 0.2 s, and its session."""
+    engine = Engine(options(scene, left="none"))
+    engine.timeline.animation.repeats = False
+    engine.timeline.change(lambda drive: dataclasses.replace(drive, velocity=(0.1, 0.0, 0.2), turning=(0.2, 0.1)))
+    engine.timeline.advance(0.2)
+    path = folder / "drive.session"
+    engine.save(path)
+    return engine, path
+
+
+def test_files_models_and_sessions_are_driven_through(tmp_path: Path) -> None:
+    for folder in ("scenes", "first"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "scenes/two.pbrt").write_text(PBRT)
+    engine, first = drives(str(tmp_path / "scenes/two.pbrt"), tmp_path / "first")
+    engine.wake()
+    until(lambda: engine.look().sides["right"])
+    engine.close()
+    assert read_session(first).scene == "../scenes/two.pbrt"
+    engine, second = drives(str(first), tmp_path)
+    engine.close()
+    again = read_session(second)
+    assert again.scene == "scenes/two.pbrt" and not np.allclose(
+        again.translation[-1], read_session(first).translation[-1]
+    )
+    scene, _ = catalog.load_any(second)
+    assert len(scene.camera.track.translation) == len(again.animation_s)
+
+
+def test_a_session_of_a_session_has_the_time_of_its_scene(tmp_path: Path) -> None:
+    engine = Engine(options("chase", left="none"))
+    engine.timeline.animation.speed = 0.5
+    engine.timeline.advance(0.4)
+    engine.save(tmp_path / "a.session")
+    engine.close()
+    engine = Engine(options(str(tmp_path / "a.session"), left="none"))
+    engine.timeline.advance(0.2)
+    engine.save(tmp_path / "b.session")
+    engine.close()
+    b = read_session(tmp_path / "b.session")
+    assert b.scene == "chase" and np.allclose(np.diff(b.animation_s), 0.5 * b.interval_s)
 
 
 @pytest.mark.slow
