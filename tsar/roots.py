@@ -1,4 +1,4 @@
-"""Roots that are the same on every processor."""
+"""Roots that are the same on every processor, and a constant of one."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float64
 from torch import Tensor
+
+GOLDEN_2D = 0.7548776662466927, 0.5698402909980532
+"""``1 / x`` and ``1 / x²`` of the golden ratio in two dimensions, the root of ``x³ = x + 1``: multiples of the pair,
+modulo 1, are spread evenly over the unit square. Source: Roberts 2018, "The unreasonable effectiveness of quasirandom
+sequences"."""
 
 _NEWTON_STEPS = 5
 

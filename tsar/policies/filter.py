@@ -37,7 +37,7 @@ from tsar.filtering.records import (
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
 from tsar.prediction import mid_display_s, predicted
-from tsar.roots import square_root
+from tsar.roots import GOLDEN_2D, square_root
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, Viewpoint
 from tsar.window import GRID
 
@@ -48,7 +48,7 @@ SAMPLE_FLOPS = 740.0
 """Operations per sample, an upper bound: replacement of non-finite values 6, encoding 6, roughness 24, sums 16,
 projection 40, update of the pixel 135, drift of a shadow 85, and 3 x 3 pixels of roughness around it 9 x 35, with about
 100 to spare."""
-_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532], dtype=torch.float64)  # 2-D golden ratio
+_STEP = torch.tensor(GOLDEN_2D, dtype=torch.float64)
 _WARMUP_FRAMES = 12  # as many as accumulating framed renderers have
 _TILES_A_PROBE = 64
 _FIRST_CYCLE = 1 << 20  # numbers of warm-up cycles are above its negative

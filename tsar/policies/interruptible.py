@@ -37,8 +37,9 @@ from tsar.policies import displacement, refinement
 from tsar.policies.refinement import Level, mean
 from tsar.policies.scatter import generator, pixel_colors, pull_push
 from tsar.policy import Moment, Picture, Policy, Price, Setting, require_square
-from tsar.roots import encoded
+from tsar.roots import GOLDEN_2D, encoded
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
+from tsar.window import GRID
 
 SAMPLES_PER_PIXEL = 16
 """A frame is complete when it has this many samples per pixel, whatever its dynamic error."""
@@ -48,7 +49,7 @@ _SURE = 3.0  # standard errors by which the probes must exceed the change from m
 _STILL = 0.1  # or motion explains less than this share of their change
 _CALIBRATION = 0.5  # initial value
 _CALIBRATION_RANGE = 0.1, 3.0
-_STEP = torch.tensor([0.7548776662466927, 0.5698402909980532])  # 2-D golden ratio
+_STEP = torch.tensor(GOLDEN_2D)
 
 
 @dataclass(frozen=True)
@@ -229,7 +230,7 @@ def _batch(frame: Frame, asked: Asked, config: TsarConfig, moment: Moment, hits:
     pixel = torch.cat((asked.pixel, frame.grid[asked.probe]))
     offset = torch.cat((offset, torch.full((asked.probe.numel(), 2), 0.5)))
     place = torch.stack((pixel % side, pixel // side), dim=1).to(torch.float32) + offset
-    position = (place * (65536 // side)).floor() / 65536.0
+    position = (place * (GRID // side)).floor() / GRID
     time_s = torch.full((pixel.numel(),), frame.time_s, dtype=torch.float64)
     time_s[asked.pixel.numel() :] = moment.time_s
     nothing = torch.zeros(pixel.numel() // config.samples, dtype=torch.int64)

@@ -23,12 +23,9 @@ from tsar.policies.late import WARP_FLOPS, warped
 from tsar.policies.surfaces import Surfaces
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.prediction import foretold
+from tsar.roots import GOLDEN_2D
 from tsar.types import FrameletBatch, SampleBatch, SampleMap, Viewpoint
 from tsar.window import GRID
-
-_GOLDEN = 0.7548776662466927, 0.5698402909980532
-"""Steps of the jitter along both axes: ``1/x`` and ``1/x²`` of the golden ratio in two dimensions, the root of
-``x³ = x + 1``."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +182,7 @@ class Reprojected(Policy[Progress]):
         if self._accumulation is None:
             return 0.0, 0.0
         pixel = GRID // self.config.resolution_px
-        x, y = (floor(((0.5 + number * step) % 1.0) * pixel) / pixel - 0.5 for step in _GOLDEN)
+        x, y = (floor(((0.5 + number * step) % 1.0) * pixel) / pixel - 0.5 for step in GOLDEN_2D)
         return x, y
 
 
