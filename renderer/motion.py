@@ -1,4 +1,4 @@
-"""Motion that becomes known while a scene is rendered: the keys of its rigid motions, replaced in place."""
+"""Motion that is defined while a scene is rendered: replacement of the keys of its rigid motions, in place."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenes.canonical import RigidTrack, Scene
 
 
 def tracks_of(scene: Scene) -> list[RigidTrack]:
-    """The rigid motions of a scene, each once: that of the camera first, if it has one, then those of instances."""
+    """The rigid motions of a scene, each once: first that of the camera, if it has one, then those of instances."""
     return list({id(track): track for track in _all(scene) if track is not None}.values())
 
 
@@ -24,20 +24,20 @@ def _all(scene: Scene) -> Iterator[RigidTrack | None]:
 
 
 class Motion:
-    """The rigid motions of a renderer's scene. Changes what the renderer reads, in place.
+    """The rigid motions of a renderer's scene. It changes the data of the renderer in place.
 
-    Between batches keys may be replaced by others of the same number; a batch must not be under way meanwhile.
+    Keys may be replaced by equally many others between batches, but not while a batch is rendered.
 
     Attributes:
-        tracks: of the scene as it was given, in the order of :func:`tracks_of`.
+        tracks: motions of the given scene, in the order of :func:`tracks_of`.
     """
 
     def __init__(self, renderer: Renderer, scene: Scene) -> None:
         """Finds the keys.
 
         Args:
-            renderer: of ``scene``.
-            scene: as the renderer was given it.
+            renderer: renderer of ``scene``.
+            scene: scene that was given to the renderer.
 
         Raises:
             ValueError: its motions have different numbers of keys.
@@ -62,25 +62,25 @@ class Motion:
         translation: Float64[NDArray, "tracks keys 3"],
         rotation: Float64[NDArray, "tracks keys 4"],
     ) -> None:
-        """Replaces the keys of all motions; their interval stays.
+        """Replaces the keys of all motions; their interval is unchanged.
 
         Args:
             start_s: time of the first keys, seconds.
-            translation, rotation: as of :class:`scenes.canonical.RigidTrack`, in the order of ``tracks``.
+            translation, rotation: keys as in :class:`scenes.canonical.RigidTrack`, in the order of ``tracks``.
 
         Raises:
-            ValueError: the shapes are others.
+            ValueError: the shapes differ from these.
         """
         expected = (len(self.tracks), self._keys)
         if translation.shape != (*expected, 3) or rotation.shape != (*expected, 4):
             given = translation.shape, rotation.shape
             raise ValueError(f"motion: expected keys {(*expected, 3)} and {(*expected, 4)}, got {given[0]}, {given[1]}")
-        first = len(self._angle) - len(self.tracks) * self._keys  # what stands still comes before
+        first = len(self._angle) - len(self.tracks) * self._keys  # the static track comes before
         moved = (translation + self._shift[:, None])[self._order].reshape(-1, 3)
         turned = rotation[self._order].reshape(-1, 4)
         self._rows["start_s"][1:] = start_s
         self._translation[first:], self._rotation[first:] = moved, turned
-        # across the border of two motions the angle is never read with a fraction above zero
+        # the angle between the last key of a motion and the first of the next is only read with fraction zero
         self._angle[first:-1] = angles_between(turned[:-1], turned[1:])
         data = self._data
         data.tracks.assign(self._rows)

@@ -1,4 +1,4 @@
-"""Scenes on another clock: all rigid motions evaluated together, and given anew at uniform times."""
+"""Retiming of scenes: all rigid motions are evaluated together and resampled at uniform times."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Keys = tuple[Float64[NDArray, "... keys 3"], Float64[NDArray, "... keys 4"]]
 """Translations, and unit quaternions ``(x, y, z, w)``."""
 
 STILL = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))
-"""Of what does not move."""
+"""The track of a static object."""
 
 
 class Motions:
     """Rigid motions that are evaluated together."""
 
     def __init__(self, tracks: Sequence[RigidTrack]) -> None:
-        """Takes at least one."""
+        """Takes at least one track."""
         counts = np.array([len(track.translation) for track in tracks])
         self._first = (np.cumsum(counts) - counts)[:, None]
         self._last = (counts - 1)[:, None]
@@ -48,14 +48,15 @@ class Motions:
 
 
 def steady(rotation: Float64[NDArray, "... keys 4"]) -> Float64[NDArray, "... keys 4"]:
-    """The same rotations, where neighbours have a dot product that is not negative; the first keep their sign."""
+    """The same rotations with signs such that neighbouring keys have a non-negative dot product; the first keys keep
+    their signs."""
     dots = (rotation[..., 1:, :] * rotation[..., :-1, :]).sum(axis=-1)
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=-1)
     return np.concatenate([rotation[..., :1, :], rotation[..., 1:, :] * signs[..., None]], axis=-2)
 
 
 def after(outer: Keys, inner: Keys) -> Keys:
-    """Rigid motions one after the other: ``outer(inner(x))``, key by key; broadcast over leading axes."""
+    """Composition of rigid motions, ``outer(inner(x))``, key by key; broadcast over leading axes."""
     (place, turn), (offset, own) = outer, inner
     shape = np.broadcast_shapes(turn.shape, own.shape)
     first, second = (Rotation.from_quat(np.array(np.broadcast_to(q, shape)).reshape(-1, 4)) for q in (turn, own))
@@ -72,7 +73,7 @@ def camera_track(scene: Scene) -> RigidTrack:
     """The rigid motion of the camera.
 
     Raises:
-        SceneError: the camera is of a kind that cannot move.
+        SceneError: the kind of camera does not support motion.
     """
     if not isinstance(scene.camera, PerspectiveCamera | OrthographicCamera):
         expected = "a perspective or orthographic camera, which can be moved"
@@ -81,16 +82,16 @@ def camera_track(scene: Scene) -> RigidTrack:
 
 
 def with_keys(scene: Scene, start_s: float, interval_s: float, camera: Keys, instances: Keys) -> Scene:
-    """The scene with other keys for all that moves, and for the camera.
+    """The scene with new keys for all moving instances and for the camera.
 
     Args:
-        scene: whose camera can be moved.
-        start_s, interval_s: time of the first keys, and from one to the next, seconds.
+        scene: scene with a camera that can move.
+        start_s, interval_s: time of the first keys, and interval between keys, seconds.
         camera: ``(keys, 3)`` and ``(keys, 4)``.
         instances: ``(tracks, keys, ...)`` in the order of :func:`instance_tracks`.
 
     Raises:
-        SceneError: the camera cannot move, or keys are not what they must be.
+        SceneError: the camera cannot move, or keys are invalid.
     """
     camera_track(scene)
     own = instance_tracks(scene)
@@ -109,21 +110,21 @@ def with_keys(scene: Scene, start_s: float, interval_s: float, camera: Keys, ins
 
 
 def still_keys(count: int) -> Keys:
-    """So many keys of what does not move: none of them of an instance."""
+    """The keys of no instances, as arrays ``(0, count, 3)`` and ``(0, count, 4)``."""
     return np.zeros((0, count, 3)), np.zeros((0, count, 4))
 
 
 def retimed(scene: Scene, interval_s: float, animation_s: Float64[NDArray, " keys"], camera: Keys) -> Scene:
-    """The scene as its animation was run through, and its camera driven.
+    """The scene with its animation retimed and its camera driven.
 
     Args:
-        scene: whose camera can be moved.
-        interval_s: from one key to the next, seconds; the first is at 0.
+        scene: scene with a camera that can move.
+        interval_s: interval between keys, seconds; the first key is at 0.
         animation_s: the scene's own time at each key, seconds.
-        camera: its rigid motion at each key.
+        camera: rigid motion of the camera at each key.
 
     Raises:
-        SceneError: the camera cannot move, or keys are not what they must be.
+        SceneError: the camera cannot move, or keys are invalid.
     """
     own = instance_tracks(scene)
     instances = Motions(own).at(animation_s) if own else still_keys(len(animation_s))

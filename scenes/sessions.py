@@ -1,6 +1,7 @@
-"""Sessions: how a camera was driven through a scene and its animation was run through, kept in a file.
+"""Sessions: recordings of a camera's drive through a scene and of the time of its animation, stored in files.
 
-A session file stands for a scene with that motion: what one saw can be rendered again, and measured.
+A session file can be used as a scene with that motion, so that the views of a session can be rendered again and
+measured.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from scenes.loading import one_line
 from scenes.retiming import retimed
 
 ENDING = ".session"
-"""Of the names of session files."""
+"""Ending of the names of session files."""
 KIND = "tsar session 1"
-"""What such a file begins with, as its field ``kind``."""
+"""Value of the field ``kind`` of such a file."""
 KEYS_MOST = 1_000_000
 
 
@@ -31,13 +32,13 @@ class Session:
     """A camera's drive through a scene.
 
     Attributes:
-        scene: its name, or that of its file.
-        phase, camera_path: as :func:`scenes.catalog.load_any` takes them.
-        interval_s: from one key to the next, seconds; the first is at 0.
+        scene: name of the scene, or of its file.
+        phase, camera_path: as for :func:`scenes.catalog.load_any`.
+        interval_s: interval between keys, seconds; the first key is at 0.
         animation_s: the scene's own time at each key, seconds.
-        translation, rotation: of the camera's rigid motion at each key, which is applied outside its ``to_world``;
+        translation, rotation: rigid motion of the camera at each key, which is applied outside its ``to_world``;
             quaternions ``(x, y, z, w)``.
-        seen: options under which it was seen, by name, for people.
+        seen: options of the display during the session, by name, for information.
     """
 
     scene: str
@@ -61,11 +62,11 @@ class Session:
 
     @property
     def seconds(self) -> float:
-        """From its first key to its last."""
+        """Time from the first key to the last, seconds."""
         return self.interval_s * (len(self.animation_s) - 1)
 
     def facts(self, scene: str = "") -> dict[str, Any]:
-        """What its file holds; ``scene`` in place of the scene's name, if given."""
+        """The content of its file; ``scene`` replaces the name of the scene, if given."""
         return {
             "kind": KIND,
             "scene": scene or self.scene,
@@ -83,7 +84,7 @@ def read_session(path: Path) -> Session:
     """A session from its file.
 
     Raises:
-        SceneError: it cannot be read; the message names the file.
+        SceneError: the file cannot be read; the message names it.
     """
     try:
         facts = json.loads(path.read_text(encoding="utf-8"))
@@ -98,14 +99,14 @@ def read_session(path: Path) -> Session:
 
 
 def load_session(path: Path, **how: Any) -> tuple[Scene, tuple[str, ...]]:
-    """The scene of a session as it was driven through, and what was lost in reading its file.
+    """The scene of a session with its recorded motion, and the losses of reading its file.
 
     Args:
-        path: of the session; a scene's file is looked for beside it.
+        path: file of the session; the file of its scene is searched beside it.
         how: further arguments of :func:`scenes.catalog.load_any`.
 
     Raises:
-        SceneError, ConfigError: the session or its scene cannot be had.
+        SceneError, ConfigError: the session or its scene cannot be read.
     """
     from scenes import catalog
 
