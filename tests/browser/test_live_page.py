@@ -116,6 +116,11 @@ def test_controls_act(page: Page, hub: Hub) -> None:
     page.locator("#c-batch").select_option("1024")
     expect(page.locator("#note")).to_contain_text("batch_size", timeout=PATIENCE_MS)
     expect(page.locator("#c-batch")).to_have_value("16")
+    page.locator("#scrub").fill("1.5")
+    expect(page.locator("#at")).to_have_text("1.50 s", timeout=PATIENCE_MS)
+    assert engine.timeline.animation.at_s == 1.5
+    expect(page.locator("#curve-cycle_ms polyline")).to_have_count(2, timeout=PATIENCE_MS)
+    expect(page.locator("#curve-predicted")).to_contain_text("no run here can tell", timeout=PATIENCE_MS)
     page.locator("#playing").click()
     expect(page.locator("#playing")).to_have_text("stop", timeout=PATIENCE_MS)
     page.locator("#stage").focus()
