@@ -13,9 +13,10 @@ from typing import Any
 from analysis.live import camera as cameras
 from analysis.live.engine import SIDES, Engine
 from analysis.live.freeze import SAID, VIEWS, Frozen, held
-from analysis.live.overlays import PLAIN, age_ms, codes, laid_over, overlays, predicted_error
+from analysis.live.overlays import PLAIN, codes, laid_over, mean_newest_s, overlays, predicted_error
 from analysis.live.runner import Runner, Seen
 from analysis.page.pictures import ColorScale, Pixels, number
+from analysis.page.video import AGES
 from scenes.sessions import ENDING
 from tsar.checks import require
 
@@ -61,6 +62,7 @@ class Hub:
         self._driver, self._came = 0, 0
         self._display, self._lock = _Display(), threading.RLock()
         self._drawn: dict[str, tuple[Any, tuple[Pixels, str]]] = {}
+        self._told: dict[str, tuple[Any, tuple[float | None, float | None]]] = {}
 
     def came(self) -> Watcher:
         """A page was opened; it drives if no other does. While any is open the engine goes on."""
@@ -107,14 +109,14 @@ class Hub:
         pictures: list[bytes] = []
         for side in SIDES:
             run, seen = look.runs[side], look.sides[side]
-            facts = _facts(run, seen, look.time_s)
+            facts = self._facts(side, run, seen, look.time_s)
             if seen is not None and run is not None:
                 config = self.engine.controls.config()
                 known = overlays(seen, config, look.time_s)
                 views = [view for view in VIEWS if frozen is not None and side in frozen.errors]
                 facts["overlays"] = [PLAIN, *known, *views]
                 overlay = display.overlay[side]
-                moment = look.time_s if overlay in known and overlay.startswith("age") else 0.0
+                moment = round(look.time_s, 1) if overlay == AGES and overlay in known else 0.0
                 key = run, seen.number, overlay, display.strength, frozen, moment
                 if watcher.sent.get(side) != key:
                     watcher.sent[side] = key
@@ -151,6 +153,25 @@ class Hub:
             found = codes(seen.shown[1].image), ""
         self._drawn[side] = key, found
         return found
+
+    def _facts(self, side: str, run: Runner | None, seen: Seen | None, time_s: float) -> dict[str, Any]:
+        """What a page is told of a side in numbers; what costs time is taken once of a picture."""
+        if run is None:
+            return {"name": ""}
+        found: dict[str, Any] = {"name": run.name, "cycles": run.cycles, "busy_s": run.busy_s, "error": run.error}
+        if seen is not None and seen.shown[1].spent is not None:
+            key, values = self._told.get(side, (None, (None, None)))
+            if key != (run, seen.number):
+                values = mean_newest_s(seen), predicted_error(seen)
+                self._told[side] = (run, seen.number), values
+            newest_s, predicted = values
+            found |= {
+                "number": seen.number,
+                "cycle_ms": 1e3 * seen.shown[1].spent.cost_s,
+                "age_ms": None if newest_s is None else 1e3 * (time_s - newest_s),
+                "predicted": predicted,
+            }
+        return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in found.items()}
 
     def _state(self, time_s: float, display: _Display, frozen: Frozen | None) -> dict[str, Any]:
         engine = self.engine
@@ -240,21 +261,6 @@ def _number(given: Mapping[str, Any], name: str, most: float) -> float:
     fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
     require(fits, name, f"a number of at most {most:g}", value)
     return float(value)
-
-
-def _facts(run: Runner | None, seen: Seen | None, time_s: float) -> dict[str, Any]:
-    """What a page is told of a side."""
-    if run is None:
-        return {"name": ""}
-    found: dict[str, Any] = {"name": run.name, "cycles": run.cycles, "busy_s": run.busy_s, "error": run.error}
-    if seen is not None and seen.shown[1].spent is not None:
-        found |= {
-            "number": seen.number,
-            "cycle_ms": 1e3 * seen.shown[1].spent.cost_s,
-            "age_ms": age_ms(seen, time_s),
-            "predicted": predicted_error(seen),
-        }
-    return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in found.items()}
 
 
 def _scale(scale: ColorScale) -> str:

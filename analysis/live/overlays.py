@@ -34,8 +34,11 @@ def _codes() -> NDArray[np.uint8]:
 
 def codes(image: Float[Tensor, "h w 3"]) -> Pixels:
     """``(h, w, 3)`` uint8 sRGB of linear RGB, by a table of 65536 entries; not a number is black."""
-    clipped = image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0).clamp(0.0, 1.0)
-    return _codes()[(clipped.numpy() * 65535.0 + 0.5).astype(np.uint16)]
+    finite = np.nan_to_num(image.numpy(), nan=0.0, posinf=0.0, neginf=0.0)
+    np.clip(finite, 0.0, 1.0, out=finite)
+    finite *= 65535.0
+    finite += 0.5
+    return np.take(_codes(), finite.astype(np.uint16))
 
 
 def overlays(seen: Seen, config: TsarConfig, time_s: float) -> Mapping[str, Callable[[], Map]]:
@@ -79,14 +82,14 @@ def laid_over(picture: Pixels, one: Map, strength: float) -> Pixels:
     return (picture + strength * (colours.astype(np.float32) - picture) + 0.5).astype(np.uint8)
 
 
-def age_ms(seen: Seen, time_s: float) -> float | None:
-    """Mean age of what is shown, milliseconds; None where the policy cannot tell."""
+def mean_newest_s(seen: Seen) -> float | None:
+    """Mean time of the newest samples that are shown, seconds; None where the policy cannot tell."""
     samples = seen.shown[1].sample_map
     if samples is None:
         return None
     newest = samples.newest_s.numpy()
     known = newest[np.isfinite(newest)]
-    return 1e3 * (time_s - float(known.mean())) if known.size else None
+    return float(known.mean()) if known.size else None
 
 
 def predicted_error(seen: Seen) -> float | None:
