@@ -181,6 +181,8 @@ def test_two_tabs_do_not_fight(page: Page, hub: Hub) -> None:
     other.keyboard.press("ArrowLeft")
     other.mouse.wheel(0, -100)
     assert not other.locator("#freeze").is_enabled() and hub.engine.timeline.drive is drive
+    found = Axe().run(other)
+    assert found.violations_count == 0, found.generate_report()
     other.locator("#drive").click()
     expect(page.locator("#status")).to_contain_text("another page drives", timeout=PATIENCE_MS)
     expect(other.locator("#drive")).to_be_hidden(timeout=PATIENCE_MS)

@@ -59,6 +59,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "live fly-by --batch-size 1024 --resolution-px 64": ("batch_size", "1024"),
     "live fly-by --latency-cycles 9": ("latency_cycles", "9"),
     "live fly-by --port 70000": ("port", "70000"),
+    "live whole-sphere": ("camera", "perspective or orthographic", "EnvironmentCamera"),
     "live gone.session": ("gone.session", "cannot be read"),
     "live fly-by --bench-seconds 0": ("bench_seconds", "0"),
     "perception stimuli gone.txt": ("gone.txt", "cannot be read"),

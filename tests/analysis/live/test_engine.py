@@ -13,7 +13,7 @@ import torch
 
 from analysis.live import camera as cameras
 from analysis.live.engine import Engine
-from analysis.live.options import Controls
+from analysis.live.options import Controls, policies
 from analysis.live.runner import in_parts
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, parameters_of
 from analysis.study.runs import Machine, begin
@@ -160,6 +160,20 @@ def test_a_policy_that_fails_leaves_the_other_side(engine: Engine) -> None:
         count = until(lambda: numbers(engine).get("right"))
         until(lambda: numbers(engine)["right"] > count + 2)
         engine.change("left", "none")
+
+
+def test_every_policy_can_be_seen(engine: Engine) -> None:
+    """Of a camera that moves, on the wall clock, without the truth."""
+    engine.timeline.change(lambda drive: dataclasses.replace(drive, velocity=(0.0, 0.0, 2.0), turning=(0.2, 0.0)))
+    engine.wake()
+    engine.change("left", "none")
+    engine.change("right", "framed")
+    for name in policies():
+        engine.change("right", name)
+        run = engine.look().runs["right"]
+        assert run is not None and until(lambda run=run: run.error or (run.cycles > 2 and engine.look().sides["right"]))
+        assert run.error == "" and run.name == name
+    assert len(policies()) == len(POLICIES) - 1
 
 
 def test_parts_of_a_batch_give_the_same_bits() -> None:
