@@ -11,7 +11,7 @@ from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.study.asked import require_distinct, require_inputs, require_named, require_rows
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from tsar.config import TsarConfig, closed_choices
 from tsar.policies import POLICIES, RIVALS
 
@@ -23,7 +23,7 @@ class AblationOptions:
     perfect picture of the same latency. Runs that are on disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs."""
+    """Built-in inputs, or other scenes by their names."""
     rows: tuple[int, ...] = (7,)
     """Rows of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from analysis.ablation.options import AblationOptions
 from analysis.ablation.parts import WHOLE, Part
 from analysis.study.cases import SCALES, Case, framed_config, is_framed
+from analysis.study.inputs import phase_of
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def _runs_at(options: AblationOptions, parts: Sequence[Part], name: str, row: in
         policy="tsar",
         tsar=config,
         scale=scale,
-        phase=repetition / options.repetitions,
+        phase=phase_of(name, repetition, options.repetitions),
         ledger=options.ledger,
         framed_rate_hz=options.framed_rate_hz,
         trace_segments=options.trace_segments,

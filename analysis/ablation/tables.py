@@ -14,7 +14,7 @@ from analysis.ablation.runs import Run
 from analysis.metrics.budget import SHARES
 from analysis.metrics.quality import Floats
 from analysis.metrics.rivals import BEST, best_of
-from analysis.study.cases import ALL, INPUTS
+from analysis.study.inputs import ALL, by_number
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,8 @@ def moment_table(results: Iterable[Result], rivals: Sequence[str]) -> pd.DataFra
     for one in results:
         place = one.run.row, one.run.case.input, one.run.repetition
         by_place.setdefault(place, {})[one.run.label] = one
-    order = sorted(by_place, key=lambda place: (place[0], INPUTS.index(place[1]), place[2]))
+    numbers = by_number(name for _, name, _ in by_place)
+    order = sorted(by_place, key=lambda place: (place[0], numbers.index(place[1]), place[2]))
     lines = []
     for row, name, repetition in order:
         here = by_place[row, name, repetition]

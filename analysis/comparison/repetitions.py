@@ -15,7 +15,8 @@ from analysis.command.console import Table
 from analysis.command.options import Unprefixed
 from analysis.comparison.options import DEFAULT_POLICY, RunOptions
 from analysis.metrics.cost_model import Ledger
-from analysis.study.cases import INPUTS
+from analysis.study.asked import require_inputs
+from analysis.study.inputs import INPUTS, phase_of
 from tsar.config import TsarConfig, closed_choices, require
 
 
@@ -25,7 +26,7 @@ class InputsOptions:
     """The inputs, and the number of repetitions. Runs that are complete in the folder are not repeated."""
 
     inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
-    """Built-in inputs."""
+    """Built-in inputs, or other scenes by their names."""
     vary: Literal["seed", "phase"] = "seed"
     """What differs between repetitions: the seed (0, 1, …) or the phase (0, 1/n, …)."""
     repetitions: int = 3
@@ -52,8 +53,7 @@ class InputsOptions:
         limits.within(self, repetitions=limits.REPETITIONS)
         require(len(self.rivals) >= 1, "rivals", "at least one", self.rivals)
         require(len(self.inputs) >= 1, "inputs", "at least one", self.inputs)
-        unknown = [name for name in self.inputs if name not in INPUTS]
-        require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        require_inputs(self.inputs)
         self.runs()
 
     def runs(self) -> list[RunOptions]:
@@ -67,7 +67,7 @@ class InputsOptions:
                     RunOptions(
                         input=name,
                         tsar=self.tsar if by_phase else dataclasses.replace(self.tsar, seed=number),
-                        phase=number / self.repetitions if by_phase else 0.0,
+                        phase=phase_of(name, number, self.repetitions) if by_phase else 0.0,
                         policy=self.policy,
                         rivals=self.rivals,
                         seconds=self.seconds,

@@ -11,7 +11,7 @@ import tyro
 from analysis.command import limits
 from analysis.command.options import REFERENCES, References, Threads
 from analysis.metrics.display_model import DisplayModel
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from tsar.config import closed_choices, require
 
 _ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"

@@ -10,7 +10,7 @@ from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.study.asked import require_distinct, require_inputs, require_rows
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from tsar.config import TsarConfig, closed_choices
 
 
@@ -21,7 +21,7 @@ class PrecisionOptions:
     not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs."""
+    """Built-in inputs, or other scenes by their names."""
     policies: tuple[Literal["tsar", "thesis"], ...] = ("tsar", "thesis")
     """Policies to study."""
     kept: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from analysis.precision.options import PrecisionOptions
 from analysis.study.cases import SCALES, Case
+from analysis.study.inputs import phase_of
 from tsar.config import require
 from tsar.policies.stored import ALL
 
@@ -79,7 +80,7 @@ def runs(options: PrecisionOptions) -> list[Run]:
             policy=policy,
             tsar=scale.config(options.row, dataclasses.replace(options.tsar, seed=repetition)),
             scale=scale,
-            phase=repetition / options.repetitions,
+            phase=phase_of(name, repetition, options.repetitions),
             start_s=options.start_s,
             formats=(("samples", "float32"),),  # changes nothing, but records the requested batches
         )

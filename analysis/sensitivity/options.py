@@ -11,7 +11,8 @@ from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import Ledger
 from analysis.study.asked import require_distinct, require_inputs, require_rows
-from analysis.study.cases import INPUTS, SCALES
+from analysis.study.cases import SCALES
+from analysis.study.inputs import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 
 
@@ -21,7 +22,7 @@ class SensitivityOptions:
     """Runs over a grid of spatial and temporal slopes, and over offsets and bias. Runs on disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs."""
+    """Built-in inputs, or other scenes by their names."""
     row: int = 7
     """Row of table 7.2 that gives batch and resolution, 0 to 15; 7 is batch 128 at 512²."""
     scale: Literal["thesis", "half", "quick"] = "quick"

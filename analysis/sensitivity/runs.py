@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.study.cases import SCALES, Case, framed_config
+from analysis.study.inputs import phase_of
 from tsar.config import TsarConfig
 
 
@@ -101,7 +102,7 @@ def runs(options: SensitivityOptions) -> list[Run]:
                 policy="thesis" if setting else "framed",
                 tsar=setting.applied(seeded) if setting else framed,
                 scale=scale,
-                phase=repetition / options.repetitions,
+                phase=phase_of(name, repetition, options.repetitions),
                 ledger=options.ledger,
                 stills_s=(options.still_s,) if repetition == 0 else (),
             )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.metrics.quality import DRAWS
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.runs import AXES, Setting, sweeps
-from analysis.study.cases import ALL
+from analysis.study.inputs import ALL
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,8 @@ import tyro
 from analysis.command import limits
 from analysis.command.options import Threads, Unprefixed
 from analysis.metrics.cost_model import CAPACITY_DEFAULT, SEGMENTS_DEFAULT, adaptive_flops, parameters_of
-from analysis.study.cases import INPUTS
+from analysis.study.asked import require_inputs
+from analysis.study.inputs import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 
 Part = Literal["slopes", "ideal", "agreement"]
@@ -72,8 +73,8 @@ class SpectrumOptions:
 
     def __post_init__(self) -> None:
         require(not self.tsar.width_px, "width_px", "none here, where pictures are squares", self.tsar.width_px)
-        unknown = [name for name in (*self.inputs, self.input) if name not in INPUTS]
-        require(not unknown and len(self.inputs) > 0, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+        require(len(self.inputs) > 0, "inputs", "at least one", self.inputs)
+        require_inputs((*self.inputs, self.input))
         limits.within(self, frames_per_input=(1, 100), samples_per_axis=(1, 16), threads=limits.THREADS)
         limits.within(self, samples=(32, 1 << 15), frames=(8, 1 << 15))
         limits.within(self, agreement_samples=(64, 1 << 15), agreement_frames=(16, 1 << 15))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.study.cases import INPUTS, ROWS
+from analysis.study.cases import ROWS
+from analysis.study.inputs import INPUTS
 from tsar.config import require
 from tsar.named import Named
 
@@ -21,13 +22,17 @@ def require_distinct(options: object, *names: str) -> None:
 
 
 def require_inputs(inputs: Sequence[str]) -> None:
-    """Checks that all are built-in inputs.
+    """Checks that all are names of scenes; nothing is imported for the five inputs.
 
     Raises:
-        ConfigError: one is not.
+        ConfigError: one is not; the message has the known names and the nearest of them.
     """
-    unknown = [one for one in inputs if one not in INPUTS]
-    require(not unknown, "inputs", f"names out of {', '.join(INPUTS)}", unknown)
+    if set(inputs) <= set(INPUTS):
+        return
+    from scenes.catalog import SCENES
+
+    for name in inputs:
+        SCENES.require(name, "inputs")
 
 
 def require_rows(name: str, rows: Sequence[int]) -> None:

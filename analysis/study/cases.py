@@ -22,14 +22,10 @@ from analysis.metrics.cost_model import (
 from analysis.metrics.display_model import DisplayModel
 from analysis.storage.files import plain
 from analysis.storage.source import brought
+from analysis.study.inputs import is_added, is_file, require_input
 from tsar.choices import chosen
 from tsar.config import TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
 from tsar.policies import POLICIES
-
-INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
-"""The five test inputs by number."""
-ALL = "all inputs"
-"""Stands for them together in tables."""
 
 ROWS = (
     (32, 256), (32, 512), (32, 1024), (64, 256), (64, 512), (64, 1024), (128, 256), (128, 512), (128, 1024),
@@ -199,7 +195,7 @@ class Case:
         require(not self.parts or self.policy == "tsar", "parts", "none but of tsar", self.parts)
         budget = self.budget_s
         require(budget is None or 0.0 < budget <= 10.0, "budget_s", "seconds in (0, 10]", budget)
-        _require_input(self.input)
+        require_input(self.input)
         require({name for name, _ in self.tracing} <= set(TRACING), "tracing", ", ".join(TRACING), self.tracing)
         POLICIES.require(self.policy)
         require(self.ledger != "wall", "ledger", "one with repeatable results (not wall)", self.ledger)
@@ -257,7 +253,7 @@ class Case:
         code."""
         # the source does not cover additions to a table
         added = brought((POLICIES, self.policy), *chosen(self.tsar))
-        content = (_content(self.animation),) if _is_file(self.input) else ()
+        content = (content_of(self.animation),) if is_file(self.input) or is_added(self.input) else ()
         text = json.dumps([plain(self), source, *plain(added), *content], sort_keys=True)
         return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
@@ -266,24 +262,9 @@ def _short(value: bool | int | float | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def _is_file(input: str) -> bool:
-    return input not in INPUTS and bool(Path(input).suffix)
-
-
-def _require_input(input: str) -> None:
-    if input in INPUTS:
-        return
-    if _is_file(input):
-        require(Path(input).is_file(), "input", "a scene by its name, or a file that is there", input)
-        return
-    from scenes import catalog
-
-    catalog.SCENES.require(input, "input")
-
-
 @lru_cache(maxsize=16)
-def _content(animation: Animation) -> str:
-    """Hash of a scene from a file, which the source does not cover."""
+def content_of(animation: Animation) -> str:
+    """Hash of a scene that the source does not cover."""
     from analysis.storage.reference import content_hash
     from scenes import catalog
 

@@ -18,7 +18,7 @@ from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
 from analysis.storage.results import SUMMARY, own_results
-from analysis.study.cases import Animation, Case, Scale
+from analysis.study.cases import Animation, Case, Scale, content_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -80,6 +80,7 @@ def run_cases(
     from analysis.study.evaluation import finished, source_of_results
 
     source = source_of_results()
+    content_of.cache_clear()
     keys = {case: case.key(source) for case in dict.fromkeys(cases)}
     missing = [case for case in keys if finished(keys[case], place) is None]
     task, failures = task or Task(), dict[Case, str]()
@@ -89,6 +90,7 @@ def run_cases(
     try:
         with connected(options) as client:
             client.run(_keep_freed_memory, on_error="ignore")
+            client.run(_forget_scenes, on_error="ignore")
             for case, reason in _outcomes(client, _submit(client, missing, keys, place)):
                 if reason is not None:
                     failures[case] = reason
@@ -99,6 +101,13 @@ def run_cases(
                 left.unlink(missing_ok=True)
         raise
     return keys, failures
+
+
+def _forget_scenes() -> None:
+    """For workers that have run earlier studies."""
+    from analysis.study.scenery import forget
+
+    forget()
 
 
 def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Case, str | None]]:

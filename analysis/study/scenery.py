@@ -22,6 +22,12 @@ _KEPT = 8
 _OF_THE_SCENE = ("depth", "light_cells")
 
 
+def forget() -> None:
+    """Drops the scenes that this process caches: a file, or what an installed package makes, may have changed."""
+    _scene.cache_clear()
+    renderer.cache_clear()
+
+
 @lru_cache(maxsize=_KEPT)
 def _scene(animation: Animation, tracing: Tracing = ()) -> Scene:
     from scenes import catalog

@@ -12,7 +12,8 @@ from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.asked import require_distinct, require_inputs, require_named, require_rows
-from analysis.study.cases import INPUTS, ROWS, SCALES
+from analysis.study.cases import ROWS, SCALES
+from analysis.study.inputs import INPUTS
 from tsar.choices import SOLVERS
 from tsar.config import TsarConfig, closed_choices
 from tsar.policies import POLICIES, RIVALS
@@ -24,7 +25,7 @@ class SuitabilityOptions:
     """Every run of table 7.2 at equal cost, beside the thesis' results. Runs that are on disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs."""
+    """Built-in inputs, or other scenes by their names."""
     rows: tuple[int, ...] = tuple(range(len(ROWS)))
     """Rows of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"

@@ -22,7 +22,7 @@ def shown_tables(tables: Tables) -> list[Table]:
     names = [name for name in percentiles.columns if f"{name} thesis" in percentiles.columns]
     rows = [
         [f"{line['row']}", f"{line['batch']}", f"{line['side']}²"]
-        + [f"{_whole(line[name])} ({line[f'{name} thesis']:.0f})" for name in names]
+        + [f"{_whole(line[name])} ({_whole(line[f'{name} thesis'])})" for name in names]
         for line in percentiles.to_dict("records")
     ]
     header = ["row", "batch", "resolution", *names]

@@ -12,8 +12,9 @@ from matplotlib.ticker import LogLocator
 
 from analysis.metrics.quality import WHISKERS, percentile
 from analysis.page.figures import ADAPTIVE, FRAMED, GRID, save
-from analysis.study.cases import INPUTS, ROWS, Case
+from analysis.study.cases import ROWS, Case
 from analysis.study.evaluation import Place
+from analysis.study.inputs import INPUTS
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.stills import finest, setting, write_strip
 from analysis.suitability.tables import Result, Results, ratios
@@ -42,14 +43,25 @@ def write_all(
         caption = f"Inputs whose runs are {label} at the 75th percentile, by majority (figs {which})"
         keep(f"fig_7_{number}", caption, boxes(results, chosen, label) if chosen else None)
     for name in results.inputs:
-        figure = {0: "7_14"}.get(INPUTS.index(name), f"7_{16 + (INPUTS.index(name) > 2)}_{name}")
-        keep(f"fig_{figure}", f"Error over time, {name} (fig. {figure[:4].replace('_', '.')})", errors(results, name))
+        figure, of = _figure_of_errors(name)
+        keep(figure, f"Error over time, {name}{of}", errors(results, name))
     keep("fig_7_15", "Error ratio over time of one run (fig. 7.15)", ratio_over_time(results, options.policy_row))
     for name in results.inputs:
-        strip = write_strip(folder / f"fig_7_{18 + INPUTS.index(name)}.png", options, results, name, keys, place)
+        number = 18 + INPUTS.index(name) if name in INPUTS else None
+        file = folder / (f"fig_7_{number}.png" if number else f"shown_{name}.png")
+        strip = write_strip(file, options, results, name, keys, place)
         if strip is not None:
-            made[f"What the displays show, {name} (fig. 7.{18 + INPUTS.index(name)})"] = strip
+            made[f"What the displays show, {name}" + (f" (fig. 7.{number})" if number else "")] = strip
     return made
+
+
+def _figure_of_errors(name: str) -> tuple[str, str]:
+    """Name of the figure of an input's errors, and the thesis' number of it where it has one."""
+    if name not in INPUTS:
+        return f"errors_{name}", ""
+    number = INPUTS.index(name)
+    figure = "7_14" if number == 0 else f"7_{16 + (number > 2)}"
+    return f"fig_{figure}" + (f"_{name}" if number else ""), f" (fig. {figure.replace('_', '.')})"
 
 
 def _axes(width: float, height: float, columns: int = 1, **kwargs: Any) -> tuple[Figure, list[Any]]:

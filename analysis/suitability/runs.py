@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from analysis.study.cases import SCALES, Case, framed_config, is_framed
+from analysis.study.inputs import phase_of
 from analysis.suitability.options import SuitabilityOptions
 from tsar.config import TsarConfig
 
@@ -58,7 +59,7 @@ def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterato
             policy=policy,
             tsar=config,
             scale=scale,
-            phase=repetition / options.repetitions,
+            phase=phase_of(name, repetition, options.repetitions),
             ledger=options.ledger,
             framed_rate_hz=options.framed_rate_hz,
             trace_segments=options.trace_segments,

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from analysis.page.figures import save
-from analysis.study.cases import INPUTS, ROWS, SCALES, Case, is_framed
+from analysis.study.cases import ROWS, SCALES, Case, is_framed
 from analysis.study.evaluation import Place
+from analysis.study.inputs import INPUTS
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.runs import STILLS, Run
 from analysis.suitability.tables import Result, Results

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from analysis.metrics.quality import DRAWS, INTERVAL, ratio, ratio_statistics, suitable_percentile
-from analysis.study.cases import INPUTS, ROWS, is_framed
+from analysis.study.cases import ROWS, is_framed
+from analysis.study.inputs import INPUTS, by_number
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
 from analysis.suitability.runs import Run
 
@@ -56,7 +57,7 @@ class Results:
             for one in self.all
         }
         self.repetitions = sorted({one.run.repetition for one in self.all})
-        self.inputs = [name for name in INPUTS if any(one.run.case.input == name for one in self.all)]
+        self.inputs = by_number(one.run.case.input for one in self.all)
         self.rows = sorted({one.run.row for one in self.all if one.run.label == "thesis" and one.run.row is not None})
 
     def get(self, label: str, name: str, row: int | None, side_px: int, repetition: int) -> Result | None:
@@ -109,7 +110,7 @@ def percentile_table(results: Results) -> pd.DataFrame:
             each = [suitable_percentile(one) for one in values]
             line[name] = suitable_percentile(np.concatenate(values)) if values else math.nan
             line[f"{name} least"], line[f"{name} most"] = (min(each), max(each)) if each else (math.nan, math.nan)
-            line[f"{name} thesis"] = SUITABLE_PERCENTILE[row][INPUTS.index(name)]
+            line[f"{name} thesis"] = SUITABLE_PERCENTILE[row][INPUTS.index(name)] if name in INPUTS else math.nan
         lines.append(line)
     return pd.DataFrame(lines)
 

@@ -12,7 +12,7 @@ from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.asked import require_distinct
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from tsar.config import closed_choices
 
 

@@ -7,8 +7,9 @@ import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from analysis.study.cases import INPUTS, SCALES, Case, Scale
+from analysis.study.cases import SCALES, Case, Scale
 from analysis.study.fitting import fitting
+from analysis.study.inputs import INPUTS, phase_of
 from analysis.trade.knobs import OWN, ROW, Knob, Setting, Value, Where, alone, case_of
 from analysis.trade.options import TradeOptions
 from tsar.config import ConfigError, TsarConfig
@@ -56,7 +57,7 @@ def places(options: TradeOptions) -> list[Where]:
             name,
             "" if name in INPUTS or "." not in name else options.camera_path,
             repetition,
-            repetition / options.repetitions if name in INPUTS else 0.0,
+            phase_of(name, repetition, options.repetitions),
         )
         for repetition, name in itertools.product(range(options.repetitions), options.inputs)
     ]

@@ -10,7 +10,7 @@ from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.study.asked import require_distinct, require_inputs, require_named
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 from tsar.policies import POLICIES, RIVALS
 
@@ -22,7 +22,7 @@ class WorkloadOptions:
     disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs."""
+    """Built-in inputs, or other scenes by their names."""
     policies: tuple[str, ...] = ("tsar", "thesis", "framed", *RIVALS)
     """Policies to compare; framed is always one of them."""
     sample_flops: tuple[float, ...] = (1e2, 1e3, 1e4, 1e5)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from analysis.metrics.cost_model import SEGMENTS_DEFAULT, CostParameters, per_segment
 from analysis.study.cases import ROWS, SCALES, Case, framed_config, is_framed
 from analysis.study.fitting import fitting
+from analysis.study.inputs import phase_of
 from analysis.workloads.options import WorkloadOptions
 from tsar.config import ConfigError
 
@@ -73,7 +74,7 @@ def _runs_at(
                 policy=policy,
                 tsar=framed_config(config.resolution_px) if is_framed(policy) else config,
                 scale=scale,
-                phase=repetition / options.repetitions,
+                phase=phase_of(name, repetition, options.repetitions),
                 framed_rate_hz=workload.image_hz,
                 trace_segments=SEGMENTS_DEFAULT if policy in UNPRICED else segments,
             ))  # fmt: skip

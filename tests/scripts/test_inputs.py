@@ -13,7 +13,7 @@ from analysis.comparison import inputs_command as script
 from analysis.comparison.options import RunOptions
 from analysis.comparison.repetitions import InputsOptions, row
 from analysis.comparison.stored import content_of, finished, write_summary
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from scenes import catalog
 from tests.scripts.commands import call_script
 from tsar.config import ConfigError, TsarConfig

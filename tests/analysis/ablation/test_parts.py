@@ -9,7 +9,8 @@ import pytest
 from analysis.ablation.options import AblationOptions
 from analysis.ablation.parts import WHOLE, all_parts, chosen_parts
 from analysis.ablation.runs import rivals_of, runs
-from analysis.study.cases import INPUTS, SCALES
+from analysis.study.cases import SCALES
+from analysis.study.inputs import INPUTS
 from tsar.config import ConfigError, TsarConfig
 from tsar.filtering.records import DEFAULT
 from tsar.policies import RIVALS

@@ -10,7 +10,8 @@ import pytest
 
 from analysis.sensitivity.options import SensitivityOptions
 from analysis.sensitivity.runs import Setting, runs, sweeps
-from analysis.study.cases import INPUTS, SCALES, framed_config
+from analysis.study.cases import SCALES, framed_config
+from analysis.study.inputs import INPUTS
 from tests.analysis.sensitivity.builders import TWO
 from tsar.config import ConfigError, ErrorConfig, ResponseConfig, TsarConfig
 

@@ -8,7 +8,9 @@ import pytest
 
 from analysis.metrics.cost_model import adaptive_flops, admitted, nonadaptive_flops
 from analysis.metrics.display_model import DisplayModel
-from analysis.study.cases import INPUTS, ROWS, SCALES, Case, framed_config
+from analysis.study.asked import require_inputs
+from analysis.study.cases import ROWS, SCALES, Case, content_of, framed_config
+from analysis.study.inputs import INPUTS, by_number, phase_of
 from scenes import catalog
 from tsar.config import ConfigError, TilingConfig, TsarConfig, tiles_at_least
 from tsar.tiling import split_bounds
@@ -101,3 +103,22 @@ def test_a_key_names_all_that_decides_a_result() -> None:
 def test_bad_cases_are_refused(changes, message) -> None:
     with pytest.raises(ConfigError, match=message):
         case(**changes)
+
+
+def test_the_content_of_a_scene_that_was_added_decides_the_result() -> None:
+    keys = []
+    for name in ("plain", "glass", "plain"):
+        content_of.cache_clear()  # as a study does
+        with catalog.SCENES.lent(mine=lambda phase, name=name: catalog.load(name)):
+            keys.append(case(input="mine").key("source"))
+    assert keys[0] == keys[2] != keys[1]
+
+
+def test_inputs_of_a_study_are_scenes_in_their_order() -> None:
+    with catalog.SCENES.lent(mine=lambda phase: catalog.load("plain")):
+        require_inputs(("fly-by", "mine", "glass"))
+        phases = [phase_of(name, 1, 4) for name in ("fly-by", "mine", "glass", "room.pbrt")]
+    assert phases == [0.25, 0.25, 0.0, 0.0]
+    assert by_number(("mine", "approach", "chase", "mine")) == ["chase", "approach", "mine"]
+    with pytest.raises(ConfigError, match=r"inputs: expected one of corner-exit, .*nearest: glass"):
+        require_inputs(("fly-by", "glas"))

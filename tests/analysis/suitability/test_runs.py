@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.study.cases import INPUTS
+from analysis.study.inputs import INPUTS
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.runs import runs
 from tsar.config import ConfigError

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.study.cases import INPUTS, ROWS
+from analysis.study.cases import ROWS
+from analysis.study.inputs import INPUTS
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.plots import boxes
