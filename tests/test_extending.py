@@ -111,4 +111,5 @@ def test_the_examples_run_from_wheels_outside_the_checkout(tmp_path: Path) -> No
     source = json.loads((tmp_path / "out" / "summary.json").read_text())["provenance"]
     assert source["commit"] is None and source["uncommitted_changes"] is None
     added = {(one["kind"], one["name"], one["distribution"], one["version"]) for one in source["added"]}
-    assert added == {("policy", "interlaced", "tsar-examples", "1.0"), ("metric", "edges", "tsar-examples", "1.0")}
+    named = {"policy": "interlaced", "metric": "edges", "scene": "pendulum"}
+    assert added == {(kind, name, "tsar-examples", "1.0") for kind, name in named.items()}

@@ -74,4 +74,4 @@ def _summary(
         "seconds": {name: sum(one["machine"][name] for one in made) for name in ("run_s", "reference_s")},
         "failures": outcomes.reasons,
     }
-    return with_source(found, options, device="cpu", seeds=sorted({run.repetition for run in planned}))
+    return with_source(found, options, outcomes.added, device="cpu", seeds=sorted({run.repetition for run in planned}))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from analysis.command.cli import bad_input, parse, require_unbroken
 from analysis.comparison.experiment import run_experiment
 from analysis.comparison.repetitions import InputsOptions, ratio_table, row
-from analysis.comparison.stored import finished
+from analysis.comparison.stored import added_by, finished
 from analysis.storage.files import plain
 from analysis.storage.results import own_results
 
@@ -25,6 +25,7 @@ def main() -> None:
     from analysis.storage.summary import write_summary
 
     found = {"ledger": options.ledger, "runs": rows}
-    write_summary(options.out, found, options, seed=options.tsar.seed, device="cpu")
+    added = list(dict.fromkeys(one for run in runs for one in added_by(run)))
+    write_summary(options.out, found, options, added, seed=options.tsar.seed, device="cpu")
     show(ratio_table(rows), f"written to {options.out}: summary.json, a folder a run")
     require_unbroken([line["run"] for line in rows if not line["invariants_ok"]])

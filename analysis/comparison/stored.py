@@ -11,6 +11,7 @@ from analysis.command.start import first_imports
 from analysis.comparison.options import RunOptions
 from analysis.metrics import METRICS
 from analysis.storage.results import SUMMARY
+from analysis.study.inputs import tables_of
 from tsar.choices import chosen
 from tsar.policies import POLICIES
 
@@ -99,4 +100,5 @@ def added_by(options: RunOptions) -> list[Brought]:
     from analysis.storage.source import brought
 
     policies = ((POLICIES, name) for name in (options.policy, *options.rivals))
-    return brought(*policies, *((METRICS, name) for name in options.metrics), *chosen(options.tsar))
+    metrics = ((METRICS, name) for name in options.metrics)
+    return brought(*policies, *metrics, *chosen(options.tsar), *tables_of(options.input))

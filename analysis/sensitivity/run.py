@@ -49,5 +49,5 @@ def study(options: SensitivityOptions) -> tuple[dict[str, Any], list[str]]:
         write_tables(out, frames, shown_tables(tables["optima"]))
         write_all(out / "figures", options, tables["settings"], sweeps(options)["slopes"], stills, outcomes.place)
         seeds = list(range(options.repetitions))
-        summary = write_summary(out, {**head, **tables}, options, device="cpu", seeds=seeds)
+        summary = write_summary(out, {**head, **tables}, options, outcomes.added, device="cpu", seeds=seeds)
     return summary, broken(summaries.values())

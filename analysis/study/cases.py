@@ -21,8 +21,8 @@ from analysis.metrics.cost_model import (
 )
 from analysis.metrics.display_model import DisplayModel
 from analysis.storage.files import plain
-from analysis.storage.source import brought
-from analysis.study.inputs import is_added, is_file, require_input
+from analysis.storage.source import Brought, brought
+from analysis.study.inputs import is_added, is_file, require_input, tables_of
 from tsar.choices import chosen
 from tsar.config import TilingConfig, TsarConfig, closed_choices, require, tiles_at_least
 from tsar.policies import POLICIES
@@ -248,13 +248,16 @@ class Case:
         text = f"{self.policy}{''.join(changes)}-{scene}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
         return text.replace(" ", "-")
 
+    @property
+    def added(self) -> list[Brought]:
+        """The additions of other packages that it uses, which no hash of the source covers."""
+        return brought((POLICIES, self.policy), *chosen(self.tsar), *tables_of(self.input))
+
     def key(self, source: str) -> str:
         """Name of its files: a readable part, and a hash of everything that decides the result, with the source
         code."""
-        # the source does not cover additions to a table
-        added = brought((POLICIES, self.policy), *chosen(self.tsar))
         content = (content_of(self.animation),) if is_file(self.input) or is_added(self.input) else ()
-        text = json.dumps([plain(self), source, *plain(added), *content], sort_keys=True)
+        text = json.dumps([plain(self), source, *plain(self.added), *content], sort_keys=True)
         return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 

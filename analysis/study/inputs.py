@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tsar.config import require
+
+if TYPE_CHECKING:
+    from tsar.named import Named
 
 INPUTS = ("corner-exit", "chase", "fly-by", "approach", "fast-crossing")
 """The five test inputs by number."""
@@ -41,6 +45,15 @@ def is_added(input: str) -> bool:
     from scenes import catalog
 
     return not catalog.SCENES.is_own(input)
+
+
+def tables_of(input: str) -> tuple[tuple[Named[Any], str], ...]:
+    """The table of scenes with the name of an input; nothing for a file, and for a scene that was given as it is."""
+    if input in INPUTS or is_file(input):
+        return ()
+    from scenes import catalog
+
+    return ((catalog.SCENES, input),) if input in catalog.SCENES else ()
 
 
 def phase_of(input: str, repetition: int, repetitions: int) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.storage.source import Brought
 from analysis.study.cases import Case
 from analysis.study.evaluation import Place, finished, times_of
 from analysis.study.farm import describe_failures
@@ -48,6 +49,11 @@ class Outcomes:
     def reasons(self) -> dict[str, str]:
         """Reasons for failures, by the key of the result."""
         return {self.keys[case]: reason for case, reason in self.failures.items()}
+
+    @property
+    def added(self) -> list[Brought]:
+        """The additions of other packages that the cases use, each once."""
+        return list(dict.fromkeys(one for case in self.keys for one in case.added))
 
     def tell(self) -> None:
         """Prints the reasons for failures at once, because later steps may fail for the same reasons, such as a full

@@ -85,7 +85,7 @@ def write_study(
         **more,
         "tables": {name: table.to_dict("records") for name, table in tables.items()},
     }
-    summary = with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
+    summary = with_source(found, options, outcomes.added, device="cpu", seeds=list(range(options.repetitions)))
     with full_disk(out):
         write_tables(out, tables, shown)
         write_json(out / SUMMARY, summary)

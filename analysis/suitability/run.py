@@ -116,4 +116,4 @@ def _summary(
         "seconds": seconds,
         "peak_memory_bytes": max(measured["peak_memory_bytes"].tolist(), default=0) if len(measured) else 0,
     }
-    return with_source(found, options, device="cpu", seeds=sorted({run.repetition for run in planned}))
+    return with_source(found, options, outcomes.added, device="cpu", seeds=sorted({run.repetition for run in planned}))

@@ -11,6 +11,7 @@ from analysis.command.progress import bars
 from analysis.storage.files import write_table
 from analysis.storage.results import own_results
 from analysis.storage.summary import write_summary
+from analysis.study.inputs import tables_of
 from analysis.tracer.options import (
     AcceleratorOptions,
     GalleryOptions,
@@ -89,7 +90,8 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
             SamplePlan(count, *kinds, time_filter=options.time_filter, shift=options.shift) if options.samples else None
         )
         picture = pictures(renderer, plan or options.samples_per_axis, *size, options.crop)
-    added = brought((POINT_SETS, options.point_set)) if options.samples else []
+    points = [(POINT_SETS, options.point_set)] if options.samples else []
+    added = brought(*points, *tables_of(options.scene))
     key = content_hash((options.job, scene, code_hash(Renderer, pictures, render_stills, StillRounds), *added))
     out, ending = options.out, options.still_ending
     with bad_input(), full_disk(out, FilmError), bars() as shown:

@@ -87,4 +87,4 @@ def _summary(options: TradeOptions, measured: Measured, tables: Tables) -> dict[
         "failures": outcomes.reasons,
         "machine": {name: sum(one["machine"][name] for one in made) for name in ("run_s", "reference_s", "jod_s")},
     }
-    return with_source(found, options, device="cpu", seeds=list(range(options.repetitions)))
+    return with_source(found, options, outcomes.added, device="cpu", seeds=list(range(options.repetitions)))

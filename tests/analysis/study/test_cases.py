@@ -111,6 +111,7 @@ def test_the_content_of_a_scene_that_was_added_decides_the_result() -> None:
         content_of.cache_clear()  # as a study does
         with catalog.SCENES.lent(mine=lambda phase, name=name: catalog.load(name)):
             keys.append(case(input="mine").key("source"))
+            assert [(one.kind, one.name) for one in case(input="mine").added] == [("scene", "mine")]
     assert keys[0] == keys[2] != keys[1]
 
 
