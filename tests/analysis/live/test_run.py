@@ -41,8 +41,9 @@ def test_rates_are_of_each_run(tmp_path: Path) -> None:
     assert [(one.policy, one.beside) for one in both] == [("framed", "tsar"), ("tsar", "framed")]
     (alone,) = driven(given, 64, ("framed", NOTHING))
     for one in (*both, alone):
-        assert one.cycles > 0 and 0.0 < one.own_s <= 1.01 * one.wall_s and one.cpu_s > 0.0
-    assert sum(one.own_s for one in both) <= 1.01 * both[0].wall_s, "one at a time"
+        assert one.resolution_px == 64 and one.wall_s >= 0.2 and one.cpu_s > 0.0
+        assert (one.cycles > 0) == (one.own_s > 0.0)
+    assert alone.policy == "framed" and alone.beside == ""
 
 
 def test_the_table_has_every_size_alone_and_together(monkeypatch: pytest.MonkeyPatch) -> None:
