@@ -7,7 +7,7 @@ from analysis import compare
 from renderer import render
 from tsar import ErrorConfig, ReconstructionConfig, ResponseConfig
 
-SMALL = {"seconds": 0.1, "resolution_px": 64, "batch_size": 16, "warmup_cycles": 8, "reference_samples_per_axis": 1}
+SMALL = {"seconds": 0.3, "resolution_px": 64, "batch_size": 16, "warmup_cycles": 8, "reference_samples_per_axis": 1}
 
 
 def main() -> None:
