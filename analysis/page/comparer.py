@@ -18,7 +18,9 @@ from typing import Any
 from analysis.page.curves import Curve, Plot
 from analysis.page.pictures import ColorScale, palette
 
-SCRIPTS = tuple(Path(__file__).with_name(f"comparer_{name}.js") for name in ("errors", "pictures", "stage", "page"))
+SCRIPTS = tuple(
+    Path(__file__).with_name(f"comparer_{name}.js") for name in ("errors", "pictures", "stage", "curves", "page")
+)
 ERROR_PALETTES = {"signed": "RdBu_r", "squared": "inferno", "flip": "magma"}
 _VERSION = 1
 

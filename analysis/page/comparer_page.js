@@ -10,7 +10,6 @@
   const [slider, play, speed, exposure] = ["#slider", "#play", "#speed", "#exposure"].map(one);
   const choice = { left: one("#left"), right: one("#right") };
   const last = given.steps.length - 1;
-  const plots = [...document.querySelectorAll("svg.plot")];
   const now = { step: 0, mode: "picture", stops: 0, holding: false, pixel: null };
   let [turn, shownTurn, moving, native] = [0, 0, null, { width: 1, height: 1 }];
 
@@ -20,25 +19,10 @@
     look();
   });
 
-  const seconds = (t) => `${t.toFixed(3)} s`;
-
-  function short(value) {
-    if (value === null || value === undefined || !Number.isFinite(value)) return "—";
-    const size = Math.abs(value);
-    return size !== 0 && (size >= 1e4 || size < 1e-2) ? value.toExponential(2) : String(Number(value.toPrecision(3)));
-  }
-
-  // The last value of a curve that is not later.
-  function valueAt(curve, time) {
-    let [low, high] = [0, curve.times.length];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (curve.times[middle] <= time + 1e-6) low = middle + 1;
-      else high = middle;
-    }
-    return low ? curve.values[low - 1] : null;
-  }
-
+  const curves = Curves(given, (step) => {
+    if (moving) stop();
+    go(step);
+  });
   function sides() {
     const truth = (label) => pictures.panels.get(label).truth;
     const shown = [choice.left.value, choice.right.value];
@@ -161,19 +145,12 @@
   }
 
   function cursors() {
-    const time = given.steps[now.step].time;
-    const [start, end] = given.span;
-    plots.forEach((plot, number) => {
-      const { left, right } = plot.dataset;
-      const x = Number(left) + ((time - start) / (end - start || 1)) * (right - left);
-      plot.querySelector(".cursor").setAttribute("transform", `translate(${x.toFixed(2)} 0)`);
-      const said = given.plots[number].curves.map((curve) => `${curve.label} ${short(valueAt(curve, time))}`);
-      plot.closest("figure").querySelector(".reading").textContent = `${seconds(time)}: ${said.join(", ")}`;
-    });
-    one("#time").textContent = seconds(time);
+    const said = seconds(given.steps[now.step].time);
+    curves.show(now.step);
+    one("#time").textContent = said;
     one("#count").textContent = `${now.step + 1} of ${last + 1}`;
     slider.value = now.step;
-    slider.setAttribute("aria-valuetext", seconds(time));
+    slider.setAttribute("aria-valuetext", said);
   }
 
   function go(step) {
@@ -259,20 +236,6 @@
     [choice.left.value, choice.right.value] = [choice.right.value, choice.left.value];
     redraw();
   }
-
-  // Moves to the step nearest to the pointer while its button is down.
-  function seek(event) {
-    if (!(event.buttons & 1)) return;
-    const plot = event.currentTarget;
-    const box = plot.getBoundingClientRect();
-    const x = ((event.clientX - box.left) / box.width) * plot.viewBox.baseVal.width;
-    const share = (x - plot.dataset.left) / (plot.dataset.right - plot.dataset.left);
-    const time = given.span[0] + share * (given.span[1] - given.span[0]);
-    const apart = given.steps.map((step) => Math.abs(step.time - time));
-    if (moving) stop();
-    go(apart.indexOf(Math.min(...apart)));
-  }
-  for (const plot of plots) for (const name of ["pointerdown", "pointermove"]) plot.addEventListener(name, seek);
 
   const KEYS = {
     ArrowRight: () => go(now.step + 1), ArrowLeft: () => go(now.step - 1), Home: () => go(0), End: () => go(last),
