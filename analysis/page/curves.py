@@ -7,11 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.page.figures import DASHES, spread
-
-Floats = NDArray[np.float64]
 
 # size of a plot in units of its view box
 WIDTH = 560.0

@@ -39,7 +39,7 @@ def native_gain(
 
 
 @wp.func_native("""
-    *(int*)found = gains::best((const double*)gain, levels, coarsest, limit, (double*)most, (unsigned char*)taken);
+    gains::best((const double*)gain, levels, coarsest, limit, (double*)most, (unsigned char*)taken, (int*)found);
 """)
 def native_best(
     gain: Address,

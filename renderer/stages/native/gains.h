@@ -170,8 +170,9 @@ inline void mark(const Market& m, int level, int row, int column, unsigned char*
     for (int k = 0; k < 4; ++k) mark(m, level + 1, 2 * row + k / 2, 2 * column + k % 2, taken);
 }
 
-// Finds the best tiles, at most `limit`, and returns their number. `most` has room for all levels.
-inline int best(const double* gain, int levels, int coarsest, int limit, double* most, unsigned char* taken) {
+// Finds the best tiles, at most `limit`; `found` receives their number. `most` has room for all levels.
+inline void best(const double* gain, int levels, int coarsest, int limit, double* most, unsigned char* taken,
+                 int* found) {
     Market m{gain, most, levels};
     int all = 0;
     for (int level = 0; level < levels; ++level) {
@@ -200,9 +201,8 @@ inline int best(const double* gain, int levels, int coarsest, int limit, double*
     m.price = high;
     for (int row = 0; row < coarsest; ++row)
         for (int column = 0; column < coarsest; ++column) mark(m, 0, row, column, taken);
-    int total = 0;
-    for (int i = 0; i < all; ++i) total += taken[i];
-    return total;
+    *found = 0;
+    for (int i = 0; i < all; ++i) *found += taken[i];
 }
 
 }  // namespace gains
