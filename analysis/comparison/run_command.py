@@ -7,6 +7,8 @@ Examples: python scripts/run.py fly-by --seconds 2 --out out/fly-by
 
 from __future__ import annotations
 
+import statistics
+
 from analysis.command.cli import bad_input, parse, require_unbroken
 from analysis.command.start import first_imports, process_began_s
 from analysis.comparison.experiment import run_experiment
@@ -26,18 +28,22 @@ def main() -> None:
     from analysis.comparison.tables import said_of
 
     title = f"{options.input}: {summary['policy']}, ledger {summary['ledger']}"
-    rows = {}
-    for rival, statistics in summary.get("ratio_statistics", {}).items():
-        low, high = statistics.quartile_low, statistics.quartile_high
-        rows[f"MSE ratio to {rival}, median"] = f"{statistics.median:.3f} (quartiles {low:.3f} – {high:.3f})"
-        rows[f"at most that of {rival}"] = f"{100 * statistics.share_suitable:.0f} % of the time"
-        rows[f"greatest suitable percentile to {rival}"] = f"{statistics.suitable_percentile:.0f}"
+    medians = {name: statistics.median(errors) for name, errors in summary["mse"].items()}
+    rows = {"MSE, median": ", ".join(f"{name} {value:.2g}" for name, value in medians.items())}
+    for rival, found in summary.get("ratio_statistics", {}).items():
+        low, high = found.quartile_low, found.quartile_high
+        rows[f"MSE ratio to {rival}, median"] = f"{found.median:.3f} (quartiles {low:.3f} – {high:.3f})"
+        rows[f"at most that of {rival}"] = f"{100 * found.share_suitable:.0f} % of the time"
+        rows[f"greatest suitable percentile to {rival}"] = f"{found.suitable_percentile:.0f}"
     if "best_rival" in summary:
-        statistics = summary["best_rival"]["ratio_statistics"]
-        rows["MSE ratio to the best rival, median"] = f"{statistics.median:.3f}"
-        rows["at most that of the best rival"] = f"{100 * statistics.share_suitable:.0f} % of the time"
+        found = summary["best_rival"]["ratio_statistics"]
+        rows["MSE ratio to the best rival, median"] = f"{found.median:.3f}"
+        rows["at most that of the best rival"] = f"{100 * found.share_suitable:.0f} % of the time"
     for metric, values in summary["metrics"].items():
         rows[metric] = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
+    untaken = [name for name in ("flip", "jod") if name not in summary["metrics"]]
+    if untaken:
+        rows[" and ".join(untaken)] = f"not taken; add --metrics {' '.join(untaken)} (extra perception)"
     checked = summary["invariants"]
     of = "" if checked is None or checked["runs"] == [summary["policy"]] else f" of {', '.join(checked['runs'])}"
     rows |= {

@@ -269,4 +269,5 @@ def test_other_built_in_scenes_run_too(name: str, tmp_path: Path, monkeypatch, c
     """Block scenes of the motion-blur study, and one with lamps, whose samples draw random numbers."""
     where = (*THESIS, "--no-film", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     assert call_script("run.py", monkeypatch, name, *SIZE, *SPAN, *where) == 0, capsys.readouterr().err
-    assert "hold in every cycle" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "hold in every cycle" in shown and "MSE, median" in shown and "add --metrics flip jod" in shown
