@@ -61,7 +61,8 @@ def main() -> None:
 
 def _dispatch() -> None:
     name, rest = (sys.argv[1:2] or ["--help"])[0], sys.argv[2:]
-    if name in ("-h", "--help"):
+    helps = {"-h", "--help"}
+    if name in helps or (name == "list" and not helps.isdisjoint(rest)):
         print(f"{__doc__}\nCommands: {', '.join([*COMMANDS, 'list'])}\nTables: {', '.join(TABLES)}")
     elif name == "--version":
         print(f"{DISTRIBUTION} {importlib.metadata.version(DISTRIBUTION)}")

@@ -75,6 +75,11 @@ def test_version_and_usage(monkeypatch, capsys) -> None:
     assert call(monkeypatch) == 0 and "Commands: run, " in capsys.readouterr().out
 
 
+def test_help_of_the_list_is_the_usage(monkeypatch, capsys) -> None:
+    assert call(monkeypatch, "list", "--help") == 0
+    assert "Tables: policies, metrics" in capsys.readouterr().out
+
+
 def test_packages_offer_their_names_without_importing_them() -> None:
     program = "import sys, tsar, renderer, analysis; assert {'TsarConfig', 'run'} <= {*dir(tsar)}\n"
     program += "print(*(name for name in ('torch', 'warp', 'numpy', 'scenes') if name in sys.modules))\n"
