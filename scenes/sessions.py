@@ -57,6 +57,8 @@ class Session:
         shapes = self.animation_s.shape, self.translation.shape, self.rotation.shape
         if shapes != ((count,), (count, 3), (count, 4)):
             raise SceneError(f"session: expected animation_s (k,), translation (k, 3), rotation (k, 4), got {shapes}")
+        if not (self.interval_s > 0.0 and np.isfinite(self.interval_s * count)):
+            raise SceneError(f"session: interval_s: expected a positive time, got {self.interval_s}")
         if not np.isfinite(self.animation_s).all():
             raise SceneError("session: animation_s holds non-finite values")
 
@@ -93,7 +95,7 @@ def read_session(path: Path) -> Session:
         keys = (np.array(facts[name], np.float64) for name in ("animation_s", "translation", "rotation"))
         named = str(facts["scene"]), float(facts["phase"]), str(facts["camera_path"]), float(facts["interval_s"])
         return Session(*named, *keys, seen=dict(facts.get("seen", {})))
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         missing = f"expected a field {error}" if isinstance(error, KeyError) else one_line(error)
         raise SceneError(f"session {path}: cannot be read: {missing[:200]}") from error
 
