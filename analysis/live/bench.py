@@ -7,7 +7,7 @@ import os
 import time
 from dataclasses import replace
 
-from analysis.command.cli import bad_input
+from analysis.command.cli import InputError, bad_input
 from analysis.command.console import Table
 from analysis.live.engine import Engine
 from analysis.live.options import NOTHING, LiveOptions
@@ -44,9 +44,11 @@ def cycle_rates(options: LiveOptions) -> list[Table | str]:
     """Drives through the scene at every size, each policy alone and both together; what they reached, as a table.
 
     Raises:
-        InputError: the scene cannot be had.
+        InputError: the scene cannot be had, or no side has a policy.
     """
     names = options.controls.sides
+    if not names:
+        raise InputError("left, right: expected a policy to measure, got none on both sides")
     pairs = [(name, NOTHING) for name in names] + ([names] if len(names) == 2 else [])
     found = [rate for side in SIZES for pair in pairs for rate in driven(options, side, pair)]
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -46,6 +46,11 @@ def test_rates_are_of_each_run(tmp_path: Path) -> None:
     assert alone.policy == "framed" and alone.beside == ""
 
 
+def test_rates_of_no_policy_are_refused() -> None:
+    with pytest.raises(InputError, match="left, right: expected a policy"):
+        cycle_rates(options(left=NOTHING, right=NOTHING))
+
+
 def test_the_table_has_every_size_alone_and_together(monkeypatch: pytest.MonkeyPatch) -> None:
     from analysis.live import bench
 
