@@ -94,6 +94,11 @@ class _Bounded(HTTPServer):
             stream.close()
 
 
+def _in_address(host: str) -> str:
+    """A host as addresses of pages have it: an IPv6 address in brackets, as RFC 3986 has it."""
+    return f"[{host}]" if ":" in host else host or "0.0.0.0"
+
+
 @contextmanager
 def served(paths: dict[str, type[RequestHandler]], state: Any, port: int, host: str = LOOPBACK) -> Iterator[str]:
     """Serves pages while the block runs; yields their address.
@@ -139,7 +144,7 @@ def served(paths: dict[str, type[RequestHandler]], state: Any, port: int, host: 
     thread = threading.Thread(target=lambda: loop.run_until_complete(serve()), daemon=True)
     thread.start()
     try:
-        yield f"http://{host}:{port}/"
+        yield f"http://{_in_address(host)}:{port}/"
     finally:
         loop.call_soon_threadsafe(over.set)
         thread.join()

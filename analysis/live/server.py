@@ -105,7 +105,13 @@ class _Socket(WebSocketHandler):
 
     async def _send(self) -> None:
         loop, hub = asyncio.get_running_loop(), self.site.hub
-        self._watcher = watcher = await loop.run_in_executor(self.site.doing, hub.came)
+        coming = self.site.doing.submit(hub.came)
+        try:
+            self._watcher = watcher = await asyncio.wrap_future(coming)
+        except asyncio.CancelledError:  # closed before it had come: it leaves as soon as it has
+            if not coming.cancelled():
+                self.site.doing.submit(lambda: hub.left(coming.result()))
+            raise
         try:
             while True:
                 await self._drawn.wait()
