@@ -35,12 +35,14 @@ class Frozen:
         time_s: of the live view, seconds.
         pictures: of each side, and of the truth, linear RGB.
         errors: of each side, by name.
+        names: of the policies then, by side.
         missing: metrics that were not taken, and why.
     """
 
     time_s: float
     pictures: Mapping[str, Tensor]
     errors: Mapping[str, Mapping[str, float]]
+    names: Mapping[str, str]
     missing: tuple[str, ...]
 
     def drawn(self, side: str, view: str) -> Pixels:
@@ -64,7 +66,8 @@ def held(engine: Engine) -> Frozen:
     truth = engine.truth()
     names, missing = _metrics()
     errors = {side: measured(image, truth, names) for side, image in shown.items() if image.shape == truth.shape}
-    return Frozen(look.time_s, {**shown, TRUTH: truth}, errors, missing)
+    policies = {side: run.name for side, run in look.runs.items() if run is not None}
+    return Frozen(look.time_s, {**shown, TRUTH: truth}, errors, policies, missing)
 
 
 def measured(shown: Tensor, truth: Tensor, names: list[str]) -> dict[str, float]:

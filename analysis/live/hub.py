@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import threading
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -13,6 +14,7 @@ from typing import Any
 from analysis.live import camera as cameras
 from analysis.live.engine import SIDES, Engine
 from analysis.live.freeze import SAID, VIEWS, Frozen, held
+from analysis.live.options import Controls
 from analysis.live.overlays import PLAIN, codes, laid_over, mean_newest_s, overlays, predicted_error
 from analysis.live.runner import Runner, Seen
 from analysis.page.pictures import ColorScale, Pixels, number
@@ -22,6 +24,10 @@ from tsar.checks import require
 
 FASTEST = 16.0
 """Greatest speed of the animation, and of the camera in distances to what it looks at a second."""
+OF_THESIS = ("spatial_slope", "temporal_slope", "bias", "solver")
+"""Controls that a replay needs where they are not the defaults."""
+LABEL_MOST = 100
+"""Letters of the name of an overlay."""
 
 
 @dataclass
@@ -96,7 +102,9 @@ class Hub:
                     self._driver = watcher.number
                 elif self._driver == watcher.number:
                     watcher.note = self._do(asked, message) or ""
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OSError) as error:
+        except KeyError as error:
+            watcher.note = f"expected a field {error}"
+        except Exception as error:  # a page may ask for anything, and what a policy or a metric does may be anybody's
             watcher.note = " ".join(f"{error}".split())[:300] or type(error).__name__
 
     def frame(self, watcher: Watcher) -> bytes:
@@ -171,12 +179,15 @@ class Hub:
                 "age_ms": None if newest_s is None else 1e3 * (time_s - newest_s),
                 "predicted": predicted,
             }
-        return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in found.items()}
+        return _finite(found)
 
     def _state(self, time_s: float, display: _Display, frozen: Frozen | None) -> dict[str, Any]:
         engine = self.engine
         animation, timeline = engine.timeline.animation, engine.timeline
-        held_at = None if frozen is None else {"errors": frozen.errors, "missing": frozen.missing}
+        held_at = None
+        if frozen is not None:
+            errors = {side: _finite(of_side) for side, of_side in frozen.errors.items()}
+            held_at = {"errors": errors, "names": frozen.names, "missing": frozen.missing}
         return {
             "time_s": time_s,
             "animation": asdict(animation),
@@ -207,7 +218,11 @@ class Hub:
             engine.change(given["name"], given["value"])
         elif asked == "overlay":
             require(given["side"] in SIDES, "side", " or ".join(SIDES), given["side"])
-            self._display.overlay[given["side"]] = str(given["label"])
+            label = given["label"]
+            require(
+                isinstance(label, str) and len(label) <= LABEL_MOST, "label", f"at most {LABEL_MOST} letters", label
+            )
+            self._display.overlay[given["side"]] = label
         elif asked == "strength":
             self._display.strength = min(max(_number(given, "value", 1.0), 0.0), 1.0)
         elif asked in ("playing", "repeats"):
@@ -225,7 +240,7 @@ class Hub:
         elif asked == "save":
             return self._save()
         elif asked == "freeze":
-            self.frozen = self.frozen or held(engine)
+            self.frozen = self.frozen or self._held()
         elif asked == "go_on":
             self.frozen = None
             self._display.overlay = {s: PLAIN if o in VIEWS else o for s, o in self._display.overlay.items()}
@@ -233,6 +248,14 @@ class Hub:
         else:
             require(False, "do", "something that a page can ask for", asked)
         return None
+
+    def _held(self) -> Frozen:
+        """Holds the moment; where that fails the view goes on."""
+        try:
+            return held(self.engine)
+        except Exception:
+            self.engine.wake()
+            raise
 
     def _save(self) -> str:
         """Writes the session under a name that is free."""
@@ -247,8 +270,13 @@ def replay(engine: Engine, path: Path, seconds: float) -> str:
     """The command that measures a session as it was seen."""
     c = engine.controls
     named = f"--policy {c.sides[-1]}" + (f" --rivals {c.sides[0]}" if len(c.sides) > 1 else "") if c.sides else ""
-    rest = f"--batch-size {c.batch_size} --resolution-px {c.resolution_px}"
-    return f"python scripts/run.py {path} --seconds {max(seconds - 0.05, 0.05):.2f} {named} {rest}"
+    changed = [
+        f"--{name.replace('_', '-')} {getattr(c, name)}"
+        for name in OF_THESIS
+        if getattr(c, name) != getattr(Controls, name)
+    ]
+    rest = " ".join([f"--batch-size {c.batch_size} --resolution-px {c.resolution_px}", *changed])
+    return f"python scripts/run.py {shlex.quote(str(path))} --seconds {max(seconds - 0.05, 0.05):.2f} {named} {rest}"
 
 
 def _standing(drive: cameras.Drive) -> cameras.Drive:
@@ -261,6 +289,11 @@ def _number(given: Mapping[str, Any], name: str, most: float) -> float:
     fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
     require(fits, name, f"a number of at most {most:g}", value)
     return float(value)
+
+
+def _finite(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """With None for numbers that JSON cannot hold."""
+    return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in facts.items()}
 
 
 def _scale(scale: ColorScale) -> str:

@@ -129,7 +129,7 @@ function show(header) {
   part("record").hidden = header.recording !== null;
   part("save").hidden = header.recording === null;
   part("save").textContent = `stop and save ${(header.recording || 0).toFixed(1)} s`;
-  table(frozen, header.sides);
+  table(frozen);
 }
 
 function said(side, facts, header) {
@@ -150,11 +150,11 @@ function said(side, facts, header) {
   return `${facts.name}${pace}${scale ? `; ${header.overlay[side]}: ${scale}` : ""}`;
 }
 
-function table(frozen, sides) {
+function table(frozen) {
   part("frozen").hidden = !frozen;
   if (!frozen) return;
   const names = [...new Set(Object.values(frozen.errors).flatMap(Object.keys))];
-  const text = (value) => (value === undefined ? "–" : value.toPrecision(4));
+  const text = (value) => (value == null ? "–" : value.toPrecision(4));
   const rows = names.map((name) => {
     const row = document.createElement("tr");
     row.innerHTML = '<th scope="row"></th><td class="n"></td><td class="n"></td>';
@@ -163,7 +163,7 @@ function table(frozen, sides) {
     row.children[2].textContent = text((frozen.errors.right || {})[name]);
     return row;
   });
-  for (const side of ["left", "right"]) part(`${side}-name`).textContent = sides[side].name || side;
+  for (const side of ["left", "right"]) part(`${side}-name`).textContent = frozen.names[side] || side;
   part("missing").textContent = `Not taken: ${frozen.missing.join("; ")}.`;
   part("errors").replaceChildren(...rows);
 }

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from analysis.live.engine import Engine
-from analysis.live.hub import Hub, Watcher
+from analysis.live.hub import Hub, Watcher, replay
+from analysis.live.options import Controls
 from analysis.live.overlays import LABELS, codes
 from analysis.metrics.quality import pixel_errors
 from analysis.page.video import to_pixels
@@ -160,7 +164,11 @@ def test_controls_and_the_animation_heed_the_driver(hub: Hub) -> None:
         ('{"do": "turn", "left": "far"}', "left"),
         ('{"do": "turn", "left": NaN}', "left"),
         ('{"do": "go", "ahead": 1e9}', "ahead"),
-        ('{"do": "set"}', "name"),
+        ('{"do": "set"}', "expected a field 'name'"),
+        ('{"do": "set", "name": "batch_size", "value": 1e999}', "infinity"),
+        ('{"do": "set", "name": "bias", "value": 1%s}' % ("0" * 400), "too large"),
+        ('{"do": "overlay", "side": "left", "label": "%s"}' % ("x" * 101), "label"),
+        ('{"do": "overlay", "side": "left", "label": {}}', "label"),
         ('{"do": "set", "name": "batch_size", "value": 99999}', "batch_size"),
         ('{"do": "set", "name": ["x"], "value": 1}', "unhashable"),
         ('{"do": "overlay", "side": "top", "label": "none"}', "side"),
@@ -201,6 +209,37 @@ def test_a_moment_is_held_and_compared_with_the_truth(hub: Hub) -> None:
     hub.left(late)
     tell(hub, watcher, "go_on")
     assert not hub.engine.stands and frame(hub, watcher)[0]["overlay"]["left"] == "none"
+
+
+def test_held_errors_keep_their_names_and_may_be_no_numbers(hub: Hub) -> None:
+    watcher = hub.came()
+    shown(hub, watcher)
+    tell(hub, watcher, "freeze")
+    assert hub.frozen is not None
+    hub.frozen = replace(hub.frozen, errors={"left": {"mse": math.nan, "ssim": 0.5}})
+    tell(hub, watcher, "set", name="right", value="framed-quarter")
+    frozen = frame(hub, watcher)[0]["frozen"]
+    assert frozen["errors"] == {"left": {"mse": None, "ssim": 0.5}}
+    assert frozen["names"] == {"left": "framed", "right": "thesis"}
+    hub.engine.change("right", "thesis")
+
+
+def test_a_moment_that_cannot_be_held_goes_on(hub: Hub, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing() -> None:
+        raise RuntimeError("no memory")
+
+    watcher = hub.came()
+    monkeypatch.setattr(hub.engine, "truth", failing)
+    tell(hub, watcher, "freeze")
+    assert frame(hub, watcher)[0]["note"] == "no memory"
+    assert hub.frozen is None and not hub.engine.stands
+
+
+def test_the_replay_is_of_what_was_seen() -> None:
+    plain, other = (SimpleNamespace(controls=Controls(bias=bias)) for bias in (0.0, 0.5))
+    said = replay(plain, Path("a b.session"), 1.0)  # type: ignore[arg-type]
+    assert "run.py 'a b.session' --seconds 0.95" in said and "--bias" not in said
+    assert replay(other, Path("a.session"), 1.0).endswith("--bias 0.5")  # type: ignore[arg-type]
 
 
 def test_what_is_driven_is_saved(hub: Hub) -> None:
