@@ -277,7 +277,7 @@ def agreement(phi: Floats, true: Floats, seed: int = 0) -> dict[str, Any]:
             "value": value[i],
             "interval": (low[i], high[i]),
             "permuted": permuted[:, i].mean(),
-            "dealt_interval": (chance_low[i], chance_high[i]),
+            "permuted_interval": (chance_low[i], chance_high[i]),
             "isotropic": ISOTROPIC[name],
         }
         for i, name in enumerate(_NAMES)

@@ -102,8 +102,8 @@ def test_perfect_opposite_and_random_estimates() -> None:
         low, high = random[name]["interval"]
         assert low < random[name]["value"] < high
         assert random[name]["value"] == pytest.approx(random[name]["isotropic"], rel=0.15)
-        dealt_low, dealt_high = random[name]["dealt_interval"]
-        assert dealt_low < random[name]["value"] < dealt_high
+        permuted_low, permuted_high = random[name]["permuted_interval"]
+        assert permuted_low < random[name]["value"] < permuted_high
     assert abs(random["space"]["spearman"]) < 0.15
 
 
@@ -137,7 +137,7 @@ def test_intervals_are_of_95_percent() -> None:
     # of 28 tiles one may get its own estimate or one of 27 others: right with a chance of 1/28, which is 3.6 %
     lone = np.ones((28, 1, 2))
     lone[0, 0, 1] = -1.0
-    low, high = agreement(lone, lone)["share_sign_time"]["dealt_interval"]
+    low, high = agreement(lone, lone)["share_sign_time"]["permuted_interval"]
     assert (low, high) == (pytest.approx(26 / 28), 1.0)
 
 
