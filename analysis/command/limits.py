@@ -72,7 +72,7 @@ def require_pace(name: str, value: object, cycle_s: float, start_s: float, secon
     Raises:
         ConfigError: the machine is too slow or too fast.
     """
-    fits = f"cycles no longer than the {seconds:g} s that are measured; they take {cycle_s:.3g} s at this speed"
+    fits = f"cycles no longer than the {seconds:g} s that are measured; they take {cycle_s:.3g} s at this capacity"
     require(cycle_s <= seconds, name, fits, value)
     require_count(name, value, seconds / cycle_s + warmup_cycles, "cycles")
     latest_s = abs(start_s) + seconds + warmup_cycles * cycle_s

@@ -139,6 +139,8 @@ class RunOptions:
                 limits.require_pace("capacity", self.machine_flops, cycle_s, self.start_s, self.seconds, warmup)
             frame_s = float(nonadaptive_flops(self.cost, priced)) / self.machine_flops
             limits.require_count("capacity", self.machine_flops, self.seconds / frame_s, "framed images")
+            least = f"a hundredth of a framed image in {self.seconds:g} s; one takes {frame_s:.3g} s"
+            require(frame_s <= 100.0 * self.seconds, "capacity", least, self.machine_flops)
 
     def _check_choice(self) -> None:
         """Checks that at most one option chooses a point, and that no other option sets the same values."""

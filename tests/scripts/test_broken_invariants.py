@@ -41,7 +41,7 @@ def test_a_comparison(
 ) -> None:
     places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
     rest = ("--reference-samples-per-axis", "1", "--reference-rate-hz", "20", "--no-film", "--stages", stages)
-    rest += ("--policy", "thesis", "--rivals", "framed")  # thesis has invariants
+    rest += ("--capacity", "8.7e10", "--policy", "thesis", "--rivals", "framed")  # thesis has invariants
     assert call_script("run.py", monkeypatch, "fly-by", *SMALL, *rest, *places) == 3
     assert last_line(capsys) == "error: invariants are broken in 1 runs: fly-by"
     assert (tmp_path / "out" / "summary.json").exists(), "what was found can be looked at"

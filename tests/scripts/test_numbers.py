@@ -15,6 +15,7 @@ from analysis.comparison.options import RunOptions
 from analysis.comparison.repetitions import InputsOptions
 from analysis.conversion.options import CheckOptions
 from analysis.cost_report.options import CostReportOptions
+from analysis.live.options import LiveOptions
 from analysis.perception.options import (
     AdaptiveOptions,
     AnalyseOptions,
@@ -51,6 +52,7 @@ OPTIONS: dict[str, Any] = {
     "gallery.py": GalleryOptions(),
     "inputs.py": InputsOptions(),
     "job.py": JobOptions(Path("job.txt")),
+    "live.py": LiveOptions("fly-by"),
     "perception.py adaptive": AdaptiveOptions(),
     "perception.py analyse": AnalyseOptions(),
     "perception.py recover": RecoverOptions(),

@@ -145,11 +145,11 @@ def test_the_number_of_sets_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
             lambda: Instance(Rectangle(), GREY, np.diag([1.0, 0.0, 1.0, 1.0]), emission=(1, 1, 1), name="lamp"),
             "'lamp': to_world is singular",
         ),
-        (lambda: Renderer(with_instance(Instance(Sphere(0.0), GREY, emission=(1, 1, 1)))), "positive radius|alike"),
+        (lambda: Renderer(with_instance(Instance(Sphere(0.0), GREY, emission=(1, 1, 1)))), "positive radius|uniformly"),
         (lambda: Renderer(with_instance(Instance(Rectangle(), GREY, emission=(1, -1, 1)))), "emission.*no negative"),
         (
             lambda: Renderer(with_instance(Instance(Sphere(), GREY, place(scale=(1, 2, 1)), emission=(1, 1, 1)))),
-            "alike",
+            "uniformly scaled",
         ),
         (lambda: Renderer(with_light(dataclasses.replace(SKY, to_world=np.diag([1.0, 2.0, 1.0, 1.0])))), "rotation"),
     ],

@@ -178,6 +178,8 @@ def test_tsar_runs_on_a_file_with_a_turntable(tmp_path: Path, monkeypatch, capsy
         "64",
         "--batch-size",
         "16",
+        "--capacity",
+        "8.7e10",
         "--no-film",
         "--rivals",
         "framed",
