@@ -51,7 +51,7 @@ study-quick: $(STAMP)
 
 # every transport solver on every input, at row 7; finished runs are not repeated
 solvers: $(STAMP)
-	$(PY) scripts/suitability.py --scale quick --rows 7 --policies framed --jod-repetitions 0 --out out/solvers \
+	$(PY) scripts/suitability.py --scale quick --rows 7 --policies thesis --rivals framed-1 --beside framed-1 --jod-repetitions 0 --out out/solvers \
 		--solvers trivial slow_greater scale_lesser square descend diffusion
 
 bench: $(STAMP)

@@ -97,6 +97,10 @@ def test_the_message_names_field_choices_and_value() -> None:
         (lambda: ResponseConfig(solver="waterfil"), r"^response\.solver: .*'waterfil' \(nearest: waterfill\)$"),
         (lambda: ReconstructionConfig(method="x"), r"^reconstruction\.method: expected one of blend, got 'x'$"),
         (lambda: RenderOptions("glass", point_set="y"), r"^point_set: expected one of hammersley, .*, got 'y'$"),
+        (
+            lambda: SuitabilityOptions(policies=("framed",), solvers=("square",)),
+            r"^solvers: expected none without the policy thesis, got ",
+        ),
         (lambda: SuitabilityOptions(solvers=("z",)), r"^solvers: expected one of waterfill, .*, got 'z'$"),
     ],
 )

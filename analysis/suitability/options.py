@@ -15,7 +15,7 @@ from analysis.study.asked import require_distinct, require_inputs, require_named
 from analysis.study.cases import ROWS, SCALES
 from analysis.study.inputs import INPUTS
 from tsar.choices import SOLVERS
-from tsar.config import TsarConfig, closed_choices
+from tsar.config import TsarConfig, closed_choices, require
 from tsar.policies import POLICIES, RIVALS
 
 
@@ -73,6 +73,10 @@ class SuitabilityOptions:
         require_inputs(self.inputs)
         require_named(self, policies=POLICIES, rivals=POLICIES, beside=POLICIES, solvers=SOLVERS)
         require_distinct(self, "inputs", "rows", "policies")
+        has_thesis = "thesis" in (*self.policies, *self.rivals)
+        require(
+            has_thesis or self.solvers in ((), ("trivial",)), "solvers", "none without the policy thesis", self.solvers
+        )
         require_rows("rows", self.rows)
         require_rows("policy_row", [self.policy_row])
         limits.within(
