@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import time
 from dataclasses import replace
+
+import psutil
 
 from analysis.command.cli import InputError, bad_input
 from analysis.command.console import Table
 from analysis.live.engine import Engine
 from analysis.live.options import NOTHING, LiveOptions
+from tsar.memory import core_count
 
 SIZES = (256, 512, 1024)
 """Sides of the pictures."""
@@ -51,11 +53,10 @@ def cycle_rates(options: LiveOptions) -> list[Table | str]:
         raise InputError("left, right: expected a policy to measure, got none on both sides")
     pairs = [(name, NOTHING) for name in names] + ([names] if len(names) == 2 else [])
     found = [rate for side in SIZES for pair in pairs for rate in driven(options, side, pair)]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     header = ("side, px", "policy", "beside", "cycles/s", "own ms a cycle", "CPU ms a cycle", "cores used")
     rows = [_row(one) for one in found]
-    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-    said = f"{cores} cores, load of the machine at the end {load}; batch {options.controls.batch_size}, {options.input}"
+    load, batch = psutil.getloadavg()[0], options.controls.batch_size
+    said = f"{core_count()} cores, load of the machine at the end {load:.1f}; batch {batch}, {options.input}"
     return [Table("cycle rates of the live view", header, rows, words=3), said]
 
 

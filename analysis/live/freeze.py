@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.command.extras import EXTRAS
+from analysis.command.cli import InputError
 from analysis.live.overlays import codes
-from analysis.metrics import METRICS
+from analysis.metrics import METRICS, require_extras
 from analysis.metrics.quality import encode, pixel_errors
 from analysis.page.pictures import Pixels, palette
+from tsar.types import LUMINANCE
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -51,7 +51,7 @@ class Frozen:
             return codes(self.pictures[TRUTH])
         apart = (encode(self.pictures[side]) - encode(self.pictures[TRUTH])).numpy()
         if view == SIGNED:
-            share = (apart @ np.array([0.2126, 0.7152, 0.0722]) + _SIGNED) / (2 * _SIGNED)
+            share = (apart @ np.array(LUMINANCE) + _SIGNED) / (2 * _SIGNED)
             return palette("RdBu_r")[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
         low, high = np.log(_SQUARED)
         share = (np.log(np.maximum(np.square(apart).sum(axis=-1), _SQUARED[0])) - low) / (high - low)
@@ -79,9 +79,14 @@ def measured(shown: Tensor, truth: Tensor, names: list[str]) -> dict[str, float]
 
 def _metrics() -> tuple[list[str], tuple[str, ...]]:
     """Names of metrics of images whose packages are installed, and of those that are not taken."""
-    absent = {d for module, d in EXTRAS["perception"].items() if importlib.util.find_spec(module) is None}
-    names = [name for name in METRICS if METRICS[name].image is not None]
-    without = [name for name in names if name == "flip" and "flip-evaluator" in absent]
-    said = [f"{name} (the extra perception installs it)" for name in without]
-    said += [f"{name} (of sequences: replay a session)" for name in METRICS if METRICS[name].image is None]
-    return [name for name in names if name not in without], tuple(said)
+    taken, missing = [], []
+    for name in METRICS:
+        if METRICS[name].image is None:
+            missing.append(f"{name} (of sequences: replay a session)")
+            continue
+        try:
+            require_extras([name])
+            taken.append(name)
+        except InputError:
+            missing.append(f"{name} (the extra {METRICS[name].extra} installs it)")
+    return taken, tuple(missing)

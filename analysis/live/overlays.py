@@ -21,8 +21,6 @@ PLAIN = "none"
 TILING, SPATIAL, TEMPORAL = "tiling by refresh rate", "spatial density", "temporal density"
 EXPECTED = "expected error"
 """The map of :class:`tsar.policies.filter.Filter` from which the curve of predicted error comes."""
-LABELS = (PLAIN, TILING, SPATIAL, TEMPORAL, AGES, EXPECTED, "rate of change")
-"""What some policy has; a policy has some of them."""
 _AGES_S = 1e-3, 10.0
 
 

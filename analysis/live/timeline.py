@@ -83,11 +83,6 @@ class Timeline:
         self._keep(still[:1], (self._camera[0][:1], self._camera[1][:1]))
         self.scene = with_keys(scene, self._first * INTERVAL_S, INTERVAL_S, self._camera, self._instances)
 
-    @property
-    def lock(self) -> threading.RLock:
-        """Held by those who look at several things at once."""
-        return self._lock
-
     def advance(self, now_s: float) -> bool:
         """Settles keys up to the one after a time, seconds; whether there were new ones."""
         with self._lock:

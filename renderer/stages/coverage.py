@@ -3,16 +3,13 @@ choice of the reference runs there until it is listed here."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from functools import lru_cache
-from typing import Literal
-
-from torch import Tensor
+from typing import Any, Literal
 
 from tsar.config import TsarConfig
-from tsar.filtering.batches import Traced
-from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
+from tsar.filtering.records import FilterOptions
 from tsar.filtering.stages import FilterStages
 
 StageName = Literal["observe", "respond", "decide", "reconstruct", "account"]
@@ -80,27 +77,15 @@ def covers_options(options: FilterOptions, stage: FilterStageName) -> bool:
 def covered(compiled: FilterStages, reference: FilterStages) -> FilterStages:
     """Compiled stages of the filter that call the reference where they do not cover the options."""
 
-    def of(options: FilterOptions, stage: FilterStageName) -> FilterStages:
-        return compiled if covers_options(options, stage) else reference
+    def choosing(stage: FilterStageName) -> Callable[..., Any]:
+        """The stage, which takes its options last."""
 
-    def chosen(
-        variance: Tensor,
-        roughness: Tensor,
-        rate: Tensor,
-        surfels: Surfels | None,
-        cycle_s: float,
-        count: int,
-        options: FilterOptions,
-    ) -> list[Tensor]:
-        stage = of(options, "chosen").chosen
-        return stage(variance, roughness, rate, surfels, cycle_s, count, options)
+        def of_options(*given: Any) -> Any:
+            return getattr(compiled if covers_options(given[-1], stage) else reference, stage)(*given)
 
-    def taken_in(
-        estimates: Estimates, surfels: Surfels, known: Change, traced: Traced, options: FilterOptions
-    ) -> tuple[Estimates, Surfels, Change]:
-        return of(options, "taken_in").taken_in(estimates, surfels, known, traced, options)
+        return of_options
 
-    return replace(compiled, chosen=chosen, taken_in=taken_in)
+    return replace(compiled, chosen=choosing("chosen"), taken_in=choosing("taken_in"))
 
 
 def _known(record: object, known: Mapping[str, tuple[object, ...] | None]) -> bool:
