@@ -19,7 +19,6 @@ from scenes.pictures import Pixels, decoded
 
 ASSETS = Path(__file__).parent / "assets"
 
-Picture = Pixels
 
 RADIANCE_MOST = 65504.0
 """The greatest half-precision number, which replaces infinite values of an image."""
@@ -57,7 +56,7 @@ def state_of(path: Path) -> FileState | None:
     return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
 
 
-def read_image(path: Path) -> Picture:
+def read_image(path: Path) -> Pixels:
     """Reads an image as linear Rec. 709 RGB.
 
     Integers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and floating-point TIFF files are linear.
@@ -85,11 +84,11 @@ def is_linear(path: Path) -> bool:
 
 
 @lru_cache(maxsize=32)
-def _image(path: Path, state: FileState | None) -> tuple[Picture, bool]:
+def _image(path: Path, state: FileState | None) -> tuple[Pixels, bool]:
     try:
         found = decoded(path)
         linear = found.dtype == np.float32
-        pixels = _clamped(cast(Picture, found), path) if linear else decode_srgb(cast(NDArray[np.uint8], found))
+        pixels = _clamped(cast(Pixels, found), path) if linear else decode_srgb(cast(NDArray[np.uint8], found))
     except Exception as error:  # decoders raise arbitrary exceptions on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
@@ -98,7 +97,7 @@ def _image(path: Path, state: FileState | None) -> tuple[Picture, bool]:
     return pixels, linear
 
 
-def _clamped(pixels: Picture, path: Path) -> Picture:
+def _clamped(pixels: Pixels, path: Path) -> Pixels:
     """An image with infinite values replaced."""
     infinite = np.isposinf(pixels)
     if not infinite.any():
@@ -116,13 +115,13 @@ def decode_srgb(encoded: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.f
     return np.where(steps > np.float32(0.04045), bright, steps / np.float32(12.92))[encoded]
 
 
-def encoded_srgb(image: Picture) -> Picture:
+def encoded_srgb(image: Pixels) -> Pixels:
     """sRGB values of linear ones, not rounded: the inverse of decoding, for an image that was linear already."""
     low = image <= 0.0031308
     return np.where(low, 12.92 * image, 1.055 * power(np.maximum(image, 0.0), 1.0 / 2.4) - 0.055).astype(np.float32)
 
 
-def clamp_radiance(image: Picture, limit: float) -> Picture:
+def clamp_radiance(image: Pixels, limit: float) -> Pixels:
     """Scales down texels whose greatest channel exceeds ``limit``, preserving their colour.
 
     The sun's disk in an environment map is tens of thousands of times brighter than the sky. In a mirror, where one

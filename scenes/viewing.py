@@ -24,7 +24,7 @@ from scenes.canonical import (
     SunSky,
 )
 from scenes.formats.geometry.meshed import as_mesh
-from scenes.loading import Picture
+from scenes.pictures import Pixels
 
 Up = Literal["y", "z"]
 
@@ -85,7 +85,7 @@ def with_camera(
     return dataclasses.replace(scene, camera=camera)
 
 
-def with_environment(scene: Scene, picture: Picture, up: Up, source: str = "") -> Scene:
+def with_environment(scene: Scene, picture: Pixels, up: Up, source: str = "") -> Scene:
     """The scene lit by an environment map whose top is upwards.
 
     The map replaces the lights at infinity: environment maps, sky, directional lights, the ambient light and the

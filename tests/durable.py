@@ -134,7 +134,7 @@ def _evaluated(folder: Path) -> int:
     from analysis.study import evaluation
 
     evaluation._store.cache_clear()  # as in a new process
-    place = evaluation.Place(folder / "runs", folder / "cache")
+    place = evaluation.Resources(folder / "runs", folder / "cache")
     key = evaluation.evaluate(_case(), _case().key(evaluation.source_of_results()), place)
     evaluation.times_of(key, place)
     return 0
@@ -217,10 +217,10 @@ def _session_files(folder: Path) -> None:
 def _session(folder: Path) -> int:
     """Shows every stimulus, and answers the trials that are open."""
     from analysis.command.cli import InputError, bad_input
-    from analysis.perception.protocol import Session
+    from analysis.perception.protocol import TrialSession
 
     try:
-        with bad_input(), Session(folder / "session", folder / "stimuli", "Ann", repetitions=3, seed=1) as session:
+        with bad_input(), TrialSession(folder / "session", folder / "stimuli", "Ann", repetitions=3, seed=1) as session:
             for trial in session.trials:
                 session.frame(trial.test, 0)
             while session.current is not None:

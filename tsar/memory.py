@@ -26,7 +26,7 @@ def free_memory_bytes(root: Path = Path("/")) -> int:
     Args:
         root: directory that contains ``proc`` and ``sys``.
     """
-    found = [*_machine(root), *_groups(root), *_process(root)]
+    found = [*_machine(root), *_control_groups(root), *_process(root)]
     return max(0, min(found) if found else _whole())
 
 
@@ -55,7 +55,7 @@ def _process(root: Path) -> Iterator[int]:
             yield most - used[name] * 1024
 
 
-def _groups(root: Path) -> Iterator[int]:
+def _control_groups(root: Path) -> Iterator[int]:
     """Bytes left by the control groups of this process and by their ancestors, in versions 1 and 2 of cgroups."""
     for line in _lines(root / "proc/self/cgroup"):
         _, controllers, name = line.split(":", 2)

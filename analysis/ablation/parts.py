@@ -12,7 +12,7 @@ from tsar.filtering.records import DEFAULT
 WHOLE = "all of it"
 """The policy as it is."""
 
-Setting = tuple[tuple[str, bool | int | float], ...]
+OptionChanges = tuple[tuple[str, bool | int | float], ...]
 
 _SWITCHED_OFF = {
     "jitter": "samples at the centres of their cells",
@@ -40,7 +40,7 @@ class Part:
 
     name: str
     words: str
-    options: Setting
+    options: OptionChanges
 
 
 def all_parts() -> tuple[Part, ...]:

@@ -11,7 +11,7 @@ from analysis.ablation.parts import WHOLE, Part, chosen_parts
 from analysis.ablation.plots import figure
 from analysis.ablation.runs import Run, rivals_of, runs
 from analysis.ablation.shown import shown_tables
-from analysis.ablation.tables import Result, budget_table, floor_table, moment_table, part_table
+from analysis.ablation.tables import RunResult, budget_table, floor_table, moment_table, part_table
 from analysis.command.cli import bad_input, full_disk
 from analysis.page.figures import save
 from analysis.storage.files import atomic, write_json
@@ -41,7 +41,7 @@ def study(options: AblationOptions) -> tuple[dict[str, Any], Tables]:
     outcomes = run_study(options, [run.case for run in planned], WRITTEN)
     outcomes.tell()
     done = outcomes.summaries()
-    results = [Result(run, outcomes.times(run.case)) for run in planned if run.case in done]
+    results = [RunResult(run, outcomes.times(run.case)) for run in planned if run.case in done]
     moments = moment_table(results, rivals_of(options))
     tables = {"parts": part_table(moments), "budget": budget_table(moments), "floor": floor_table(moments)}
     out = options.out.resolve()

@@ -11,24 +11,24 @@ import pandas as pd
 
 from analysis.ablation.parts import WHOLE
 from analysis.ablation.runs import Run
+from analysis.metrics.arrays import Floats
 from analysis.metrics.budget import SHARES
-from analysis.metrics.quality import Floats
 from analysis.metrics.rivals import BEST, best_of
 from analysis.study.inputs import ALL, by_number
 
 
 @dataclass(frozen=True)
-class Result:
+class RunResult:
     """A run as read from disk: its place in the study, and its table over the reference times."""
 
     run: Run
     times: pd.DataFrame
 
 
-def moment_table(results: Iterable[Result], rivals: Sequence[str]) -> pd.DataFrame:
+def moment_table(results: Iterable[RunResult], rivals: Sequence[str]) -> pd.DataFrame:
     """A line for each run of the policy and reference time: ``mse``, ``framed``, ``best-rival`` and, for the whole
     policy, the columns ``budget_*``. Runs without their framed renderer are left out."""
-    by_place: dict[tuple[int, str, int], dict[str, Result]] = {}
+    by_place: dict[tuple[int, str, int], dict[str, RunResult]] = {}
     for one in results:
         place = one.run.row, one.run.case.input, one.run.repetition
         by_place.setdefault(place, {})[one.run.label] = one

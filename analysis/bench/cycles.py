@@ -42,7 +42,7 @@ def cycles(config: TsarConfig, trace: Trace, cycle_s: float = CYCLE_S) -> Iterat
 
 
 @dataclass
-class Turns:
+class RunningPipeline:
     """A pipeline past its warm-up that runs a few more cycles at each call. Changes in place.
 
     Attributes:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from analysis.bench.cycles import Tilings, Turns, cycles, default_stages, steady, synthetic_trace
+from analysis.bench.cycles import RunningPipeline, Tilings, cycles, default_stages, steady, synthetic_trace
 from analysis.bench.options import BenchOptions
 from analysis.bench.rows import Row, limit_row, limited_row
 from analysis.bench.scenes import driving_scenes, renderer_of
@@ -85,7 +85,8 @@ def batch_row(options: BenchOptions, task: Task) -> Row:
     side = options.resolution_px
     sizes = [size for size in BATCHES if size <= (side // 16) ** 2]
     cases = {
-        str(size): Turns(steady(TsarConfig(batch_size=size, resolution_px=side)), renderer.trace) for size in sizes
+        str(size): RunningPipeline(steady(TsarConfig(batch_size=size, resolution_px=side)), renderer.trace)
+        for size in sizes
     }
     take_turns(cases, options.repetitions, task)
     renderer.close()
@@ -96,7 +97,9 @@ def batch_row(options: BenchOptions, task: Task) -> Row:
 def picture_row(options: BenchOptions, task: Task) -> Row:
     """Reconstruction time against pixels, for pictures of moving ripples."""
     configs = [steady(TsarConfig(batch_size=options.batch_size, resolution_px=side)) for side in SIDES_PX]
-    cases = {str(config.resolution_px): Turns(config, synthetic_trace, cycles_per_turn=2) for config in configs}
+    cases = {
+        str(config.resolution_px): RunningPipeline(config, synthetic_trace, cycles_per_turn=2) for config in configs
+    }
     take_turns(cases, options.repetitions, task)
     rounds = [[median(taken["reconstruction"] for taken in turn) for turn in case.turns()] for case in cases.values()]
     return exponent_row("reconstruction against pixels", [side**2 for side in SIDES_PX], rounds)

@@ -27,7 +27,7 @@ _LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 _LLVM_NAMES = ("libLLVM.so.19*", "libLLVM-19.so*")  # libllvm14 and 15 load but fail
 _LLVM_FOLDERS = ("/usr/lib/*-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/lib/llvm-19/lib", "/usr/local/lib")
 
-Integrator = Literal["direct", "path"]
+IntegratorName = Literal["direct", "path"]
 
 
 def find_llvm() -> str | None:
@@ -89,7 +89,7 @@ class MitsubaPicture:
         return lambda: self.render(samples_per_pixel, next(seeds))
 
 
-def still(scene: Scene, time_s: float, resolution_px: int, integrator: Integrator, variant: str) -> MitsubaPicture:
+def still(scene: Scene, time_s: float, resolution_px: int, integrator: IntegratorName, variant: str) -> MitsubaPicture:
     """Mitsuba's version of a scene at one time.
 
     Args:

@@ -35,7 +35,7 @@ DWT_TARGET = 5.0
 MEASURED_CYCLES = 60
 
 
-class Cycle(NamedTuple):
+class CycleTimes(NamedTuple):
     """Wall seconds of every stage of a cycle, and its number of rays."""
 
     stage_s: Mapping[str, float]
@@ -50,7 +50,7 @@ def overhead(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     everything = []
     for name, scene in scenes.items():
         renderer = renderer_of(scene, options)
-        found = measured_cycles(config, renderer.trace, task)
+        found = thesis_cycles(config, renderer.trace, task)
         renderer.close()
         yield from limit_rows(name, found)
         everything += found
@@ -58,22 +58,22 @@ def overhead(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     yield transform_row(options, task)
 
 
-def measured_cycles(config: TsarConfig, trace: Trace, task: Task) -> list[Cycle]:
+def thesis_cycles(config: TsarConfig, trace: Trace, task: Task) -> list[CycleTimes]:
     """Cycles of a run after its cache is full."""
     found = []
     config = steady(config)
     for record in islice(cycles(config, trace), config.warmup_cycles, config.warmup_cycles + MEASURED_CYCLES):
-        found.append(Cycle(record.stage_s, record.counters))
+        found.append(CycleTimes(record.stage_s, record.counters))
         task.advance()
     return found
 
 
-def seconds_of(cycle: Cycle, names: Sequence[str]) -> float:
+def seconds_of(cycle: CycleTimes, names: Sequence[str]) -> float:
     """Seconds of the named stages together."""
     return sum(cycle.stage_s[name] for name in names)
 
 
-def limit_rows(name: str, found: Sequence[Cycle]) -> Iterator[Row]:
+def limit_rows(name: str, found: Sequence[CycleTimes]) -> Iterator[Row]:
     """Time of the control stages and of the reconstruction on one scene, against their limits relative to tracing."""
     traced_ms = 1e3 * median(cycle.stage_s["tracing"] for cycle in found)
     for what, stages, limit in (
@@ -86,7 +86,7 @@ def limit_rows(name: str, found: Sequence[Cycle]) -> Iterator[Row]:
         yield limit_row(row, [seconds_of(cycle, stages) / cycle.stage_s["tracing"] for cycle in found], limit)
 
 
-def stage_rows(config: TsarConfig, found: Sequence[Cycle]) -> Iterator[Row]:
+def stage_rows(config: TsarConfig, found: Sequence[CycleTimes]) -> Iterator[Row]:
     """Each stage's share of a cycle over all scenes, beside its share in the cost model."""
     rays = sum(cycle.counters.get(name, 0) for cycle in found for name in RAYS)
     segments = rays / sum(cycle.counters["primary_rays"] for cycle in found)

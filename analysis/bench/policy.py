@@ -47,12 +47,12 @@ def policy(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     task = bars.task("tsar", len(scenes) * MEASURED_CYCLES)
     for name, scene in scenes.items():
         renderer = renderer_of(scene, options)
-        found = measured_cycles(pipeline_config(options), renderer, task)
+        found = policy_cycles(pipeline_config(options), renderer, task)
         renderer.close()
         yield from policy_rows(name, found)
 
 
-def measured_cycles(config: TsarConfig, renderer: Renderer, task: Task) -> list[Mapping[str, float]]:
+def policy_cycles(config: TsarConfig, renderer: Renderer, task: Task) -> list[Mapping[str, float]]:
     """Seconds by stage of the cycles after the warm-up."""
     seconds: dict[str, float] = {}
     setting = Setting(config, lambda config: timed(default_stages(config), seconds), view=renderer.viewpoint)

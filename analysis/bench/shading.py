@@ -49,7 +49,7 @@ class Still:
     name: str
     scene: Scene
     time_s: float
-    integrator: peer.Integrator
+    integrator: peer.IntegratorName
     samples_per_axis: int
     targets: Mapping[str, float | None]
 

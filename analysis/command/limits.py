@@ -38,10 +38,10 @@ def within(options: object, **bounds: tuple[float, float]) -> None:
     for name, (low, high) in bounds.items():
         value = getattr(options, name)
         for one in value if isinstance(value, tuple) else (value,):
-            require(one is None or low <= one <= high, name, f"between {_short(low)} and {_short(high)}", one)
+            require(one is None or low <= one <= high, name, f"between {_in_words(low)} and {_in_words(high)}", one)
 
 
-def _short(value: float) -> str:
+def _in_words(value: float) -> str:
     return str(value) if isinstance(value, int) else f"{value:g}"
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from analysis.command.console import Table
-from analysis.comparison.front import Front, Place, stored_front
+from analysis.comparison.front import Front, FrontPoint, stored_front
 from analysis.comparison.options import CHOICES, RunOptions
 from analysis.comparison.summary import Measured
 from tsar.config import ConfigError
@@ -23,7 +23,7 @@ _WORDS = {"flops": "FLOPs in all", "wall_s": "wall seconds of its cycles", "mse"
 
 
 @dataclass(frozen=True)
-class Chosen:
+class Choice:
     """A point on the front, for a run.
 
     Attributes:
@@ -34,12 +34,12 @@ class Chosen:
     """
 
     asked: str
-    place: Place
+    place: FrontPoint
     predicted: Mapping[str, float]
     limit: tuple[str, float] | None
 
 
-def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions, Chosen | None]:
+def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions, Choice | None]:
     """The options with the settings that they choose from the front; unchanged if they choose none.
 
     The simulated machine becomes as fast as the point needs, and rivals get the same machine.
@@ -65,10 +65,10 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
     predicted = {"flops": capacity * options.seconds, "wall_s": place.wall_s * span, "mse": place.mse}
     limits = {"budget_flops": "flops", "budget_seconds": "wall_s", "error_target": "mse"}
     limit = (limits[asked], float(value)) if asked in limits else None
-    return found, Chosen(f"{asked} {value if isinstance(value, str) else f'{value:g}'}", place, predicted, limit)
+    return found, Choice(f"{asked} {value if isinstance(value, str) else f'{value:g}'}", place, predicted, limit)
 
 
-def _place(options: RunOptions, asked: str, front: Front) -> Place:
+def _place(options: RunOptions, asked: str, front: Front) -> FrontPoint:
     span = options.tsar.pixels * options.seconds
     if asked == "preset":
         assert options.preset
@@ -83,7 +83,7 @@ def _place(options: RunOptions, asked: str, front: Front) -> Place:
     return front.at_error(options.error_target)
 
 
-def what_came(chosen: Chosen, measured: Measured, capacity: float, seconds: float) -> dict[str, Any]:
+def what_came(chosen: Choice, measured: Measured, capacity: float, seconds: float) -> dict[str, Any]:
     """The request, the setting, the predicted and the measured values, and their relative differences."""
     totals = measured.totals
     came = {

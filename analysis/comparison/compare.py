@@ -20,7 +20,7 @@ from analysis.command.ownership import release_folder
 from analysis.comparison.experiment import measure
 from analysis.comparison.options import DEFAULT_POLICY, RunOptions
 from analysis.metrics import METRICS, Metric
-from analysis.metrics.quality import View, reference_times
+from analysis.metrics.quality import DisplayedImages, reference_times
 from tsar.config import ConfigError, TsarConfig
 from tsar.policies import POLICIES
 
@@ -171,7 +171,7 @@ class _Kept:
         self._times_s: list[float] = []
         self._images: list[list[np.ndarray]] = []
 
-    def __call__(self, view: View) -> None:
+    def __call__(self, view: DisplayedImages) -> None:
         if view.number in self._numbers:
             self._times_s.append(view.time_s)
             shown = [display.image for _, display in view.shown.values()]

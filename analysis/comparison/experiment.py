@@ -16,18 +16,19 @@ from analysis.command.cli import InputError, bad_input, full_disk, require_memor
 from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
-from analysis.comparison.stored import FILES, Recording, added_by, content_of, write_summary
+from analysis.comparison.stored import FILES, Recording, added_by, complete_run, content_of
 from analysis.metrics import METRICS, require_extras
 from analysis.storage.results import SUMMARY, own_results
 
 if TYPE_CHECKING:
     from analysis.command.progress import Bars
     from analysis.comparison.summary import Measured
+    from analysis.metrics.arrays import Floats
     from analysis.metrics.causes import Truths
-    from analysis.metrics.quality import Floats, View
+    from analysis.metrics.quality import DisplayedImages
     from analysis.storage.records import RecordLimits
     from analysis.storage.reference import Reference
-    from analysis.study.displays import Seen
+    from analysis.study.displays import DisplayRecord
     from analysis.study.runs import PolicyRun
     from renderer.trace import Renderer
     from scenes.canonical import Scene
@@ -63,9 +64,9 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
     with bad_input():
         scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
-        renderer_of(1)  # an error of the scene's loader is bad input
         own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
         writable_folder(options.cache, "cache")
+        renderer_of(1)  # an error of the scene's loader is bad input
     for loss in losses:
         print(loss)
     return Setup(scene, renderer_of, losses)
@@ -100,7 +101,7 @@ def measure(
     options: RunOptions,
     began_s: float | None = None,
     scene: Scene | None = None,
-    viewers: Sequence[Callable[[View], None]] = (),
+    viewers: Sequence[Callable[[DisplayedImages], None]] = (),
 ) -> tuple[dict[str, Any], Measured]:
     """As :func:`run_experiment`; also returns everything that was measured.
 
@@ -200,7 +201,7 @@ def _compare(
     reference: Reference,
     runs: dict[str, PolicyRun],
     bars: Bars,
-    further: Sequence[Callable[[View], None]],
+    further: Sequence[Callable[[DisplayedImages], None]],
 ) -> Measured:
     from analysis.comparison.rivalry import Panels
     from analysis.comparison.summary import Measured
@@ -217,7 +218,7 @@ def _compare(
     steps = Steps(options.policy, scales, len(times_s), exact=options.page == EXACT)
     task = bars.task("comparison", len(times_s))
 
-    def on_view(view: View) -> None:
+    def on_view(view: DisplayedImages) -> None:
         task.advance()
         if options.frames:
             write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
@@ -239,7 +240,7 @@ def _compare(
     return Measured(options.policy, times_s, seen, runs, *shown, reference.nonfinite, options.cost, sequences)
 
 
-def _scored(options: RunOptions, metric: str, seen: dict[str, Seen]) -> dict[str, float]:
+def _scored(options: RunOptions, metric: str, seen: dict[str, DisplayRecord]) -> dict[str, float]:
     """A metric of sequences for every run."""
     import numpy as np
 
@@ -295,4 +296,4 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
     }
     results.write_figures(options.out, summary, measured)
     results.write_page(options.out, summary, measured)
-    return write_summary(options, summary)
+    return complete_run(options, summary)

@@ -19,7 +19,7 @@ PresetName = Literal["draft", "balanced", "accurate"]
 
 
 @dataclass(frozen=True)
-class Place:
+class FrontPoint:
     """A setting of the policy ``tsar`` on the front.
 
     Attributes:
@@ -56,34 +56,34 @@ class Front:
         made: scale, inputs, seeds and ledger.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[FrontPoint, ...]
     made: Mapping[str, Any]
 
     @property
-    def knee(self) -> Place:
+    def knee(self) -> FrontPoint:
         """The knee of the front."""
         return next(one for one in self.places if one.knee)
 
-    def preset(self, name: PresetName) -> Place:
+    def preset(self, name: PresetName) -> FrontPoint:
         """The knee (``balanced``), or an end of the front: the cheapest point (``draft``), or the most accurate one."""
         return {"draft": self.places[0], "balanced": self.knee, "accurate": self.places[-1]}[name]
 
-    def within_flops(self, flops: float, ledger: str) -> Place:
+    def within_flops(self, flops: float, ledger: str) -> FrontPoint:
         """The most accurate point of at most ``flops`` operations per pixel and second; the cheapest if there is
         none."""
         return self._most_accurate(flops, lambda place: place.flops[ledger])
 
-    def within_seconds(self, wall_s: float) -> Place:
+    def within_seconds(self, wall_s: float) -> FrontPoint:
         """The most accurate point of at most ``wall_s`` wall seconds per pixel and second; the fastest if there is
         none."""
         return self._most_accurate(wall_s, lambda place: place.wall_s)
 
-    def at_error(self, mse: float) -> Place:
+    def at_error(self, mse: float) -> FrontPoint:
         """The cheapest point of at most this error; the most accurate if there is none."""
         good = [place for place in self.places if place.mse <= mse]
         return min(good, key=lambda place: place.cost) if good else min(self.places, key=lambda place: place.mse)
 
-    def _most_accurate(self, most: float, cost: Any) -> Place:
+    def _most_accurate(self, most: float, cost: Any) -> FrontPoint:
         affordable = [place for place in self.places if cost(place) <= most * (1.0 + 1e-9)]
         return min(affordable, key=lambda place: place.mse) if affordable else min(self.places, key=cost)
 
@@ -113,8 +113,8 @@ def read_front(path: Path) -> Front:
 def _place(
     batch: int, parts: Mapping[str, Any], flops: Mapping[str, float], wall_s: float, mse: float, cost: float,
     error: float, knee: bool,
-) -> Place:  # fmt: skip
+) -> FrontPoint:  # fmt: skip
     numbers = (batch, wall_s, mse, cost, error, *flops.values())
     if not all(math.isfinite(value) and value > 0.0 for value in numbers):
         raise ValueError(f"numbers above 0, got {numbers}")
-    return Place(batch, tuple(sorted(parts.items())), dict(flops), wall_s, mse, cost, error, knee)
+    return FrontPoint(batch, tuple(sorted(parts.items())), dict(flops), wall_s, mse, cost, error, knee)

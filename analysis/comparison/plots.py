@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from analysis.page.figures import ADAPTIVE, FRAMED, Floats, label_ends, line_style, new_figure, styles
+from analysis.metrics.arrays import Floats
+from analysis.page.figures import ADAPTIVE, FRAMED, label_ends, line_style, new_figure, styles
 
 _TITLE_CHARACTERS = 105  # characters in a line above the figure
 

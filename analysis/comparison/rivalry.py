@@ -11,12 +11,13 @@ import numpy as np
 from analysis.command.console import Table
 from analysis.comparison.summary import Measured, metrics_of
 from analysis.metrics import METRICS
-from analysis.metrics.quality import Floats, ratio_statistics
+from analysis.metrics.arrays import Floats
+from analysis.metrics.quality import ratio_statistics
 from analysis.metrics.rivals import BEST, Standing, best_of, best_shares, standing
 from analysis.page.video import REFERENCE
 from analysis.study.cases import is_framed
 
-Picture = TypeVar("Picture")
+Image = TypeVar("Image")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Panels:
         hidden = tuple(name for name in framed if name != best)
         return cls(own, best, hidden, (*([best] if best else []), *others, own))
 
-    def arranged(self, pictures: Mapping[str, Picture]) -> dict[str, Picture]:
+    def arranged(self, pictures: Mapping[str, Image]) -> dict[str, Image]:
         """Pictures by label: the reference, the runs that are shown, and all pictures that belong to no run. The label
         of a framed rival that was chosen out of several says so."""
         shown = {name: pictures[name] for name in (REFERENCE, *self.runs) if name in pictures}

@@ -78,7 +78,7 @@ def content_of(options: RunOptions, scene: Scene) -> str:
     return content_hash((kept, scene, code_hash(run_experiment), *added_by(options)))
 
 
-def write_summary(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
+def complete_run(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:
     """Lists the files of a run that has ended, and writes its summary last: from then on the run is complete.
 
     Returns:

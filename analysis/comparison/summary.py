@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.metrics.arrays import Floats
 from analysis.metrics.cost_model import (
     LEDGERS,
     CostParameters,
@@ -16,9 +17,9 @@ from analysis.metrics.cost_model import (
     policy_flops,
     stage_flops,
 )
-from analysis.metrics.quality import Floats, RatioStatistics, ratio, ratio_statistics
+from analysis.metrics.quality import RatioStatistics, ratio, ratio_statistics
 from analysis.page.comparer import Panel, Step
-from analysis.study.displays import Seen
+from analysis.study.displays import DisplayRecord
 from analysis.study.runs import PolicyRun, Totals
 from analysis.study.spending import cycle_flops
 
@@ -45,7 +46,7 @@ class Measured:
 
     own: str
     times_s: Floats
-    seen: Mapping[str, Seen]
+    seen: Mapping[str, DisplayRecord]
     runs: Mapping[str, PolicyRun]
     steps: list[Step]
     panels: list[Panel]

@@ -17,9 +17,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.comparison.rivalry import Panels
-from analysis.metrics.quality import View
+from analysis.metrics.quality import DisplayedImages
 from analysis.page.comparer import Panel, Step
-from analysis.page.pictures import ColorScale, Map, Pixels, enlarge, picture_bytes
+from analysis.page.pictures import ByteMap, ColorScale, PagePixels, enlarge, picture_bytes
 from analysis.page.video import (
     AGES,
     REFERENCE,
@@ -67,7 +67,7 @@ class Steps:
     _ages: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, np.int64))
     _last: dict[str, tuple[Any, bytes]] = field(default_factory=dict)
 
-    def __call__(self, view: View) -> None:
+    def __call__(self, view: DisplayedImages) -> None:
         if view.number % -(-self.count // self.most) == 0:
             # encoded at once: the pixels of all steps together would take as much memory as the run
             pictures: dict[str, bytes | None] = {name: self._kept(name, image) for name, image in images(view).items()}
@@ -100,14 +100,14 @@ class Reel:
         self._file = tempfile.TemporaryFile(dir=folder)
         self._codec = pa.Codec("zstd", compression_level=1)
 
-    def keep(self, pixels: Pixels) -> tuple[int, int, tuple[int, ...]]:
+    def keep(self, pixels: PagePixels) -> tuple[int, int, tuple[int, ...]]:
         """Stores a picture; returns its offset, length and shape."""
         packed = self._codec.compress(np.ascontiguousarray(pixels), asbytes=True)
         place = self._file.seek(0, 2)
         self._file.write(packed)
         return place, len(packed), pixels.shape
 
-    def picture(self, kept: tuple[int, int, tuple[int, ...]]) -> Pixels:
+    def picture(self, kept: tuple[int, int, tuple[int, ...]]) -> PagePixels:
         """The stored picture."""
         place, size, shape = kept
         self._file.seek(place)
@@ -134,7 +134,7 @@ class Filming:
         self._times_s: list[float] = []
         self._errors: dict[str, list[float]] = {}
 
-    def __call__(self, view: View) -> None:
+    def __call__(self, view: DisplayedImages) -> None:
         self._times_s.append(view.time_s)
         for name, mse in view.mse.items():
             self._errors.setdefault(name, []).append(mse)
@@ -167,7 +167,7 @@ class Filming:
         for number, (time_s, kept) in enumerate(self._frames):
             pictures = {label: self._reel.picture(one) for label, one in panels.arranged(kept).items()}
             for label in scales.keys() & pictures.keys():
-                coloured = Map(pictures[label], scales[label]).pixels()
+                coloured = ByteMap(pictures[label], scales[label]).pixels()
                 pictures[label] = enlarge(coloured, self.side_px, height_px)
             until = number * self.stride + 1
             sink.add(film.frame(time_s, pictures, self._times_s[:until], _until(self._errors, until)))

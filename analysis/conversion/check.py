@@ -10,13 +10,13 @@ import numpy as np
 
 from analysis.command.progress import Task
 from analysis.conversion.options import CheckOptions
-from analysis.conversion.peers import Picture, rendered
+from analysis.conversion.peers import RenderedImage, rendered
 
 if TYPE_CHECKING:
     from scenes.canonical import Instance, Scene
 
 
-def flip(first: Picture, second: Picture) -> float:
+def flip(first: RenderedImage, second: RenderedImage) -> float:
     """Mean FLIP of two pictures, encoded for a display."""
     import flip_evaluator
 
@@ -24,7 +24,7 @@ def flip(first: Picture, second: Picture) -> float:
     return float(flip_evaluator.evaluate(shown[0], shown[1], "LDR")[1])
 
 
-def shown_as(picture: Picture) -> np.ndarray:
+def shown_as(picture: RenderedImage) -> np.ndarray:
     """A picture encoded for a display, 8 bits."""
     import torch
 
@@ -36,7 +36,7 @@ def shown_as(picture: Picture) -> np.ndarray:
 def checked(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
     """A row for each pair of pictures of each scene, with the rendering of the source file first if there is one."""
     rows: list[dict[str, Any]] = []
-    shown: list[tuple[str, Picture]] = []
+    shown: list[tuple[str, RenderedImage]] = []
     for number, source in enumerate(options.scenes):
         name = f"{source.parent.name}/{source.name}"
         folder = options.out / f"{number:02d}-{source.parent.name}-{source.stem}"
@@ -55,7 +55,7 @@ def checked(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
 
 def _pictures(
     options: CheckOptions, source: Path, folder: Path
-) -> tuple[Scene, dict[str, Picture | str], Picture | str, dict[str, list[str]]]:
+) -> tuple[Scene, dict[str, RenderedImage | str], RenderedImage | str, dict[str, list[str]]]:
     """A scene, its pictures by renderer, the first picture again with other noise, and the losses for each."""
     from scenes.formats.conversion import format_of, load_scene_file, save_scene_file
     from scenes.formats.losses import LossReport
@@ -73,7 +73,7 @@ def _pictures(
         lost[program] = [str(loss) for loss in report.losses]
         jobs.append((program, program, file))
 
-    def picture(name: str, program: str, file: Path, seed: int) -> Picture | str:
+    def picture(name: str, program: str, file: Path, seed: int) -> RenderedImage | str:
         out = folder / f"{name.replace(', ', '-').replace(' ', '-')}-{seed}.npy"
         return rendered(program, file, out, size, options.samples, options.limit_s, seed)
 
@@ -104,7 +104,7 @@ def _plain_row(options: CheckOptions, name: str, scene: Scene, folder: Path) -> 
     from scenes.formats.conversion import save_scene_file
 
     made, size = plain(scene), _size(options, scene)
-    pictures: dict[str, Picture | str] = {}
+    pictures: dict[str, RenderedImage | str] = {}
     for program, kind, file in (("mitsuba", "mitsuba3", "plain.xml"), ("luxcore", "luxrender", "plain.lxs")):
         save_scene_file(made, folder / file, kind)  # type: ignore[arg-type]
         out = folder / f"plain-{program}.npy"
@@ -118,8 +118,8 @@ def _plain_row(options: CheckOptions, name: str, scene: Scene, folder: Path) -> 
 def _row(
     scene: str,
     names: tuple[str, str],
-    pictures: dict[str, Picture | str],
-    again: Picture | str,
+    pictures: dict[str, RenderedImage | str],
+    again: RenderedImage | str,
     lost: dict[str, list[str]],
 ) -> dict[str, Any]:
     losses = lost[""] + [loss for name in names for loss in lost.get(name, [])]
@@ -136,7 +136,7 @@ def _row(
     return {**row, "flip": flip(first, second), "flip_noise": noise, "note": ""}
 
 
-def _sheet(path: Path, shown: list[tuple[str, Picture]]) -> None:
+def _sheet(path: Path, shown: list[tuple[str, RenderedImage]]) -> None:
     from analysis.tracer.gallery import write_sheet
 
     height = max(one.shape[0] for _, one in shown)

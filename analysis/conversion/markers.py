@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.conversion.peers import Picture, rendered
+from analysis.conversion.peers import RenderedImage, rendered
 
 EYE, TARGET, UP = np.array([3.0, 2.0, 4.0]), np.array([0.2, 0.1, -0.3]), np.array([0.0, 1.0, 0.0])
 FOV_DEG = 40.0
@@ -121,7 +121,7 @@ def native(source: str, size: tuple[int, int]) -> tuple[str, str]:
     return _directives(size, "Scale -1 1 1\n" if source == "pbrt, turned" else "", "rgb", ""), ".pbrt"
 
 
-def farthest_px(picture: Picture, size: tuple[int, int], mirrored: bool) -> float:
+def farthest_px(picture: RenderedImage, size: tuple[int, int], mirrored: bool) -> float:
     """Greatest distance of a marker from its expected place, pixels; infinite if no marker of its colour is near."""
     worst = 0.0
     rows, columns = np.mgrid[: size[1], : size[0]] + 0.5
@@ -137,7 +137,7 @@ def farthest_px(picture: Picture, size: tuple[int, int], mirrored: bool) -> floa
     return worst
 
 
-def here(file: Path, size: tuple[int, int]) -> Picture:
+def here(file: Path, size: tuple[int, int]) -> RenderedImage:
     """The picture of a scene file by this project's renderer."""
     from renderer.trace import Renderer
     from scenes.catalog import load_any
@@ -192,7 +192,7 @@ def marker_offsets(
     return rows
 
 
-def _offset(picture: Picture | str, size: tuple[int, int], mirrored: bool) -> dict[str, Any]:
+def _offset(picture: RenderedImage | str, size: tuple[int, int], mirrored: bool) -> dict[str, Any]:
     if isinstance(picture, str):
         return {"offset_px": math.inf, "note": picture}
     return {"offset_px": farthest_px(picture, size, mirrored), "note": ""}

@@ -105,12 +105,12 @@ os._exit(0)
 
 _PROGRAMS = {"mitsuba": _MITSUBA, "luxcore": _LUXCORE}
 
-Picture = NDArray[np.float32]
+RenderedImage = NDArray[np.float32]
 
 
 def rendered(
     program: str, file: Path, out: Path, size: tuple[int, int], samples: int, limit_s: float, seed: int = 0
-) -> Picture | str:
+) -> RenderedImage | str:
     """The picture of a renderer, or a line that says why it made none.
 
     Args:

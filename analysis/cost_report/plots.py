@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from analysis.cost_report.refit import Cell, MemoryTrace, PowerLaw, StageFit
-    from analysis.cost_report.sweeps import Sweep
+    from analysis.cost_report.sweeps import ParameterSweep
 
 __all__ = [
     "advantage_figure",
@@ -60,7 +60,7 @@ def _resolution_axis(axis: Axes) -> None:
     axis.minorticks_off()
 
 
-def cost_figure(found: Sweep, title: str, crossing: float | None = None) -> Figure:
+def cost_figure(found: ParameterSweep, title: str, crossing: float | None = None) -> Figure:
     """Cost per output pixel along one parameter, with thin lines for stages and thick lines for sums (figs 7.3 to 7.5).
 
     Args:

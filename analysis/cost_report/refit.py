@@ -78,7 +78,7 @@ class MemoryTrace:
 
 
 @dataclass(frozen=True)
-class Line:
+class FittedLine:
     """Least-squares line.
 
     Attributes:
@@ -117,7 +117,7 @@ class PowerLaw:
     low: float
     high: float
     above_fixed: float | None
-    linear: Line
+    linear: FittedLine
 
 
 @dataclass(frozen=True)
@@ -133,30 +133,30 @@ class StageFit:
 
     flops: Sequence[float]
     seconds: Sequence[float]
-    origin: Line
-    affine: Line | None
+    origin: FittedLine
+    affine: FittedLine | None
     relative_to_tracing: float
 
     @property
-    def best(self) -> Line:
+    def best(self) -> FittedLine:
         """The line with a fixed cost if it can be fitted, else the line through the origin."""
         return self.affine or self.origin
 
 
-def _judged(x: np.ndarray, y: np.ndarray, per_unit: float, offset: float) -> Line:
+def _judged(x: np.ndarray, y: np.ndarray, per_unit: float, offset: float) -> FittedLine:
     left = y - (offset + per_unit * x)
     spread = float(((y - y.mean()) ** 2).sum())
     r2 = 1.0 - float((left**2).sum()) / spread if spread > 0.0 else None
-    return Line(per_unit, offset, r2, float(np.abs(left / y).max()))
+    return FittedLine(per_unit, offset, r2, float(np.abs(left / y).max()))
 
 
-def origin_line(x: Sequence[float], y: Sequence[float]) -> Line:
+def origin_line(x: Sequence[float], y: Sequence[float]) -> FittedLine:
     """Least squares through the origin."""
     a, b = np.asarray(x, float), np.asarray(y, float)
     return _judged(a, b, float(a @ b / (a @ a)), 0.0)
 
 
-def affine_line(x: Sequence[float], y: Sequence[float]) -> Line | None:
+def affine_line(x: Sequence[float], y: Sequence[float]) -> FittedLine | None:
     """Least squares with an offset; None if the abscissas are equal."""
     a, b = np.asarray(x, float), np.asarray(y, float)
     if np.ptp(a) <= _ALIKE * np.abs(a).max():

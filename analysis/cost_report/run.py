@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from analysis.cost_report.measurement import Measurement
-    from analysis.cost_report.sweeps import Sweep
+    from analysis.cost_report.sweeps import ParameterSweep
 
 SURFACE_BATCHES = (16.0, 1536.0)
 SURFACE_SEGMENTS = (0.0, 8.0)
@@ -104,7 +104,7 @@ def conclusion(
     }
 
 
-def sweeps(options: CostReportOptions) -> dict[str, Sweep]:
+def sweeps(options: CostReportOptions) -> dict[str, ParameterSweep]:
     """Cost per pixel along the three parameters of figs 7.3, 7.4 and 7.5."""
     import torch
 

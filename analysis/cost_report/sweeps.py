@@ -49,7 +49,7 @@ def crossing_batch(p: CostParameters, ledger: Ledger = "thesis", most: float = 2
 
 
 @dataclass(frozen=True)
-class Sweep:
+class ParameterSweep:
     """Operations per output pixel along the parameter ``name``; ``adaptive`` is the sum of the stages."""
 
     name: str
@@ -59,7 +59,7 @@ class Sweep:
     nonadaptive: Tensor
 
 
-def sweep(p: CostParameters, name: str, values: Tensor, ledger: Ledger = "thesis") -> Sweep:
+def sweep(p: CostParameters, name: str, values: Tensor, ledger: Ledger = "thesis") -> ParameterSweep:
     """Cost per output pixel while one parameter takes every value of a tensor (figs 7.3 to 7.5)."""
     varied = replace(p, **{name: values})
 
@@ -69,4 +69,4 @@ def sweep(p: CostParameters, name: str, values: Tensor, ledger: Ledger = "thesis
 
     stages = {stage: per_pixel(cost) for stage, cost in stage_flops(varied, ledger).items()}
     adaptive, nonadaptive = adaptive_flops(varied, ledger), nonadaptive_flops(varied, ledger)
-    return Sweep(name, values, stages, per_pixel(adaptive), per_pixel(nonadaptive))
+    return ParameterSweep(name, values, stages, per_pixel(adaptive), per_pixel(nonadaptive))

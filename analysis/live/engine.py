@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.live.options import NOTHING, Controls, LiveOptions
-from analysis.live.runner import Runner, Seen, SessionTime
+from analysis.live.runner import DisplayState, Runner, SessionTime
 from analysis.live.timeline import INTERVAL_S, Timeline
 from analysis.live.turns import Turns
 from analysis.storage.files import write_json
@@ -52,7 +52,7 @@ class _Sharpened:
 
 
 @dataclass(frozen=True)
-class Look:
+class LiveView:
     """What is seen at one time.
 
     Attributes:
@@ -62,7 +62,7 @@ class Look:
     """
 
     time_s: float
-    sides: dict[str, Seen | None]
+    sides: dict[str, DisplayState | None]
     runs: dict[str, Runner | None]
 
 
@@ -152,12 +152,12 @@ class Engine:
             self.controls = self.controls.changed(name, value)
             self._assign()
 
-    def look(self) -> Look:
+    def look(self) -> LiveView:
         """What is seen now."""
         with self._lock:
             now_s = self.now_s
             runs = {side: self._run_of(getattr(self.controls, side)) for side in SIDES}
-            return Look(now_s, {side: run and run.at(now_s) for side, run in runs.items()}, runs)
+            return LiveView(now_s, {side: run and run.at(now_s) for side, run in runs.items()}, runs)
 
     def truth(self) -> Any:
         """The picture as it should be at this moment, linear RGB ``(height, width, 3)``; the engine must stand."""

@@ -12,7 +12,7 @@ from analysis.command.cli import InputError
 from analysis.live.overlays import codes
 from analysis.metrics import METRICS, require_extras
 from analysis.metrics.quality import encode, pixel_errors
-from analysis.page.pictures import Pixels, palette
+from analysis.page.pictures import PagePixels, palette
 from tsar.types import LUMINANCE
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Frozen:
     names: Mapping[str, str]
     missing: tuple[str, ...]
 
-    def drawn(self, side: str, view: str) -> Pixels:
+    def drawn(self, side: str, view: str) -> PagePixels:
         """``(h, w, 3)`` uint8 of one of :data:`VIEWS`."""
         if view == TRUTH:
             return codes(self.pictures[TRUTH])

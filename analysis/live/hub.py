@@ -16,8 +16,8 @@ from analysis.live.engine import SIDES, Engine
 from analysis.live.freeze import SAID, VIEWS, Frozen, held
 from analysis.live.options import Controls
 from analysis.live.overlays import PLAIN, codes, laid_over, mean_newest_s, overlays, predicted_error
-from analysis.live.runner import Runner, Seen
-from analysis.page.pictures import ColorScale, Pixels, number
+from analysis.live.runner import DisplayState, Runner
+from analysis.page.pictures import ColorScale, PagePixels, number
 from analysis.page.video import AGES
 from scenes.sessions import ENDING
 from tsar.checks import require
@@ -67,7 +67,7 @@ class Hub:
         self._watchers: dict[int, Watcher] = {}
         self._driver, self._came = 0, 0
         self._display, self._lock = _Display(), threading.RLock()
-        self._drawn: dict[str, tuple[Any, tuple[Pixels, str]]] = {}
+        self._drawn: dict[str, tuple[Any, tuple[PagePixels, str]]] = {}
         self._told: dict[str, tuple[Any, tuple[float | None, float | None]]] = {}
 
     def came(self) -> Watcher:
@@ -145,8 +145,8 @@ class Hub:
         return b"".join((len(header).to_bytes(4, "little"), header, *pictures))
 
     def _pixels(
-        self, side: str, key: Any, seen: Seen, known: Mapping[str, Any], frozen: Frozen | None
-    ) -> tuple[Pixels, str]:
+        self, side: str, key: Any, seen: DisplayState, known: Mapping[str, Any], frozen: Frozen | None
+    ) -> tuple[PagePixels, str]:
         """Pixels of a side, and what their colours mean; those that another page was sent are not made again."""
         overlay, strength = key[2], key[3]
         before = self._drawn.get(side)
@@ -162,7 +162,7 @@ class Hub:
         self._drawn[side] = key, found
         return found
 
-    def _facts(self, side: str, run: Runner | None, seen: Seen | None, time_s: float) -> dict[str, Any]:
+    def _facts(self, side: str, run: Runner | None, seen: DisplayState | None, time_s: float) -> dict[str, Any]:
         """What a page is told of a side in numbers; what costs time is taken once of a picture."""
         if run is None:
             return {"name": ""}

@@ -11,9 +11,19 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from torch import Tensor
 
-from analysis.live.runner import Seen
+from analysis.live.runner import DisplayState
 from analysis.metrics.quality import encode
-from analysis.page.pictures import RATE_MAP, ColorScale, Map, Pixels, age_map, density_map, enlarge, stored, tiling_map
+from analysis.page.pictures import (
+    RATE_MAP,
+    ByteMap,
+    ColorScale,
+    PagePixels,
+    age_map,
+    density_map,
+    enlarge,
+    stored,
+    tiling_map,
+)
 from analysis.page.video import AGES, Scales
 from tsar.config import TsarConfig
 
@@ -30,7 +40,7 @@ def _codes() -> NDArray[np.uint8]:
     return (encode(linear)[:, 0, 0] * 255.0 + 0.5).byte().numpy()
 
 
-def codes(image: Float[Tensor, "h w 3"]) -> Pixels:
+def codes(image: Float[Tensor, "h w 3"]) -> PagePixels:
     """``(h, w, 3)`` uint8 sRGB of linear RGB, by a table of 65536 entries; not a number is black."""
     finite = np.nan_to_num(image.numpy(), nan=0.0, posinf=0.0, neginf=0.0)
     np.clip(finite, 0.0, 1.0, out=finite)
@@ -39,7 +49,7 @@ def codes(image: Float[Tensor, "h w 3"]) -> Pixels:
     return np.take(_codes(), finite.astype(np.uint16))
 
 
-def overlays(seen: Seen, config: TsarConfig, time_s: float) -> Mapping[str, Callable[[], Map]]:
+def overlays(seen: DisplayState, config: TsarConfig, time_s: float) -> Mapping[str, Callable[[], ByteMap]]:
     """Maps that can be drawn of what stands on a display, by label; each is made when it is called.
 
     Args:
@@ -48,7 +58,7 @@ def overlays(seen: Seen, config: TsarConfig, time_s: float) -> Mapping[str, Call
         time_s: now.
     """
     record, display = seen.shown
-    found: dict[str, Callable[[], Map]] = {}
+    found: dict[str, Callable[[], ByteMap]] = {}
     scales = Scales(config.spatial_bounds, config.temporal_bounds)
     if record is not None:
         densities = record.densities
@@ -63,12 +73,14 @@ def overlays(seen: Seen, config: TsarConfig, time_s: float) -> Mapping[str, Call
     return found
 
 
-def _of_policy(seen: Seen, label: str) -> Map:
+def _of_policy(seen: DisplayState, label: str) -> ByteMap:
     one = seen.shown[1].maps[label]
-    return Map(stored(one.values.numpy().astype(np.float64), one.bounds), ColorScale.of(one.bounds, one.unit, RATE_MAP))
+    return ByteMap(
+        stored(one.values.numpy().astype(np.float64), one.bounds), ColorScale.of(one.bounds, one.unit, RATE_MAP)
+    )
 
 
-def laid_over(picture: Pixels, one: Map, strength: float) -> Pixels:
+def laid_over(picture: PagePixels, one: ByteMap, strength: float) -> PagePixels:
     """A map over a picture.
 
     Args:
@@ -80,7 +92,7 @@ def laid_over(picture: Pixels, one: Map, strength: float) -> Pixels:
     return (picture + strength * (colours.astype(np.float32) - picture) + 0.5).astype(np.uint8)
 
 
-def mean_newest_s(seen: Seen) -> float | None:
+def mean_newest_s(seen: DisplayState) -> float | None:
     """Mean time of the newest samples that are shown, seconds; None where the policy cannot tell."""
     samples = seen.shown[1].sample_map
     if samples is None:
@@ -90,7 +102,7 @@ def mean_newest_s(seen: Seen) -> float | None:
     return float(known.mean()) if known.size else None
 
 
-def predicted_error(seen: Seen) -> float | None:
+def predicted_error(seen: DisplayState) -> float | None:
     """Root of the mean square that the policy takes its errors to have; None where it does not tell."""
     if EXPECTED not in seen.shown[1].maps:
         return None

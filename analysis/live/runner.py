@@ -49,7 +49,7 @@ class SessionTime:
 
 
 @dataclass(frozen=True)
-class Seen:
+class DisplayState:
     """What stands on a display.
 
     Attributes:
@@ -109,12 +109,12 @@ class Runner:
         self._refresh, self._latency = refresh, latency_cycles
         self.cycles, self.busy_s, self.error = 0, 0.0, ""
         self._before_s = 0.0
-        self._lock, self._ready = threading.Lock(), deque[Seen]()
+        self._lock, self._ready = threading.Lock(), deque[DisplayState]()
         self._who = turns.join()
         self._thread = threading.Thread(target=self._work, name=f"live {name}", daemon=True)
         self._thread.start()
 
-    def at(self, time_s: float) -> Seen | None:
+    def at(self, time_s: float) -> DisplayState | None:
         """What stands on its display; None before the first picture."""
         with self._lock:
             self._drop(time_s)
@@ -161,7 +161,7 @@ class Runner:
         with self._lock:
             self.cycles += 1
             self.busy_s = self._turns.worked(self._who) - self._before_s
-            self._ready.append(Seen(self.cycles, (record, display)))
+            self._ready.append(DisplayState(self.cycles, (record, display)))
             self._drop(self._session.now())
 
     def _drop(self, time_s: float) -> None:

@@ -30,7 +30,7 @@ _DROPPED = 1200
 
 
 @dataclass
-class Animation:
+class Playback:
     """Where the scene's own time is and how it goes on. Changes in place.
 
     Attributes:
@@ -70,7 +70,7 @@ class Timeline:
         self._own_camera = Motions([camera_track(scene)])
         tracks = instance_tracks(scene)
         self._own = Motions(tracks) if tracks else None
-        self.animation = Animation(scene.duration_s)
+        self.animation = Playback(scene.duration_s)
         self.drive = cameras.at_rest(np.asarray(scene.camera.to_world, np.float64))
         self._lock = threading.RLock()
         self._first = -PAST + 1

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from analysis.metrics.arrays import Floats
+
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
@@ -87,7 +88,7 @@ def least_error(costs: Floats, errors: Floats, budgets: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Bands:
+class FrontBands:
     """Variation of a front with the runs on which it was measured.
 
     Attributes:
@@ -109,7 +110,7 @@ def means(values: Floats) -> Floats:
     return np.exp(np.log(values).mean(axis=1))
 
 
-def bootstrap(costs: Floats, errors: Floats, budgets: Floats, draws: int = 1000, seed: int = 0) -> Bands:
+def bootstrap(costs: Floats, errors: Floats, budgets: Floats, draws: int = 1000, seed: int = 0) -> FrontBands:
     """Bootstrap of the front of geometric means, over runs drawn with replacement, the same for all points.
 
     Args:
@@ -133,7 +134,7 @@ def bootstrap(costs: Floats, errors: Floats, budgets: Floats, draws: int = 1000,
         least[number] = least_error(cost, error, budgets)
     # the nearest draw, because interpolation with an infinite neighbour fails
     low, high = (np.quantile(least, share, axis=0, method="nearest") for share in (0.025, 0.975))
-    return Bands(np.asarray(budgets, np.float64), low, high, shares[0] / draws, shares[1] / draws)
+    return FrontBands(np.asarray(budgets, np.float64), low, high, shares[0] / draws, shares[1] / draws)
 
 
 def interval(values: Floats, draws: int = 1000, seed: int = 0) -> tuple[float, float]:

@@ -18,10 +18,10 @@ import numpy as np
 import torch
 from jaxtyping import Float
 from kornia.color import linear_rgb_to_rgb
-from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.command.cli import InputError
+from analysis.metrics.arrays import Floats
 from tsar.types import ShownImage, StepRecord
 
 WHISKERS = 1.5
@@ -31,7 +31,6 @@ DRAWS = 4000
 INTERVAL = (2.5, 97.5)
 """Percentiles of the samples that bound an interval."""
 
-Floats = NDArray[np.float64]
 Payload = TypeVar("Payload")
 
 
@@ -40,7 +39,7 @@ Shown = tuple[StepRecord | None, ShownImage]
 
 
 @dataclass(frozen=True)
-class View:
+class DisplayedImages:
     """The images on all displays at one reference time.
 
     Attributes:

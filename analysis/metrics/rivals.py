@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.metrics.quality import Floats
+from analysis.metrics.arrays import Floats
 
 BEST = "best-rival"
 """Name of the best rival in tables."""

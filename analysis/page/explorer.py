@@ -32,7 +32,7 @@ font-size:12px;display:block} .explorer svg text{fill:var(--soft)} .explorer .gr
 
 
 @dataclass(frozen=True)
-class Point:
+class PlotPoint:
     """A point of the plot.
 
     Attributes:
@@ -63,7 +63,7 @@ class Explorer:
         note: text below the plot.
     """
 
-    points: Sequence[Point]
+    points: Sequence[PlotPoint]
     across: Sequence[str]
     upward: Sequence[str]
     colours: Mapping[str, str]

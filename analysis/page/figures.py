@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from analysis.storage.files import atomic
 
-Floats = NDArray[np.float64]
-
 INKS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9")
 """Vermilion is the ink of the run's own policy. Yellow is left out, because it is hard to see on white."""
 DASHES = ("", "7 3", "2 2", "8 3 2 3", "5 2 1 2 1 2", "12 3", "1 3")

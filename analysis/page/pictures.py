@@ -22,7 +22,7 @@ from torch import Tensor
 from tsar.morton import interleave, raster_to_morton
 from tsar.types import Tiling
 
-Pixels = NDArray[np.uint8]
+PagePixels = NDArray[np.uint8]
 
 DENSITY_MAP = "viridis"
 RATE_MAP = "inferno"
@@ -76,7 +76,7 @@ class ColorScale:
     def _value(self, place: int) -> float:
         return self.bounds[0] * (self.bounds[1] / self.bounds[0]) ** (place / 254)
 
-    def colours(self) -> Pixels:
+    def colours(self) -> PagePixels:
         """``(256, 3)`` colours of the bytes."""
         values = self.bounds[0] * (self.bounds[1] / self.bounds[0]) ** (np.arange(-1, 255) / 254)
         found = colour(values, self.shown, self.palette)
@@ -85,13 +85,13 @@ class ColorScale:
 
 
 @dataclass(frozen=True)
-class Map:
+class ByteMap:
     """A byte for each place, ``(rows, columns)``, and the scale of the bytes."""
 
-    places: Pixels
+    places: PagePixels
     scale: ColorScale
 
-    def pixels(self) -> Pixels:
+    def pixels(self) -> PagePixels:
         """Colours, ``(rows, columns, 3)``."""
         return self.scale.colours()[self.places]
 
@@ -113,21 +113,21 @@ def font(size_px: int) -> ImageFont.FreeTypeFont:
 
 
 @lru_cache(maxsize=4)
-def palette(name: str) -> Pixels:
+def palette(name: str) -> PagePixels:
     """``(256, 3)`` colours of a colour map of monotonic lightness."""
     import matplotlib
 
     return (matplotlib.colormaps[name](np.arange(256))[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
 
-def colour(values: NDArray[np.float64], bounds: tuple[float, float], name: str) -> Pixels:
+def colour(values: NDArray[np.float64], bounds: tuple[float, float], name: str) -> PagePixels:
     """Colours of positive values on a logarithmic scale between the bounds."""
     low, high = math.log(bounds[0]), math.log(bounds[1])
     share = (np.log(np.maximum(values, bounds[0])) - low) / max(high - low, 1e-12)
     return palette(name)[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
 
 
-def stored(values: NDArray[np.float64], bounds: tuple[float, float]) -> Pixels:
+def stored(values: NDArray[np.float64], bounds: tuple[float, float]) -> PagePixels:
     """Bytes of positive values; 0 where a value is not finite."""
     known = np.isfinite(values)
     share = np.log(np.clip(np.where(known, values, bounds[0]), *bounds) / bounds[0]) / math.log(bounds[1] / bounds[0])
@@ -153,7 +153,7 @@ def tile_map(tiling: Tiling, resolution_px: int) -> NDArray[np.int64]:
 
 def tiling_map(
     tiling: Tiling, temporal: Float[Tensor, " e"], resolution_px: int, bounds: tuple[float, float] = (1 / 64, 1.0)
-) -> Map:
+) -> ByteMap:
     """Tiles by refresh rate, with outlines.
 
     Args:
@@ -176,24 +176,26 @@ def tiling_map(
     edge[1:, :] |= tiles[1:, :] != tiles[:-1, :]
     places[edge] = 0
     scale = ColorScale.of(bounds, "refreshes per cycle", RATE_MAP, special=EDGE, meaning="edge of a tile")
-    return Map(places, scale)
+    return ByteMap(places, scale)
 
 
-def density_map(density: Float[Tensor, " e"], bounds: tuple[float, float], unit: str, name: str = DENSITY_MAP) -> Map:
+def density_map(
+    density: Float[Tensor, " e"], bounds: tuple[float, float], unit: str, name: str = DENSITY_MAP
+) -> ByteMap:
     """A field in Morton order as a map in raster order, one byte an element."""
     side = math.isqrt(density.numel())
     raster = density[raster_to_morton(side)].reshape(side, side).numpy().astype(np.float64)
-    return Map(stored(raster, bounds), ColorScale.of(bounds, unit, name))
+    return ByteMap(stored(raster, bounds), ColorScale.of(bounds, unit, name))
 
 
-def age_map(newest_s: Float[Tensor, "h w"], time_s: float, bounds_s: tuple[float, float]) -> Map:
+def age_map(newest_s: Float[Tensor, "h w"], time_s: float, bounds_s: tuple[float, float]) -> ByteMap:
     """Age of the newest samples at ``time_s``, milliseconds; ``NEVER`` where there are none."""
     bounds = 1e3 * bounds_s[0], 1e3 * bounds_s[1]
     age_ms = 1e3 * (time_s - newest_s.numpy().astype(np.float64))
-    return Map(stored(age_ms, bounds), ColorScale.of(bounds, "ms", AGE_MAP, meaning="not sampled yet"))
+    return ByteMap(stored(age_ms, bounds), ColorScale.of(bounds, "ms", AGE_MAP, meaning="not sampled yet"))
 
 
-def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
+def enlarge(image: PagePixels, width_px: int, height_px: int = 0) -> PagePixels:
     """A picture at another size, by default a square: pixels are repeated if it grows by whole factors, and averaged
     smoothly otherwise."""
     size, (height, width) = (height_px or width_px, width_px), image.shape[:2]
@@ -206,8 +208,8 @@ def enlarge(image: Pixels, width_px: int, height_px: int = 0) -> Pixels:
 
 
 def scale_strip(
-    width_px: int, height_px: int, scale: ColorScale, ink: tuple[int, int, int], paper: Pixels | tuple
-) -> Pixels:
+    width_px: int, height_px: int, scale: ColorScale, ink: tuple[int, int, int], paper: PagePixels | tuple
+) -> PagePixels:
     """A colour scale with its ends and its unit, for the place below a map: a bar, and text below it."""
     picture = Image.new("RGB", (width_px, height_px), tuple(paper))
     draw, margin, bar = ImageDraw.Draw(picture), max(4, width_px // 40), max(3, height_px // 5)
@@ -228,7 +230,7 @@ def number(value: float) -> str:
     return f"{value:.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
 
 
-def picture_bytes(pixels: Pixels, exact: bool) -> bytes:
+def picture_bytes(pixels: PagePixels, exact: bool) -> bytes:
     """An array ``(h, w, 3)`` or ``(h, w)`` uint8 as an image file for browsers: lossless WebP, or AVIF without chroma
     subsampling, whose codes are off by about 1 of 255 on average and by less than 6 in 99 % of places."""
     buffer, image = io.BytesIO(), Image.fromarray(pixels)

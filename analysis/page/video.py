@@ -12,12 +12,12 @@ import numpy as np
 from PIL import Image, ImageDraw
 from torch import Tensor
 
-from analysis.metrics.quality import View, encode
+from analysis.metrics.quality import DisplayedImages, encode
 from analysis.page.pictures import (
     RATE_MAP,
+    ByteMap,
     ColorScale,
-    Map,
-    Pixels,
+    PagePixels,
     age_map,
     density_map,
     enlarge,
@@ -46,7 +46,7 @@ def inks(runs: Sequence[str], own: str) -> list[tuple[int, int, int]]:
 class FrameSink(Protocol):
     """Destination of finished frames, such as an MP4 writer."""
 
-    def add(self, pixels: Pixels) -> None: ...
+    def add(self, pixels: PagePixels) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -59,34 +59,34 @@ class Scales:
     age_s: tuple[float, float] = (1e-3, 100.0)
 
 
-def to_pixels(image: Tensor) -> Pixels:
+def to_pixels(image: Tensor) -> PagePixels:
     """``(h, w, 3)`` uint8 sRGB of linear RGB; values that are not finite become black."""
     finite = image.nan_to_num(nan=0.0, posinf=0.0, neginf=0.0)
     return (encode(finite) * 255.0 + 0.5).clamp(0, 255).byte().contiguous().numpy()
 
 
-def images(view: View) -> dict[str, Tensor]:
+def images(view: DisplayedImages) -> dict[str, Tensor]:
     """The reference and the images on all displays, by name, linear RGB."""
     return {REFERENCE: view.reference} | {name: display.image for name, (_, display) in view.shown.items()}
 
 
-def photographs(view: View, side_px: int) -> dict[str, Pixels]:
+def photographs(view: DisplayedImages, side_px: int) -> dict[str, PagePixels]:
     """The reference and the images on all displays, by name, at one size."""
     size = side_px, height_of(view, side_px)
     return {label: enlarge(to_pixels(image), *size) for label, image in images(view).items()}
 
 
-def height_of(view: View, width_px: int) -> int:
+def height_of(view: DisplayedImages, width_px: int) -> int:
     """Even height of a picture of the given width with the aspect of the reference, limited to between a quarter of the
     width and four times the width."""
     height, width = view.reference.shape[:2]
     return width_px if height == width else 2 * round(0.5 * width_px * min(max(height / width, 0.25), 4.0))
 
 
-def maps(view: View, own: str, scales: Scales) -> dict[str, Map]:
+def maps(view: DisplayedImages, own: str, scales: Scales) -> dict[str, ByteMap]:
     """Maps of the runs' decisions, by label: the maps of the run ``own``, the ages of its samples, and tiling and
     densities of every run that records its cycles. The labels of other runs begin with their names."""
-    found: dict[str, Map] = {}
+    found: dict[str, ByteMap] = {}
     height, width = view.reference.shape[:2]
     for name in (own, *(name for name in view.shown if name != own)):
         record, display = view.shown[name]
@@ -100,7 +100,7 @@ def maps(view: View, own: str, scales: Scales) -> dict[str, Map]:
         if name == own:
             for label, one in display.maps.items():
                 places = stored(one.values.numpy().astype(np.float64), one.bounds)
-                found[label] = Map(places, ColorScale.of(one.bounds, one.unit, RATE_MAP))
+                found[label] = ByteMap(places, ColorScale.of(one.bounds, one.unit, RATE_MAP))
             if display.sample_map is not None:
                 found[AGES] = age_map(display.sample_map.newest_s, view.time_s, scales.age_s)
     return found
@@ -147,10 +147,10 @@ class ComparisonFilm:
     def frame(
         self,
         time_s: float,
-        pictures: Mapping[str, Pixels],
+        pictures: Mapping[str, PagePixels],
         times_s: Sequence[float],
         errors: Mapping[str, Sequence[float]],
-    ) -> Pixels:
+    ) -> PagePixels:
         """One frame, with ``errors`` of each run up to now at ``times_s``. ``pictures`` are by label; the place of a
         missing one stays empty."""
         canvas = Image.new("RGB", (self.width_px, self.height_px), PAPER)

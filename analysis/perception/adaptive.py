@@ -16,7 +16,7 @@ from analysis.perception.observers import Observer, correct_probability
 from analysis.perception.options import AdaptiveOptions
 from analysis.perception.psychometrics import THRESHOLD
 from analysis.study.cases import ROWS, SCALES, Case, framed_config
-from analysis.study.evaluation import Place, broken, finished
+from analysis.study.evaluation import Resources, broken, finished
 from analysis.study.farm import describe_failures, run_cases
 from tsar.config import TsarConfig
 
@@ -44,7 +44,7 @@ def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
             for policy, chosen in pair:
                 case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
                 cases[name, row, policy] = case
-    place = Place(options.out / "runs", Path(options.cache))
+    place = Resources(options.out / "runs", Path(options.cache))
     keys, failures = run_cases(list(cases.values()), place, ClusterOptions(options.workers), task)
     if failures:
         for line in describe_failures({case.name: reason for case, reason in failures.items()}):

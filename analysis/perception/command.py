@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from analysis.command.cli import parse
 from analysis.command.extras import require_extra
-from analysis.perception.options import AdaptiveOptions, SimulateOptions, Step
+from analysis.perception.options import AdaptiveOptions, SimulateOptions, StepOptions
 
 NEEDS = {SimulateOptions: ("perception",), AdaptiveOptions: ("study", "perception")}
 
 
 def main() -> None:
     """Parses, runs one step of the study, prints the outcome."""
-    options = parse(Step, __doc__ or "")  # type: ignore[arg-type]
+    options = parse(StepOptions, __doc__ or "")  # type: ignore[arg-type]
     require_extra(*NEEDS.get(type(options), ()))
     from analysis.command.console import show
     from analysis.perception.run import run

@@ -209,7 +209,7 @@ class AdaptiveOptions:
         require(0.0 <= self.span_s[0] < self.span_s[1] <= 2.0, "span_s", "from and to within the 2 s", self.span_s)
 
 
-Step = (
+StepOptions = (
     Annotated[StimuliOptions, tyro.conf.subcommand("stimuli")]
     | Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
     | Annotated[ServeOptions, tyro.conf.subcommand("serve")]

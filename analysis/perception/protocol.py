@@ -52,7 +52,7 @@ class Trial:
     test_first: bool
 
 
-class Session:
+class TrialSession:
     """The trials of one person, in a folder of their own; a session that is opened again continues where it was.
 
     One process at a time may have it open.
@@ -102,7 +102,7 @@ class Session:
             self.answers: dict[int, dict[str, Any]] = {row["trial"]: row for row in self._store.rows()}
             self._held = held.pop_all()
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> TrialSession:
         return self
 
     def __exit__(self, *caught: object) -> None:

@@ -24,7 +24,7 @@ from analysis.perception.options import (
     SimulateOptions,
     StimuliOptions,
 )
-from analysis.perception.protocol import Session
+from analysis.perception.protocol import TrialSession
 from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, render_stimuli
 from analysis.perception.trials import CONDITIONS, checked_trials
@@ -114,7 +114,7 @@ def simulate(options: SimulateOptions, bars: Bars) -> Found:
 
 def serve(options: ServeOptions, bars: Bars) -> Found:
     """Shows trials to a person until all are answered, or until this is interrupted."""
-    with Session(options.out, options.stimuli, options.observer, options.repetitions, options.seed) as session:
+    with TrialSession(options.out, options.stimuli, options.observer, options.repetitions, options.seed) as session:
         _answered(session, options, bars)
     table = session.table()
     late = int(np.count_nonzero(table["dropped_frames"].to_numpy() > 0))
@@ -122,7 +122,7 @@ def serve(options: ServeOptions, bars: Bars) -> Found:
     return found, f"{len(table)} of {len(session.trials)} trials answered, {late} with late frames"
 
 
-def _answered(session: Session, options: ServeOptions, bars: Bars) -> None:
+def _answered(session: TrialSession, options: ServeOptions, bars: Bars) -> None:
     task = bars.task("answers", len(session.trials))
     task.reach(len(session.answers))
     try:

@@ -21,7 +21,7 @@ from tornado.web import HTTPError
 
 from analysis.command.cli import InputError
 from analysis.command.pages import Answering, served
-from analysis.perception.protocol import Session
+from analysis.perception.protocol import TrialSession
 
 _HERE = Path(__file__).parent
 _THREADS = 4
@@ -29,7 +29,7 @@ _THREADS = 4
 
 @dataclass(frozen=True)
 class _Service:
-    session: Session
+    session: TrialSession
     break_every: int
     threads: concurrent.futures.Executor
 
@@ -104,7 +104,7 @@ class _Frame(_Guarded):
         self.finish(content)
 
 
-def _state(session: Session, break_every: int) -> dict[str, Any]:
+def _state(session: TrialSession, break_every: int) -> dict[str, Any]:
     """State of the page: the current trial, without naming the pair that differs."""
     trial = session.current
     done, total = len(session.answers), len(session.trials)
@@ -126,7 +126,7 @@ def _state(session: Session, break_every: int) -> dict[str, Any]:
 
 
 @contextmanager
-def serving(session: Session, port: int = 0, break_every: int = 24) -> Iterator[str]:
+def serving(session: TrialSession, port: int = 0, break_every: int = 24) -> Iterator[str]:
     """Serves a session while the block runs; yields the address of its page.
 
     Raises:

@@ -36,7 +36,7 @@ def study(options: PrecisionOptions) -> dict[str, Any]:
         InputError: the machine or the input cannot provide what the options ask for.
     """
     from analysis.precision.runs import OWN, runs
-    from analysis.precision.tables import Result, format_table, least_safe, run_table, shown_tables
+    from analysis.precision.tables import RunResult, format_table, least_safe, run_table, shown_tables
     from analysis.study.evaluation import broken
     from analysis.study.farm import run_study
     from analysis.study.written import WRITTEN, write_study
@@ -48,7 +48,7 @@ def study(options: PrecisionOptions) -> dict[str, Any]:
     done = outcomes.summaries()
     made = [run for run in planned if run.case in done]
     lines = run_table(
-        Result(
+        RunResult(
             run,
             float(outcomes.times(run.case)["mse"].to_numpy().mean()),
             done[run.case]["asked"],

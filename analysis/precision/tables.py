@@ -16,7 +16,7 @@ BITS = {"float64": 64, "float32": 32, "bfloat16": 16, "float16": 16, "float8": 8
 
 
 @dataclass(frozen=True)
-class Result:
+class RunResult:
     """A run as read from disk.
 
     Attributes:
@@ -40,7 +40,7 @@ def same_for(asked: Sequence[str], others: Sequence[str]) -> int:
     return min(len(asked), len(others))
 
 
-def run_table(results: Iterable[Result]) -> pd.DataFrame:
+def run_table(results: Iterable[RunResult]) -> pd.DataFrame:
     """A line for each run in another format: its error over that of the unchanged policy, and the number of batches
     before their requests differ. Runs whose counterpart is missing are left out."""
     results = list(results)

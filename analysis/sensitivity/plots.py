@@ -20,8 +20,8 @@ from analysis.page.pictures import RATE_MAP, number
 
 if TYPE_CHECKING:
     from analysis.sensitivity.options import SensitivityOptions
-    from analysis.sensitivity.runs import Setting
-    from analysis.study.evaluation import Place
+    from analysis.sensitivity.runs import TemplateSetting
+    from analysis.study.evaluation import Resources
 
 Lines = Sequence[Mapping[str, Any]]
 """Lines of the table of settings."""
@@ -38,9 +38,9 @@ def write_all(
     folder: Path,
     options: SensitivityOptions,
     lines: Lines,
-    settings: Sequence[Setting],
-    keys: Mapping[Setting | None, str],
-    place: Place,
+    settings: Sequence[TemplateSetting],
+    keys: Mapping[TemplateSetting | None, str],
+    place: Resources,
 ) -> list[Path]:
     """Draws every figure that has results.
 

@@ -19,7 +19,7 @@ from tsar.config import TsarConfig
 
 
 @dataclass(frozen=True)
-class Setting:
+class TemplateSetting:
     """The varied parameters: slopes and offsets of the template, and the bias."""
 
     spatial_slope: float
@@ -29,12 +29,12 @@ class Setting:
     bias: float
 
     @classmethod
-    def of(cls, tsar: TsarConfig) -> Setting:
+    def of(cls, tsar: TsarConfig) -> TemplateSetting:
         """The setting of a configuration."""
         e = tsar.error
         return cls(e.spatial_slope, e.temporal_slope, e.spatial_offset, e.temporal_offset, tsar.response.bias)
 
-    def changed(self, **values: float) -> Setting:
+    def changed(self, **values: float) -> TemplateSetting:
         """The setting with some values replaced."""
         # adding zero turns -0.0 into 0.0: equal settings must not have two names
         return dataclasses.replace(self, **{name: float(value) + 0.0 for name, value in values.items()})
@@ -55,10 +55,10 @@ AXES = {
 """Sweeps, and the parameters that each varies."""
 
 
-def sweeps(options: SensitivityOptions) -> dict[str, list[Setting]]:
+def sweeps(options: SensitivityOptions) -> dict[str, list[TemplateSetting]]:
     """Settings of every sweep; those of the slopes in rows of equal temporal slope, each with the steepest spatial one
     first."""
-    base = Setting.of(options.tsar)
+    base = TemplateSetting.of(options.tsar)
     slopes = itertools.product(sorted(options.temporal_slopes), sorted(options.spatial_slopes))
     offsets = sorted(options.offsets)
     return {
@@ -74,12 +74,12 @@ class Run:
     """A case and its place in the study; the framed renderer has no setting."""
 
     input: str
-    setting: Setting | None
+    setting: TemplateSetting | None
     repetition: int
     case: Case
 
     @property
-    def place(self) -> tuple[str, Setting | None, int]:
+    def place(self) -> tuple[str, TemplateSetting | None, int]:
         """Input, setting and repetition."""
         return self.input, self.setting, self.repetition
 
@@ -92,7 +92,7 @@ def runs(options: SensitivityOptions) -> list[Run]:
     """
     scale = SCALES[options.scale]
     row = scale.config(options.row, options.tsar)
-    settings = dict.fromkeys([Setting.of(options.tsar), *itertools.chain(*sweeps(options).values())])
+    settings = dict.fromkeys([TemplateSetting.of(options.tsar), *itertools.chain(*sweeps(options).values())])
     framed, found = framed_config(row.resolution_px), []
     for repetition, name in itertools.product(range(options.repetitions), options.inputs):
         seeded = dataclasses.replace(row, seed=repetition)

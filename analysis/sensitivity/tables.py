@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.metrics.arrays import Floats
 from analysis.metrics.quality import DRAWS
 from analysis.sensitivity.options import SensitivityOptions
-from analysis.sensitivity.runs import AXES, Setting, sweeps
+from analysis.sensitivity.runs import AXES, TemplateSetting, sweeps
 from analysis.study.inputs import ALL
 
 if TYPE_CHECKING:
@@ -20,19 +20,18 @@ if TYPE_CHECKING:
 
     from analysis.command.console import Table
 
-Floats = NDArray[np.float64]
 
 BEST = ("to_default", "edge", "low", "high", "held_out", "beyond_spread")
 """Columns of the table of optima on the best setting; the others describe the flatness of the sweep."""
 _FLAT = 1e-9
 
-Line = dict[str, Any]
+TableLine = dict[str, Any]
 """A line of a table, by column."""
-Results = Mapping[tuple[str, "Setting | None", int], "pd.DataFrame"]
+TablesByPlace = Mapping[tuple[str, "TemplateSetting | None", int], "pd.DataFrame"]
 """Tables over the reference times by input, setting and repetition. Runs that failed are missing."""
 
 
-def errors(results: Results, name: str, settings: Sequence[Setting | None], repetitions: int) -> Floats:
+def errors(results: TablesByPlace, name: str, settings: Sequence[TemplateSetting | None], repetitions: int) -> Floats:
     """Mean MSE ``(settings, repetitions)`` of an input, or ``ALL``; NaN where a run is missing."""
     if name == ALL:
         each = [errors(results, one, settings, repetitions) for one in {key[0]: None for key in results}]
@@ -42,15 +41,20 @@ def errors(results: Results, name: str, settings: Sequence[Setting | None], repe
     return np.array(found, dtype=np.float64).reshape(len(settings), repetitions)
 
 
-def setting_table(results: Results, options: SensitivityOptions) -> list[Line]:
+def setting_table(results: TablesByPlace, options: SensitivityOptions) -> list[TableLine]:
     """One line per sweep, input and setting, over its repetitions; errors and ratios are NaN where a run is missing."""
     from analysis.metrics.quality import ratio, suitable_percentile
 
-    default, lines = Setting.of(options.tsar), []
+    default, lines = TemplateSetting.of(options.tsar), []
     for (sweep, settings), name in itertools.product(sweeps(options).items(), options.inputs):
         for setting in settings:
             ours, base, framed = errors(results, name, (setting, default, None), options.repetitions)
-            line: Line = {"sweep": sweep, "input": name, **dataclasses.asdict(setting), "default": setting == default}
+            line: TableLine = {
+                "sweep": sweep,
+                "input": name,
+                **dataclasses.asdict(setting),
+                "default": setting == default,
+            }
             line |= {"mse": ours.mean(), "to_default": ours.mean() / base.mean(), "ratio": ours.mean() / framed.mean()}
             each = ours / framed
             line |= {"ratio_least": each.min(), "ratio_most": each.max(), "ratio_median": np.nan}
@@ -62,9 +66,9 @@ def setting_table(results: Results, options: SensitivityOptions) -> list[Line]:
     return lines
 
 
-def optimum_table(results: Results, options: SensitivityOptions) -> list[Line]:
+def optimum_table(results: TablesByPlace, options: SensitivityOptions) -> list[TableLine]:
     """The best setting of every sweep and input, its gain over the default, and the flatness of the sweep."""
-    default, lines = Setting.of(options.tsar), []
+    default, lines = TemplateSetting.of(options.tsar), []
     names = (*options.inputs, ALL) if results else ()
     for (sweep, settings), name in itertools.product(sweeps(options).items(), names):
         found = errors(results, name, settings, options.repetitions)
@@ -77,10 +81,10 @@ def optimum_table(results: Results, options: SensitivityOptions) -> list[Line]:
     return lines
 
 
-def _optimum(found: Floats, base: Floats, settings: Sequence[Setting], axes: tuple[str, ...]) -> Line:
+def _optimum(found: Floats, base: Floats, settings: Sequence[TemplateSetting], axes: tuple[str, ...]) -> TableLine:
     mean, points = found.mean(1), np.array([[getattr(one, axis) for axis in axes] for one in settings])
     best = int(mean.argmin())
-    line: Line = dict(zip(axes, points[best], strict=True))
+    line: TableLine = dict(zip(axes, points[best], strict=True))
     line |= {"to_default": mean[best] / base.mean(), "edge": edge(points[best], points, axes) or "inside"}
     near = int((mean <= 1.05 * mean[best]).sum())
     line |= {"worst_to_best": mean.max() / mean[best], "within_5_percent": near, "settings": len(mean)}
@@ -88,7 +92,7 @@ def _optimum(found: Floats, base: Floats, settings: Sequence[Setting], axes: tup
     return line | (bowl(points, mean) if len(axes) == 2 else {})
 
 
-def beyond_spread(found: Floats, base: Floats) -> Line:
+def beyond_spread(found: Floats, base: Floats) -> TableLine:
     """Whether the best of settings ``(settings, repetitions)`` beats the default ``(repetitions,)`` beyond the spread.
 
     ``held_out`` is the error, over that of the default, of settings that were chosen on the other repetitions, because
@@ -116,7 +120,7 @@ def edge(point: Floats, points: Floats, axes: Sequence[str]) -> str:
     return ", ".join(names)
 
 
-def bowl(points: Floats, mse: Floats) -> Line:
+def bowl(points: Floats, mse: Floats) -> TableLine:
     """Least-squares fit of ``ln mse`` by a quadratic in two slopes, and its minimum within the grid.
 
     Returns:
@@ -151,7 +155,7 @@ def bowl(points: Floats, mse: Floats) -> Line:
     return found | {"fit_edge": "flat" if np.ptp(np.log(mse)) < _FLAT else edge(least, points, AXES["slopes"])}
 
 
-def shown_tables(optima: Sequence[Line]) -> list[Table]:
+def shown_tables(optima: Sequence[TableLine]) -> list[Table]:
     """The best setting of every sweep, and the flatness of the sweep, for a terminal."""
     import pandas as pd
 

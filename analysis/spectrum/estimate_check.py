@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import torch
 from jaxtyping import Float
-from numpy.typing import NDArray
 from scipy.stats import rankdata
 from torch import Tensor
 
 from analysis.command.progress import Task
+from analysis.metrics.arrays import Floats
 from analysis.metrics.quality import INTERVAL
 from analysis.spectrum.ideal_density import ideal_band, octant_power, power_norm, raster, share_of_total, tile_volume
 from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
@@ -26,8 +26,6 @@ from tsar.error import errors_of
 from tsar.estimators import state_size
 from tsar.morton import deinterleave, interleave, morton_to_raster
 from tsar.types import Trace
-
-Floats = NDArray[np.float64]
 
 _TIMES = 4
 _TILES_AT_ONCE = 16  # bounds memory

@@ -13,12 +13,11 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
+from analysis.metrics.arrays import Floats
 from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER
 from analysis.spectrum.estimate_check import Example, Tiles
 from analysis.spectrum.ideal_density import share_of_total
 from analysis.spectrum.spectra import Spectrum
-
-Floats = NDArray[np.float64]
 
 _LEVELS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 _INKS = (ADAPTIVE, FRAMED, OTHER, "#8d4fa8", "#b8960c", "0.35")

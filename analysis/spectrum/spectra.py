@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.command.cli import InputError, bad_input
+from analysis.metrics.arrays import Floats
 from analysis.spectrum.options import FRAMELET_SIDE, SpectrumOptions
 
 if TYPE_CHECKING:
     from analysis.command.progress import Task
     from renderer.trace import Renderer
 
-Floats = NDArray[np.float64]
 
 PHOTOGRAPHS = ("landscape_band.jpg", "sky.exr")
 _LEAST_SIDE = 32

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.storage.store import shortened
+
 if TYPE_CHECKING:
     import pyarrow as pa
 
@@ -101,12 +103,7 @@ def _of_values(a: Any, b: Any, ignore: set[str], place: str = "") -> Iterator[st
         for number, (left, right) in enumerate(zip(a, b, strict=True)):
             yield from _of_values(left, right, ignore, f"{place}[{number}]")
     elif a != b:
-        yield f"{place}: {_short(a)} and {_short(b)}"
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+        yield f"{place}: {shortened(a)} and {shortened(b)}"
 
 
 def _of_tables(first: Path, second: Path, ignore: set[str]) -> Iterator[str]:

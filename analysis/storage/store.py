@@ -255,10 +255,10 @@ def _require(value: Any, expected: Any, where: str) -> None:
 
     if isinstance(expected, Mapping):
         if not isinstance(value, dict):
-            raise ValueError(f"{where}: expected an object with {', '.join(expected)}, got {_short(value)}")
+            raise ValueError(f"{where}: expected an object with {', '.join(expected)}, got {shortened(value)}")
         for key, inner in expected.items():
             if key not in value:
-                raise ValueError(f"{where}: expected {key!r}, got only {_short(list(value))}")
+                raise ValueError(f"{where}: expected {key!r}, got only {shortened(list(value))}")
             _require(value[key], inner, f"{where}: {key}")
         return
     if isinstance(expected, list):
@@ -270,9 +270,10 @@ def _require(value: Any, expected: Any, where: str) -> None:
         check_type(value, expected, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
     except TypeCheckError:
         name = expected.__name__ if isinstance(expected, type) and not hasattr(expected, "__args__") else expected
-        raise ValueError(f"{where}: expected {name}, got {_short(value)}") from None
+        raise ValueError(f"{where}: expected {name}, got {shortened(value)}") from None
 
 
-def _short(value: Any) -> str:
+def shortened(value: Any) -> str:
+    """A JSON value as text of at most 60 characters."""
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

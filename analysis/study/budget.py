@@ -9,7 +9,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from analysis.metrics.budget import budget
-from analysis.metrics.quality import View
+from analysis.metrics.quality import DisplayedImages
 from analysis.study.sight import first_hits, places
 from tsar.types import Trace, Viewpoint
 
@@ -47,7 +47,7 @@ class Budgeting:
         self._name, self._side, self._trace, self._view = name, side, trace, view
         self._picture, self._before_s = picture, before_s
 
-    def __call__(self, view: View) -> None:
+    def __call__(self, view: DisplayedImages) -> None:
         display = view.shown[self._name][1]
         at_s = display.sample_time_s
         late = self._picture(at_s)

@@ -117,7 +117,7 @@ SCALES: dict[str, Scale] = {
 
 
 @dataclass(frozen=True)
-class Animation:
+class MovingScene:
     """A scene in motion.
 
     Attributes:
@@ -217,9 +217,9 @@ class Case:
         require(fits, "display_px", "a multiple of the pictures' side, and a divisor of the reference's", shown)
 
     @property
-    def animation(self) -> Animation:
+    def animation(self) -> MovingScene:
         """The scene and its motion."""
-        return Animation(self.input, self.phase, self.camera_path)
+        return MovingScene(self.input, self.phase, self.camera_path)
 
     @property
     def shown_px(self) -> int:
@@ -243,7 +243,7 @@ class Case:
         """Name for messages: policy and changes, input, batch, resolution, seed and phase."""
         c = self.tsar
         batch = "" if is_framed(self.policy) else f"-b{c.batch_size}"
-        changes = (f"-{name}-{_short(value)}" for name, value in (*self.parts, *self.tracing, *self.formats))
+        changes = (f"-{name}-{_value_name(value)}" for name, value in (*self.parts, *self.tracing, *self.formats))
         scene = Path(self.input).stem
         text = f"{self.policy}{''.join(changes)}-{scene}{batch}-{c.resolution_px}px-seed{c.seed}-phase{self.phase:.3f}"
         return text.replace(" ", "-")
@@ -261,12 +261,12 @@ class Case:
         return f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
 
-def _short(value: bool | int | float | str) -> str:
+def _value_name(value: bool | int | float | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
 @lru_cache(maxsize=16)
-def content_of(animation: Animation) -> str:
+def content_of(animation: MovingScene) -> str:
     """Hash of a scene that the source does not cover."""
     from analysis.storage.reference import content_hash
     from scenes import catalog

@@ -15,16 +15,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from analysis.metrics import METRICS
+from analysis.metrics.arrays import Floats
 from analysis.metrics.causes import CAUSES, REGIONS, Split, Truths, flicker, split
-from analysis.metrics.quality import Floats, Hold, Shown, View, encode, pixel_errors
-from analysis.page.pictures import Pixels
+from analysis.metrics.quality import DisplayedImages, Hold, Shown, encode, pixel_errors
+from analysis.page.pictures import PagePixels
 from tsar.policies.resampling import widened
 from tsar.types import ShownImage
 
 _MOTION_S = 0.1  # seconds over which motion is judged
 
 
-Viewer = Callable[[View], None]
+Viewer = Callable[[DisplayedImages], None]
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Measuring:
 
 
 @dataclass
-class Seen:
+class DisplayRecord:
     """The measurements of one display. Changes in place.
 
     Attributes:
@@ -64,7 +65,7 @@ class Seen:
     refresh_s: list[float] = field(default_factory=list)
     nonfinite: int = 0
     splits: list[Split] = field(default_factory=list)
-    frames: tuple[list[Pixels], list[Pixels]] = field(default_factory=lambda: ([], []))
+    frames: tuple[list[PagePixels], list[PagePixels]] = field(default_factory=lambda: ([], []))
 
     @property
     def images(self) -> int:
@@ -115,7 +116,7 @@ def watch(
     times_s: NDArray[np.float64],
     measuring: Measuring,
     viewers: Sequence[Viewer] = (),
-) -> dict[str, Seen]:
+) -> dict[str, DisplayRecord]:
     """Measures the image on each display at every reference time.
 
     Args:
@@ -135,7 +136,7 @@ def watch(
         wanted = encode(truth)
         shown = {name: hold.at(time_s) for name, hold in holds.items()}
         mse = {name: watchers[name].measure(number, display, truth, wanted) for name, (_, display) in shown.items()}
-        view = View(number, time_s, truth, shown, mse)
+        view = DisplayedImages(number, time_s, truth, shown, mse)
         for viewer in viewers:
             viewer(view)
     return {name: watcher.seen for name, watcher in watchers.items()}
@@ -145,7 +146,7 @@ class _Watcher:
     """Measures one display. Changes in place."""
 
     def __init__(self, truths: Truths, times_s: Floats, measuring: Measuring, hold: Hold) -> None:
-        self.seen = Seen(refresh_s=hold.refresh_s)
+        self.seen = DisplayRecord(refresh_s=hold.refresh_s)
         self._truths, self._times_s, self._measuring = truths, times_s, measuring
         self._before: tuple[Tensor, Tensor] | None = None
         self._hold = hold

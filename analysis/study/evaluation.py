@@ -22,8 +22,8 @@ from PIL import Image
 
 from analysis.metrics.causes import Truths
 from analysis.metrics.perceptual import jod, one_thread
-from analysis.metrics.quality import View, reference_times
-from analysis.page.pictures import Pixels, tiling_map
+from analysis.metrics.quality import DisplayedImages, reference_times
+from analysis.page.pictures import PagePixels, tiling_map
 from analysis.page.video import to_pixels
 from analysis.storage.files import locked
 from analysis.storage.reference import Reference, as_stored
@@ -31,7 +31,7 @@ from analysis.storage.source import code_hash
 from analysis.storage.store import Store
 from analysis.study.budget import Budgeting, averaged
 from analysis.study.cases import Case
-from analysis.study.displays import Measuring, Seen, enlarged, watch
+from analysis.study.displays import DisplayRecord, Measuring, enlarged, watch
 from analysis.study.memory import PeakMemory
 from analysis.study.runs import Machine, PolicyRun, Totals, begin
 from analysis.study.scenery import render_reference, renderer
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Place:
+class Resources:
     """Folders of results and references, and the number of threads.
 
     Attributes:
@@ -83,7 +83,7 @@ def source_of_results() -> str:
     return code_hash(evaluate)
 
 
-def finished(key: str, place: Place) -> dict[str, Any] | None:
+def finished(key: str, place: Resources) -> dict[str, Any] | None:
     """The summary of a result whose files are all intact on disk, or None. Reports damaged files.
 
     Raises:
@@ -95,7 +95,7 @@ def finished(key: str, place: Place) -> dict[str, Any] | None:
     return found if names and all(store.find(name) is not None for name in names) else None
 
 
-def times_of(key: str, place: Place) -> pd.DataFrame:
+def times_of(key: str, place: Resources) -> pd.DataFrame:
     """The table of a finished result over the reference times.
 
     Raises:
@@ -114,7 +114,7 @@ def broken(found: Iterable[Mapping[str, Any] | None]) -> list[str]:
     return [one["key"] for one in found if one and not one.get("invariants", {"ok": True})["ok"]]
 
 
-def evaluate(case: Case, key: str, place: Place) -> str:
+def evaluate(case: Case, key: str, place: Resources) -> str:
     """Runs a case unless its result is on disk; of two processes that want it, only one runs it.
 
     Args:
@@ -149,14 +149,14 @@ def _truths(case: Case, reference: Reference) -> Truths:
     return Truths(image, case.start_s, case.scale.reference_rate_hz, reference.spec.count)
 
 
-def _run(case: Case, key: str, place: Place) -> None:
+def _run(case: Case, key: str, place: Resources) -> None:
     began = time.perf_counter()
     reference = render_reference(case.animation, case.start_s, case.scale, place.references, place.threads)
     truths = _truths(case, reference)
     began_run = time.perf_counter()
     store, stills = place.store(key), list[str]()
 
-    def keep(number: int, pictures: dict[str, Pixels]) -> None:
+    def keep(number: int, pictures: dict[str, PagePixels]) -> None:
         for what, pixels in pictures.items():
             stills.append(place.still(key, what, number).relative_to(place.results).as_posix())
             with store.make(stills[-1]) as made:
@@ -229,12 +229,12 @@ def _scored(case: Case) -> tuple[int, int]:
 class _Stills:
     """Passes on the pictures of some times, with the number of the still."""
 
-    def __init__(self, case: Case, count: int, keep: Callable[[int, dict[str, Pixels]], None]) -> None:
+    def __init__(self, case: Case, count: int, keep: Callable[[int, dict[str, PagePixels]], None]) -> None:
         rate_hz = case.scale.reference_rate_hz
         self._case, self._keep = case, keep
         self._numbers = {min(round(at * rate_hz), count - 1): number for number, at in enumerate(case.stills_s)}
 
-    def __call__(self, view: View) -> None:
+    def __call__(self, view: DisplayedImages) -> None:
         if view.number in self._numbers:
             record, display = view.shown[self._case.policy]
             pictures = {"shown": to_pixels(display.image), "reference": to_pixels(view.reference)}
@@ -245,14 +245,14 @@ class _Stills:
             self._keep(self._numbers[view.number], pictures)
 
 
-def _score(case: Case, seen: Seen) -> float | None:
+def _score(case: Case, seen: DisplayRecord) -> float | None:
     if case.jod_span_s is None:
         return None
     shown, reference = (np.stack(frames) for frames in seen.frames)
     return jod(shown, reference, case.scale.reference_rate_hz, case.display)
 
 
-def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
+def _begin(case: Case, place: Resources, truths: Truths) -> PolicyRun:
     def renderer_of(footprint: float) -> Renderer:
         return renderer(case.animation, case.tsar.resolution_px * footprint, place.threads, case.tracing)
 
@@ -264,7 +264,7 @@ def _begin(case: Case, place: Place, truths: Truths) -> PolicyRun:
     )  # fmt: skip
 
 
-def _budgeting(case: Case, place: Place) -> Budgeting:
+def _budgeting(case: Case, place: Resources) -> Budgeting:
     scale, side = case.scale, case.tsar.resolution_px
     fine = renderer(case.animation, scale.reference_px, place.threads)
 

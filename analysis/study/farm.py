@@ -18,12 +18,12 @@ from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
 from analysis.storage.results import SUMMARY, own_results
-from analysis.study.cases import Animation, Case, Scale, content_of
+from analysis.study.cases import Case, MovingScene, Scale, content_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-    from analysis.study.evaluation import Place
+    from analysis.study.evaluation import Resources
     from analysis.study.outcomes import Outcomes
 
 
@@ -49,7 +49,7 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
     Raises:
         InputError: a folder cannot be created or locked, or nothing answers at the scheduler's address.
     """
-    from analysis.study.evaluation import Place
+    from analysis.study.evaluation import Resources
     from analysis.study.outcomes import Outcomes
 
     with bad_input():
@@ -57,14 +57,14 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
         writable_folder(options.cache, "cache")
     out = options.out.resolve()
     (out / SUMMARY).unlink(missing_ok=True)  # so that a killed study leaves no older summary
-    place = Place(out / "runs", options.cache.resolve(), options.farm.threads)
+    place = Resources(out / "runs", options.cache.resolve(), options.farm.threads)
     with full_disk(out), bars() as shown:
         place.results.mkdir(exist_ok=True)
         return Outcomes(place, *run_cases(cases, place, options.farm, shown.task("runs", len(set(cases)))))
 
 
 def run_cases(
-    cases: Sequence[Case], place: Place, options: ClusterOptions, task: Task | None = None
+    cases: Sequence[Case], place: Resources, options: ClusterOptions, task: Task | None = None
 ) -> tuple[dict[Case, str], dict[Case, str]]:
     """Runs every case whose result is not on disk yet; a case that fails does not stop the others.
 
@@ -179,7 +179,7 @@ def _keep_freed_memory() -> None:
         tune(option, value)
 
 
-def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Place) -> dict[Future, Case]:
+def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Resources) -> dict[Future, Case]:
     """Futures of the cases, each after that of its reference, in an order that puts the references early."""
     references = {_reference_of(case): None for case in missing}
     behind = {wanted: client.submit(_prepare, *wanted, place, pure=False) for wanted in references}
@@ -189,17 +189,17 @@ def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], plac
     }
 
 
-def _reference_of(case: Case) -> tuple[Animation, float, Scale]:
+def _reference_of(case: Case) -> tuple[MovingScene, float, Scale]:
     return case.animation, case.start_s, case.scale
 
 
-def _prepare(animation: Animation, start_s: float, scale: Scale, place: Place) -> None:
+def _prepare(animation: MovingScene, start_s: float, scale: Scale, place: Resources) -> None:
     from analysis.study.scenery import render_reference
 
     render_reference(animation, start_s, scale, place.references, place.threads)
 
 
-def _evaluate(case: Case, key: str, place: Place, reference: None) -> str:
+def _evaluate(case: Case, key: str, place: Resources, reference: None) -> str:
     from analysis.study.evaluation import evaluate
 
     return evaluate(case, key, place)

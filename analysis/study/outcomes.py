@@ -10,7 +10,7 @@ import pandas as pd
 
 from analysis.storage.source import Brought
 from analysis.study.cases import Case
-from analysis.study.evaluation import Place, finished, times_of
+from analysis.study.evaluation import Resources, finished, times_of
 from analysis.study.farm import describe_failures
 
 
@@ -24,7 +24,7 @@ class Outcomes:
         failures: reasons for failures, by case.
     """
 
-    place: Place
+    place: Resources
     keys: dict[Case, str] = field(default_factory=dict)
     failures: dict[Case, str] = field(default_factory=dict)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tsar.policy import Truth
 
 
-class Traced(Protocol):
+class Tracer(Protocol):
     """A renderer as runs see it: :class:`renderer.trace.Renderer`, or what stands for one."""
 
     def trace(self, batch: FrameletBatch, aspect: float = ...) -> SampleBatch: ...
@@ -179,7 +179,7 @@ class PolicyRun:
 def begin(
     name: str,
     config: TsarConfig,
-    renderer_of: Callable[[float], Traced],
+    renderer_of: Callable[[float], Tracer],
     machine: Machine,
     span_s: tuple[float, float],
     truth: Truth | None = None,
@@ -219,7 +219,7 @@ def begin(
 def made(
     name: str,
     config: TsarConfig,
-    renderer_of: Callable[[float], Traced],
+    renderer_of: Callable[[float], Tracer],
     truth: Truth | None = None,
     stages: StagesName = "compiled",
     threads: int = 1,

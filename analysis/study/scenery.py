@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from analysis.metrics.perceptual import one_thread
 from analysis.metrics.quality import reference_times
 from analysis.storage.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
-from analysis.study.cases import Animation, Scale, Tracing
+from analysis.study.cases import MovingScene, Scale, Tracing
 from tsar.formats import rounded
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def forget() -> None:
 
 
 @lru_cache(maxsize=_KEPT)
-def _scene(animation: Animation, tracing: Tracing = ()) -> Scene:
+def _scene(animation: MovingScene, tracing: Tracing = ()) -> Scene:
     from scenes import catalog
 
     scene, _ = catalog.load_any(animation.input, animation.phase, animation.camera_path)
@@ -43,7 +43,7 @@ def _scene(animation: Animation, tracing: Tracing = ()) -> Scene:
 
 
 @lru_cache(maxsize=_KEPT)
-def renderer(animation: Animation, footprint_px: float, threads: int, tracing: Tracing = ()) -> Renderer:
+def renderer(animation: MovingScene, footprint_px: float, threads: int, tracing: Tracing = ()) -> Renderer:
     """A renderer on the CPU that filters textures for ``footprint_px`` pixels along the image's side.
 
     Raises:
@@ -61,7 +61,7 @@ def renderer(animation: Animation, footprint_px: float, threads: int, tracing: T
     return made
 
 
-def render_reference(animation: Animation, start_s: float, scale: Scale, folder: Path, threads: int) -> Reference:
+def render_reference(animation: MovingScene, start_s: float, scale: Scale, folder: Path, threads: int) -> Reference:
     """The reference of an animation, from disk or rendered now.
 
     Args:
@@ -90,5 +90,5 @@ def render_reference(animation: Animation, start_s: float, scale: Scale, folder:
 
 
 @lru_cache(maxsize=16)
-def _scene_hash(animation: Animation) -> str:
+def _scene_hash(animation: MovingScene) -> str:
     return content_hash(_scene(animation))

@@ -13,17 +13,17 @@ from matplotlib.ticker import LogLocator
 from analysis.metrics.quality import WHISKERS, percentile
 from analysis.page.figures import ADAPTIVE, FRAMED, GRID, save
 from analysis.study.cases import ROWS, Case
-from analysis.study.evaluation import Place
+from analysis.study.evaluation import Resources
 from analysis.study.inputs import INPUTS
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.stills import finest, setting, write_strip
-from analysis.suitability.tables import Result, Results, ratios
+from analysis.suitability.tables import Results, RunResult, ratios
 
 _INK = {256: "#e8a33d", 512: "#c9570c", 1024: "#6d2077"}
 
 
 def write_all(
-    folder: Path, options: SuitabilityOptions, results: Results, keys: Mapping[Case, str], place: Place
+    folder: Path, options: SuitabilityOptions, results: Results, keys: Mapping[Case, str], place: Resources
 ) -> dict[str, Path]:
     """Draws every figure that has results; returns captions and files in the order of the thesis."""
     made: dict[str, Path] = {}
@@ -78,7 +78,7 @@ def _positive(values: Any) -> Any:
     return np.where(np.asarray(values) > 0, values, np.nan)
 
 
-def _refreshes(axis: Any, framed: Result) -> None:
+def _refreshes(axis: Any, framed: RunResult) -> None:
     """Draws vertical lines at the reference times at which the shown image changes."""
     changes = framed.times["time_s"][framed.times["refresh"].diff() > 0]
     axis.vlines(changes, 0, 1, transform=axis.get_xaxis_transform(), color="0.75", linewidth=0.7, linestyle=":")

@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.metrics.quality import Floats, percentile, ratio, suitable_percentile
+from analysis.metrics.arrays import Floats
+from analysis.metrics.quality import percentile, ratio, suitable_percentile
 from analysis.metrics.rivals import BEST, best_of, best_shares, standing
 from analysis.study.cases import ROWS, is_framed
-from analysis.suitability.tables import SIGNS, Result, Results
+from analysis.suitability.tables import SIGNS, Results, RunResult
 
 ALL = "all"
 """Stands in the column of rows for all rows together."""
 
 
 @dataclass(frozen=True)
-class Group:
+class RunGroup:
     """Results of one input, row and repetition, which share the reference.
 
     Attributes:
@@ -33,7 +34,7 @@ class Group:
 
     input: str
     row: int
-    results: Mapping[str, Result]
+    results: Mapping[str, RunResult]
 
     def values(self, name: str, metric: str) -> Floats:
         """Values of a metric at the reference times; the score of a sequence is a single value."""
@@ -47,7 +48,7 @@ class Group:
         return best_of([self.values(name, metric) for name in rivals if name in self.results], SIGNS[metric])
 
 
-def groups_of(results: Results, rows: Mapping[int, int], names: Sequence[str]) -> list[Group]:
+def groups_of(results: Results, rows: Mapping[int, int], names: Sequence[str]) -> list[RunGroup]:
     """Groups of the results of some policies, if the framed renderer has a result.
 
     Args:
@@ -62,18 +63,18 @@ def groups_of(results: Results, rows: Mapping[int, int], names: Sequence[str]) -
                 made = {one: results.get(one, name, None if is_framed(one) else row, side, repetition) for one in names}
                 present = {one: result for one, result in made.items() if result is not None}
                 if "framed" in present:
-                    found.append(Group(name, row, present))
+                    found.append(RunGroup(name, row, present))
     return found
 
 
-def _by_row(groups: Sequence[Group]) -> Iterator[tuple[int | str, list[Group]]]:
+def _by_row(groups: Sequence[RunGroup]) -> Iterator[tuple[int | str, list[RunGroup]]]:
     rows = sorted({group.row for group in groups})
     if len(rows) > 1:
         yield ALL, list(groups)
     yield from ((row, [group for group in groups if group.row == row]) for row in rows)
 
 
-def rival_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
+def rival_table(groups: Sequence[RunGroup], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
     """A line for each row and policy: its error compared with that of the framed renderer and of the best rival.
 
     ``at most`` is the share of moments at which the error is at most the other's, and ``median`` the median of the
@@ -96,7 +97,7 @@ def rival_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequen
     return pd.DataFrame(lines)
 
 
-def _beside(groups: Sequence[Group], name: str, others: Sequence[str]) -> dict[str, float]:
+def _beside(groups: Sequence[RunGroup], name: str, others: Sequence[str]) -> dict[str, float]:
     """Statistics of the error of a policy over the least error of the others."""
     of_run: dict[tuple[str, int], list[Floats]] = {}
     for group in groups:
@@ -114,7 +115,7 @@ def _beside(groups: Sequence[Group], name: str, others: Sequence[str]) -> dict[s
     }
 
 
-def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
+def metric_table(groups: Sequence[RunGroup], policies: Sequence[str], rivals: Sequence[str]) -> pd.DataFrame:
     """Policies by every metric, all rows together: share of moments, and number of runs in which the mean is better.
 
     The score of a sequence counts as one moment.
@@ -136,7 +137,7 @@ def metric_table(groups: Sequence[Group], policies: Sequence[str], rivals: Seque
     return pd.DataFrame(lines)
 
 
-def _better_runs(groups: Sequence[Group], name: str, others: Sequence[str], metric: str) -> tuple[int, int]:
+def _better_runs(groups: Sequence[RunGroup], name: str, others: Sequence[str], metric: str) -> tuple[int, int]:
     """Number of runs in which the mean is better than that of every other, and number of runs with a value."""
     sign, means = SIGNS[metric], dict[tuple[str, int], list[tuple[float, float]]]()
     for group in groups:
@@ -149,7 +150,7 @@ def _better_runs(groups: Sequence[Group], name: str, others: Sequence[str], metr
     return sum(bool(own > other) for own, other in pairs), len(pairs)
 
 
-def lead_table(groups: Sequence[Group], rivals: Sequence[str]) -> pd.DataFrame:
+def lead_table(groups: Sequence[RunGroup], rivals: Sequence[str]) -> pd.DataFrame:
     """A line for each row: share of the moments at which each rival has the lowest error; equal ones all count."""
     lines = []
     for row, found in _by_row(groups):

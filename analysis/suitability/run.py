@@ -22,8 +22,8 @@ from analysis.suitability.page import shown_tables, write_page
 from analysis.suitability.rivalry import groups_of, lead_table, metric_table, rival_table
 from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import (
-    Result,
     Results,
+    RunResult,
     cause_table,
     disagreement_table,
     percentile_table,
@@ -53,7 +53,7 @@ def study(options: SuitabilityOptions) -> tuple[dict[str, Any], Tables]:
     outcomes = run_study(options, [run.case for run in planned], written)
     outcomes.tell()
     out, done = options.out.resolve(), outcomes.summaries()
-    results = Results([Result(run, done[run.case], outcomes.times(run.case)) for run in planned if run.case in done])
+    results = Results([RunResult(run, done[run.case], outcomes.times(run.case)) for run in planned if run.case in done])
     tables, measured = tables_of(options, results), timing(done)
     with full_disk(out):
         write_tables(out, tables, shown_tables(tables))

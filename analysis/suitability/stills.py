@@ -11,11 +11,11 @@ from PIL import Image
 
 from analysis.page.figures import save
 from analysis.study.cases import ROWS, SCALES, Case, is_framed
-from analysis.study.evaluation import Place
+from analysis.study.evaluation import Resources
 from analysis.study.inputs import INPUTS
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.runs import STILLS, Run
-from analysis.suitability.tables import Result, Results
+from analysis.suitability.tables import Results, RunResult
 
 _BATCHES = (32, 128, 256, 512, 1024)
 LOOKS_AHEAD = "oracle"
@@ -31,14 +31,14 @@ def setting(run: Run) -> str:
     return f"{ran} (thesis: {batch}, {side}²)"
 
 
-def finest(results: Results, label: str, name: str) -> Result | None:
+def finest(results: Results, label: str, name: str) -> RunResult | None:
     """The run of an input at the finest resolution, first repetition; None if there is none."""
     found = [one for one in results.all if (one.run.label, one.run.case.input) == (label, name)]
     found = [one for one in found if one.run.repetition == results.repetitions[0]]
     return max(found, key=lambda one: one.run.side_px, default=None)
 
 
-def best(results: Results, name: str, side_px: int) -> Result | None:
+def best(results: Results, name: str, side_px: int) -> RunResult | None:
     """The run of an input, first repetition, with the least mean squared error over time among all policies except
     framed ones and the oracle; at one resolution, because errors at different resolutions are not comparable."""
     found = [one for one in results.all if (one.run.case.input, one.run.side_px) == (name, side_px)]
@@ -47,7 +47,7 @@ def best(results: Results, name: str, side_px: int) -> Result | None:
     return min((one for one in found if one.value("mse") >= 0), key=lambda one: one.value("mse"), default=None)
 
 
-def shown(results: Results, name: str) -> list[tuple[str, Result]]:
+def shown(results: Results, name: str) -> list[tuple[str, RunResult]]:
     """Runs whose pictures are shown side by side, with titles: the framed renderer, ``thesis`` with growing batch, each
     at its finest resolution, and the policy of least error at the resolution of the framed one."""
     framed = finest(results, "framed", name)
@@ -70,7 +70,7 @@ def shown(results: Results, name: str) -> list[tuple[str, Result]]:
 
 
 def write_strip(
-    path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Place
+    path: Path, options: SuitabilityOptions, results: Results, name: str, keys: Mapping[Case, str], place: Resources
 ) -> Path | None:
     """Draws the reference and the runs of :func:`shown` at one time; None if no picture is on disk."""
     # the fast vehicle is gone by the second

@@ -10,23 +10,21 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from analysis.metrics.arrays import Floats
 from analysis.metrics.quality import DRAWS, INTERVAL, ratio, ratio_statistics, suitable_percentile
 from analysis.study.cases import ROWS, is_framed
 from analysis.study.inputs import INPUTS, by_number
 from analysis.study.thesis import SHARES, SUITABLE_PERCENTILE
 from analysis.suitability.runs import Run
 
-Floats = NDArray[np.float64]
-
 SIGNS = {"mse": -1, "log_mse": -1, "flip": -1, "ssim": 1, "jod": 1}
 """Metrics by name: 1 if higher is better, -1 if lower is better."""
 
 
 @dataclass(frozen=True)
-class Result:
+class RunResult:
     """A run as read from disk.
 
     Attributes:
@@ -50,7 +48,7 @@ class Result:
 class Results:
     """Results by their place in the study. Failed runs are missing."""
 
-    def __init__(self, results: Sequence[Result]) -> None:
+    def __init__(self, results: Sequence[RunResult]) -> None:
         self.all = sorted(results, key=lambda one: (one.run.label, one.run.case.name))
         self._by = {
             (one.run.label, one.run.case.input, one.run.row, one.run.side_px, one.run.repetition): one
@@ -60,11 +58,11 @@ class Results:
         self.inputs = by_number(one.run.case.input for one in self.all)
         self.rows = sorted({one.run.row for one in self.all if one.run.label == "thesis" and one.run.row is not None})
 
-    def get(self, label: str, name: str, row: int | None, side_px: int, repetition: int) -> Result | None:
+    def get(self, label: str, name: str, row: int | None, side_px: int, repetition: int) -> RunResult | None:
         """The result at a place; None if the run failed."""
         return self._by.get((label, name, row, side_px, repetition))
 
-    def pairs(self, name: str, row: int) -> list[tuple[Result, Result]]:
+    def pairs(self, name: str, row: int) -> list[tuple[RunResult, RunResult]]:
         """The adaptive run and its framed one, for every repetition that has both."""
         found = []
         for one in self.all:
@@ -74,7 +72,7 @@ class Results:
         return sorted(found, key=lambda pair: pair[0].run.repetition)
 
 
-def ratios(pair: tuple[Result, Result]) -> Floats:
+def ratios(pair: tuple[RunResult, RunResult]) -> Floats:
     """``mse_adaptive / mse_framed`` at the reference times. Source: Stephens 2011, eq. 7.2."""
     return ratio(pair[0].times["mse"].to_numpy(), pair[1].times["mse"].to_numpy())
 
@@ -286,7 +284,7 @@ def region_table(results: Results, row: int, side_px: int) -> pd.DataFrame:
     return frame.mean()
 
 
-def _cause_lines(name: str, one: Result) -> list[dict[str, Any]]:
+def _cause_lines(name: str, one: RunResult) -> list[dict[str, Any]]:
     known = one.times[one.times["causes_known"] > 0.999]
     if known.empty:
         return []

@@ -19,7 +19,7 @@ from scenes.formats.blocks.settings import Settings
 
 
 @dataclass(frozen=True)
-class Work:
+class PreparedJob:
     """A job that is ready to run: its scene, frames and combinations."""
 
     job: Job
@@ -29,7 +29,7 @@ class Work:
     frames: range
 
 
-def prepare(options: JobOptions) -> Work:
+def prepare(options: JobOptions) -> PreparedJob:
     """Reads the job and its scene.
 
     Raises:
@@ -49,10 +49,10 @@ def prepare(options: JobOptions) -> Work:
     if not options.first_frame < end <= settings.frame_count:
         count = settings.frame_count
         raise SceneError(f"frames: expected some of the sequence's {count}, got {options.first_frame} to {end - 1}")
-    return Work(job, scene, settings, size, range(options.first_frame, end))
+    return PreparedJob(job, scene, settings, size, range(options.first_frame, end))
 
 
-def run_job(work: Work, options: JobOptions, bars: Bars) -> list[dict[str, Any]]:
+def run_job(work: PreparedJob, options: JobOptions, bars: Bars) -> list[dict[str, Any]]:
     """Renders frames that are not on disk yet; returns a row for each combination.
 
     Args:
@@ -78,7 +78,7 @@ def run_job(work: Work, options: JobOptions, bars: Bars) -> list[dict[str, Any]]
 def _run(
     renderer: Any,
     combination: Combination,
-    work: Work,
+    work: PreparedJob,
     options: JobOptions,
     content: str,
     task: Task,

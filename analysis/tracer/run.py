@@ -24,7 +24,7 @@ from analysis.tracer.render_options import RenderOptions
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.tracer.jobs import Work
+    from analysis.tracer.jobs import PreparedJob
     from scenes.canonical import Scene
 
 
@@ -108,7 +108,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
         return write_summary(out, found, options, added, scene=scene.name, device=options.device)
 
 
-def job(options: JobOptions) -> tuple[Work, dict[str, Any]]:
+def job(options: JobOptions) -> tuple[PreparedJob, dict[str, Any]]:
     """Renders missing frames of a job; returns the job and the content of ``summary.json``.
 
     Raises:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.command.progress import Task
-from analysis.tracer.tiles import Picture, assembled, rendered
+from analysis.tracer.tiles import PictureTask, assembled, rendered
 from tsar.memory import core_count
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _dispatch_s(client: Client, chunks: Sequence[range], workers: Sequence[str])
 
 def study(
     client: Client,
-    picture: Picture,
+    picture: PictureTask,
     chunks: Sequence[range],
     counts: Sequence[int],
     repetitions: int,

@@ -32,7 +32,7 @@ _RETRIES = 5
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureTask:
     """Complete description of a picture, small enough to send with every chunk."""
 
     scene: str
@@ -71,7 +71,7 @@ def source_of(scene: str, point_set: str) -> str:
     return content_hash((catalog.load_any(scene)[0], code_hash(render_chunk), *added))
 
 
-def picture_of(options: TileOptions, threads: int) -> Picture:
+def picture_of(options: TileOptions, threads: int) -> PictureTask:
     """The requested picture.
 
     Raises:
@@ -87,12 +87,12 @@ def picture_of(options: TileOptions, threads: int) -> Picture:
     size = options.width_px or film.width_px, options.height_px or film.height_px
     check_frame_size(*size, 1)
     kinds = options.samples, options.point_set, options.space_filter
-    return Picture(
+    return PictureTask(
         options.scene, size, *kinds, options.time_s, options.seed, threads, source_of(options.scene, options.point_set)
     )
 
 
-def chunks_of(picture: Picture, chunk_tiles: int) -> list[range]:
+def chunks_of(picture: PictureTask, chunk_tiles: int) -> list[range]:
     """Runs of consecutive tiles of a picture."""
     from renderer.frames import tile_count
 
@@ -109,7 +109,7 @@ def _renderer(scene: str, seed: int, threads: int) -> Renderer:
     return Renderer(catalog.load_any(scene)[0], threads=threads, seed=seed)
 
 
-def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:
+def render_chunk(picture: PictureTask, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:
     """Pixels ``(tiles, 256, 3)`` of some tiles, counts of their rays, and seconds without building the scene.
 
     Raises:
@@ -128,7 +128,7 @@ def render_chunk(picture: Picture, tiles: Sequence[int]) -> tuple[NDArray[np.flo
 
 
 def rendered(
-    client: Client, picture: Picture, chunks: Sequence[range], workers: Sequence[str] | None = None
+    client: Client, picture: PictureTask, chunks: Sequence[range], workers: Sequence[str] | None = None
 ) -> Iterator[tuple[int, tuple[NDArray[np.float32], dict[str, int], float]]]:
     """Renders chunks on a cluster, in any order; if a worker dies, others render its chunks again.
 
@@ -152,7 +152,7 @@ def rendered(
         future.release()
 
 
-def assembled(picture: Picture, chunks: Sequence[range], pixels: Sequence[NDArray[np.float32]]) -> Tensor:
+def assembled(picture: PictureTask, chunks: Sequence[range], pixels: Sequence[NDArray[np.float32]]) -> Tensor:
     """The picture, linear radiance ``(h, w, 3)``."""
     import torch
 
@@ -165,7 +165,9 @@ def assembled(picture: Picture, chunks: Sequence[range], pixels: Sequence[NDArra
     return image
 
 
-def render_resumed(client: Client, picture: Picture, options: TileOptions, task: Task) -> tuple[Tensor, dict[str, Any]]:
+def render_resumed(
+    client: Client, picture: PictureTask, options: TileOptions, task: Task
+) -> tuple[Tensor, dict[str, Any]]:
     """Renders the chunks that an interrupted run of the same picture has not left on disk, and assembles the picture.
 
     Args:

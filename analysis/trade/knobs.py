@@ -108,7 +108,7 @@ Changes = tuple[tuple[str, Value], ...]
 
 
 @dataclass(frozen=True)
-class Setting:
+class KnobSetting:
     """A policy, and the values of its knobs.
 
     Attributes:
@@ -134,22 +134,22 @@ def said(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def turned(policy: str = OWN, **values: Value) -> Setting:
+def turned(policy: str = OWN, **values: Value) -> KnobSetting:
     """A setting of a policy from the values of some knobs, by name with underscores for hyphens."""
     named = {name.replace("_", "-"): value for name, value in values.items()}
     return setting_of(policy, named)
 
 
-def setting_of(policy: str, values: Mapping[str, Value]) -> Setting:
+def setting_of(policy: str, values: Mapping[str, Value]) -> KnobSetting:
     """As :func:`turned`, from unchanged names."""
     changes = [(name, values[name]) for name in KNOBS if name in values and values[name] != KNOBS[name].default]
-    return Setting(policy, tuple(changes))
+    return KnobSetting(policy, tuple(changes))
 
 
-def alone(knob: Knob) -> list[tuple[Value, Setting]]:
+def alone(knob: Knob) -> list[tuple[Value, KnobSetting]]:
     """Every value of a knob, with all others at their defaults."""
     if knob.name == "policy":
-        return [(value, Setting(str(value))) for value in (knob.default, *knob.values)]
+        return [(value, KnobSetting(str(value))) for value in (knob.default, *knob.values)]
     return [(value, setting_of(knob.policy, {knob.name: value})) for value in (knob.default, *knob.values)]
 
 
@@ -181,7 +181,7 @@ class Where:
     phase: float
 
 
-def case_of(setting: Setting, where: Where, scale: Scale, base: Case) -> Case:
+def case_of(setting: KnobSetting, where: Where, scale: Scale, base: Case) -> Case:
     """The case of a setting.
 
     Args:

@@ -12,11 +12,11 @@ from analysis.command.progress import bars
 from analysis.metrics.front import means
 from analysis.study import farm
 from analysis.study.outcomes import Outcomes
-from analysis.trade.knobs import Knob, Setting, chosen_knobs
+from analysis.trade.knobs import Knob, KnobSetting, chosen_knobs
 from analysis.trade.options import TradeOptions
 from analysis.trade.runs import Point, Run, points_of, runs
 from analysis.trade.search import search, searched
-from analysis.trade.tables import Result
+from analysis.trade.tables import RunResult
 
 WRITTEN = (
     *("trade.csv", "tables/*.csv", "tables.md", "front.json", "report.html"),
@@ -25,7 +25,7 @@ WRITTEN = (
 
 
 @dataclass
-class Measured:
+class Measurements:
     """The runs made so far. Changes in place.
 
     Attributes:
@@ -38,17 +38,17 @@ class Measured:
     runs: list[Run]
     dropped: dict[str, str] = field(default_factory=dict)
 
-    def result(self, run: Run) -> Result | None:
+    def result(self, run: Run) -> RunResult | None:
         """A run as read from disk; None if it failed."""
         summary = self.outcomes.summary(run.case)
-        return None if summary is None else Result(run, summary, self.outcomes.times(run.case))
+        return None if summary is None else RunResult(run, summary, self.outcomes.times(run.case))
 
-    def results(self) -> list[Result]:
+    def results(self) -> list[RunResult]:
         """Results of all runs that succeeded."""
         return [found for run in self.runs if (found := self.result(run)) is not None]
 
 
-def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
+def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measurements:
     """Makes missing runs, those of single knobs first, with a progress bar for each part.
 
     Raises:
@@ -57,7 +57,7 @@ def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
     with bad_input():
         planned, dropped = runs(options, points_of(knobs))
     outcomes = farm.run_study(options, [run.case for run in planned], WRITTEN)
-    measured = Measured(outcomes, planned, dropped)
+    measured = Measurements(outcomes, planned, dropped)
     turned = searched(chosen_knobs(options.search_knobs) if options.search_knobs else knobs)
     if options.trials and turned:
         with full_disk(outcomes.place.results), bars() as shown:
@@ -70,7 +70,7 @@ def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
                 outcomes.keep(*farm.run_cases([run.case for run in asked], outcomes.place, options.farm))
                 task.advance(len(points))
                 standing = _by_place(
-                    measured, [run for run in measured.runs if run.point.setting == Setting()], options
+                    measured, [run for run in measured.runs if run.point.setting == KnobSetting()], options
                 )
                 return [
                     _over(_by_place(measured, [run for run in asked if run.point is point], options), standing)
@@ -81,10 +81,10 @@ def measure(options: TradeOptions, knobs: Sequence[Knob]) -> Measured:
     return measured
 
 
-Pair = tuple[float, float]
+CostAndError = tuple[float, float]
 
 
-def _by_place(measured: Measured, found: Sequence[Run], options: TradeOptions) -> dict[object, Pair]:
+def _by_place(measured: Measurements, found: Sequence[Run], options: TradeOptions) -> dict[object, CostAndError]:
     """Cost and error of the runs of one setting, by scene, seed and phase."""
     pairs = {}
     for run in found:
@@ -97,7 +97,7 @@ def _by_place(measured: Measured, found: Sequence[Run], options: TradeOptions) -
     return pairs
 
 
-def _over(here: dict[object, Pair], standing: dict[object, Pair]) -> Pair | None:
+def _over(here: dict[object, CostAndError], standing: dict[object, CostAndError]) -> CostAndError | None:
     """Geometric means of cost and error over those of the default; None unless all runs of the default have their
     pair."""
     if not standing or standing.keys() - here.keys():

@@ -10,10 +10,10 @@ from typing import Any
 import pandas as pd
 from PIL import Image
 
-from analysis.page.explorer import Explorer, Point
+from analysis.page.explorer import Explorer, PlotPoint
 from analysis.page.figures import ADAPTIVE, FRAMED, OTHER
 from analysis.page.report import Report, write_report
-from analysis.study.evaluation import Place
+from analysis.study.evaluation import Resources
 from analysis.trade.knobs import OWN
 from analysis.trade.runs import SEARCH
 from analysis.trade.shown import shown_tables
@@ -37,7 +37,7 @@ _ALONE, _SEARCHED, _OTHERS = "a knob of tsar alone", "the search", "another poli
 
 def write_page(
     path: Path, summary: Mapping[str, Any], tables: Tables, points: pd.DataFrame, figures: Mapping[str, str],
-    place: Place,
+    place: Resources,
 ) -> None:  # fmt: skip
     """Writes ``report.html``.
 
@@ -72,10 +72,10 @@ def write_page(
     write_report(path, report)
 
 
-def _explorer(points: pd.DataFrame, place: Place) -> Explorer:
+def _explorer(points: pd.DataFrame, place: Resources) -> Explorer:
     """The points of the first seed, with each setting once."""
     own = lines(points, points["seed"] == points["seed"].min()).drop_duplicates(["input", "setting"])
-    found, pictures, truths = list[Point](), dict[str, bytes](), dict[str, str]()
+    found, pictures, truths = list[PlotPoint](), dict[str, bytes](), dict[str, str]()
     for line in own.to_dict("records"):
         key, group = line["result"], line["input"].rsplit("/", 1)[-1]
         if place.still(key, "shown", 0).is_file():
@@ -85,7 +85,7 @@ def _explorer(points: pd.DataFrame, place: Place) -> Explorer:
             pictures[truths[group]] = _webp(place.still(key, "reference", 0))
         values = {name: float(line[column]) for name, column in _QUANTITIES.items()}
         kind = _SEARCHED if line["knob"] == SEARCH else _OTHERS if line["policy"] != OWN else _ALONE
-        found.append(Point(group, kind, line["setting"], values, key))
+        found.append(PlotPoint(group, kind, line["setting"], values, key))
     names = list(_QUANTITIES)
     return Explorer(
         points=found,

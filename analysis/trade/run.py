@@ -16,7 +16,7 @@ from analysis.study.evaluation import broken
 from analysis.study.written import write_tables
 from analysis.trade import plots
 from analysis.trade.knobs import KNOBS, chosen_knobs
-from analysis.trade.measuring import Measured, measure
+from analysis.trade.measuring import Measurements, measure
 from analysis.trade.options import TradeOptions
 from analysis.trade.page import write_page
 from analysis.trade.shown import shown_tables
@@ -73,7 +73,7 @@ def _figures(options: TradeOptions, points: pd.DataFrame, front: Relative, knobs
     return made
 
 
-def _summary(options: TradeOptions, measured: Measured, tables: Tables) -> dict[str, Any]:
+def _summary(options: TradeOptions, measured: Measurements, tables: Tables) -> dict[str, Any]:
     outcomes = measured.outcomes
     made = list(outcomes.summaries().values())
     found = {

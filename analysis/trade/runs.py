@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from analysis.study.cases import SCALES, Case, Scale
 from analysis.study.fitting import fitting
 from analysis.study.inputs import INPUTS, phase_of
-from analysis.trade.knobs import OWN, ROW, Knob, Setting, Value, Where, alone, case_of
+from analysis.trade.knobs import OWN, ROW, Knob, KnobSetting, Value, Where, alone, case_of
 from analysis.trade.options import TradeOptions
 from tsar.config import ConfigError, TsarConfig
 
@@ -30,7 +30,7 @@ class Point:
 
     knob: str
     value: Value
-    setting: Setting
+    setting: KnobSetting
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Run:
 def points_of(knobs: Iterable[Knob]) -> list[Point]:
     """Every value of every knob with all others at their defaults, and always the default of the policy ``tsar``."""
     found = [Point(knob.name, value, setting) for knob in knobs for value, setting in alone(knob)]
-    if all(point.setting != Setting() for point in found):
-        found.insert(0, Point("policy", OWN, Setting()))
+    if all(point.setting != KnobSetting() for point in found):
+        found.insert(0, Point("policy", OWN, KnobSetting()))
     return found
 
 
@@ -94,7 +94,7 @@ def runs(options: TradeOptions, points: Iterable[Point]) -> tuple[list[Run], dic
         try:
             found.append(Run(point, where, fitting(case_of(point.setting, where, scale, base))))
         except ConfigError as error:
-            if point.setting == Setting():
+            if point.setting == KnobSetting():
                 raise
             dropped[point.setting.words] = str(error)
     return found, dropped

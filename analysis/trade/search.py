@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from analysis.trade.knobs import OWN, Knob, Setting, Value, setting_of
+from analysis.trade.knobs import OWN, Knob, KnobSetting, Value, setting_of
 from analysis.trade.runs import SEARCH, Point
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ NOT_SEARCHED = ("policy", "structure", "packets", "latency-cycles", "light-cells
 """Knobs that the search does not turn: policies have their own knobs, trees and packets change no picture, latency
 costs nothing, and the built-in inputs have no area light."""
 
-Measure = Callable[[Sequence[Point]], list[tuple[float, float] | None]]
+MeasurePoints = Callable[[Sequence[Point]], list[tuple[float, float] | None]]
 """Cost and error of points over those of the default; None for a point that cannot be measured."""
 
 
@@ -31,7 +31,7 @@ def searched(knobs: Sequence[Knob]) -> tuple[Knob, ...]:
     return tuple(knob for knob in knobs if knob.policy == OWN and knob.name not in NOT_SEARCHED)
 
 
-def search(knobs: Sequence[Knob], trials: int, at_once: int, seed: int, measure: Measure) -> list[Point]:
+def search(knobs: Sequence[Knob], trials: int, at_once: int, seed: int, measure: MeasurePoints) -> list[Point]:
     """The settings that were tried, in order; the first is the default.
 
     Args:
@@ -74,6 +74,6 @@ def _choices(knob: Knob) -> list[Value]:
     return sorted(values) if numbers else values  # type: ignore[type-var]
 
 
-def _suggested(trial: optuna.Trial, knobs: Sequence[Knob]) -> Setting:
+def _suggested(trial: optuna.Trial, knobs: Sequence[Knob]) -> KnobSetting:
     values = {knob.name: _choices(knob)[trial.suggest_int(knob.name, 0, len(_choices(knob)) - 1)] for knob in knobs}
     return setting_of(OWN, values)

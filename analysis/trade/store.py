@@ -11,7 +11,7 @@ import pandas as pd
 from analysis.metrics.cost_model import LEDGERS
 from analysis.metrics.front import means, on_front
 from analysis.study.cases import ROWS
-from analysis.trade.knobs import KNOBS, OWN, ROW, Setting
+from analysis.trade.knobs import KNOBS, OWN, ROW, KnobSetting
 from analysis.trade.options import TradeOptions
 from analysis.trade.runs import scale_of
 from analysis.trade.tables import by_place, lines, relative
@@ -25,12 +25,12 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
     """The front of the settings that a run can use: those of the policy ``tsar`` that turn only its batch and its own
     options. None if the default was not measured.
 
-    Its columns are those of :class:`analysis.comparison.front.Place`. The knee is that of all measured settings. The
-    default is stored in its place if it is as good within :data:`NEAR`, so that no option changes for a gain that the
-    runs hardly show.
+    Its columns are those of :class:`analysis.comparison.front.FrontPoint`. The knee is that of all measured settings.
+    The default is stored in its place if it is as good within :data:`NEAR`, so that no option changes for a gain that
+    the runs hardly show.
     """
     own = lines(points, (points["policy"] == OWN) & points["changes"].map(_can_be_given))
-    default = Setting().words
+    default = KnobSetting().words
     if default not in set(own["setting"]):
         return None
     tables = {name: by_place(own, name) for name in _STORED}

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.metrics.cost_model import LEDGERS, RAYS, Ledger
-from analysis.metrics.front import Bands, bootstrap, interval, knee, means, on_front
-from analysis.trade.knobs import KNOBS, Setting, said
+from analysis.metrics.front import FrontBands, bootstrap, interval, knee, means, on_front
+from analysis.trade.knobs import KNOBS, KnobSetting, said
 from analysis.trade.runs import SEARCH, Run
 
 COLUMNS = (
@@ -29,7 +29,7 @@ GRID = 64
 
 
 @dataclass(frozen=True)
-class Result:
+class RunResult:
     """A run as read from disk: its place in the measurement, its summary, and its table over the reference times."""
 
     run: Run
@@ -37,7 +37,7 @@ class Result:
     times: pd.DataFrame
 
 
-def point_table(results: Iterable[Result], ledger: Ledger) -> pd.DataFrame:
+def point_table(results: Iterable[RunResult], ledger: Ledger) -> pd.DataFrame:
     """A line for each run: :data:`COLUMNS`, then the setting in words and as JSON, and further numbers.
 
     Costs are those of the whole measured span. ``on_front`` says whether no other point of the same input and seed has
@@ -53,7 +53,7 @@ def point_table(results: Iterable[Result], ledger: Ledger) -> pd.DataFrame:
     return found
 
 
-def _line(one: Result, ledger: Ledger) -> dict[str, Any]:
+def _line(one: RunResult, ledger: Ledger) -> dict[str, Any]:
     spent, machine, run = one.summary["spent"], one.summary["machine"], one.run
     jod = one.summary["jod"]
     return {
@@ -94,13 +94,13 @@ class Relative:
     costs: np.ndarray
     errors: np.ndarray
     front: pd.DataFrame
-    bands: Bands | None
+    bands: FrontBands | None
 
 
 def relative(points: pd.DataFrame, draws: int, cost: str = "cost_flops", error: str = "mse") -> Relative:
     """The front of all settings that were measured at every place where the default was measured."""
     pivots = [by_place(points, column) for column in (cost, error)]
-    default = Setting().words
+    default = KnobSetting().words
     if default not in pivots[0].index:
         return Relative([], np.empty((0, 0)), np.empty((0, 0)), pd.DataFrame(), None)
     places = pivots[0].columns[pivots[0].loc[default].notna()]

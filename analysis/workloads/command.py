@@ -40,7 +40,7 @@ def study(options: WorkloadOptions) -> dict[str, Any]:
     from analysis.study.written import WRITTEN, write_study
     from analysis.workloads.plots import figure
     from analysis.workloads.runs import runs
-    from analysis.workloads.tables import Result, map_table, paying_table, policy_table, shown_tables
+    from analysis.workloads.tables import RunResult, map_table, paying_table, policy_table, shown_tables
 
     with bad_input():
         planned = runs(options)
@@ -50,7 +50,7 @@ def study(options: WorkloadOptions) -> dict[str, Any]:
     done = outcomes.summaries()
     errors = {case: float(outcomes.times(case)["mse"].to_numpy().mean()) for case in done}
     policies = policy_table(
-        Result(run, errors.get(run.case, float("nan")) if run.case else float("nan")) for run in planned
+        RunResult(run, errors.get(run.case, float("nan")) if run.case else float("nan")) for run in planned
     )
     tables = {"policies": policies, "map": map_table(policies), "pays": paying_table(policies)}
     shown = shown_tables(tables["map"], tables["pays"])

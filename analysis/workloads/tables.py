@@ -16,14 +16,14 @@ PLACE = ["side_px", "image_hz", "sample_flops"]
 
 
 @dataclass(frozen=True)
-class Result:
+class RunResult:
     """A run and its mean squared error over the reference times; NaN if the run was not possible."""
 
     run: Run
     mse: float
 
 
-def policy_table(results: Iterable[Result]) -> pd.DataFrame:
+def policy_table(results: Iterable[RunResult]) -> pd.DataFrame:
     """A line for each workload and policy: ``ratio`` is the geometric mean over inputs and repetitions of its error
     over that of the framed renderer, NaN if one is missing; ``least`` and ``most`` are the ratios of single runs."""
     errors: dict[Workload, dict[str, dict[tuple[str, int], float]]] = {}

@@ -120,7 +120,7 @@ def _packer(structure: type[ctypes.Structure], first: int) -> Callable[..., None
     return lambda target, *numbers: pack(target, start, *numbers)
 
 
-class Record:
+class NativeRecord:
     """A structure of native code that launches read through its address; it consists of words of eight bytes.
 
     Attributes:

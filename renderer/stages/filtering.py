@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from renderer.compute.launching import Command, Record, address
+from renderer.compute.launching import Command, NativeRecord, address
 from renderer.compute.memory import Memory, Recycled
 from renderer.compute.team import TEAM
 from renderer.stages import filtering_kernels as kernels
@@ -79,7 +79,7 @@ class _Compiled:
         planes = address("planes", self._planes, _I64, len(self._planes))
         self._take = [Command(kernels.take, self._plans[0], bands, number, planes) for number in numbers]
         self._prepare_batch(threads)
-        self._shadows = Record("2Q q 4Q q Q Qqdd Qqdd qd")  # shadows::Batch
+        self._shadows = NativeRecord("2Q q 4Q q Q Qqdd Qqdd qd")  # shadows::Batch
         self._drifted = Command(kernels.drifted, self._shadows.address).launch
         self._prepare_tiles(threads)
         self._prepare_picture(threads)
@@ -227,7 +227,7 @@ class _Compiled:
     def _prepare_batch(self, threads: int) -> None:
         room, pixels = self._memory.room, self._pixels
         self._samples = [room("at", pixels, torch.int32), *(room(f"samples {k}", pixels) for k in range(5))]
-        self._batch = Record("6Q Q 9Q 8Q 6Q Qqdd Qqdd 3d 3q")  # batches::Batch
+        self._batch = NativeRecord("6Q Q 9Q 8Q 6Q Qqdd Qqdd 3d 3q")  # batches::Batch
         rows = [(ELEMENT_PX * a, ELEMENT_PX * b) for a, b in _shares(self._side // ELEMENT_PX, threads)]
         sums = [room(f"sums {number}", 9 * (self._side + 16)) for number in range(len(rows))]
         self._parts = np.array(

@@ -17,14 +17,14 @@ def check_finite(values: object, what: str) -> None:
     with np.errstate(over="ignore"):
         good = np.isfinite(np.asarray(values, np.float32)).all()
     if not good:
-        raise SceneError(f"{what}: expected finite values, got {_short(values)}")
+        raise SceneError(f"{what}: expected finite values, got {_described(values)}")
 
 
 def check_light(values: object, what: str) -> None:
     """Raises SceneError unless all values of a radiance or reflectance are finite and not negative."""
     check_finite(values, what)
     if (np.asarray(values) < 0.0).any():
-        raise SceneError(f"{what}: expected no negative values, got {_short(values)}")
+        raise SceneError(f"{what}: expected no negative values, got {_described(values)}")
 
 
 def check_affine(matrix: object, what: str) -> None:
@@ -39,7 +39,7 @@ def check_affine(matrix: object, what: str) -> None:
         raise SceneError(f"{what}: expected a matrix that can be inverted")
 
 
-def _short(values: object) -> str:
+def _described(values: object) -> str:
     array = np.asarray(values)
     if array.size > 4:
         return f"{array.size} values from {array.min()} to {array.max()}"

@@ -22,7 +22,7 @@ DURATION_S = 6.0
 _CAMERA_INTERVAL_S = 1.0 / 240.0
 _LANE_M = -2.6  # the right-hand lane of the road along x
 
-View = Callable[[Path], PerspectiveCamera]
+CameraPath = Callable[[Path], PerspectiveCamera]
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,10 @@ class Animation:
     """One input: motion of the car and of the camera."""
 
     path: Path
-    view: View
+    view: CameraPath
 
 
-def _fixed(eye: tuple[float, float, float], target: tuple[float, float, float], fov_deg: float) -> View:
+def _fixed(eye: tuple[float, float, float], target: tuple[float, float, float], fov_deg: float) -> CameraPath:
     pose = camera_to_world(np.array(eye), np.array(target))
     return lambda path: PerspectiveCamera(pose, fov_deg)
 
@@ -42,7 +42,7 @@ def _track(pose: PoseFunction) -> RigidTrack:
     return sample_track(pose, -LEAD_S, DURATION_S, _CAMERA_INTERVAL_S)
 
 
-def _chase(behind: float, aside: float, height: float, aim: float, fov_deg: float) -> View:
+def _chase(behind: float, aside: float, height: float, aim: float, fov_deg: float) -> CameraPath:
     """A camera at a fixed place in the car's frame that looks at a point ``aim`` metres above the car's origin."""
 
     def view(path: Path) -> PerspectiveCamera:
@@ -56,7 +56,7 @@ def _chase(behind: float, aside: float, height: float, aim: float, fov_deg: floa
     return view
 
 
-def _pivot(eye: tuple[float, float, float], aim: float, fov_deg: float) -> View:
+def _pivot(eye: tuple[float, float, float], aim: float, fov_deg: float) -> CameraPath:
     """A camera at a fixed place that turns to follow the car."""
 
     def view(path: Path) -> PerspectiveCamera:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import BSpline, PchipInterpolator
 
 from scenes.arithmetic import cos, exp, hypot, power, sin
-from scenes.driving.meshing import Array, Surface, from_faces, grid, join, mirrored_y, smooth_normals
+from scenes.driving.meshing import Array, SurfaceMesh, from_faces, grid, join, mirrored_y, smooth_normals
 from scenes.driving.wheel import RADIUS_M
 
 FRONT_AXLE_M = 1.38
@@ -148,7 +148,7 @@ def _bend(points: Array) -> Array:
     return np.stack([bent, y + 0.020 * flare * outer, z], -1)
 
 
-def shell() -> Surface:
+def shell() -> SurfaceMesh:
     """The whole closed body, before parts are cut out."""
     x = _stations()
     sections = _sections(x)
@@ -157,10 +157,10 @@ def shell() -> Surface:
     nose = _end(sections[-1], float(x[-1]), 1.0)
     left = grid(_bend(np.stack([*tail, *middle, *nose])))
     both = join([left, mirrored_y(left)])
-    return Surface(both.vertices, both.faces, smooth_normals(both.vertices, both.faces, 1e-5), both.uvs)
+    return SurfaceMesh(both.vertices, both.faces, smooth_normals(both.vertices, both.faces, 1e-5), both.uvs)
 
 
-def wheel_housing(side: float, axle: float) -> Surface:
+def wheel_housing(side: float, axle: float) -> SurfaceMesh:
     """Liner around one wheel: an arch from the body's skin inwards, closed by a wall, facing the wheel."""
     angle = np.linspace(np.radians(-25.0), np.radians(205.0), 30)
     ring = np.stack([axle + ARCH_RADIUS_M * cos(angle), AXLE_HEIGHT_M + ARCH_RADIUS_M * sin(angle)], -1)

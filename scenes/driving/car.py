@@ -26,7 +26,7 @@ from scenes.driving.body import (
     wheel_housing,
 )
 from scenes.driving.cutting import carve
-from scenes.driving.meshing import Array, Surface, box, ellipsoid, join, lathe, mirrored_y, moved, transformed, tube
+from scenes.driving.meshing import Array, SurfaceMesh, box, ellipsoid, join, lathe, mirrored_y, moved, transformed, tube
 from scenes.driving.wheel import RADIUS_M, brake, caliper, rim, tyre
 
 WHEELS = tuple((axle, side) for axle in (FRONT_AXLE_M, REAR_AXLE_M) for side in (1.0, -1.0))
@@ -126,7 +126,7 @@ def _screen_half(z: Array) -> Array:
 @lru_cache(maxsize=1)
 def body_parts() -> dict[str, Mesh]:
     """All parts fixed to the body, one mesh per material."""
-    parts: dict[str, list[Surface]] = {name: [] for name in MATERIALS}
+    parts: dict[str, list[SurfaceMesh]] = {name: [] for name in MATERIALS}
     rest = shell()
     for name, fields in _regions():
         piece, rest = carve(rest, *fields)
@@ -145,7 +145,7 @@ def body_parts() -> dict[str, Mesh]:
     return {name: join(pieces).mesh(name) for name, pieces in parts.items() if pieces}
 
 
-def _details() -> list[tuple[str, Surface]]:
+def _details() -> list[tuple[str, SurfaceMesh]]:
     """Small parts of the left side; the right side mirrors them."""
     handle = [("chrome", ellipsoid((x, 0.905, 0.80), (0.085, 0.022, 0.014), 8, 12)) for x in (0.12, -0.80)]
     pipe = lathe(np.array([[0.030, 0.0], [0.036, 0.0], [0.036, 0.16]])[::-1], 16)

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenes.driving.meshing import Array, Surface, join, unit
+from scenes.driving.meshing import Array, SurfaceMesh, join, unit
 
 
-def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
+def cut(surface: SurfaceMesh, value: Array) -> tuple[SurfaceMesh, SurfaceMesh]:
     """Cuts a surface along the zero line of a function, splitting the triangles it crosses.
 
     Args:
@@ -46,11 +46,13 @@ def cut(surface: Surface, value: Array) -> tuple[Surface, Surface]:
     tip_below = below[a]
     inside += [tip[tip_below], rest[np.tile(~tip_below, 2)]]
     outside += [tip[~tip_below], rest[np.tile(tip_below, 2)]]
-    whole = Surface(blend(surface.vertices), np.concatenate(inside), unit(blend(surface.normals)), blend(surface.uvs))
+    whole = SurfaceMesh(
+        blend(surface.vertices), np.concatenate(inside), unit(blend(surface.normals)), blend(surface.uvs)
+    )
     return whole.compact(), replace(whole, faces=np.concatenate(outside)).compact()
 
 
-def carve(surface: Surface, *sides: Callable[[Array], Array]) -> tuple[Surface, Surface]:
+def carve(surface: SurfaceMesh, *sides: Callable[[Array], Array]) -> tuple[SurfaceMesh, SurfaceMesh]:
     """Cuts out the part where each of several functions of the vertices ``(v, 3)`` is negative.
 
     The cuts are made successively, so that corners between them stay sharp.

@@ -17,7 +17,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class SurfaceMesh:
     """A triangle mesh under construction, in double precision.
 
     Attributes:
@@ -49,12 +49,12 @@ class Surface:
             source=source,
         )
 
-    def compact(self) -> Surface:
+    def compact(self) -> SurfaceMesh:
         """The surface without unused vertices."""
         used = np.zeros(len(self.vertices), bool)
         used[self.faces] = True
         faces = (np.cumsum(used) - 1)[self.faces]
-        return Surface(self.vertices[used], faces, self.normals[used], self.uvs[used])
+        return SurfaceMesh(self.vertices[used], faces, self.normals[used], self.uvs[used])
 
 
 def unit(vectors: Array) -> Array:
@@ -96,24 +96,24 @@ def _places(cells: Indices, piece: Indices | None) -> Indices:
     return place
 
 
-def from_faces(vertices: Array, faces: Indices, uvs: Array | None = None) -> Surface:
+def from_faces(vertices: Array, faces: Indices, uvs: Array | None = None) -> SurfaceMesh:
     """A smooth surface from bare triangles."""
     vertices = np.asarray(vertices, np.float64)
     faces = np.asarray(faces, np.int64)
     uvs = np.zeros((len(vertices), 2)) if uvs is None else np.asarray(uvs, np.float64)
-    return Surface(vertices, faces, smooth_normals(vertices, faces), uvs)
+    return SurfaceMesh(vertices, faces, smooth_normals(vertices, faces), uvs)
 
 
-def flat(surface: Surface) -> Surface:
+def flat(surface: SurfaceMesh) -> SurfaceMesh:
     """The surface with separate triangles, each with its face normal."""
     vertices = surface.vertices[surface.faces].reshape(-1, 3)
     a, b, c = vertices[0::3], vertices[1::3], vertices[2::3]
     normals = np.repeat(unit(np.cross(b - a, c - a)), 3, axis=0)
     faces = np.arange(len(vertices)).reshape(-1, 3)
-    return Surface(vertices, faces, normals, surface.uvs[surface.faces].reshape(-1, 2))
+    return SurfaceMesh(vertices, faces, normals, surface.uvs[surface.faces].reshape(-1, 2))
 
 
-def grid(points: Array) -> Surface:
+def grid(points: Array) -> SurfaceMesh:
     """A surface through a grid of points.
 
     Args:
@@ -122,7 +122,7 @@ def grid(points: Array) -> Surface:
     return grids(points[None])
 
 
-def grids(nets: Array) -> Surface:
+def grids(nets: Array) -> SurfaceMesh:
     """Surfaces through grids ``(k, m, n, 3)`` as in :func:`grid`, joined with sharp edges between them."""
     count, rows, columns = nets.shape[:3]
     index = np.arange(count * rows * columns).reshape(count, rows, columns)
@@ -132,10 +132,10 @@ def grids(nets: Array) -> Surface:
     u, v = np.meshgrid(np.linspace(0.0, 1.0, rows), np.linspace(0.0, 1.0, columns), indexing="ij")
     uvs = np.tile(np.stack([u, v], -1).reshape(-1, 2), (count, 1))
     piece = np.repeat(np.arange(count), rows * columns)
-    return Surface(vertices, faces, smooth_normals(vertices, faces, piece=piece), uvs)
+    return SurfaceMesh(vertices, faces, smooth_normals(vertices, faces, piece=piece), uvs)
 
 
-def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> Surface:
+def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> SurfaceMesh:
     """The surface of revolution of a profile about the y axis.
 
     Args:
@@ -156,12 +156,12 @@ def lathe(profile: Array, segments: int, crease_deg: float = 35.0) -> Surface:
     return join(strips)
 
 
-def box(lower: Sequence[float], upper: Sequence[float]) -> Surface:
+def box(lower: Sequence[float], upper: Sequence[float]) -> SurfaceMesh:
     """An axis-aligned box with flat faces; uv in metres along the faces."""
     return boxes([(lower, upper)])
 
 
-def boxes(spans: Sequence[tuple[Sequence[float], Sequence[float]]]) -> Surface:
+def boxes(spans: Sequence[tuple[Sequence[float], Sequence[float]]]) -> SurfaceMesh:
     """Boxes by their lower and upper corners, joined: like :func:`box`, but all at once."""
     ends = np.asarray(spans, np.float64)
     corners = np.empty((len(ends), 3, 2, 2, 2, 3))  # box, axis, side, net
@@ -177,7 +177,7 @@ def boxes(spans: Sequence[tuple[Sequence[float], Sequence[float]]]) -> Surface:
     return replace(sheets, uvs=uvs.reshape(-1, 2))
 
 
-def extrude(outline: Array, lower: float, upper: float) -> Surface:
+def extrude(outline: Array, lower: float, upper: float) -> SurfaceMesh:
     """A convex polygon ``(n, 2)``, counter-clockwise, raised from ``z = lower`` to ``upper``; flat sides and caps."""
     count = len(outline)
     ring = np.arange(count)
@@ -190,7 +190,9 @@ def extrude(outline: Array, lower: float, upper: float) -> Surface:
     return flat(from_faces(vertices, np.concatenate([walls, fan + count, fan[:, ::-1]])))
 
 
-def tube(start: Sequence[float], end: Sequence[float], radius: float, end_radius: float, sides: int = 10) -> Surface:
+def tube(
+    start: Sequence[float], end: Sequence[float], radius: float, end_radius: float, sides: int = 10
+) -> SurfaceMesh:
     """A closed, tapered round bar between two points, metres."""
     begin, finish = np.asarray(start, np.float64), np.asarray(end, np.float64)
     length = norm(finish - begin)
@@ -202,7 +204,7 @@ def tube(start: Sequence[float], end: Sequence[float], radius: float, end_radius
     return transformed(bar, np.stack([side, along, np.cross(side, along)], -1), begin)
 
 
-def ellipsoid(center: Sequence[float], radii: Sequence[float], rings: int = 10, segments: int = 16) -> Surface:
+def ellipsoid(center: Sequence[float], radii: Sequence[float], rings: int = 10, segments: int = 16) -> SurfaceMesh:
     """An ellipsoid with its axes along x, y and z."""
     ball = _ball(rings, segments)
     scale = np.asarray(radii, np.float64)
@@ -211,33 +213,35 @@ def ellipsoid(center: Sequence[float], radii: Sequence[float], rings: int = 10, 
 
 
 @lru_cache(maxsize=8)
-def _ball(rings: int, segments: int) -> Surface:
+def _ball(rings: int, segments: int) -> SurfaceMesh:
     """A unit ball; it is shared, so it must not be changed in place."""
     turn = np.linspace(np.pi, 0.0, rings + 1)
     return lathe(np.stack([sin(turn), cos(turn)], -1), segments)
 
 
-def transformed(surface: Surface, rotation: Array, translation: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Surface:
+def transformed(
+    surface: SurfaceMesh, rotation: Array, translation: Sequence[float] | Array = (0.0, 0.0, 0.0)
+) -> SurfaceMesh:
     """The surface rotated by a matrix ``(3, 3)`` and translated; a reflection also reverses its faces."""
     faces = surface.faces if np.linalg.det(rotation) > 0.0 else surface.faces[:, ::-1]
     vertices = product(surface.vertices, rotation.T) + np.asarray(translation, np.float64)
-    return Surface(vertices, faces, product(surface.normals, rotation.T), surface.uvs)
+    return SurfaceMesh(vertices, faces, product(surface.normals, rotation.T), surface.uvs)
 
 
-def moved(surface: Surface, translation: Sequence[float] | Array) -> Surface:
+def moved(surface: SurfaceMesh, translation: Sequence[float] | Array) -> SurfaceMesh:
     """The surface translated."""
     return transformed(surface, np.eye(3), translation)
 
 
-def mirrored_y(surface: Surface) -> Surface:
+def mirrored_y(surface: SurfaceMesh) -> SurfaceMesh:
     """The mirror image across the plane ``y = 0``."""
     return transformed(surface, np.diag([1.0, -1.0, 1.0]))
 
 
-def join(parts: Sequence[Surface]) -> Surface:
+def join(parts: Sequence[SurfaceMesh]) -> SurfaceMesh:
     """All parts as one surface."""
     first = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    return Surface(
+    return SurfaceMesh(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + offset for part, offset in zip(parts, first, strict=True)]),
         np.concatenate([part.normals for part in parts]),

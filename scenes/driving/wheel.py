@@ -11,7 +11,7 @@ import numpy as np
 
 from scenes.arithmetic import cos, sin
 from scenes.canonical import Mesh
-from scenes.driving.meshing import Array, Surface, extrude, grid, join, lathe, smooth_normals, transformed
+from scenes.driving.meshing import Array, SurfaceMesh, extrude, grid, join, lathe, smooth_normals, transformed
 
 RADIUS_M = 0.335
 SPOKES = 5
@@ -40,7 +40,7 @@ def tyre() -> Mesh:
     return lathe(np.concatenate([upper, lower])[::-1], _SEGMENTS, crease_deg=30.0).mesh("tyre")
 
 
-def _spoke() -> Surface:
+def _spoke() -> SurfaceMesh:
     """One spoke along ``+z``: a bevelled, slightly dished bar that widens towards hub and rim."""
     along = np.linspace(0.0, 1.0, 9)
     radius = 0.052 + along * (_RIM_RADIUS - 0.016 - 0.052)
@@ -57,10 +57,10 @@ def _spoke() -> Surface:
     points[..., 1] = face[:, None] + depth[:, None] * section[:, 1]
     points[..., 2] = radius[:, None]
     bar = join([grid(points[:, i : i + 2]) for i in range(len(section) - 1)])
-    return Surface(bar.vertices, bar.faces, smooth_normals(bar.vertices, bar.faces), bar.uvs)
+    return SurfaceMesh(bar.vertices, bar.faces, smooth_normals(bar.vertices, bar.faces), bar.uvs)
 
 
-def _nut(angle: float) -> Surface:
+def _nut(angle: float) -> SurfaceMesh:
     """A hexagonal wheel nut on the hub."""
     turn = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
     head = extrude(0.0105 * np.stack([cos(turn), sin(turn)], -1), 0.0, 0.018)
@@ -98,7 +98,7 @@ def brake() -> Mesh:
     return lathe(disc[::-1], 40).mesh("brake disc")
 
 
-def caliper() -> Surface:
+def caliper() -> SurfaceMesh:
     """A caliper that clasps the disc behind the axle (towards ``-x``); it does not turn with the wheel."""
     turn = np.radians(np.linspace(-32.0, 32.0, 8))
     inside, outside = 0.118, 0.186

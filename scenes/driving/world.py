@@ -22,7 +22,7 @@ from scenes.canonical import (
     Rectangle,
     Rgb,
 )
-from scenes.driving.meshing import Surface, box, boxes, ellipsoid, extrude, grid, grids, join, moved, tube
+from scenes.driving.meshing import SurfaceMesh, box, boxes, ellipsoid, extrude, grid, grids, join, moved, tube
 from scenes.driving.sky import blurred
 from scenes.loading import FileState, asset, read_image, state_of
 
@@ -67,22 +67,22 @@ def _facade() -> NDArray[np.float32]:
 Span = tuple[float, float]
 
 
-def _sheets(spans: Sequence[tuple[Span, Span]], height: float) -> Surface:
+def _sheets(spans: Sequence[tuple[Span, Span]], height: float) -> SurfaceMesh:
     """Horizontal rectangles that face up, each given by its spans along x and y; uv is ``(x, y)`` in metres."""
     (west, east), (south, north) = np.moveaxis(np.asarray(spans, np.float64), 0, -1)
     level = np.full_like(west, height)
     corners = [np.stack([x, y, level], -1) for x in (west, east) for y in (south, north)]
     sheets = grids(np.stack(corners, 1).reshape(-1, 2, 2, 3))
-    return Surface(sheets.vertices, sheets.faces, sheets.normals, sheets.vertices[:, :2])
+    return SurfaceMesh(sheets.vertices, sheets.faces, sheets.normals, sheets.vertices[:, :2])
 
 
-def _paving() -> Surface:
+def _paving() -> SurfaceMesh:
     half, far = ROAD_HALF_WIDTH_M, ROAD_LENGTH_M
     arms = [((-half, half), side) for side in ((-far, -half), (half, far))]
     return _sheets([((-far, far), (-half, half)), *arms], 0.0)
 
 
-def _markings() -> Surface:
+def _markings() -> SurfaceMesh:
     """Dashed centre lines and stop lines."""
     half = ROAD_HALF_WIDTH_M
     dashes = []
@@ -95,7 +95,7 @@ def _markings() -> Surface:
     return _sheets(dashes, 0.004)
 
 
-def _kerbs() -> Surface:
+def _kerbs() -> SurfaceMesh:
     """Kerb stones along both roads, in lengths of 2 m with joints."""
     half, stones = ROAD_HALF_WIDTH_M, []
     for start in np.arange(half, 90.0, 2.0):
@@ -115,16 +115,16 @@ _HOUSES = (
 )  # fmt: skip
 
 
-def _walls() -> Surface:
+def _walls() -> SurfaceMesh:
     """Walls of the houses; uv in storeys of 4 m by 3 m."""
     blocks = []
     for west, east, south, north, storeys in _HOUSES:
         block = box((west, south, 0.0), (east, north, 3.0 * storeys))
-        blocks.append(Surface(block.vertices, block.faces, block.normals, block.uvs / np.array([4.0, 3.0])))
+        blocks.append(SurfaceMesh(block.vertices, block.faces, block.normals, block.uvs / np.array([4.0, 3.0])))
     return join(blocks)
 
 
-def _roofs() -> Surface:
+def _roofs() -> SurfaceMesh:
     """Hipped roofs with eaves."""
     roofs = []
     for west, east, south, north, storeys in _HOUSES:
@@ -153,7 +153,7 @@ _TREES = (
 )  # fmt: skip
 
 
-def _crowns() -> Surface:
+def _crowns() -> SurfaceMesh:
     """Crowns of the trees, each of several overlapping balls of leaves with an uneven surface."""
     shapes = np.random.default_rng(3)
     crowns = []
@@ -166,15 +166,15 @@ def _crowns() -> Surface:
                 7.1 * ball.vertices[:, :1] + 5.3 * ball.vertices[:, 1:2] + 6.7 * ball.vertices[:, 2:]
             )
             vertices = np.asarray(center) + (ball.vertices - np.asarray(center)) * bumps
-            crowns.append(Surface(vertices, ball.faces, ball.normals, ball.uvs * np.array([6.0, 4.0])))
+            crowns.append(SurfaceMesh(vertices, ball.faces, ball.normals, ball.uvs * np.array([6.0, 4.0])))
     return join(crowns)
 
 
-def _trunks() -> Surface:
+def _trunks() -> SurfaceMesh:
     return join([tube((x, y, -0.1), (x, y, 3.6 * size), 0.20 * size, 0.12 * size, 8) for x, y, size in _TREES])
 
 
-def _posts() -> Surface:
+def _posts() -> SurfaceMesh:
     """Lamp posts along the road and bollards at the crossing."""
     half = ROAD_HALF_WIDTH_M
     parts = []

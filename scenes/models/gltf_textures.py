@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scenes.arithmetic import cos, sin
 from scenes.canonical import ImageTexture
 from scenes.formats.losses import LossReport
-from scenes.loading import Picture, decode_srgb
+from scenes.loading import decode_srgb
 from scenes.models.gltf_data import GltfData
-from scenes.pictures import alpha_of, by_pillow, decoded
+from scenes.pictures import Pixels, alpha_of, by_pillow, decoded
 
 Uvs = Float[NDArray[np.float64], "*n 2"]
 _NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
@@ -76,10 +76,10 @@ class GltfTextures:
 
     def __init__(self, data: GltfData, report: LossReport) -> None:
         self.data, self.report = data, report
-        self._pictures: dict[tuple[int, bool], Picture] = {}
-        self._opacities: dict[int, Picture] = {}
+        self._pictures: dict[tuple[int, bool], Pixels] = {}
+        self._opacities: dict[int, Pixels] = {}
 
-    def picture(self, lookup: Lookup, numbers: bool = False) -> Picture:
+    def picture(self, lookup: Lookup, numbers: bool = False) -> Pixels:
         """Texels ``(h, w, 3)`` of a texture: linear colours, or raw values with ``numbers``."""
         source = self._source(lookup)
         key = (source, numbers)
@@ -95,7 +95,7 @@ class GltfTextures:
             self._pictures[key] = found.astype(np.float32)
         return self._pictures[key]
 
-    def opacity(self, lookup: Lookup) -> Picture:
+    def opacity(self, lookup: Lookup) -> Pixels:
         """Texels ``(h, w, 3)`` of the alpha channel of a texture; 1 if its image has none."""
         source = self._source(lookup)
         if source not in self._opacities:
@@ -108,7 +108,7 @@ class GltfTextures:
         texture = self.data.at("textures", lookup.texture)
         return texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
 
-    def texture(self, lookup: Lookup, image: Picture, where: str) -> ImageTexture:
+    def texture(self, lookup: Lookup, image: Pixels, where: str) -> ImageTexture:
         """A texture of these texels, with the sampler of the file."""
         sampler = self._sampler(lookup)
         wraps = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
@@ -132,14 +132,14 @@ class GltfTextures:
         return self.data.at("samplers", texture["sampler"]) if "sampler" in texture else {}
 
 
-def resized(image: Picture, height: int, width: int) -> Picture:
+def resized(image: Pixels, height: int, width: int) -> Pixels:
     """An image enlarged by nearest-neighbour sampling."""
     rows = np.arange(height) * image.shape[0] // height
     columns = np.arange(width) * image.shape[1] // width
     return image[rows[:, None], columns[None]]
 
 
-def multiplied(first: Picture, second: Picture) -> Picture:
+def multiplied(first: Pixels, second: Pixels) -> Pixels:
     """The product of two images, with the larger number of texels along each axis."""
     height, width = (max(first.shape[axis], second.shape[axis]) for axis in (0, 1))
     return resized(first, height, width) * resized(second, height, width)

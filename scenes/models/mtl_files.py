@@ -78,7 +78,7 @@ def entries(text: str) -> dict[str, _Entry]:
 
 
 @dataclass(frozen=True)
-class Map:
+class MtlMap:
     """The name of an image and the options before it."""
 
     name: str
@@ -90,7 +90,7 @@ class Map:
         return values[0], values[1]
 
 
-def map_of(rest: str) -> Map:
+def map_of(rest: str) -> MtlMap:
     """The options and the name of a line such as ``-s 2 2 1 -clamp on bricks old.png``.
 
     Vectors have one to three numbers, fewer if the name itself is a number; the name may contain spaces.
@@ -108,7 +108,7 @@ def map_of(rest: str) -> Map:
         at += 1 + count
     # spaces of the name as in the line
     name = rest.split(maxsplit=at)[at] if at < len(words) else ""
-    return Map(name.strip().strip('"'), options)
+    return MtlMap(name.strip().strip('"'), options)
 
 
 def _is_number(word: str) -> bool:

@@ -7,7 +7,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from scenes.canonical import SceneError
-from scenes.loading import FileState, Picture, read_image, state_of
+from scenes.loading import FileState, read_image, state_of
+from scenes.pictures import Pixels
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
@@ -42,7 +43,7 @@ class Sources:
             raise SceneError(f"expected {what} {self.path.parent / name}, found no file")
         return path
 
-    def picture(self, name: str) -> tuple[Path, Picture]:
+    def picture(self, name: str) -> tuple[Path, Pixels]:
         """An image by its file name, as linear RGB, and its path.
 
         Raises:

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from PIL import Image
 
-from analysis.metrics.quality import View
-from analysis.page.pictures import Pixels
+from analysis.metrics.quality import DisplayedImages
+from analysis.page.pictures import PagePixels
 from analysis.page.video import Scales
 from analysis.storage.records import RecordLimits
 from tsar.types import Densities, Errors, SampleMap, ShownImage, StepRecord, Tiling
@@ -70,7 +70,9 @@ def grey(value: float, side: int = 8) -> torch.Tensor:
     return torch.full((side, side, 3), value)
 
 
-def view(time_s: float = 0.0, reference: float = 0.0, own: float = 1.0, framed: float = 0.5, number: int = 0) -> View:
+def view(
+    time_s: float = 0.0, reference: float = 0.0, own: float = 1.0, framed: float = 0.5, number: int = 0
+) -> DisplayedImages:
     """Plain images of two runs, the first over a uniform tiling and fields, of samples 0.125 s old."""
     densities = Densities(*torch.tensor([[1.0], [0.5]], dtype=torch.float64).expand(2, ELEMENTS))
     record = good_record(densities=densities, tiling=tiling(*((1, i) for i in range(4))))
@@ -78,10 +80,10 @@ def view(time_s: float = 0.0, reference: float = 0.0, own: float = 1.0, framed: 
     ages = SampleMap(newest_s, torch.zeros(2, 2, dtype=torch.int64))
     displays = ShownImage(time_s, time_s, grey(own), ages), ShownImage(time_s, 0.0, grey(framed))
     shown = {"own": (record, displays[0]), "framed": (None, displays[1])}
-    return View(number, time_s, grey(reference), shown, {"own": 0.1, "framed": 0.2})
+    return DisplayedImages(number, time_s, grey(reference), shown, {"own": 0.1, "framed": 0.2})
 
 
-def png_bytes(pixels: Pixels) -> bytes:
+def png_bytes(pixels: PagePixels) -> bytes:
     """An array ``(h, w, 3)`` uint8 as PNG."""
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, format="PNG", optimize=True)

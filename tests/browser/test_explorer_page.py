@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import expect
 
-from analysis.page.explorer import SCRIPT, STYLE, Explorer, Point
+from analysis.page.explorer import SCRIPT, STYLE, Explorer, PlotPoint
 from analysis.page.report import Report, render
 from tests.analysis.page.test_report import EVIL
 from tests.browser.reports import Opened
@@ -24,11 +24,11 @@ def picture(level: int) -> bytes:
 
 
 POINTS = [
-    Point("one", "alone", f"setting {k}", {"FLOPs": 10.0**k, "MSE": 10.0 ** (-k), "JOD": k - 1.0}, f"p{k}")
+    PlotPoint("one", "alone", f"setting {k}", {"FLOPs": 10.0**k, "MSE": 10.0 ** (-k), "JOD": k - 1.0}, f"p{k}")
     for k in range(3)
 ]
-BEATEN = Point("one", "other", EVIL, {"FLOPs": 50.0, "MSE": 0.5, "JOD": float("nan")})
-OTHER = Point("two", "alone", "of two", {"FLOPs": 1.0, "MSE": 2.0, "JOD": 3.0})
+BEATEN = PlotPoint("one", "other", EVIL, {"FLOPs": 50.0, "MSE": 0.5, "JOD": float("nan")})
+OTHER = PlotPoint("two", "alone", "of two", {"FLOPs": 1.0, "MSE": 2.0, "JOD": 3.0})
 EXPLORER = Explorer(
     points=[*POINTS, BEATEN, OTHER],
     across=["FLOPs"],

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 from playwright.sync_api import Browser, Page, expect
 
-from analysis.perception.protocol import TABLE, Session
+from analysis.perception.protocol import TABLE, TrialSession
 from analysis.perception.server import serving
 from tests.analysis.perception.builders import write_stimuli
 
@@ -35,7 +35,7 @@ def test_a_session_from_the_first_trial_to_the_last(browser: Browser, tmp_path: 
     page = browser.new_page(viewport={"width": 900, "height": 700})
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    session = Session(folder, stimuli, "anna", 2, 5)
+    session = TrialSession(folder, stimuli, "anna", 2, 5)
     total = len(session.trials)
     assert total == 6
     given = {}
@@ -68,7 +68,7 @@ def test_a_session_from_the_first_trial_to_the_last(browser: Browser, tmp_path: 
     page.keyboard.press(correct_key(3))
     expect(page.locator("#message")).to_contain_text("does not answer", timeout=10_000)
     session.close()
-    again = Session(folder, stimuli, "anna", 2, 5)
+    again = TrialSession(folder, stimuli, "anna", 2, 5)
     assert again.current is not None and again.current.number == 3
     with serving(again, port, break_every=100):
         answered(page, 4, total)
@@ -95,7 +95,7 @@ PAIRS = """all => all.map(one => ({
 def test_the_pair_that_differs_is_seen_on_the_side_that_is_right(browser: Browser, tmp_path: Path) -> None:
     stimuli = write_stimuli(tmp_path / "stimuli", frames=1)  # so that what is on the canvases does not change
     page = browser.new_page(viewport={"width": 900, "height": 700})
-    with Session(tmp_path / "session", stimuli, "anna", 2, 5) as session, serving(session) as address:
+    with TrialSession(tmp_path / "session", stimuli, "anna", 2, 5) as session, serving(session) as address:
         page.goto(address)
         page.wait_for_function("phase === 'pause'")
         page.keyboard.press("Space")
@@ -120,7 +120,7 @@ def test_a_stimulus_that_was_damaged_is_said(browser: Browser, tmp_path: Path) -
     for frame in stimuli.rglob("*.png"):
         frame.write_bytes(frame.read_bytes() + b"x")
     page = browser.new_page()
-    with Session(tmp_path / "session", stimuli, "anna", 2, 5) as session, serving(session) as address:
+    with TrialSession(tmp_path / "session", stimuli, "anna", 2, 5) as session, serving(session) as address:
         page.goto(address)
         page.wait_for_function("phase === 'pause'")
         page.keyboard.press("Space")
@@ -131,7 +131,7 @@ def test_a_stimulus_that_was_damaged_is_said(browser: Browser, tmp_path: Path) -
 def test_a_window_that_is_too_small_is_noted(browser: Browser, tmp_path: Path) -> None:
     stimuli = write_stimuli(tmp_path / "stimuli", side=160)
     page = browser.new_page(viewport={"width": 300, "height": 300})
-    with Session(tmp_path / "session", stimuli, "bert", 1, 0) as session, serving(session) as address:
+    with TrialSession(tmp_path / "session", stimuli, "bert", 1, 0) as session, serving(session) as address:
         page.goto(address)
         page.wait_for_function("phase === 'pause'")
         page.keyboard.press("Space")

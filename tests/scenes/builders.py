@@ -7,34 +7,34 @@ from numpy.typing import NDArray
 
 from scenes.animation import pose_at
 from scenes.canonical import Instance, Matrix, Mesh, PerspectiveCamera, RigidTrack, Scene
-from scenes.driving.meshing import Surface
+from scenes.driving.meshing import SurfaceMesh
 
 Array = NDArray[np.float64]
 
 
-def corners(shape: Surface | Mesh) -> tuple[Array, Array, Array]:
+def corners(shape: SurfaceMesh | Mesh) -> tuple[Array, Array, Array]:
     """The three corners ``(f, 3)`` of every triangle."""
     points = shape.vertices.astype(np.float64)[shape.faces]
     return points[:, 0], points[:, 1], points[:, 2]
 
 
-def face_normals(shape: Surface | Mesh) -> Array:
+def face_normals(shape: SurfaceMesh | Mesh) -> Array:
     """Normals ``(f, 3)``, as long as twice the area."""
     a, b, c = corners(shape)
     return np.cross(b - a, c - a)
 
 
-def areas(shape: Surface | Mesh) -> Array:
+def areas(shape: SurfaceMesh | Mesh) -> Array:
     return 0.5 * np.linalg.norm(face_normals(shape), axis=1)
 
 
-def volume(shape: Surface | Mesh) -> float:
+def volume(shape: SurfaceMesh | Mesh) -> float:
     """Of a closed shape; positive where its faces look outwards."""
     a, b, c = corners(shape)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
-def directed_edges(shape: Surface | Mesh, weld: float = 1e-7) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+def directed_edges(shape: SurfaceMesh | Mesh, weld: float = 1e-7) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Edges between places, in their triangles' direction; triangles that welding flattens are left out."""
     places = np.round(shape.vertices.astype(np.float64) / weld).astype(np.int64)
     found = []
@@ -44,7 +44,7 @@ def directed_edges(shape: Surface | Mesh, weld: float = 1e-7) -> list[tuple[tupl
     return found
 
 
-def open_edges(shape: Surface | Mesh, weld: float = 1e-7) -> set[tuple[tuple[int, ...], tuple[int, ...]]]:
+def open_edges(shape: SurfaceMesh | Mesh, weld: float = 1e-7) -> set[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Edges whose reverse belongs to no triangle; none in a closed shape whose faces all look the same way."""
     edges = set(directed_edges(shape, weld))
     return {(a, b) for a, b in edges if (b, a) not in edges}

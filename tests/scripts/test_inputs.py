@@ -12,7 +12,7 @@ import analysis.storage.source
 from analysis.comparison import inputs_command as script
 from analysis.comparison.options import RunOptions
 from analysis.comparison.repetitions import InputsOptions, row
-from analysis.comparison.stored import content_of, finished, write_summary
+from analysis.comparison.stored import complete_run, content_of, finished
 from analysis.study.inputs import INPUTS
 from scenes import catalog
 from tests.scripts.commands import call_script
@@ -86,7 +86,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         found = {**FOUND, "provenance": {"content": content_of(options, scene)}}
         options.out.mkdir(exist_ok=True)
         (options.out / "steps.parquet").write_bytes(b"records of " + options.out.name.encode())
-        write_summary(options, found)
+        complete_run(options, found)
         return found
 
     monkeypatch.setattr(script, "run_experiment", pretend)
@@ -156,7 +156,7 @@ def test_a_run_of_a_scene_that_was_edited_is_not_finished(tmp_path: Path) -> Non
     scene.write_text(text)
     options = RunOptions(str(scene), out=tmp_path)
     content = content_of(options, catalog.load_any(str(scene))[0])
-    write_summary(options, {**FOUND, "provenance": {"content": content}})
+    complete_run(options, {**FOUND, "provenance": {"content": content}})
     assert finished(options) is not None
     scene.write_text(text.replace("[1 1 1]", "[1 2 1]"))
     assert finished(options) is None

@@ -16,10 +16,10 @@ from analysis.command.cli import parse
 from analysis.sensitivity import run as study
 from analysis.sensitivity import runs as sensitivity
 from analysis.sensitivity.options import SensitivityOptions
-from analysis.sensitivity.runs import Run, Setting, runs
+from analysis.sensitivity.runs import Run, TemplateSetting, runs
 from analysis.study import cases
 from analysis.study.cases import Case, Scale
-from analysis.study.evaluation import Place, finished, source_of_results
+from analysis.study.evaluation import Resources, finished, source_of_results
 from tests.scripts.commands import assert_refused, call_script
 from tsar.config import TsarConfig
 
@@ -40,7 +40,7 @@ def error(run: Run) -> float:
 
 def fill(out: Path, planned: list[Run], more: dict[Case, dict[str, Any]] | None = None) -> None:
     """Results as the runs would leave them, without the runs."""
-    place = Place(out / "runs", out / "cache")
+    place = Resources(out / "runs", out / "cache")
     (out / "runs" / "stills").mkdir(parents=True)
     rng, source = np.random.default_rng(0), source_of_results()
     for run in planned:
@@ -109,7 +109,7 @@ def test_failures_are_listed_and_the_rest_is_shown(
 ) -> None:
     out, source = tmp_path / "out", source_of_results()
     planned = runs(options(*SMALL))
-    steep = Setting.of(TsarConfig()).changed(spatial_slope=-2.0, temporal_slope=-1.0)
+    steep = TemplateSetting.of(TsarConfig()).changed(spatial_slope=-2.0, temporal_slope=-1.0)
     flat = steep.changed(temporal_slope=0.0)
     failed = [run for run in planned if run.input == "chase" and run.setting in (steep, flat)]
     fill(out, [run for run in planned if run not in failed])
@@ -159,7 +159,7 @@ def test_a_study_from_end_to_end(
     errors = [line["mse"] for line in first["settings"]]
     assert min(errors) > 0 and len(set(errors)) > 1 and all(line["ratio"] > 0 for line in first["settings"])
     assert {path.name for path in (out / "figures").iterdir()} == FIGURES
-    place = Place(out / "runs", cache)
+    place = Resources(out / "runs", cache)
     planned = runs(options(*chosen))
     kept = [finished(run.case.key(source_of_results()), place) for run in planned]
     assert all(found is not None for found in kept)

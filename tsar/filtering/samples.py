@@ -26,7 +26,7 @@ COLOR_MAX = 1.5
 
 
 @dataclass(frozen=True)
-class Seen:
+class PixelBatch:
     """A batch by pixels.
 
     Attributes:
@@ -66,7 +66,7 @@ def gathered(
     now_s: float,
     roughness: Float[Tensor, "1 h w"],
     semivariance: Float[Tensor, "n samples"],
-) -> Seen:
+) -> PixelBatch:
     """Gathers the samples of a batch by pixels.
 
     The roughness is the semivariance of samples per pixel of distance between them. The samples of a coarse tile only
@@ -90,7 +90,7 @@ def gathered(
         torch.maximum(roughness, _box(least) / near.clamp(min=COUNT_LEAST)), _box(most) / near.clamp(min=COUNT_LEAST)
     )
     mixed = torch.where(near > 0.0, 0.5 * (roughness + bounded), roughness).clamp(min=ROUGHNESS_MIN)
-    return Seen(
+    return PixelBatch(
         color=torch.cat([summed(flat[:, channel].contiguous()) for channel in range(3)]) / many,
         time_s=summed(time_s.reshape(-1) - now_s) / many.to(torch.float64) + now_s,
         count=count,
@@ -101,7 +101,7 @@ def gathered(
 
 def updated(
     estimates: Estimates,
-    seen: Seen,
+    seen: PixelBatch,
     rate: Float[Tensor, "1 h w"],
     now_s: float,
     replaced: Bool[Tensor, "1 h w"],
@@ -163,7 +163,7 @@ class Met:
     least_share: Float[Tensor, "1 h w"]
 
 
-def met(hits: Hits, seen: Seen, before: Surfels, view: Viewpoint, earlier: Viewpoint | None) -> Met:
+def met(hits: Hits, seen: PixelBatch, before: Surfels, view: Viewpoint, earlier: Viewpoint | None) -> Met:
     """The surfels of a batch at the poses of a view; their displacement is that since the poses of the cycle before."""
     side = before.step.shape[-1]
     pixel = (seen.newest >= 0).nonzero().squeeze(1)

@@ -36,7 +36,7 @@ from tsar.filtering.samples import COLOR_MAX
 from tsar.policies import deep_buffer, tiles
 from tsar.policies.deep_buffer import DeepBuffer, Placed
 from tsar.policies.scatter import generator, pixel_colors, pull_push
-from tsar.policies.tiles import Tree
+from tsar.policies.tiles import TileTree
 from tsar.policy import Moment, Picture, Policy, Price, Setting
 from tsar.prediction import foretold
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
@@ -65,7 +65,7 @@ class Sampled:
     """The tiles; the buffer, which changes in place; the reprojected samples of the buffer; and the requested
     samples."""
 
-    tree: Tree
+    tree: TileTree
     buffer: DeepBuffer
     placed: Placed | None = None
     asked: Crosshairs | None = None
@@ -150,7 +150,7 @@ class Afr(Policy[Sampled]):
 
 
 def draw(
-    tree: Tree, depth: int, config: TsarConfig, cycle: int
+    tree: TileTree, depth: int, config: TsarConfig, cycle: int
 ) -> tuple[Int64[Tensor, " crosshairs"], Float[Tensor, "samples 2"]]:
     """Tile of each crosshair and all sample positions of a cycle.
 
@@ -173,7 +173,7 @@ def draw(
     return node, config.window.of_picture(places)
 
 
-def extents(tree: Tree, depth: int, config: TsarConfig, cycle_s: float) -> Float64[Tensor, " leaves"]:
+def extents(tree: TileTree, depth: int, config: TsarConfig, cycle_s: float) -> Float64[Tensor, " leaves"]:
     """Temporal extent ``e_t`` of the filter of each tile, seconds."""
     leaves = tree.leaves
     sums = tree.sums[:, leaves].to(torch.float64)

@@ -22,7 +22,7 @@ from tsar.config import TsarConfig
 from tsar.error import compressed_luminance
 from tsar.policies import tiles
 from tsar.policies.scatter import PixelBuffer, generator, pixel_batch, pixel_colors, pull_push, sample_map, write
-from tsar.policies.tiles import LEAVES, Tree
+from tsar.policies.tiles import LEAVES, TileTree
 from tsar.policy import Moment, Picture, Policy, Price
 from tsar.types import FrameletBatch, SampleBatch
 
@@ -36,7 +36,7 @@ class Scattered:
     Frozen, except that the buffer changes in place.
     """
 
-    tree: Tree
+    tree: TileTree
     buffer: PixelBuffer
     node: Int64[Tensor, " samples"] | None = None
     pixel: Int64[Tensor, " samples"] | None = None
@@ -86,7 +86,7 @@ class AfrSimple(Policy[Scattered]):
 
 
 def draw(
-    tree: Tree, count: int, depth: int, config: TsarConfig, cycle: int
+    tree: TileTree, count: int, depth: int, config: TsarConfig, cycle: int
 ) -> tuple[Int64[Tensor, " samples"], Int64[Tensor, " samples"]]:
     """Leaf and raster pixel of each sample: leaves in turn, a uniformly random pixel within each."""
     leaves = tree.sampled
@@ -96,7 +96,7 @@ def draw(
 
 
 def _image(
-    tree: Tree, buffer: PixelBuffer, config: TsarConfig, depth: int, now_s: float, cycle_s: float
+    tree: TileTree, buffer: PixelBuffer, config: TsarConfig, depth: int, now_s: float, cycle_s: float
 ) -> Float[Tensor, "h w 3"]:
     """Newest samples weighted by ``exp(-age / refresh interval of the leaf)``, filled by pull and push."""
     leaves = tree.leaves

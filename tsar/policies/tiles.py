@@ -27,7 +27,7 @@ LEAVES = 1024
 
 
 @dataclass(frozen=True)
-class Tree:
+class TileTree:
     """A cut through a kd-tree, by kd index.
 
     Attributes:
@@ -52,13 +52,13 @@ class Tree:
         return leaves[self.shown_px[leaves] > 0]
 
 
-def initial(depth: int, leaves: int, rows: int, window: Window) -> Tree:
+def initial(depth: int, leaves: int, rows: int, window: Window) -> TileTree:
     """The uniform cut into ``leaves`` leaves, a power of two, through the tree over the plane of a window; its pixels
     are the nodes of ``depth``."""
     nodes = 2 ** (depth + 1)
     leaf = torch.zeros(nodes, dtype=torch.bool)
     leaf[leaves : 2 * leaves] = True
-    return Tree(leaf, _shown(depth, window), torch.zeros(rows, nodes))
+    return TileTree(leaf, _shown(depth, window), torch.zeros(rows, nodes))
 
 
 def _shown(depth: int, window: Window) -> Int64[Tensor, " nodes"]:
@@ -95,7 +95,9 @@ def first_cell(node: Int64[Tensor, " n"], depth: int) -> Int64[Tensor, " n"]:
     return (node << (depth - floor_log2(node))) - 2**depth
 
 
-def per_pixel(values: Float64[Tensor, " leaves"], tree: Tree, depth: int, window: Window) -> Float64[Tensor, " pixels"]:
+def per_pixel(
+    values: Float64[Tensor, " leaves"], tree: TileTree, depth: int, window: Window
+) -> Float64[Tensor, " pixels"]:
     """Values of the leaves as a raster of the picture."""
     leaves = tree.leaves
     order = torch.argsort(first_cell(leaves, depth))
@@ -106,8 +108,8 @@ def per_pixel(values: Float64[Tensor, " leaves"], tree: Tree, depth: int, window
 
 
 def gather(
-    tree: Tree, node: Int64[Tensor, " samples"], values: Float[Tensor, "rows samples"], memory_cycles: float
-) -> Tree:
+    tree: TileTree, node: Int64[Tensor, " samples"], values: Float[Tensor, "rows samples"], memory_cycles: float
+) -> TileTree:
     """Fades the sums of all leaves by one cycle, to 1/e in ``memory_cycles``, and adds new samples."""
     sums = tree.sums * exp(-1.0 / memory_cycles)
     for row, value in enumerate(values):
@@ -115,14 +117,14 @@ def gather(
     return replace(tree, sums=sums)
 
 
-def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"], tree: Tree) -> Float[Tensor, " n"]:
+def error(sums: Float[Tensor, "rows n"], node: Int64[Tensor, " n"], tree: TileTree) -> Float[Tensor, " n"]:
     """Variance times area within the picture, as a share of the plane."""
     weight = sums[0].clamp(min=1e-12)
     variance = (sums[2] / weight - (sums[1] / weight).square()).clamp(min=0.0)
     return variance * (tree.shown_px[node] / (len(tree.shown_px) // 2)).to(torch.float32)
 
 
-def adapt(tree: Tree, depth: int) -> Tree:
+def adapt(tree: TileTree, depth: int) -> TileTree:
     """Splits the leaves of greatest error and merges as many sibling pairs of least error, as long as a split gains
     more than a merge costs.
 
@@ -150,4 +152,4 @@ def adapt(tree: Tree, depth: int) -> Tree:
         leaf[child] = True
     leaf[split] = leaf[pair] = leaf[pair + 1] = False
     leaf[pair >> 1] = True
-    return Tree(leaf, tree.shown_px, sums)
+    return TileTree(leaf, tree.shown_px, sums)

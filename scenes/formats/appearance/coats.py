@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenes.canonical import ConstantTexture, Texture
-from scenes.formats.appearance.folding import Change, changed, mean_of
+from scenes.formats.appearance.folding import ValueChange, changed, mean_of
 from scenes.formats.appearance.indices import mean_reflectance
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
@@ -35,7 +35,7 @@ def with_bounces(base: Texture, ior: float, where: str, report: LossReport) -> T
     return _recoloured(base, lambda p: p / np.maximum(1.0 - back + p * back, 1e-6), where, report)
 
 
-def _recoloured(base: Texture, change: Change, where: str, report: LossReport) -> Texture:
+def _recoloured(base: Texture, change: ValueChange, where: str, report: LossReport) -> Texture:
     made = changed(base, change)
     if made is None:
         report.add(where, "a texture under a coat", "that of their mean")

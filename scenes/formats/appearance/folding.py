@@ -20,7 +20,7 @@ from scenes.canonical import (
 from scenes.formats.appearance.graphs import once_a_node
 from scenes.formats.appearance.spectra import grey, rgb
 
-Change = Callable[[np.ndarray], np.ndarray]
+ValueChange = Callable[[np.ndarray], np.ndarray]
 Join = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Pairs = Callable[[Texture, Texture], Texture | None]
 
@@ -84,12 +84,12 @@ def _joined(first: Texture, second: Texture, join: Join, again: Pairs) -> Textur
     return None
 
 
-def changed(texture: Texture, change: Change) -> Texture | None:
+def changed(texture: Texture, change: ValueChange) -> Texture | None:
     """A texture with every colour changed, or None if it is not plain."""
     return once_a_node(lambda node, again: _change(node, change, again), texture)
 
 
-def _change(texture: Texture, change: Change, again: Callable[[Texture], Texture | None]) -> Texture | None:
+def _change(texture: Texture, change: ValueChange, again: Callable[[Texture], Texture | None]) -> Texture | None:
     if isinstance(texture, ConstantTexture):
         value: Rgb = rgb(change(np.array(texture.value)))
         return ConstantTexture(value)

@@ -11,16 +11,16 @@ from scenes.canonical import Material, SceneError, Texture
 NESTED_MAX = 64
 """Maximum depth of nested textures or materials."""
 
-Result = TypeVar("Result")
-Visit = Callable[[Any, Callable[[Any], Result]], Result]
+Answer = TypeVar("Answer")
+Visit = Callable[[Any, Callable[[Any], Answer]], Answer]
 
 
-def once_a_node(visit: Visit[Result], root: Any) -> Result:
+def once_a_node(visit: Visit[Answer], root: Any) -> Answer:
     """The result of a visit of a graph. ``visit`` is called once for each node, with a function that visits other
     nodes."""
-    found: dict[int, tuple[Any, Result]] = {}
+    found: dict[int, tuple[Any, Answer]] = {}
 
-    def again(node: Any) -> Result:
+    def again(node: Any) -> Answer:
         if id(node) not in found:
             found[id(node)] = node, visit(node, again)  # the node is kept alive, so that its id is not reused
         return found[id(node)][1]

@@ -26,7 +26,7 @@ from scenes.formats.geometry.transform_stack import (
     translation,
 )
 from scenes.formats.losses import HINTS, LossReport
-from scenes.formats.text.places import Place
+from scenes.formats.text.places import TextPosition
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 
 SAVED_MAX = 1024
@@ -46,7 +46,7 @@ class Attributes:
 
 
 @dataclass
-class Block:
+class OpenBlock:
     """An open block: its kind, the state that it restores, and the mark of its names."""
 
     kind: str
@@ -70,7 +70,7 @@ class DirectiveReader:
     transforms: TransformStack = field(default_factory=TransformStack)
     attributes: Attributes = field(default_factory=Attributes)
     names: Names = field(default_factory=Names)
-    _saved: list[Block] = field(default_factory=list)
+    _saved: list[OpenBlock] = field(default_factory=list)
     _file: Path | None = None
     _known: dict[str, Callable[[Directive], None]] = field(default_factory=dict)
 
@@ -84,7 +84,7 @@ class DirectiveReader:
             self._file = directive.file
             self._do(directive)
 
-    def _open(self, name: str, place: Place, inside: tuple[Path, ...]) -> tuple[str, Path]:
+    def _open(self, name: str, place: TextPosition, inside: tuple[Path, ...]) -> tuple[str, Path]:
         """Text and path of an included file."""
         path, where = self.files.path(name, str(place), inside[-1]), str(inside[-1])
         if path in inside:
@@ -166,7 +166,7 @@ class DirectiveReader:
             raise SceneError(f"{directive.place}: expected at most {SAVED_MAX} blocks inside each other")
         self.transforms.push()
         saved = copy.copy(self.attributes) if kind != "Transform" else None
-        self._saved.append(Block(kind, saved, self.names.mark()))
+        self._saved.append(OpenBlock(kind, saved, self.names.mark()))
 
     def _end(self, kind: str, directive: Directive) -> None:
         self._cross(kind, directive)

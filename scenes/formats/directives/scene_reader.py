@@ -41,9 +41,9 @@ from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import DirectiveReader, typed, word
 from scenes.formats.directives.shapes import ShapeReader
-from scenes.formats.directives.surfaces import Surfaces
+from scenes.formats.directives.surfaces import SurfaceFactory
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
-from scenes.formats.directives.window import Window, fitted, window_of
+from scenes.formats.directives.window import ScreenWindow, fitted, window_of
 from scenes.formats.geometry.conventions import FAR, duration_s
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import inverse, motion, moved_by, translation
@@ -64,7 +64,7 @@ class SceneReader(DirectiveReader):
     """State of reading a scene; a dialect adds film, samplers, integrators and lights."""
 
     camera: Camera | None = None
-    window: Window | None = None
+    window: ScreenWindow | None = None
     film: Film = field(default_factory=Film)
     sampler: Sampler = field(default_factory=lambda: Sampler("halton", 16))
     integrator: Integrator = field(default_factory=lambda: Integrator("path", 5))
@@ -77,7 +77,7 @@ class SceneReader(DirectiveReader):
         self.shapes = ShapeReader(self.files, self.report)
         self.surfaces = self.make_surfaces()
 
-    def make_surfaces(self) -> Surfaces:
+    def make_surfaces(self) -> SurfaceFactory:
         """The reader of the dialect's textures and materials."""
         raise NotImplementedError
 

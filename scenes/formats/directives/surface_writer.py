@@ -22,12 +22,12 @@ from scenes.canonical import (
     ScaleTexture,
     Texture,
 )
+from scenes.formats.directives.textures import Pair
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import listed, number
 from scenes.formats.text.output import Output
 
 Kind = Literal["color", "float"]
-Pair = tuple[float, float]
 
 
 @dataclass

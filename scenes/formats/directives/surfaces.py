@@ -15,7 +15,7 @@ from scenes.formats.directives.textures import TextureReader
 Maker = Callable[[Parameters], Material]
 
 
-class Surfaces(TextureReader):
+class SurfaceFactory(TextureReader):
     """Creates textures and materials from parameters; a dialect adds its kinds of materials."""
 
     def makers(self) -> dict[str, Maker]:

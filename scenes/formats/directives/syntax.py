@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
 from scenes.formats.text.numbers import NUMBER_MAX
-from scenes.formats.text.places import Place
+from scenes.formats.text.places import TextPosition
 
 if TYPE_CHECKING:
     import lark
@@ -43,7 +43,7 @@ _PIECE = 1 << 20  # characters of a list of numbers that are converted at a time
 
 Values = NDArray[np.float64] | tuple[str, ...]
 
-Opener = Callable[[str, Place, tuple[Path, ...]], tuple[str, Path]]
+Opener = Callable[[str, TextPosition, tuple[Path, ...]], tuple[str, Path]]
 """``(name, place, open files) -> (text, path)`` of an included file; ``place`` is where it is named, and the innermost
 open file is the last."""
 
@@ -62,7 +62,7 @@ class Directive:
 
     name: str
     values: tuple[Values, ...]
-    place: Place
+    place: TextPosition
     file: Path
 
 
@@ -76,7 +76,7 @@ class Parameters:
         types: declared types of the parameters by name.
     """
 
-    place: Place
+    place: TextPosition
     given: Mapping[str, Values]
     types: Mapping[str, str]
     asked: set[str] = field(default_factory=set)
@@ -165,7 +165,7 @@ def parse_directives(text: str, file: Path, opener: Opener) -> Iterator[Directiv
                 yield _directive(head, values, begun)
             head, begun, values = token, within, []
         elif head is None:
-            place = Place(within.name, token.line, token.column)
+            place = TextPosition(within.name, token.line, token.column)
             raise SceneError(f"{place}: expected a directive, got {str(token)[:20]!r}")
         else:
             values.append(_values(token, within.name))
@@ -181,7 +181,7 @@ def _spliced(text: str, inside: tuple[Path, ...], opener: Opener) -> Iterator[tu
         if token.type != "NAME" or str(token) != "Include":
             yield token, file
             continue
-        place, name = Place(file.name, token.line, token.column), next(tokens, None)
+        place, name = TextPosition(file.name, token.line, token.column), next(tokens, None)
         found = _values(name, file.name) if name is not None and name.type in ("STRING", "STRINGS") else ()
         if not isinstance(found, tuple) or len(found) != 1:
             raise SceneError(f"{place}: Include: expected a string")
@@ -197,12 +197,12 @@ def _tokens(text: str, file: str) -> Iterator[Any]:
         yield from _lexer().lex(text)
     except lark.exceptions.UnexpectedCharacters as error:
         got = text[error.pos_in_stream : error.pos_in_stream + 20].split("\n")[0] if error.pos_in_stream else ""
-        place = Place(file, error.line, error.column)
+        place = TextPosition(file, error.line, error.column)
         raise SceneError(f"{place}: expected a directive, string or number, got {got!r}") from None
 
 
 def _directive(head: Any, values: list[Values], file: Path) -> Directive:
-    return Directive(str(head), tuple(values), Place(file.name, head.line, head.column), file)
+    return Directive(str(head), tuple(values), TextPosition(file.name, head.line, head.column), file)
 
 
 def _values(token: Any, file: str) -> Values:
@@ -212,7 +212,7 @@ def _values(token: Any, file: str) -> Values:
         return (str(token),)
     if token.type == "STRINGS":
         return tuple(str(part) if part.type == "TRUTH" else _unquoted(part) for part in _strings(token))
-    place = Place(file, token.line, token.column)
+    place = TextPosition(file, token.line, token.column)
     if token.type == "NUMBER" and abs(value := float(token)) <= NUMBER_MAX:
         return np.array([value])
     body = str(token) if token.type == "NUMBER" or "#" in token else token
@@ -229,7 +229,7 @@ def _values(token: Any, file: str) -> Values:
     return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else np.zeros(0)
 
 
-def _parsed(text: str, place: Place) -> NDArray[np.float64]:
+def _parsed(text: str, place: TextPosition) -> NDArray[np.float64]:
     """Numbers separated by blanks and commas."""
     text = text.replace(",", " ")
     if not text or text.isspace():

@@ -23,7 +23,7 @@ _ROUNDED = 3e-3  # relative tolerance of the aspect: 1.33 deviates from 4 / 3 by
 
 
 @dataclass(frozen=True)
-class Window:
+class ScreenWindow:
     """A window in the plane at distance one.
 
     Attributes:
@@ -50,7 +50,7 @@ class Window:
         return self.middle[0] / sides[0], self.middle[1] / sides[1]
 
 
-def window_of(parameters: Parameters, where: str) -> Window:
+def window_of(parameters: Parameters, where: str) -> ScreenWindow:
     """The window of a camera.
 
     Raises:
@@ -58,17 +58,17 @@ def window_of(parameters: Parameters, where: str) -> Window:
     """
     window = parameters.numbers("screenwindow", 4)
     if window is None:
-        return Window(where, None, np.eye(4), (0.0, 0.0))
+        return ScreenWindow(where, None, np.eye(4), (0.0, 0.0))
     left, right, bottom, top = window.tolist()
     sides, signs = (abs(right - left), abs(top - bottom)), np.sign([right - left, top - bottom])
     if not signs.all():
         raise SceneError(f"{where}: screenwindow: expected left and right, bottom and top apart")
     ends = zip((left + right, bottom + top), sides, signs.tolist(), strict=True)
     across, up = (0.5 * sign * end if abs(end) > 1e-6 * side else 0.0 for end, side, sign in ends)
-    return Window(where, sides, np.diag([*signs, 1.0, 1.0]), (across, up))
+    return ScreenWindow(where, sides, np.diag([*signs, 1.0, 1.0]), (across, up))
 
 
-def fitted(camera: Camera, window: Window, film: Film, report: LossReport) -> Camera:
+def fitted(camera: Camera, window: ScreenWindow, film: Film, report: LossReport) -> Camera:
     """The camera of a window whose aspect may differ from the picture's, over which PBRT stretches it.
 
     A parallel projection is stretched by the transform of its camera. A perspective one keeps the window's side along

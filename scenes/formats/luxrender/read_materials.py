@@ -30,13 +30,13 @@ from scenes.formats.appearance.indices import index_of_reflectance
 from scenes.formats.appearance.mixtures import NOTHING, is_nothing, mixture_of
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb
 from scenes.formats.directives.names import Of
-from scenes.formats.directives.surfaces import Maker, Surfaces
+from scenes.formats.directives.surfaces import Maker, SurfaceFactory
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 from scenes.formats.geometry.conventions import first_row_below
 
 
-class LuxSurfaces(Surfaces):
+class LuxSurfaces(SurfaceFactory):
     """Reader of textures and materials of LuxRender."""
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:

@@ -17,9 +17,9 @@ import numpy as np
 from scenes.canonical import Scene, SceneError
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.read import MitsubaReader, scene_of
-from scenes.formats.text.places import Place
+from scenes.formats.text.places import TextPosition
 from scenes.formats.text.scene_files import SceneFiles
-from scenes.formats.text.xml_tree import DEPTH_MAX, NODES_MAX, Node
+from scenes.formats.text.xml_tree import DEPTH_MAX, NODES_MAX, XmlNode
 
 _KINDS = {
     "shape": "obj ply serialized sphere cylinder disk rectangle cube bsplinecurve linearcurve sdfgrid shapegroup "
@@ -44,7 +44,7 @@ _TAGS = {kind: tag for tag, kinds in _KINDS.items() for kind in kinds.split()}
 
 
 @dataclass(frozen=True)
-class Key(Place):
+class Key(TextPosition):
     """A place in a tree, given by the keys that lead to it."""
 
     def __str__(self) -> str:
@@ -57,7 +57,7 @@ class _Converter:
     def __init__(self) -> None:
         self.count = 0
 
-    def node(self, value: Any, name: str, where: str, depth: int = 0) -> Node:
+    def node(self, value: Any, name: str, where: str, depth: int = 0) -> XmlNode:
         """The element of a value under a key."""
         self.count += 1
         if depth > DEPTH_MAX or self.count > NODES_MAX:
@@ -66,14 +66,14 @@ class _Converter:
         if isinstance(value, Mapping):
             return self._plugin(value, name, place, depth)
         if isinstance(value, bool | np.bool_):
-            return Node("boolean", {**named, "value": str(bool(value)).lower()}, place)
+            return XmlNode("boolean", {**named, "value": str(bool(value)).lower()}, place)
         if isinstance(value, int | float | np.integer | np.floating):
-            return Node("float", {**named, "value": repr(float(value))}, place)
+            return XmlNode("float", {**named, "value": repr(float(value))}, place)
         if isinstance(value, str):
-            return Node("string", {**named, "value": value}, place)
+            return XmlNode("string", {**named, "value": value}, place)
         return self._numbers(getattr(value, "matrix", value), named, place)
 
-    def _numbers(self, value: Any, named: dict[str, str], place: Place) -> Node:
+    def _numbers(self, value: Any, named: dict[str, str], place: TextPosition) -> XmlNode:
         """A vector, a transform, or a list of numbers as text."""
         try:
             found = np.array(value, np.float64)
@@ -85,17 +85,17 @@ class _Converter:
                 full = np.eye(4)
                 full[:2, :2], full[:2, 3] = found[:2, :2], found[:2, 2]
                 text = " ".join(repr(float(part)) for part in full.ravel())
-            return Node("transform", named, place, [Node("matrix", {"value": text}, place)])
-        return Node("vector" if found.shape == (3,) else "string", {**named, "value": text}, place)
+            return XmlNode("transform", named, place, [XmlNode("matrix", {"value": text}, place)])
+        return XmlNode("vector" if found.shape == (3,) else "string", {**named, "value": text}, place)
 
-    def _plugin(self, value: Mapping[str, Any], name: str, place: Place, depth: int) -> Node:
+    def _plugin(self, value: Mapping[str, Any], name: str, place: TextPosition, depth: int) -> XmlNode:
         kind = value.get("type")
         if not isinstance(kind, str):
             raise SceneError(f"{place}: expected a 'type'")
         if kind == "ref":
-            return Node("ref", {"name": name, "id": str(value.get("id", ""))}, place)
+            return XmlNode("ref", {"name": name, "id": str(value.get("id", ""))}, place)
         if kind in ("rgb", "spectrum") and "value" in value:
-            return Node(kind, {"name": name, "value": _colour(value["value"], place)}, place)
+            return XmlNode(kind, {"name": name, "value": _colour(value["value"], place)}, place)
         tag = "scene" if kind == "scene" and depth == 0 else _TAGS.get(kind, "")
         attributes = {"type": kind, "id": str(value["id"])} if "id" in value else {"type": kind}
         if depth > 1 or tag in ("texture", "spectrum"):
@@ -111,10 +111,10 @@ class _Converter:
             for key, part in value.items()
             if key not in ("type", "id") and part is not None
         ]
-        return Node(tag, attributes, place, children)
+        return XmlNode(tag, attributes, place, children)
 
 
-def _colour(value: Any, place: Place) -> str:
+def _colour(value: Any, place: TextPosition) -> str:
     """One or three numbers, or pairs of a wavelength and a value."""
     try:
         found = np.array(value, np.float64)

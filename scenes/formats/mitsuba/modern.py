@@ -15,7 +15,7 @@ import numpy as np
 from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import numbers, transform_of
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 
 _OLD_NAMES = {"int_ior": "intIOR", "ext_ior": "extIOR"}
 _DEFAULTS = {
@@ -33,7 +33,7 @@ _WRAPPERS = ("aov", "moment", "stokes")
 """Integrators that write additional outputs of a nested integrator."""
 
 
-def is_modern(version: str, root: Node) -> bool:
+def is_modern(version: str, root: XmlNode) -> bool:
     """Whether a file belongs to Mitsuba 2 or 3: by its version or, without one, by the name of its transforms."""
     if re.fullmatch(r"0(\.\d+)*", version):
         return False
@@ -44,13 +44,13 @@ def is_modern(version: str, root: Node) -> bool:
     return any(_speaks_modern(child) for child in root.children)
 
 
-def _speaks_modern(node: Node) -> bool:
+def _speaks_modern(node: XmlNode) -> bool:
     return node.get("name") in ("to_world", "max_depth", "sample_count", "int_ior") or any(
         map(_speaks_modern, node.children)
     )
 
 
-def in_old_words(node: Node, report: LossReport) -> None:
+def in_old_words(node: XmlNode, report: LossReport) -> None:
     """Translates an element and its descendants in place, after their parameters have been filled in."""
     if "name" in node.attributes:
         node.attributes["name"] = old_name(node.attributes["name"])
@@ -67,7 +67,7 @@ def in_old_words(node: Node, report: LossReport) -> None:
         return
     if kind in _DEFAULTS and not _has(node, _DEFAULTS[kind][1], "eta"):
         tag, name, value = _DEFAULTS[kind]
-        node.children.append(Node(tag, {"name": name, "value": value}, node.place))
+        node.children.append(XmlNode(tag, {"name": name, "value": value}, node.place))
     if node.tag == "texture":
         _placed_by_numbers(node, report)
     if node.tag == "emitter" and kind == "sunsky":
@@ -82,18 +82,18 @@ def old_name(name: str) -> str:
     return _OLD_NAMES.get(name) or re.sub(r"(?<=[a-z0-9])_([a-z0-9])", lambda found: found[1].upper(), name)
 
 
-def _has(node: Node, *names: str) -> bool:
+def _has(node: XmlNode, *names: str) -> bool:
     return any(child.get("name") in names for child in node.children)
 
 
-def _value(node: Node, name: str, default: str) -> str:
+def _value(node: XmlNode, name: str, default: str) -> str:
     for child in node.children:
         if child.get("name") == name:
             return child.get("value", default)
     return default
 
 
-def _spectrum(node: Node, report: LossReport) -> None:
+def _spectrum(node: XmlNode, report: LossReport) -> None:
     """Converts a spectrum plugin to a spectrum value."""
     kind = node.attributes.pop("type")
     node.tag = "spectrum"
@@ -126,7 +126,7 @@ def _spectrum(node: Node, report: LossReport) -> None:
     node.children = []
 
 
-def _placed_by_numbers(node: Node, report: LossReport) -> None:
+def _placed_by_numbers(node: XmlNode, report: LossReport) -> None:
     """Converts the transform of texture coordinates to two scales and two offsets, and the flag for linear values to a
     gamma."""
     for child in [part for part in node.children if part.get("name") == "toUv"]:
@@ -136,24 +136,24 @@ def _placed_by_numbers(node: Node, report: LossReport) -> None:
             report.add(str(child.place), "texture coordinates that are turned", "not turned")
         given = {"uscale": matrix[0, 0], "vscale": matrix[1, 1], "uoffset": matrix[0, 3], "voffset": matrix[1, 3]}
         for name, value in given.items():
-            node.children.append(Node("float", {"name": name, "value": repr(float(value))}, child.place))
+            node.children.append(XmlNode("float", {"name": name, "value": repr(float(value))}, child.place))
     for child in [part for part in node.children if part.get("name") == "raw"]:
         node.children.remove(child)
         if child.get("value").lower() == "true":
-            node.children.append(Node("float", {"name": "gamma", "value": "1"}, child.place))
+            node.children.append(XmlNode("float", {"name": "gamma", "value": "1"}, child.place))
 
 
-def _zenith_along_y(node: Node) -> None:
+def _zenith_along_y(node: XmlNode) -> None:
     """Rotates daylight with the zenith z, as in Mitsuba 3, to the zenith y of Mitsuba 0.5."""
-    turn = Node("rotate", {"x": "1", "angle": "90"}, node.place)
+    turn = XmlNode("rotate", {"x": "1", "angle": "90"}, node.place)
     placed = [child for child in node.children if child.get("name") == "toWorld"]
     if placed:
         placed[0].children.insert(0, turn)
     else:
-        node.children.append(Node("transform", {"name": "toWorld"}, node.place, [turn]))
+        node.children.append(XmlNode("transform", {"name": "toWorld"}, node.place, [turn]))
 
 
-def _integrator(node: Node, report: LossReport) -> None:
+def _integrator(node: XmlNode, report: LossReport) -> None:
     """Replaces wrapping integrators by the nested one that computes the picture."""
     inside = [child for child in node.children if child.tag == "integrator"]
     if node.get("type") in _WRAPPERS and len(inside) == 1:

@@ -14,7 +14,7 @@ from scenes.formats.appearance.spectra import grey, radiant_rgb, rgb, sampled_rg
 from scenes.formats.geometry.transform_stack import KEYS_MAX, invertible, looking, rotation, scaling, translation
 from scenes.formats.losses import HINTS, LossReport
 from scenes.formats.text.numbers import NUMBER_MAX
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 from scenes.loading import decode_srgb
 
 PROPERTIES = ("integer", "float", "string", "boolean", "rgb", "srgb", "spectrum", "blackbody", "point", "vector",
@@ -25,10 +25,10 @@ PROPERTIES = ("integer", "float", "string", "boolean", "rgb", "srgb", "spectrum"
 class Properties:
     """The properties of an element by name, and its other children."""
 
-    node: Node
+    node: XmlNode
     report: LossReport
-    given: dict[str, Node] = field(default_factory=dict)
-    rest: list[Node] = field(default_factory=list)
+    given: dict[str, XmlNode] = field(default_factory=dict)
+    rest: list[XmlNode] = field(default_factory=list)
     asked: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -120,7 +120,7 @@ class Properties:
                 self.report.add(str(child.place), f"{self.node.get('type')}: texture {child.get('name')!r}")
 
 
-def numbers(node: Node, text: str, count: int | None) -> list[float]:
+def numbers(node: XmlNode, text: str, count: int | None) -> list[float]:
     """Numbers of a text, separated by commas or spaces.
 
     Raises:
@@ -138,7 +138,7 @@ def numbers(node: Node, text: str, count: int | None) -> list[float]:
     return found
 
 
-def triple(node: Node, default: float, whole: str = "value") -> list[float]:
+def triple(node: XmlNode, default: float, whole: str = "value") -> list[float]:
     """Three numbers, given as ``x``, ``y`` and ``z`` or as one value."""
     if whole in node.attributes:
         found = numbers(node, node.get(whole), None)
@@ -148,7 +148,7 @@ def triple(node: Node, default: float, whole: str = "value") -> list[float]:
     return [numbers(node, node.get(axis, repr(default)), 1)[0] for axis in "xyz"]
 
 
-def color_of(node: Node) -> Rgb:
+def color_of(node: XmlNode) -> Rgb:
     """The colour of an element.
 
     Raises:
@@ -183,7 +183,7 @@ def color_of(node: Node) -> Rgb:
     return rgb(values)
 
 
-def transform_of(node: Node) -> Matrix:
+def transform_of(node: XmlNode) -> Matrix:
     """The product of the steps of a transform; each step is applied after those before it."""
     matrix = np.eye(4)
     for step in node.children:
@@ -206,7 +206,7 @@ def transform_of(node: Node) -> Matrix:
     return matrix
 
 
-def _looked_along(step: Node) -> Matrix:
+def _looked_along(step: XmlNode) -> Matrix:
     """Camera-to-world transform from two points and an upward direction."""
     origin, target = (np.array(numbers(step, step.get(name), 3)) for name in ("origin", "target"))
     if "up" in step.attributes:

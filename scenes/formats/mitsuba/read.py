@@ -22,7 +22,7 @@ from scenes.formats.mitsuba.read_settings import MitsubaSettings
 from scenes.formats.mitsuba.read_shapes import MitsubaShapes, seeing_all
 from scenes.formats.mitsuba.read_textures import MISSING
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
-from scenes.formats.text.xml_tree import Node, parse_xml
+from scenes.formats.text.xml_tree import XmlNode, parse_xml
 
 TEXT_MAX = 1 << 16
 """Maximum number of characters of a value with its parameters."""
@@ -38,10 +38,10 @@ class MitsubaReader(MitsubaSettings):
     def __init__(self, files: SceneFiles, report: LossReport) -> None:
         super().__init__(report)
         self.files = files
-        self.names: dict[str, Node] = {}
+        self.names: dict[str, XmlNode] = {}
         self.defaults: dict[str, str] = {}
         self._longest = 0
-        self._missing: dict[str, Node] = {}
+        self._missing: dict[str, XmlNode] = {}
         self.surfaces = MitsubaSurfaces(files, report, self.find)
         self.shapes = MitsubaShapes(files, report, self.surfaces, self.find)
         self.materials: dict[str, Material] = {}
@@ -55,12 +55,12 @@ class MitsubaReader(MitsubaSettings):
         for node in self._nodes(path, []):
             self._node(node)
 
-    def read_tree(self, root: Node, path: Path) -> None:
+    def read_tree(self, root: XmlNode, path: Path) -> None:
         """Reads the elements of a parsed tree; ``path`` is used for messages and includes."""
         for node in self._within(root, path, []):
             self._node(node)
 
-    def _nodes(self, path: Path, inside: list[Path]) -> list[Node]:
+    def _nodes(self, path: Path, inside: list[Path]) -> list[XmlNode]:
         """Elements of the scene and of included files; fills in parameters and collects names."""
         where = str(inside[-1]) if inside else str(path)
         if path in inside:
@@ -69,7 +69,7 @@ class MitsubaReader(MitsubaSettings):
             raise SceneError(f"{where}: expected at most {DEPTH_MAX} files inside each other")
         return self._within(parse_xml(self.files.read(path, where), path.name), path, inside)
 
-    def _within(self, root: Node, path: Path, inside: list[Path]) -> list[Node]:
+    def _within(self, root: XmlNode, path: Path, inside: list[Path]) -> list[XmlNode]:
         if root.tag != "scene":
             raise SceneError(f"{root.place}: expected a scene, got {root.tag!r}")
         modern = self.shapes.modern = is_modern(root.get("version"), root)
@@ -91,7 +91,7 @@ class MitsubaReader(MitsubaSettings):
                 found.append(node)
         return found
 
-    def _filled(self, node: Node) -> None:
+    def _filled(self, node: XmlNode) -> None:
         """Replaces ``$name`` by the parameter, and collects named elements."""
         for key, value in node.attributes.items():
             if "$" in value:
@@ -103,7 +103,7 @@ class MitsubaReader(MitsubaSettings):
         for child in node.children:
             self._filled(child)
 
-    def _with_parameters(self, text: str, node: Node) -> str:
+    def _with_parameters(self, text: str, node: XmlNode) -> str:
         """A value with its parameters inserted; of two matching names the longer one is used."""
         for _ in range(DEPTH_MAX):  # the value of a parameter may contain further parameters
             found = [self._parameter(part) for part in text.split("$")[1:]]
@@ -124,7 +124,7 @@ class MitsubaReader(MitsubaSettings):
                 return text[:length], text[length:]
         return "", text
 
-    def _sample(self, node: Node) -> None:
+    def _sample(self, node: XmlNode) -> None:
         """Replaces the name of a spectrum file by its samples, or by none if the file is missing."""
         name, where = node.attributes.pop("filename"), str(node.place)
         path = self.files.known(name, where, self.report, f"the spectrum {name!r}", "the constant 0.5")
@@ -136,12 +136,12 @@ class MitsubaReader(MitsubaSettings):
             raise SceneError(f"{path}: expected pairs of a wavelength and a value")
         node.attributes["value"] = ", ".join(f"{a}:{b}" for a, b in zip(words[::2], words[1::2], strict=True))
 
-    def _named(self, node: Node, name: str) -> Node:
+    def _named(self, node: XmlNode, name: str) -> XmlNode:
         if name not in self.names:
             raise SceneError(f"{node.place}: expected a name of something before it, got {name!r}")
         return self.names[name]
 
-    def find(self, reference: Node) -> Node:
+    def find(self, reference: XmlNode) -> XmlNode:
         """The element to which a reference refers; for an unknown name a grey one, which is reported."""
         name = reference.get("id")
         if name in self.names:
@@ -149,10 +149,10 @@ class MitsubaReader(MitsubaSettings):
         self.report.add(str(reference.place), f"{name!r}, which no earlier element has as its name", "grey")
         if name not in self._missing:
             tag = "texture" if reference.get("name") else "bsdf"
-            self._missing[name] = Node(tag, {"type": MISSING if tag == "texture" else "diffuse"}, reference.place)
+            self._missing[name] = XmlNode(tag, {"type": MISSING if tag == "texture" else "diffuse"}, reference.place)
         return self._missing[name]
 
-    def _node(self, node: Node) -> None:
+    def _node(self, node: XmlNode) -> None:
         if node.tag in ("integrator", "sensor", "camera", "sampler", "film"):
             self.setting(node)
         elif node.tag == "bsdf":

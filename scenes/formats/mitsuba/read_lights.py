@@ -24,7 +24,7 @@ from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.text.scene_files import SceneFiles
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 
 _TIME_AND_PLACE = ("year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone")
 
@@ -36,7 +36,7 @@ class MitsubaLights:
         self.files, self.report = files, report
         self.lights: list[Light] = []
 
-    def read(self, node: Node) -> None:
+    def read(self, node: XmlNode) -> None:
         """Reads an emitter outside of shapes."""
         kind, properties = node.get("type"), Properties(node, self.report)
         matrix = properties.transform()

@@ -33,7 +33,7 @@ from scenes.formats.appearance.spectra import grey, metal
 from scenes.formats.mitsuba.principled import principled
 from scenes.formats.mitsuba.properties import Properties, ior
 from scenes.formats.mitsuba.read_textures import MitsubaTextures
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 
 _NESTED_MAX = 32
 _ONE_SIDED = ("diffuse", "roughdiffuse", "conductor", "roughconductor", "plastic", "roughplastic", "phong", "ward")
@@ -48,7 +48,7 @@ class MitsubaSurfaces(MitsubaTextures):
     _sides: dict[int, bool] = field(default_factory=dict)
     _deep: int = 0
 
-    def material(self, node: Node) -> Material:
+    def material(self, node: XmlNode) -> Material:
         """The material of an element, created once; an unknown kind is reported."""
         if id(node) in self.made:
             return self.made[id(node)]
@@ -80,14 +80,14 @@ class MitsubaSurfaces(MitsubaTextures):
         self.made[id(node)] = made
         return made
 
-    def one_sided(self, node: Node, deep: int = 0) -> bool:
+    def one_sided(self, node: XmlNode, deep: int = 0) -> bool:
         """Whether the material of an element is black on the back: opaque materials are one-sided in Mitsuba unless
         stated otherwise."""
         if id(node) not in self._sides:
             self._sides[id(node)] = self._one_sided(node, deep)
         return self._sides[id(node)]
 
-    def _one_sided(self, node: Node, deep: int) -> bool:
+    def _one_sided(self, node: XmlNode, deep: int) -> bool:
         if node.get("type") in _ONE_SIDED:
             return True
         if node.get("type") not in _AROUND or deep > _NESTED_MAX:

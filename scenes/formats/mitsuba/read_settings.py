@@ -25,7 +25,7 @@ from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.transform_stack import motion
 from scenes.formats.losses import SAME_PICTURE, LossReport
 from scenes.formats.mitsuba.properties import Properties
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 
 _FILE_SETTINGS = ("fileFormat", "pixelFormat", "gamma", "banner", "exposure", "componentFormat", "tonemapMethod",
                   "key", "burn", "sampleBorder", "compensate")  # fmt: skip
@@ -51,12 +51,12 @@ class MitsubaSettings:
         self.camera: Camera | None = None
         self.film, self.sampler, self.integrator = Film(768, 576), Sampler("independent", 4), Integrator("path", -1)
 
-    def setting(self, node: Node) -> None:
+    def setting(self, node: XmlNode) -> None:
         """Reads a camera, film, sampler or integrator."""
         kinds = {"integrator": self._integrator, "film": self._film, "sampler": self._sampler}
         kinds.get(node.tag, self._sensor)(node)
 
-    def _integrator(self, node: Node) -> None:
+    def _integrator(self, node: XmlNode) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
         name = self.report.kind(INTEGRATORS, kind, "integrator", node.place, kind not in SAME_PICTURE)
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
@@ -66,7 +66,7 @@ class MitsubaSettings:
         self.integrator = Integrator(name, -1 if edges < 0 else max(edges - 1, 0))  # type: ignore[arg-type]
         properties.left_over()
 
-    def _film(self, node: Node) -> None:
+    def _film(self, node: XmlNode) -> None:
         properties = Properties(node, self.report)
         size = properties.whole("width", 768, 1, 32768), properties.whole("height", 576, 1, 32768)
         name, radius = "gaussian", None
@@ -86,13 +86,13 @@ class MitsubaSettings:
                 self.report.hint(properties.where, f"{setting} of the film", "linear radiance")
         properties.left_over()
 
-    def _sampler(self, node: Node) -> None:
+    def _sampler(self, node: XmlNode) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
         name = self.report.kind(SAMPLERS, kind, "sampler", node.place, picture=False)
         self.sampler = Sampler(name, properties.whole("sampleCount", 4, 1, 1 << 24))  # type: ignore[arg-type]
         properties.left_over()
 
-    def _sensor(self, node: Node) -> None:
+    def _sensor(self, node: XmlNode) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
         for child in properties.rest:
             if child.tag in ("film", "sampler"):

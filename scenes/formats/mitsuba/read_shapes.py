@@ -43,7 +43,7 @@ from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
 from scenes.formats.text.scene_files import SceneFiles
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 
 _SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized")
 _HAIR = ("hair", "bsplinecurve", "linearcurve")
@@ -55,7 +55,7 @@ class MitsubaShapes:
     """Creates instances from elements; each mesh file is read once."""
 
     def __init__(
-        self, files: SceneFiles, report: LossReport, surfaces: MitsubaSurfaces, find: Callable[[Node], Node]
+        self, files: SceneFiles, report: LossReport, surfaces: MitsubaSurfaces, find: Callable[[XmlNode], XmlNode]
     ) -> None:
         self.files, self.report, self.surfaces, self.find = files, report, surfaces, find
         self.groups: dict[int, list[Instance]] = {}
@@ -64,7 +64,7 @@ class MitsubaShapes:
         self._contents: dict[Path, bytes] = {}
         self._used: dict[Path, list[str]] = {}
 
-    def read(self, node: Node) -> list[Instance]:
+    def read(self, node: XmlNode) -> list[Instance]:
         """Instances of a shape: one, those of a group, or none if it is left out, which is reported."""
         kind, properties = node.get("type"), Properties(node, self.report)
         if kind == "shapegroup":

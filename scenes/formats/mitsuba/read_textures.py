@@ -20,7 +20,7 @@ from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.text.scene_files import SceneFiles
-from scenes.formats.text.xml_tree import Node
+from scenes.formats.text.xml_tree import XmlNode
 
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "zero": "black", "mirror": "repeat", "one": "clamp"}
 MISSING = "missing"
@@ -41,7 +41,7 @@ class MitsubaTextures:
 
     files: SceneFiles
     report: LossReport
-    find: Callable[[Node], Node]
+    find: Callable[[XmlNode], XmlNode]
     textures: dict[int, Texture] = field(default_factory=dict)
     _inside: int = 0
 
@@ -56,7 +56,7 @@ class MitsubaTextures:
                 return self.made_texture(node)
         return ConstantTexture(properties.color(name, default))
 
-    def made_texture(self, node: Node) -> Texture:
+    def made_texture(self, node: XmlNode) -> Texture:
         """The texture of an element, created once."""
         if id(node) not in self.textures:
             properties = Properties(node, self.report)

@@ -27,7 +27,7 @@ from scenes.canonical import (
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.mixtures import NOTHING, mixture_of
 from scenes.formats.appearance.spectra import METALS, grey
-from scenes.formats.directives.surfaces import Maker, Surfaces
+from scenes.formats.directives.surfaces import Maker, SurfaceFactory
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 
@@ -41,7 +41,7 @@ def alpha_of_roughness(roughness: float) -> float:
     return 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)))
 
 
-class PbrtSurfaces(Surfaces):
+class PbrtSurfaces(SurfaceFactory):
     """Creates the textures and materials of PBRT."""
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:

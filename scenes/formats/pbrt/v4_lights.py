@@ -27,7 +27,7 @@ from scenes.formats.losses import LossReport
 from scenes.formats.pbrt.v4_materials import PBRT_LUMINANCE, PbrtV4Surfaces
 from scenes.formats.text.scene_files import SceneFiles
 
-Placed = Callable[[Any, tuple[float, float, float]], Rgb]
+LightAt = Callable[[Any, tuple[float, float, float]], Rgb]
 
 
 class V4Lights:
@@ -36,7 +36,7 @@ class V4Lights:
     def __init__(self, surfaces: PbrtV4Surfaces, files: SceneFiles, report: LossReport) -> None:
         self.surfaces, self.files, self.report = surfaces, files, report
 
-    def read(self, kind: str, parameters: Parameters, matrix: Matrix, placed: Placed) -> list[Light]:
+    def read(self, kind: str, parameters: Parameters, matrix: Matrix, placed: LightAt) -> list[Light]:
         """The lights of a directive; an unknown kind is reported."""
         where = str(parameters.place)
         if "portal" in parameters:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Place:
+class TextPosition:
     """A place in a text; lines and columns count from 1."""
 
     file: str

@@ -9,20 +9,20 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from scenes.canonical import SceneError
-from scenes.formats.text.places import Place
+from scenes.formats.text.places import TextPosition
 
 DEPTH_MAX = 64
 NODES_MAX = 2_000_000
 
 
 @dataclass
-class Node:
+class XmlNode:
     """An element: its tag, attributes, children, and its place."""
 
     tag: str
     attributes: dict[str, str]
-    place: Place
-    children: list[Node] = field(default_factory=list)
+    place: TextPosition
+    children: list[XmlNode] = field(default_factory=list)
 
     def get(self, name: str, default: str = "") -> str:
         """An attribute."""
@@ -33,15 +33,15 @@ class _Builder(xml.sax.ContentHandler):
     def __init__(self, file: str) -> None:
         super().__init__()
         self.file, self.open, self.count = file, [], 0
-        self.root: Node | None = None
+        self.root: XmlNode | None = None
         self.locator: Any = None
 
     def setDocumentLocator(self, locator: Any) -> None:
         self.locator = locator
 
     def startElement(self, name: str, attrs: Any) -> None:
-        place = Place(self.file, self.locator.getLineNumber(), self.locator.getColumnNumber() + 1)
-        node = Node(name, dict(attrs.items()), place)
+        place = TextPosition(self.file, self.locator.getLineNumber(), self.locator.getColumnNumber() + 1)
+        node = XmlNode(name, dict(attrs.items()), place)
         self.count += 1
         if len(self.open) >= DEPTH_MAX or self.count > NODES_MAX:
             raise SceneError(
@@ -57,7 +57,7 @@ class _Builder(xml.sax.ContentHandler):
         self.open.pop()
 
 
-def parse_xml(content: bytes, file: str) -> Node:
+def parse_xml(content: bytes, file: str) -> XmlNode:
     """The tree of a document.
 
     Raises:
@@ -78,7 +78,7 @@ def parse_xml(content: bytes, file: str) -> Node:
     try:
         parser.parse(io.BytesIO(content))
     except xml.sax.SAXParseException as error:
-        place = Place(file, error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1)
+        place = TextPosition(file, error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1)
         raise SceneError(f"{place}: expected well-formed XML ({error.getMessage()})") from None
     except defusedxml.DefusedXmlException as error:
         raise SceneError(f"{file}: expected no document type and no entities, got {type(error).__name__}") from None

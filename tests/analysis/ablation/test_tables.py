@@ -13,7 +13,7 @@ from analysis.ablation.parts import WHOLE, chosen_parts
 from analysis.ablation.plots import figure
 from analysis.ablation.runs import rivals_of, runs
 from analysis.ablation.shown import shown_tables
-from analysis.ablation.tables import ALL, Result, budget_table, floor_table, moment_table, part_table
+from analysis.ablation.tables import ALL, RunResult, budget_table, floor_table, moment_table, part_table
 from analysis.command.console import markdown
 from analysis.metrics.budget import SHARES
 
@@ -25,7 +25,7 @@ ERRORS = {WHOLE: 0.2, NO_JITTER: 0.6, "framed": 1.0, "afr": 0.4}
 OF_SHARES = dict(zip(SHARES, (0.1, 0.05, 0.04, 0.02, -0.01), strict=True))
 
 
-def results(**changed) -> list[Result]:
+def results(**changed) -> list[RunResult]:
     """Errors as above, those of chase twice as large; in the second repetition a half more than in the first."""
     made = []
     for run in runs(OPTIONS, PARTS):
@@ -37,7 +37,7 @@ def results(**changed) -> list[Result]:
             rest = {"floor": 0.16, **OF_SHARES}
             times = times.assign(**{f"budget_{name}": scale * value for name, value in rest.items()})
             times = times.assign(budget_uncovered=0.25, budget_relit=0.125, budget_late_s=0.008)
-        made.append(Result(run, times))
+        made.append(RunResult(run, times))
     return made
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.bench.cycles import Turns, steady, synthetic_trace
+from analysis.bench.cycles import RunningPipeline, steady, synthetic_trace
 from analysis.bench.growth import EXPONENT_LIMIT, TILE_BOUNDS, exponent, exponent_row, memory_rows, tiling_row, watched
 from analysis.bench.options import BenchOptions
 from analysis.command.progress import Task
@@ -38,7 +38,7 @@ def test_an_order_is_divided_by_before_the_fit() -> None:
 def test_turns_go_on_past_the_warm_up() -> None:
     config = steady(TsarConfig(batch_size=16, resolution_px=64, sdf_side=16, cache_size=64, warmup_cycles=0))
     assert config.warmup_cycles == -(-config.cache_slots // 16)
-    turns = Turns(config, synthetic_trace, cycles_per_turn=3)
+    turns = RunningPipeline(config, synthetic_trace, cycles_per_turn=3)
     for _ in range(4):
         turns()
     assert [len(turn) for turn in turns.turns()] == [3, 3, 3]

@@ -9,11 +9,11 @@ from analysis.bench.options import BenchOptions
 from analysis.bench.overhead import (
     CONTROL,
     MEASURED_CYCLES,
-    Cycle,
+    CycleTimes,
     PyWaveletsStream,
     limit_rows,
-    measured_cycles,
     stage_rows,
+    thesis_cycles,
     transform_row,
 )
 from analysis.bench.rows import NOT_INSTALLED
@@ -25,9 +25,9 @@ from tsar.morton import raster_to_morton
 COUNTERS = {"primary_rays": 100, "shadow_rays": 80, "reflection_rays": 20}
 
 
-def cycle(control: float, reconstruction: float, tracing: float = 10.0) -> Cycle:
+def cycle(control: float, reconstruction: float, tracing: float = 10.0) -> CycleTimes:
     taken = dict.fromkeys(CONTROL, control / len(CONTROL)) | {"tracing": tracing, "reconstruction": reconstruction}
-    return Cycle(taken, COUNTERS)
+    return CycleTimes(taken, COUNTERS)
 
 
 def test_shares_of_tracing_against_their_limits() -> None:
@@ -58,7 +58,7 @@ def test_a_run_is_measured_past_its_warm_up() -> None:
         return synthetic_trace(batch)
 
     config = TsarConfig(batch_size=16, resolution_px=64, sdf_side=16, cache_size=64, warmup_cycles=2)
-    found = measured_cycles(config, trace, Task())
+    found = thesis_cycles(config, trace, Task())
     assert len(found) == MEASURED_CYCLES and found[0].counters["primary_rays"] == 16 * 256
     assert set(CONTROL) < set(found[0].stage_s)
     assert asked[-MEASURED_CYCLES:] == list(range(MEASURED_CYCLES))

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from analysis.comparison.choosing import choice_table, settled, what_came
-from analysis.comparison.front import Front, Place, PresetName, stored_front
+from analysis.comparison.front import Front, FrontPoint, PresetName, stored_front
 from analysis.comparison.options import RunOptions
 from analysis.metrics.cost_model import MODELLED
 from tsar.config import ConfigError, TsarConfig
 
 
-def place(batch: int, cost: float, error: float, knee: bool = False, **parts: float) -> Place:
+def place(batch: int, cost: float, error: float, knee: bool = False, **parts: float) -> FrontPoint:
     flops = {name: 1e5 * cost for name in (*MODELLED, "work")}
-    return Place(batch, tuple(sorted(parts.items())), flops, 1e-5 * cost, 1e-3 * error, cost, error, knee)
+    return FrontPoint(batch, tuple(sorted(parts.items())), flops, 1e-5 * cost, 1e-3 * error, cost, error, knee)
 
 
 FRONT = Front(

@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from analysis.study.cases import Case, Scale, framed_config
-from analysis.study.evaluation import Place, evaluate, finished, source_of_results
+from analysis.study.evaluation import Resources, evaluate, finished, source_of_results
 from analysis.study.runs import Totals
 from renderer.trace import Renderer
 from tests.scripts.commands import call_script
@@ -101,7 +101,7 @@ def test_images_and_fields_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_a_case_of_a_study(policy: str, tmp_path: Path, broken_renderer: None) -> None:
     scale = Scale(4, seconds=0.2, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=2)
     config = framed_config(64) if policy == "framed" else scale.config(0, TsarConfig(warmup_cycles=4))
-    case, place = Case("fly-by", policy, config, scale), Place(tmp_path / "runs", tmp_path / "cache")
+    case, place = Case("fly-by", policy, config, scale), Resources(tmp_path / "runs", tmp_path / "cache")
     found = finished(evaluate(case, case.key(source_of_results()), place), place)
     assert found is not None and found["nonfinite_samples"] > 0 and found["reference_nonfinite"] == 4
     if policy == "thesis":

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
-from analysis.metrics.quality import View
-from analysis.page.pictures import RATE_MAP, Map, Pixels, enlarge
+from analysis.metrics.quality import DisplayedImages
+from analysis.page.pictures import RATE_MAP, ByteMap, PagePixels, enlarge
 from analysis.page.video import OWN, PAPER, RIVALS, ComparisonFilm, draw_errors, inks, maps, photographs, to_pixels
 from renderer.film.files import Mp4Writer
 from tests.analysis.builders import SCALES, grey, view
@@ -29,7 +29,7 @@ FRAMED, ERRORS = RIVALS[0], {"own": [0.1], "framed": [0.2]}
 class Film(ComparisonFilm):
     """Of two runs, drawn from what they show."""
 
-    def of(self, view: View, times_s: list[float], errors: dict) -> Pixels:
+    def of(self, view: DisplayedImages, times_s: list[float], errors: dict) -> PagePixels:
         return self.frame(view.time_s, panels(view, self.width_px // 4), times_s, errors)
 
 
@@ -38,11 +38,11 @@ def film(side: int = SIDE, span: tuple[float, float] = (0.0, 1.0)) -> Film:
     return Film(side, span, ["own", "framed"], "own", LABELS, 3, scales=scales)
 
 
-def panels(view: View, side: int = SIDE) -> dict:
+def panels(view: DisplayedImages, side: int = SIDE) -> dict:
     return photographs(view, side) | drawn(maps(view, "own", SCALES), side)
 
 
-def drawn(found: dict[str, Map], side: int = SIDE) -> dict[str, Pixels]:
+def drawn(found: dict[str, ByteMap], side: int = SIDE) -> dict[str, PagePixels]:
     return {label: enlarge(one.pixels(), side) for label, one in found.items()}
 
 
@@ -51,7 +51,7 @@ def strip_of(made: ComparisonFilm, side: int = SIDE) -> int:
     return (made.height_px - 2 * side) // 4
 
 
-def of_age(view: View, newest_s: torch.Tensor | None) -> View:
+def of_age(view: DisplayedImages, newest_s: torch.Tensor | None) -> DisplayedImages:
     """The same with other ages of the samples of the first run."""
     record, display = view.shown["own"]
     ages = None if newest_s is None else SampleMap(newest_s, torch.zeros(2, 2, dtype=torch.int64))

@@ -14,7 +14,7 @@ import pytest
 
 from analysis.command.cli import InputError
 from analysis.perception.observers import COLUMNS
-from analysis.perception.protocol import Session
+from analysis.perception.protocol import TrialSession
 from analysis.perception.stimuli import MANIFEST, write_manifest
 from analysis.storage.files import write_json
 from tests.analysis.perception.builders import LEVELS, write_stimuli
@@ -25,8 +25,8 @@ def stimuli(tmp_path: Path) -> Path:
     return write_stimuli(tmp_path / "stimuli")
 
 
-def opened(tmp_path: Path, stimuli: Path, observer: str = "anna", repetitions: int = 4) -> Session:
-    return Session(tmp_path / "session", stimuli, observer, repetitions, seed=3)
+def opened(tmp_path: Path, stimuli: Path, observer: str = "anna", repetitions: int = 4) -> TrialSession:
+    return TrialSession(tmp_path / "session", stimuli, observer, repetitions, seed=3)
 
 
 def test_every_stimulus_is_asked_as_often_as_told_on_either_side(tmp_path: Path, stimuli: Path) -> None:
@@ -85,8 +85,8 @@ def test_a_fact_that_the_table_cannot_hold_is_refused(tmp_path: Path, stimuli: P
 
 def test_a_session_is_open_in_one_process(tmp_path: Path, stimuli: Path) -> None:
     source = (
-        "import sys; from pathlib import Path; from analysis.perception.protocol import Session; "
-        "Session(Path(sys.argv[1]), Path(sys.argv[2]), 'anna', 4, 3)"
+        "import sys; from pathlib import Path; from analysis.perception.protocol import TrialSession; "
+        "TrialSession(Path(sys.argv[1]), Path(sys.argv[2]), 'anna', 4, 3)"
     )
     command = [sys.executable, "-c", source, str(tmp_path / "session"), str(stimuli)]
     with opened(tmp_path, stimuli):
@@ -146,7 +146,7 @@ def test_a_session_belongs_to_one_person_and_its_stimuli(tmp_path: Path, stimuli
     with pytest.raises(InputError, match="with these stimuli, found another"):
         opened(tmp_path, other)
     with pytest.raises(InputError, match=r"expected .*manifest.json"):
-        Session(tmp_path / "x", tmp_path / "nowhere", "anna", 4, 0)
+        TrialSession(tmp_path / "x", tmp_path / "nowhere", "anna", 4, 0)
 
 
 def test_a_manifest_that_says_something_else_is_another_session(tmp_path: Path, stimuli: Path) -> None:

@@ -17,7 +17,7 @@ import pytest
 
 from analysis.command.cli import InputError
 from analysis.command.pages import BODY_MAX, CONNECTIONS_MAX
-from analysis.perception.protocol import TABLE, Session
+from analysis.perception.protocol import TABLE, TrialSession
 from analysis.perception.server import serving
 from tests.analysis.perception.builders import write_stimuli
 
@@ -59,18 +59,18 @@ def stimuli(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def session(tmp_path: Path, stimuli: Path) -> Iterator[Session]:
-    with Session(tmp_path / "session", stimuli, "anna", 4, seed=3) as session:
+def session(tmp_path: Path, stimuli: Path) -> Iterator[TrialSession]:
+    with TrialSession(tmp_path / "session", stimuli, "anna", 4, seed=3) as session:
         yield session
 
 
 @pytest.fixture
-def client(session: Session) -> Iterator[Client]:
+def client(session: TrialSession) -> Iterator[Client]:
     with serving(session, break_every=2) as address:
         yield Client(address, session.token)
 
 
-def test_the_server_hands_out_frames_and_takes_answers(client: Client, session: Session, stimuli: Path) -> None:
+def test_the_server_hands_out_frames_and_takes_answers(client: Client, session: TrialSession, stimuli: Path) -> None:
     page, script = client.ask("", headers={"X-Token": None}), client.ask("trial_page.js", headers={"X-Token": None})
     assert page[0] == script[0] == 200 and b"requestAnimationFrame" in script[1]
     assert b"trial_page.js" in page[1] and f'content="{session.token}"'.encode() in page[1]
@@ -86,7 +86,7 @@ def test_the_server_hands_out_frames_and_takes_answers(client: Client, session: 
     assert (state["done"], state["rest"], state["trial"]["number"]) == (2, True, 2)
 
 
-def test_the_pair_that_differs_is_on_its_side(client: Client, session: Session) -> None:
+def test_the_pair_that_differs_is_on_its_side(client: Client, session: TrialSession) -> None:
     for trial in session.trials:
         shown = client.state()["trial"]
         assert shown["number"] == trial.number
@@ -103,7 +103,7 @@ def test_it_listens_on_loopback_only(client: Client) -> None:
     assert [place.ip for place in listening if place.port == client.port] == ["127.0.0.1"]
 
 
-def test_bad_answers_are_refused_and_end_nothing(client: Client, session: Session, tmp_path: Path) -> None:
+def test_bad_answers_are_refused_and_end_nothing(client: Client, session: TrialSession, tmp_path: Path) -> None:
     bodies = (
         b"", b"{}", b"[]", b"7", b"null", b"nonsense", b"\xff", b"[" * 60_000, b'{"a":' * 10_000,
         b'{"trial": 7, "answer": "left"}', b'{"trial": 0, "answer": "up"}', b'{"trial": 0, "answer": ["left"]}',
@@ -126,7 +126,7 @@ def test_bad_answers_are_refused_and_end_nothing(client: Client, session: Sessio
     assert len(pd.read_parquet(session.export())) == 1
 
 
-def test_a_body_is_bounded(client: Client, session: Session) -> None:
+def test_a_body_is_bounded(client: Client, session: TrialSession) -> None:
     body = b'{"trial": 0, "answer": "left"}'
     assert BODY_MAX == 65536
     try:
@@ -137,7 +137,7 @@ def test_a_body_is_bounded(client: Client, session: Session) -> None:
     assert client.ask("answer", body.ljust(BODY_MAX))[0] == 200 and session.answers
 
 
-def test_other_hosts_and_origins_are_refused(client: Client, session: Session) -> None:
+def test_other_hosts_and_origins_are_refused(client: Client, session: TrialSession) -> None:
     body, own = b'{"trial": 0, "answer": "left"}', f"127.0.0.1:{client.port}"
     for host in (
         None,
@@ -164,7 +164,7 @@ def test_other_hosts_and_origins_are_refused(client: Client, session: Session) -
     assert client.ask("answer", body, {"Origin": f"http://{own}"})[0] == 200
 
 
-def test_only_who_knows_the_token_is_heard(client: Client, session: Session) -> None:
+def test_only_who_knows_the_token_is_heard(client: Client, session: TrialSession) -> None:
     body = b'{"trial": 0, "answer": "left"}'
     for token in (None, "", "mine", session.token[:-1], session.token.upper(), "\xe4" * 9):
         for path, content in (("state", None), ("frame/0/0", None), ("answer", body)):
@@ -172,7 +172,7 @@ def test_only_who_knows_the_token_is_heard(client: Client, session: Session) -> 
     assert not session.answers and len(session.token) >= 40
 
 
-def test_requests_that_never_end_hold_no_threads_and_keep_nobody_out(client: Client, session: Session) -> None:
+def test_requests_that_never_end_hold_no_threads_and_keep_nobody_out(client: Client, session: TrialSession) -> None:
     before = threading.active_count()
     half = [socket.create_connection(("127.0.0.1", client.port), timeout=10) for _ in range(3 * CONNECTIONS_MAX)]
     for number, one in enumerate(half):
@@ -190,7 +190,9 @@ def test_requests_that_never_end_hold_no_threads_and_keep_nobody_out(client: Cli
             one.close()
 
 
-def test_an_answer_that_cannot_be_stored_is_not_acknowledged(client: Client, session: Session, monkeypatch) -> None:
+def test_an_answer_that_cannot_be_stored_is_not_acknowledged(
+    client: Client, session: TrialSession, monkeypatch
+) -> None:
     def full(row: object) -> None:
         raise OSError(28, "database or disk is full", "answers.sqlite")
 
@@ -201,7 +203,7 @@ def test_an_answer_that_cannot_be_stored_is_not_acknowledged(client: Client, ses
     assert client.answer(0) == 200 and client.state()["done"] == 1
 
 
-def test_a_stimulus_that_was_damaged_is_not_shown(client: Client, session: Session, stimuli: Path) -> None:
+def test_a_stimulus_that_was_damaged_is_not_shown(client: Client, session: TrialSession, stimuli: Path) -> None:
     frame = stimuli / "planescene/hammersley-box-0008/frame00002.png"
     content = bytearray(frame.read_bytes())
     content[-30] ^= 1
@@ -211,7 +213,7 @@ def test_a_stimulus_that_was_damaged_is_not_shown(client: Client, session: Sessi
     assert isinstance(session.fault, InputError) and client.ask("frame/0/0")[0] == 200
 
 
-def test_a_port_that_is_taken_is_named(session: Session) -> None:
+def test_a_port_that_is_taken_is_named(session: TrialSession) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=f"port: expected a free one, got {port}"):
@@ -219,7 +221,7 @@ def test_a_port_that_is_taken_is_named(session: Session) -> None:
                 pass
 
 
-def test_the_table_is_written_when_serving_ends(session: Session) -> None:
+def test_the_table_is_written_when_serving_ends(session: TrialSession) -> None:
     with serving(session) as address:
         assert Client(address, session.token).answer(0) == 200
     assert len(pd.read_parquet(session.folder / TABLE)) == 1 and os.path.exists(session.folder / "answers.sqlite")

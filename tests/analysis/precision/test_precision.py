@@ -7,7 +7,7 @@ import pytest
 
 from analysis.precision.options import PrecisionOptions
 from analysis.precision.runs import KEPT, OWN, TEXTURES, Run, runs
-from analysis.precision.tables import Result, format_table, least_safe, run_table, same_for, shown_tables
+from analysis.precision.tables import RunResult, format_table, least_safe, run_table, same_for, shown_tables
 from tsar.policies import POLICIES
 from tsar.policies.stored import Stored
 from tsar.policy import Setting
@@ -15,11 +15,11 @@ from tsar.policy import Setting
 OPTIONS = PrecisionOptions(inputs=("chase", "fly-by"), policies=("tsar",))
 
 
-def result(run: Run, mse: float, asked: str, broken: bool = False) -> Result:
-    return Result(run, mse, list(asked), broken)
+def result(run: Run, mse: float, asked: str, broken: bool = False) -> RunResult:
+    return RunResult(run, mse, list(asked), broken)
 
 
-def results(options: PrecisionOptions, of: dict[tuple[str, str], tuple[float, str, bool]]) -> list[Result]:
+def results(options: PrecisionOptions, of: dict[tuple[str, str], tuple[float, str, bool]]) -> list[RunResult]:
     """Results of every run; runs that are not named equal the unchanged policy."""
     return [result(run, *of.get((run.kept, run.form), (2.0, "abcd", False))) for run in runs(options)]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.sensitivity.options import SensitivityOptions
-from analysis.sensitivity.runs import Setting, runs, sweeps
+from analysis.sensitivity.runs import TemplateSetting, runs, sweeps
 from analysis.study.cases import SCALES, framed_config
 from analysis.study.inputs import INPUTS
 from tests.analysis.sensitivity.builders import TWO
@@ -21,7 +21,7 @@ def test_cases_are_made_once() -> None:
     assert len(planned) == len({run.case for run in planned}) == len({run.place for run in planned})
     per_input = 1 + 9 + 4 + 4 + 4
     assert len(planned) == len(INPUTS) * per_input
-    default = Setting.of(TsarConfig())
+    default = TemplateSetting.of(TsarConfig())
     assert sum(run.setting == default for run in planned) == len(INPUTS)
     assert all(default in settings for settings in sweeps(SensitivityOptions()).values())
     assert sum(run.case.policy == "framed" for run in planned) == sum(run.setting is None for run in planned) == 5
@@ -35,8 +35,8 @@ def test_a_case_is_the_row_at_its_setting() -> None:
         if run.setting is None:
             assert run.case.tsar == framed_config(row.resolution_px)
             continue
-        assert Setting.of(run.case.tsar) == run.setting
-        back = Setting.of(base).applied(dataclasses.replace(run.case.tsar, seed=0))
+        assert TemplateSetting.of(run.case.tsar) == run.setting
+        back = TemplateSetting.of(base).applied(dataclasses.replace(run.case.tsar, seed=0))
         assert back == row and run.case.tsar.seed == run.repetition
         assert run.case.phase == run.repetition / 2
         assert run.case.stills_s == ((options.still_s,) if run.repetition == 0 else ())
@@ -51,8 +51,8 @@ def test_the_default_runs_even_where_no_sweep_holds_it() -> None:
     )
     assert [run.setting for run in runs(options)] == [
         None,
-        Setting.of(TsarConfig()),
-        Setting.of(TsarConfig()).changed(spatial_slope=-3, temporal_slope=-3),
+        TemplateSetting.of(TsarConfig()),
+        TemplateSetting.of(TsarConfig()).changed(spatial_slope=-3, temporal_slope=-3),
     ]
 
 

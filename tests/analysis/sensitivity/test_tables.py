@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.sensitivity.runs import Setting
+from analysis.sensitivity.runs import TemplateSetting
 from analysis.sensitivity.tables import ALL, beyond_spread, bowl, edge, optimum_table, setting_table
 from tests.analysis.sensitivity.builders import TWO, centred, made_up
 from tsar.config import TsarConfig
@@ -24,12 +24,12 @@ def test_table_of_settings() -> None:
     assert len(lines) == 2 * (9 + 5 + 5 + 5)
     assert sum(line["default"] for line in lines) == 2 * 4
     for line in lines:
-        setting = Setting(**{name: line[name] for name in dataclasses.asdict(Setting.of(TsarConfig()))})
+        setting = TemplateSetting(**{name: line[name] for name in dataclasses.asdict(TemplateSetting.of(TsarConfig()))})
         error = centred(line["input"], setting, 0)
         assert line["mse"] == pytest.approx(error)
         for column in ("ratio", "ratio_median", "ratio_least", "ratio_most"):
             assert line[column] == pytest.approx(error / 2)
-        assert line["to_default"] == pytest.approx(error / centred(line["input"], Setting.of(TsarConfig()), 0))
+        assert line["to_default"] == pytest.approx(error / centred(line["input"], TemplateSetting.of(TsarConfig()), 0))
         assert line["suitable_percentile"] == (100.0 if error <= 2 else 0.0)
     assert {line["suitable_percentile"] for line in lines} == {0.0, 100.0}
 
@@ -37,7 +37,7 @@ def test_table_of_settings() -> None:
 def test_ratios_are_of_the_framed_run_of_the_same_repetition() -> None:
     options = dataclasses.replace(TWO, repetitions=2)
 
-    def error(name: str, setting: Setting | None, repetition: int) -> float:
+    def error(name: str, setting: TemplateSetting | None, repetition: int) -> float:
         return (4.0 if repetition else 1.0) if setting is None else (2.0 if repetition else 3.0)
 
     line = setting_table(made_up(options, error), options)[0]
@@ -71,7 +71,7 @@ def test_optima() -> None:
 def test_all_inputs_are_judged_by_factors() -> None:
     """A quarter on the dark input outweighs a doubling on the bright one, whatever their errors are."""
 
-    def error(name: str, setting: Setting | None, repetition: int) -> float:
+    def error(name: str, setting: TemplateSetting | None, repetition: int) -> float:
         changed = setting is not None and setting.bias == 2.0
         return (100.0 * (2.0 if changed else 1.0)) if name == "chase" else 0.01 * (0.25 if changed else 1.0)
 
@@ -83,9 +83,9 @@ def test_all_inputs_are_judged_by_factors() -> None:
 
 
 def test_failed_runs_leave_gaps_and_nothing_else() -> None:
-    gone = Setting.of(TsarConfig()).changed(spatial_slope=-2.0, temporal_slope=0.0)
+    gone = TemplateSetting.of(TsarConfig()).changed(spatial_slope=-2.0, temporal_slope=0.0)
 
-    def error(name: str, setting: Setting | None, repetition: int) -> float:
+    def error(name: str, setting: TemplateSetting | None, repetition: int) -> float:
         framed_gone = setting is None and name == "chase"
         return np.nan if setting == gone or framed_gone else centred(name, setting, repetition)
 

@@ -13,6 +13,7 @@ import pytest
 from analysis.command.ownership import release_folders
 from analysis.storage.results import own_results
 from analysis.storage.store import Store
+from renderer.compute import device
 from tests.durable import KINDS
 from tests.scripts.commands import call_script, one_line
 
@@ -82,6 +83,8 @@ def test_every_command_leaves_a_summary_of_the_user(
 ) -> None:
     KINDS["job"].prepare(tmp_path)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(device, "_loaded", set())
+    monkeypatch.setattr(device.wp, "load_module", lambda *_, **__: pytest.fail("kernels are loaded before the check"))
     (tmp_path / "out").mkdir()
     for name in ("summary.json", "error.png"):
         (tmp_path / "out" / name).write_text("mine")

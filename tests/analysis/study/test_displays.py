@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.metrics.causes import Truths
-from analysis.metrics.quality import Shown, View
-from analysis.study.displays import Measuring, Seen, watch
+from analysis.metrics.quality import DisplayedImages, Shown
+from analysis.study.displays import DisplayRecord, Measuring, watch
 from tests.analysis.builders import good_record
 from tsar.types import SampleMap, ShownImage
 
@@ -36,13 +36,13 @@ def recorded(display_s: Sequence[float]) -> list[Shown]:
 
 def look(
     times_s: Sequence[float], runs: Mapping[str, Iterable[Shown]], truth: Sequence[torch.Tensor] = (), **more
-) -> dict[str, Seen]:
+) -> dict[str, DisplayRecord]:
     truths = Truths(lambda number: truth[number] if truth else image(0), 0.0, 10.0, len(times_s))
     viewers = more.pop("viewers", ())
     return watch(runs, truths, np.array(times_s, np.float64), Measuring(**more), viewers)
 
 
-def white(seen: Seen) -> list[int]:
+def white(seen: DisplayRecord) -> list[int]:
     """Number of white pixels of each image from its error."""
     return [round(e * SIDE * SIDE) for e in seen.column("mse")]
 
@@ -81,7 +81,7 @@ def test_holding_agrees_with_a_search(shown: list[int], also: list[int]) -> None
 
 
 def test_viewers_see_all_displays() -> None:
-    views: list[View] = []
+    views: list[DisplayedImages] = []
     records = recorded([0.0, 0.1])
     look([0.0, 0.1], {"a": records, "b": stream([0.0, 0.1], 7), "c": stream([0.0], 3)}, viewers=[views.append])
     assert [view.number for view in views] == [0, 1]
@@ -130,7 +130,7 @@ def test_images_of_a_span_are_kept_encoded() -> None:
 def test_ages_are_of_the_image_on_the_display() -> None:
     maps = [SampleMap(torch.full((2, 2), t, dtype=torch.float64), torch.zeros(2, 2, dtype=torch.int64)) for t in (3, 4)]
     shown = [(good_record(i), ShownImage(i * 0.2, 0.0, image(i), maps[i])) for i in range(2)]
-    views: list[View] = []
+    views: list[DisplayedImages] = []
     look([0.1, 0.3], {"a": shown, "b": stream([0.0])}, viewers=[views.append])
     assert [view.shown["a"][1].sample_map is maps[i] for i, view in enumerate(views)] == [True, True]
 

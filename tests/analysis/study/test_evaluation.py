@@ -18,7 +18,7 @@ from analysis.command.cluster import ClusterOptions
 from analysis.command.progress import Task
 from analysis.metrics.budget import SHARES
 from analysis.study.cases import Case, Scale, framed_config
-from analysis.study.evaluation import Place, evaluate, finished, source_of_results, times_of
+from analysis.study.evaluation import Resources, evaluate, finished, source_of_results, times_of
 from analysis.study.farm import run_cases
 from tsar.config import ConfigError, TsarConfig
 
@@ -35,7 +35,7 @@ def key(one: Case) -> str:
     return one.key(source_of_results())
 
 
-def content(place: Place, name: str) -> tuple[bytes, list[bytes], dict]:
+def content(place: Resources, name: str) -> tuple[bytes, list[bytes], dict]:
     """A result without its measurements of the machine."""
     files = place.files(name)
     summary = json.loads(files["summary"].read_text())
@@ -49,11 +49,11 @@ def references(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def place(tmp_path: Path, references: Path) -> Place:
-    return Place(tmp_path / "runs", references)
+def place(tmp_path: Path, references: Path) -> Resources:
+    return Resources(tmp_path / "runs", references)
 
 
-def test_a_result_holds_every_reference_time(place: Place) -> None:
+def test_a_result_holds_every_reference_time(place: Resources) -> None:
     one = case(stills_s=(0.1,), jod_span_s=(0.0, 0.2))
     name = evaluate(one, key(one), place)
     table, found = pd.read_parquet(place.files(name)["times"]), finished(name, place)
@@ -72,13 +72,13 @@ def test_a_result_holds_every_reference_time(place: Place) -> None:
 @pytest.mark.parametrize(
     "policy", ["framed", "framed-super", "framed-quarter", "framed-taa-late", "frameless", "afr", "oracle"]
 )
-def test_every_policy_runs(policy: str, place: Place) -> None:
+def test_every_policy_runs(policy: str, place: Resources) -> None:
     one = case(policy)
     table = pd.read_parquet(place.files(evaluate(one, key(one), place))["times"])
     assert len(table) == TIMES and (table["mse"] > 0).all()
 
 
-def test_the_oracle_is_better_than_what_does_not_look(place: Place) -> None:
+def test_the_oracle_is_better_than_what_does_not_look(place: Resources) -> None:
     errors = {}
     for policy in ("thesis", "framed", "oracle"):
         one = case(policy)
@@ -86,11 +86,11 @@ def test_the_oracle_is_better_than_what_does_not_look(place: Place) -> None:
     assert errors["oracle"] < min(errors["thesis"], errors["framed"])
 
 
-def test_threads_change_nothing(place: Place, references: Path, tmp_path: Path) -> None:
+def test_threads_change_nothing(place: Resources, references: Path, tmp_path: Path) -> None:
     one, threads = case(), torch.get_num_threads()
     found = []
     for number, count in enumerate((1, 2)):
-        other = Place(tmp_path / str(number), references, threads=count)
+        other = Resources(tmp_path / str(number), references, threads=count)
         torch.set_num_threads(count)
         try:
             found.append(content(other, evaluate(one, key(one), other)))
@@ -99,7 +99,7 @@ def test_threads_change_nothing(place: Place, references: Path, tmp_path: Path) 
     assert found[0] == found[1]
 
 
-def test_a_result_on_disk_is_not_made_again(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_result_on_disk_is_not_made_again(place: Resources, monkeypatch: pytest.MonkeyPatch) -> None:
     one = case()
     evaluate(one, key(one), place)
     before = content(place, key(one))
@@ -109,16 +109,16 @@ def test_a_result_on_disk_is_not_made_again(place: Place, monkeypatch: pytest.Mo
 
 
 @pytest.fixture(scope="module")
-def made(references: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Place, str]:
+def made(references: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Resources, str]:
     """A result with stills."""
-    one, place = case("framed", stills_s=(0.1,)), Place(tmp_path_factory.mktemp("made"), references)
+    one, place = case("framed", stills_s=(0.1,)), Resources(tmp_path_factory.mktemp("made"), references)
     return place, evaluate(one, key(one), place)
 
 
 @pytest.mark.parametrize("damage", ["lost", "cut", "bit", "exchanged"])
 @pytest.mark.parametrize("part", ["summary", "times", "still"])
 def test_a_damaged_result_is_named_and_made_again(
-    part: str, damage: str, made: tuple[Place, str], place: Place, capsys: pytest.CaptureFixture
+    part: str, damage: str, made: tuple[Resources, str], place: Resources, capsys: pytest.CaptureFixture
 ) -> None:
     """As after a kill between its files, a bit that flipped, or the file of another run in its place."""
     whole, name = made
@@ -144,7 +144,7 @@ def test_a_damaged_result_is_named_and_made_again(
     assert content(place, name) == content(whole, name) and finished(name, place) is not None
 
 
-def test_a_table_that_is_damaged_is_not_read(made: tuple[Place, str], place: Place) -> None:
+def test_a_table_that_is_damaged_is_not_read(made: tuple[Resources, str], place: Resources) -> None:
     shutil.copytree(made[0].results, place.results)
     assert len(times_of(made[1], place)) == TIMES
     place.files(made[1])["times"].write_bytes(b"")
@@ -152,7 +152,7 @@ def test_a_table_that_is_damaged_is_not_read(made: tuple[Place, str], place: Pla
         times_of(made[1], place)
 
 
-def test_a_run_that_fails_leaves_nothing_that_counts(place: Place) -> None:
+def test_a_run_that_fails_leaves_nothing_that_counts(place: Resources) -> None:
     """Without a warm-up there is nothing on the display when the measurement starts."""
     bad = case(tsar=TINY.config(0, TsarConfig(warmup_cycles=0)))
     with pytest.raises(ValueError, match="nothing is shown yet"):
@@ -160,23 +160,23 @@ def test_a_run_that_fails_leaves_nothing_that_counts(place: Place) -> None:
     assert finished(key(bad), place) is None and not list(place.results.glob("*.parquet"))
 
 
-def test_another_source_is_refused(place: Place) -> None:
+def test_another_source_is_refused(place: Resources) -> None:
     with pytest.raises(ValueError, match="this worker runs another"):
         evaluate(case(), case().key("other source"), place)
 
 
-def test_other_rates_of_the_display_are_refused(place: Place) -> None:
+def test_other_rates_of_the_display_are_refused(place: Resources) -> None:
     odd = dataclasses.replace(TINY, reference_rate_hz=25.0)
     with pytest.raises(ConfigError, match="reference_rate_hz"):
         evaluate(case(scale=odd, jod_span_s=(0.0, 0.2)), key(case(scale=odd, jod_span_s=(0.0, 0.2))), place)
 
 
 def test_two_processes_give_what_one_gives_and_a_failure_stops_no_other(
-    place: Place, references: Path, tmp_path: Path
+    place: Resources, references: Path, tmp_path: Path
 ) -> None:
     bad = case(tsar=TINY.config(0, TsarConfig(warmup_cycles=0)))
     cases = [case(), bad, case("framed"), case("afr"), case()]
-    many = Place(tmp_path / "many", references)
+    many = Resources(tmp_path / "many", references)
     told: list[int] = []
     keys, failures = run_cases(cases, many, ClusterOptions(workers=2), Task(show=told.append))
     assert set(failures) == {bad} and "nothing is shown yet" in failures[bad]
@@ -187,7 +187,7 @@ def test_two_processes_give_what_one_gives_and_a_failure_stops_no_other(
     assert not failures and again[case()] == keys[case()], "what is on disk needs no cluster"
 
 
-def test_a_running_cluster_is_used_by_its_address(place: Place) -> None:
+def test_a_running_cluster_is_used_by_its_address(place: Resources) -> None:
     from distributed import LocalCluster
 
     one = case("framed")
@@ -197,7 +197,7 @@ def test_a_running_cluster_is_used_by_its_address(place: Place) -> None:
     assert not failures and finished(keys[one], place) is not None
 
 
-def test_parts_of_the_policy_are_left_out_and_named(place: Place) -> None:
+def test_parts_of_the_policy_are_left_out_and_named(place: Resources) -> None:
     whole, less = case("tsar"), case("tsar", parts=(("smoothing", False),))
     tables = [pd.read_parquet(place.files(evaluate(one, key(one), place))["times"]) for one in (whole, less)]
     assert (tables[0]["mse"] != tables[1]["mse"]).all() and "tsar-smoothing-0-fly-by" in key(less)
@@ -207,7 +207,7 @@ def test_parts_of_the_policy_are_left_out_and_named(place: Place) -> None:
 
 
 @pytest.mark.parametrize("policy", ["tsar", "framed"])
-def test_the_budget_of_an_error_adds_up(policy: str, place: Place) -> None:
+def test_the_budget_of_an_error_adds_up(policy: str, place: Resources) -> None:
     """At every time, with the truth rendered at the time that the image shows; the longer a frame is shown, the larger
     the floor that its latency sets."""
     one = case(policy, budget_s=0.05)

@@ -20,7 +20,7 @@ from analysis.command.cluster import ClusterOptions, connected
 from analysis.command.progress import Task
 from analysis.study import farm
 from analysis.study.cases import Case, Scale
-from analysis.study.evaluation import Place
+from analysis.study.evaluation import Resources
 from analysis.study.farm import describe_failures, run_cases
 from tests.scripts.commands import ROOT
 from tsar.config import TsarConfig
@@ -34,8 +34,8 @@ def cases(count: int) -> list[Case]:
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Place:
-    return Place(tmp_path / "runs", tmp_path / "references")
+def place(tmp_path: Path) -> Resources:
+    return Resources(tmp_path / "runs", tmp_path / "references")
 
 
 def sleep_as_a_run(*_: Any) -> None:
@@ -61,7 +61,7 @@ def test_a_local_cluster_listens_on_loopback_only() -> None:
         assert len(workers) == 1 and all(one["host"] == "127.0.0.1" for one in workers)
 
 
-def test_runs_whose_workers_die_fail_with_the_reason(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_whose_workers_die_fail_with_the_reason(place: Resources, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(farm, "_prepare", exit_as_a_run)
     asked, told = cases(2), list[int]()
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
@@ -90,7 +90,9 @@ def cluster() -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
 
 
 @pytest.mark.parametrize("ended", ["scheduler", "workers"])
-def test_a_cluster_that_ends_is_said(ended: str, cluster: Any, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cluster_that_ends_is_said(
+    ended: str, cluster: Any, place: Resources, monkeypatch: pytest.MonkeyPatch
+) -> None:
     address, scheduler, workers = cluster
     monkeypatch.setattr(farm, "_prepare", sleep_as_a_run)
     monkeypatch.setattr(farm, "WAIT_S", 3)

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from analysis.suitability.options import SuitabilityOptions
-from analysis.suitability.rivalry import Group, groups_of, lead_table, metric_table, rival_table
+from analysis.suitability.rivalry import RunGroup, groups_of, lead_table, metric_table, rival_table
 from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import Results
 from tests.analysis.suitability.builders import TIMES, result
@@ -22,7 +22,7 @@ RIVALS = ("framed", *OPTIONS.rivals)
 EARLY = np.arange(TIMES) < TIMES // 4
 
 
-def groups(error: Callable[[Run], object], failed: Callable[[Run], bool] = lambda run: False) -> list[Group]:
+def groups(error: Callable[[Run], object], failed: Callable[[Run], bool] = lambda run: False) -> list[RunGroup]:
     made = [result(run, error(run)) for run in runs(OPTIONS) if not failed(run)]
     return groups_of(Results(made), SIDES, ("thesis", *RIVALS))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from analysis.study.evaluation import Place
+from analysis.study.evaluation import Resources
 from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.plots import boxes, errors, ratio_over_time
 from analysis.suitability.runs import STILLS, runs
@@ -65,7 +65,7 @@ def test_the_best_policy_is_neither_framed_nor_sees_the_truth_and_is_shown() -> 
 
 
 def test_pictures_of_the_strip_are_those_of_their_runs(tmp_path: Path) -> None:
-    results, place = made(OPTIONS), Place(tmp_path / "runs", tmp_path)
+    results, place = made(OPTIONS), Resources(tmp_path / "runs", tmp_path)
     keys = {one.run.case: one.run.case.name for one in results.all}
     strip = tmp_path / "strip.png"
     assert write_strip(strip, OPTIONS, results, "fly-by", keys, place) is None, "no picture is on disk"

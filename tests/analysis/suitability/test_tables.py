@@ -15,8 +15,8 @@ from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.plots import boxes
 from analysis.suitability.runs import Run, runs
 from analysis.suitability.tables import (
-    Result,
     Results,
+    RunResult,
     cause_table,
     disagreement_table,
     percentile_table,
@@ -182,7 +182,7 @@ def test_regions_are_averaged_over_repetitions() -> None:
     for run in runs(OPTIONS):
         one = result(run, 1.0)
         regions = {"still plain": {"lag": 0.25 + run.repetition, "share": 0.5}}
-        found.append(Result(run, {**one.summary, "regions": regions}, one.times))
+        found.append(RunResult(run, {**one.summary, "regions": regions}, one.times))
     table = region_table(Results(found), 7, 128).set_index(["input", "policy"]).loc["chase"]
     assert set(table.index) == {*ERRORS, "framed"} and set(table["region"]) == {"still plain"}
     assert (table["lag"] == 0.75).all() and (table["share"] == 0.5).all()

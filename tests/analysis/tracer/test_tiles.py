@@ -17,7 +17,7 @@ from analysis.command.cluster import ClusterOptions, connected
 from analysis.command.progress import Task
 from analysis.tracer.tile_speedup import FarmModel, fitted, study
 from analysis.tracer.tiles import (
-    Picture,
+    PictureTask,
     TileOptions,
     assembled,
     chunks_of,
@@ -33,7 +33,9 @@ from renderer.trace import Renderer
 from scenes import catalog
 from tsar.memory import core_count
 
-PICTURE = Picture("quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", "hammersley"))
+PICTURE = PictureTask(
+    "quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", "hammersley")
+)
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,13 @@ from analysis.comparison.front import Front, read_front
 from analysis.metrics.front import on_front
 from analysis.storage.files import write_json
 from analysis.study.cases import SCALES, Case
-from analysis.trade.knobs import KNOBS, Setting, Where, alone, case_of, chosen_knobs, said, setting_of, turned
+from analysis.trade.knobs import KNOBS, KnobSetting, Where, alone, case_of, chosen_knobs, said, setting_of, turned
 from analysis.trade.options import TradeOptions
 from analysis.trade.runs import Point, places, points_of, runs
 from analysis.trade.search import search, searched
 from analysis.trade.shown import shown_tables
 from analysis.trade.store import front_file
-from analysis.trade.tables import Result, knees, knob_table, point_table, relative, sentences
+from analysis.trade.tables import RunResult, knees, knob_table, point_table, relative, sentences
 from tsar.config import ConfigError, TsarConfig
 from tsar.filtering.records import DEFAULT, FilterOptions
 
@@ -37,7 +37,7 @@ def base(scale: str) -> Case:
 def test_every_value_of_every_knob_changes_its_case_and_nothing_else(scale: str) -> None:
     refused = set()
     for knob in KNOBS.values():
-        standing = case_of(Setting(knob.policy), HERE, SCALES[scale], base(scale))
+        standing = case_of(KnobSetting(knob.policy), HERE, SCALES[scale], base(scale))
         for value, setting in alone(knob):
             try:
                 case = case_of(setting, HERE, SCALES[scale], base(scale))
@@ -59,7 +59,7 @@ def test_the_pace_is_that_of_the_machine_of_the_other_studies() -> None:
     """At row 7 a cycle of tsar takes as long as on the machine that shows 8 framed images a second."""
     from analysis.metrics.cost_model import CAPACITY_DEFAULT, parameters_of, policy_flops
     from tsar.policies.filter import Filter
-    from tsar.policy import Setting as OfAPolicy
+    from tsar.policy import KnobSetting as OfAPolicy
 
     config = TsarConfig()
     price = Filter(OfAPolicy(config)).price
@@ -75,7 +75,7 @@ def test_all_options_of_the_policy_but_for_one_bound_are_knobs() -> None:
 
 
 def test_settings_are_named_by_what_differs() -> None:
-    assert setting_of("tsar", {"batch": 128, "jitter": True}) == Setting() and Setting().words == "tsar"
+    assert setting_of("tsar", {"batch": 128, "jitter": True}) == KnobSetting() and KnobSetting().words == "tsar"
     assert turned(jitter=False, batch=16, share_max=1 / 64).words == "tsar, batch 16, share-max 1/64, jitter off"
     assert said(1 / 3) == "0.333333" and said(0.05) == "0.05" and said("sum") == "sum"
     with pytest.raises(ConfigError, match="knobs: expected none twice"):
@@ -86,7 +86,7 @@ def test_the_default_is_measured_at_every_place() -> None:
     assert [(one.input, one.seed, one.phase) for one in places(OPTIONS)] == [
         ("chase", 0, 0.0), ("planescene", 0, 0.0), ("chase", 1, 0.5), ("planescene", 1, 0.0),
     ]  # fmt: skip
-    assert Setting() in [point.setting for point in points_of(chosen_knobs(["tiles"]))]
+    assert KnobSetting() in [point.setting for point in points_of(chosen_knobs(["tiles"]))]
     found, dropped = runs(OPTIONS, points_of(chosen_knobs(["resolution"])))
     assert len(found) == 4 * 2 and list(dropped) == ["tsar, resolution 0.25"]
 
@@ -109,14 +109,14 @@ def test_a_search_nears_the_front_and_is_the_same_again() -> None:
         return found
 
     tried = search(knobs, 30, 6, 5, measure)
-    assert tried[0].setting == Setting() and [point.value for point in tried] == list(range(30))
+    assert tried[0].setting == KnobSetting() and [point.value for point in tried] == list(range(30))
     assert [len(one) for one in asked] == [6] * 5
     jittered = ["jitter" not in dict(point.setting.changes) for point in tried]
     assert sum(jittered[15:]) > 10
     assert search(knobs, 30, 6, 5, measure) == tried and search(knobs, 30, 6, 6, measure) != tried
 
 
-def results(seed: int = 0) -> list[Result]:
+def results(seed: int = 0) -> list[RunResult]:
     """Runs of a simple law: the error falls with cost, and every input has its own level."""
     drawn = np.random.default_rng(seed)
     found = []
@@ -132,7 +132,7 @@ def results(seed: int = 0) -> list[Result]:
         machine = {"cycles_s": 0.01 * batch, "run_memory_bytes": 4096}
         summary = {"spent": spent, "machine": machine, "jod": 7.0 - worse, "key": run.case.name}
         times = pd.DataFrame({"mse": [mse, mse], "flip": [0.1, np.nan], "ssim": [0.9, np.nan]})
-        found.append(Result(run, summary, times))
+        found.append(RunResult(run, summary, times))
     return found
 
 
@@ -222,10 +222,10 @@ def test_budgets_buy_the_most_accurate_and_targets_the_cheapest(flops: float, ms
 
 
 def some_front() -> Front:
-    from analysis.comparison.front import Place
+    from analysis.comparison.front import FrontPoint
 
     places = [
-        Place(16 * 2**k, (), {"work": 1e6 * 2.0**k}, 1e-6 * 2**k, 0.1 / 2**k, 0.125 * 2.0**k, 8.0 / 2**k, k == 3)
+        FrontPoint(16 * 2**k, (), {"work": 1e6 * 2.0**k}, 1e-6 * 2**k, 0.1 / 2**k, 0.125 * 2.0**k, 8.0 / 2**k, k == 3)
         for k in range(6)
     ]
     return Front(tuple(places), {})

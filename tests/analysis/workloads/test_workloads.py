@@ -13,7 +13,7 @@ from analysis.study.cases import is_framed
 from analysis.workloads.options import WorkloadOptions
 from analysis.workloads.plots import figure
 from analysis.workloads.runs import UNPRICED, Run, Workload, runs
-from analysis.workloads.tables import Result, map_table, paying_table, pays_from, policy_table, shown_tables
+from analysis.workloads.tables import RunResult, map_table, paying_table, pays_from, policy_table, shown_tables
 from tsar.policies import POLICIES
 from tsar.policy import Setting
 
@@ -58,12 +58,12 @@ def test_a_policy_without_time_for_a_cycle_has_no_case() -> None:
     assert [run.case is None for run in runs(options)] == [False, True, False], "frameless is cheaper than thesis"
 
 
-def results(ratios: dict[str, list[float]]) -> list[Result]:
+def results(ratios: dict[str, list[float]]) -> list[RunResult]:
     """Errors of policies at prices of 1e2 and 1e4 FLOPs, over 2.0 of the framed renderer, at 8 images a second."""
     found = []
     for name, values in {"framed": [1.0, 1.0], **ratios}.items():
         for flops, ratio in zip((1e2, 1e4), values, strict=True):
-            found.append(Result(Run(name, Workload(flops, 8.0, 512), 0, "chase", None), 2.0 * ratio))
+            found.append(RunResult(Run(name, Workload(flops, 8.0, 512), 0, "chase", None), 2.0 * ratio))
     return found
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from scenes.driving.cutting import carve, cut
 from scenes.driving.meshing import (
-    Surface,
+    SurfaceMesh,
     box,
     boxes,
     ellipsoid,
@@ -42,13 +42,13 @@ CLOSED = {
 }
 
 
-def wavy(rows: int = 13, columns: int = 9) -> Surface:
+def wavy(rows: int = 13, columns: int = 9) -> SurfaceMesh:
     """An open, curved sheet over the unit square."""
     u, v = np.meshgrid(np.linspace(0.0, 1.0, rows), np.linspace(0.0, 1.0, columns), indexing="ij")
     return grid(np.stack([u, v, 0.2 * np.sin(5.0 * u) * np.cos(4.0 * v)], axis=-1))
 
 
-def level(size: int = 8) -> Surface:
+def level(size: int = 8) -> SurfaceMesh:
     """The unit square, flat, facing up."""
     u, v = np.meshgrid(*[np.linspace(0.0, 1.0, size)] * 2, indexing="ij")
     return grid(np.stack([u, v, np.zeros_like(u)], axis=-1))
@@ -117,7 +117,7 @@ def test_box_has_flat_faces_and_uv_in_metres() -> None:
     assert wall.uvs[uprights, 1] == pytest.approx(wall.vertices[uprights, 2])
 
 
-def bits(surface: Surface) -> list[bytes]:
+def bits(surface: SurfaceMesh) -> list[bytes]:
     """Everything of a surface, to the last bit and the sign of zeros."""
     return [array.tobytes() for array in (surface.vertices, surface.faces, surface.normals, surface.uvs)]
 
@@ -204,7 +204,7 @@ def test_join_keeps_every_part() -> None:
 
 def test_compact_drops_unused_vertices_only() -> None:
     sheet = level(4)
-    few = Surface(sheet.vertices, sheet.faces[[3, 7]], sheet.normals, sheet.uvs).compact()
+    few = SurfaceMesh(sheet.vertices, sheet.faces[[3, 7]], sheet.normals, sheet.uvs).compact()
     assert len(few.vertices) == len(np.unique(sheet.faces[[3, 7]])) < len(sheet.vertices)
     assert few.vertices[few.faces] == pytest.approx(sheet.vertices[sheet.faces[[3, 7]]])
     assert few.uvs[few.faces] == pytest.approx(sheet.uvs[sheet.faces[[3, 7]]])
@@ -216,7 +216,7 @@ def test_compact_drops_unused_vertices_only() -> None:
 
 @pytest.mark.parametrize("normal", [(1.0, 0.0, 0.0), (0.3, 1.0, 0.0), (-0.5, 0.7, 0.4)])
 @pytest.mark.parametrize("shape", [wavy(), CLOSED["extrusion"][0], ellipsoid((0.5, 0.5, 0.0), (0.6, 0.5, 0.4))])
-def test_a_plane_cuts_exactly(shape: Surface, normal: tuple[float, float, float]) -> None:
+def test_a_plane_cuts_exactly(shape: SurfaceMesh, normal: tuple[float, float, float]) -> None:
     distance = (shape.vertices - [0.47, 0.52, 0.0]) @ np.array(normal)
     below, above = cut(shape, distance)
     for part, sign in ((below, -1.0), (above, 1.0)):

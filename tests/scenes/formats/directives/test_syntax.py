@@ -9,10 +9,10 @@ import pytest
 
 from scenes.canonical import SceneError
 from scenes.formats.directives.syntax import parameters_of, parse_directives
-from scenes.formats.text.places import Place
+from scenes.formats.text.places import TextPosition
 
 
-def no_files(name: str, place: Place, inside: tuple[Path, ...]) -> tuple[str, Path]:
+def no_files(name: str, place: TextPosition, inside: tuple[Path, ...]) -> tuple[str, Path]:
     raise SceneError(f"{place}: no files, got {name}")
 
 
