@@ -15,7 +15,7 @@ from analysis.command.progress import Task
 from analysis.perception.observers import Observer, correct_probability
 from analysis.perception.options import AdaptiveOptions
 from analysis.perception.psychometrics import THRESHOLD
-from analysis.study.cases import ROWS, SCALES, Case, framed_config
+from analysis.study.cases import ROWS, SCALES, Case, framed_config, is_framed
 from analysis.study.evaluation import Resources, broken, finished
 from analysis.study.farm import describe_failures, run_cases
 from tsar.config import TsarConfig
@@ -25,7 +25,7 @@ SIDE_PX = 512
 
 
 def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
-    """JOD from the reference of both renderers at equal cost, a row for each input and batch size.
+    """JOD from the reference of both policies at equal cost, a row for each input and batch size.
 
     Results and references are kept as in the other studies, so that this continues where it was stopped.
 
@@ -40,8 +40,8 @@ def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
         for row in rows:
             config = scale.config(row, TsarConfig(seed=options.seed))
             framed = framed_config(config.resolution_px)
-            pair: tuple[tuple[str, TsarConfig], ...] = (("thesis", config), ("framed", framed))
-            for policy, chosen in pair:
+            own = framed if is_framed(options.policy) else config
+            for policy, chosen in ((options.policy, own), ("framed", framed)):
                 case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
                 cases[name, row, policy] = case
     place = Resources(options.out / "runs", Path(options.cache))
@@ -55,10 +55,9 @@ def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
     table = []
     for name in options.inputs:
         for row in rows:
-            seen = {policy: _distance(found[name, row, policy]) for policy in ("thesis", "framed")}
-            table.append(
-                {"input": name, "batch": ROWS[row][0], **{f"jod_{policy}": jod for policy, jod in seen.items()}}
-            )
+            own, framed = (_distance(found[name, row, policy]) for policy in (options.policy, "framed"))
+            line = {"input": name, "policy": options.policy, "batch": ROWS[row][0]}
+            table.append({**line, "jod_policy": own, "jod_framed": framed})
     return pd.DataFrame(table).sort_values(["input", "batch"], ignore_index=True)
 
 
@@ -71,32 +70,32 @@ def judged(table: pd.DataFrame, sigma: float) -> pd.DataFrame:
     """The judgements of a simulated observer without lapses.
 
     Adds the probability of a right answer in the dual-pair task for each renderer against the reference, and the
-    probability of preferring ``thesis`` to the framed renderer: of two stimuli with noise ``sigma`` each, the observer
+    probability of preferring the policy to the framed renderer: of two stimuli with noise ``sigma`` each, the observer
     prefers the one that looks nearer to the reference.
     """
     from scipy import stats
 
     plain = Observer("ideal", 1.0, 0.0)
-    thesis, framed = (table[f"jod_{name}"].to_numpy(np.float64) for name in ("thesis", "framed"))
+    policy, framed = (table[f"jod_{name}"].to_numpy(np.float64) for name in ("policy", "framed"))
     return table.assign(
-        noticed_thesis=correct_probability(thesis, plain, sigma),
+        noticed_policy=correct_probability(policy, plain, sigma),
         noticed_framed=correct_probability(framed, plain, sigma),
-        thesis_preferred=stats.norm.cdf((framed - thesis) / (np.sqrt(2.0) * sigma)),
+        policy_preferred=stats.norm.cdf((framed - policy) / (np.sqrt(2.0) * sigma)),
     )
 
 
 def thresholds(table: pd.DataFrame) -> pd.DataFrame:
-    """For each input the batch sizes at which ``thesis`` differs noticeably from the reference, and those at which it,
+    """For each input the batch sizes at which the policy differs noticeably from the reference, and those at which it,
     or the framed renderer, is preferred in three of four pairs."""
     rows = []
     for name in dict.fromkeys(table["input"]):
         part = table.loc[table["input"] == name]
         batch = part["batch"].to_numpy()
-        preferred = part["thesis_preferred"].to_numpy(np.float64)
+        preferred = part["policy_preferred"].to_numpy(np.float64)
         rows.append(
             {
                 "input": name,
-                "noticed_at": _listed(batch[part["noticed_thesis"].to_numpy(np.float64) >= THRESHOLD]),
+                "noticed_at": _listed(batch[part["noticed_policy"].to_numpy(np.float64) >= THRESHOLD]),
                 "framed_noticed": bool((part["noticed_framed"] >= THRESHOLD).any()),
                 "preferred_at": _listed(batch[preferred >= THRESHOLD]),
                 "framed_preferred_at": _listed(batch[preferred <= 1.0 - THRESHOLD]),

@@ -11,8 +11,10 @@ import tyro
 from analysis.command import limits
 from analysis.command.options import REFERENCES, References, Threads
 from analysis.metrics.display_model import DisplayModel
+from analysis.study.asked import require_distinct, require_inputs
 from analysis.study.inputs import INPUTS
 from tsar.config import closed_choices, require
+from tsar.policies import POLICIES
 
 _ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"
 _SIGMAS_JOD = (1e-3, 100.0)
@@ -182,10 +184,12 @@ class ServeOptions:
 @dataclass(frozen=True)
 @closed_choices()
 class AdaptiveOptions:
-    """Shows thesis and the framed renderer to the simulated observer, at equal cost and by batch size."""
+    """Shows a policy and the framed renderer to the simulated observer, at equal cost and by batch size."""
 
     inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
-    """Inputs of the study of suitability."""
+    """Built-in inputs, or other scenes by their names."""
+    policy: str = "thesis"
+    """Policy that the observer compares with framed."""
     scale: Literal["thesis", "half", "quick"] = "quick"
     """Size of the runs."""
     span_s: tuple[float, float] = (0.4, 0.9)
@@ -203,8 +207,10 @@ class AdaptiveOptions:
     """Folder for the runs, adaptive.csv, thresholds.csv and summary.json."""
 
     def __post_init__(self) -> None:
-        for name in self.inputs:
-            require(name in INPUTS, "inputs", f"one of {', '.join(INPUTS)}", name)
+        require_distinct(self, "inputs")
+        require_inputs(self.inputs)
+        POLICIES.require(self.policy, "policy")
+        require(self.policy != "framed", "policy", "one other than framed", self.policy)
         limits.within(self, sigma_jod=_SIGMAS_JOD, workers=limits.WORKERS, seed=limits.SEEDS)
         require(0.0 <= self.span_s[0] < self.span_s[1] <= 2.0, "span_s", "from and to within the 2 s", self.span_s)
 

@@ -140,7 +140,7 @@ def _answered(session: TrialSession, options: ServeOptions, bars: Bars) -> None:
 
 
 def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
-    """Shows thesis and the framed renderer to the same observer."""
+    """Shows a policy and the framed renderer to the same observer."""
     from analysis.perception.adaptive import judged, scores, thresholds
 
     table = judged(scores(options, bars.task("runs", 12 * len(options.inputs))), options.sigma_jod)
@@ -148,8 +148,8 @@ def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
     for name, rows in (("adaptive", table), ("thresholds", found)):
         write_table(options.out / f"{name}.csv", rows)
     lines = [
-        f"{row['input']}: thesis noticed at batch {row['noticed_at']}, preferred to framed at {row['preferred_at']}, "
-        f"framed preferred at {row['framed_preferred_at']}"
+        f"{row['input']}: {options.policy} noticed at batch {row['noticed_at']}, preferred to framed at "
+        f"{row['preferred_at']}, framed preferred at {row['framed_preferred_at']}"
         for row in found.to_dict("records")
     ]
     return {"rows": table.to_dict("records"), "thresholds": found.to_dict("records")}, "\n".join(lines)
