@@ -76,6 +76,9 @@ def product(first: ArrayLike, second: ArrayLike) -> Any:
         second: ``(..., k, n)`` or ``(k,)``.
     """
     a, b = np.asarray(first), np.asarray(second)
+    if a.shape == b.shape == (4, 4):  # the same sums, with one multiplication for all terms
+        terms = a[:, :, None] * b
+        return terms[:, 0] + terms[:, 1] + terms[:, 2] + terms[:, 3]
     rows, columns = a[None] if a.ndim == 1 else a, b[:, None] if b.ndim == 1 else b
     total = rows[..., :1] * columns[..., :1, :]
     for k in range(1, rows.shape[-1]):
@@ -91,6 +94,12 @@ def products(*matrices: ArrayLike) -> Any:
     for matrix in matrices[1:]:
         total = product(total, matrix)
     return total
+
+
+def determinant(matrix: Array) -> float:
+    """Determinant of the first three rows and columns of a matrix, which is the factor by which it scales volumes."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix[:3, :3].tolist()
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def inverse(matrix: ArrayLike) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.arithmetic import determinant
 from scenes.canonical.materials import Material
 from scenes.canonical.values import Matrix, Rgb, RigidTrack, SceneError, identity
 
@@ -99,5 +100,5 @@ class Instance:
     def __post_init__(self) -> None:
         if self.to_world.shape != (4, 4) or not np.isfinite(self.to_world).all():
             raise SceneError(f"Instance {self.name!r}: to_world must be a finite (4, 4) matrix")
-        if abs(np.linalg.det(self.to_world[:3, :3])) == 0.0:
+        if determinant(self.to_world) == 0.0:
             raise SceneError(f"Instance {self.name!r}: to_world is singular")

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +35,19 @@ def format_of(path: Path) -> str:
     return known[ending]
 
 
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Holds off the search for cycles among the objects of a scene, which live on and would be searched again and
+    again."""
+    on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if on:
+            gc.enable()
+
+
 def load_scene_file(path: Path, root: Path | None = None, report: LossReport | None = None) -> Scene:
     """Reads a scene file of any format.
 
@@ -47,7 +63,8 @@ def load_scene_file(path: Path, root: Path | None = None, report: LossReport | N
     if found.read is None:
         raise SceneError(f"{path}: expected a format that can be read, {found.name} can be written only")
     try:
-        return found.read(Path(path), root, report or LossReport())
+        with _without_collections():
+            return found.read(Path(path), root, report or LossReport())
     except (ArithmeticError, np.linalg.LinAlgError, RecursionError, MemoryError) as error:
         raise SceneError(f"{path}: expected a scene of usual size and numbers ({one_line(error)[:100]})") from error
 
@@ -73,7 +90,8 @@ def save_scene_file(
         raise SceneError(f"{path}: expected a format that can be written, {wanted.name} can be read only")
     output = Output(path)
     try:
-        wanted.write(scene, output, found)
+        with _without_collections():
+            wanted.write(scene, output, found)
         if strict:
             found.refuse_any()
         output.place()

@@ -104,6 +104,12 @@ def test_functions_of_two_numbers() -> None:
     assert isinstance(arithmetic.sin(1.0), float) and arithmetic.sin(np.float32(1.0)).dtype == np.float64
 
 
+def test_the_determinant_is_that_of_the_linear_part() -> None:
+    for matrix in np.random.default_rng(3).normal(size=(20, 4, 4)):
+        assert arithmetic.determinant(matrix) == pytest.approx(np.linalg.det(matrix[:3, :3]), rel=1e-9)
+    assert arithmetic.determinant(np.diag([2.0, -3.0, 0.0])) == 0.0
+
+
 def test_products_are_those_of_matrices() -> None:
     rng = np.random.default_rng(2)
     matrix, points, vector = rng.normal(size=(3, 3)), rng.normal(size=(7, 3)), rng.normal(size=3)
@@ -114,6 +120,11 @@ def test_products_are_those_of_matrices() -> None:
     assert arithmetic.products(points, matrix, vector) == pytest.approx(points @ matrix @ vector, rel=1e-12)
     assert arithmetic.product(vector, vector) == pytest.approx(vector @ vector, rel=1e-14)
     assert arithmetic.norm(vector) == pytest.approx(np.linalg.norm(vector), rel=1e-14)
+    for _ in range(50):  # two transforms take another way to the same bits
+        first, second = (
+            rng.normal(size=(2, 4, 4)) * 10.0 ** rng.uniform(-8.0, 8.0, (2, 4, 4)) * rng.integers(-1, 2, (4, 4))
+        )
+        assert arithmetic.product(first, second).tobytes() == arithmetic.product(first[None], second)[0].tobytes()
     # from the first term to the last, where another order would lose the small one
     assert arithmetic.product((1e16, 1.0, -1e16), (1.0, 1.0, 1.0)) == 0.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import cache
 from typing import Any, TypeVar
 
 from scenes.canonical import Material, SceneError, Texture
@@ -30,8 +31,13 @@ def once_a_node(visit: Visit[Answer], root: Any) -> Answer:
 
 def parts_of(node: Any) -> list[Any]:
     """Textures and materials that a texture or material contains."""
-    values = (getattr(node, field.name) for field in dataclasses.fields(node))
-    return [value for value in values if dataclasses.is_dataclass(value)]
+    values = [getattr(node, name) for name in _names(type(node))]
+    return [value for value in values if hasattr(value, "__dataclass_fields__")]
+
+
+@cache
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 def check_depth(part: Texture | Material, where: str) -> None:

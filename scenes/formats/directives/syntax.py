@@ -7,12 +7,12 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); LuxRender 1.x 
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,24 +21,21 @@ from scenes.canonical import SceneError
 from scenes.formats.text.numbers import NUMBER_MAX
 from scenes.formats.text.places import TextPosition
 
-if TYPE_CHECKING:
-    import lark
+_TOKEN = re.compile(
+    r"""
+    (?P<BLANK> (?: \s+ | \#[^\n]* )+ )
+    | (?P<TRUTH> (?: true | false )\b )
+    | (?P<NAME> [A-Za-z_]\w* )
+    | (?P<STRING> "[^"\\\n]*(?:\\.[^"\\\n]*)*" )
+    | (?P<NUMBER> [-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.]) )
+    | (?P<STRINGS> \[\s*(?:(?:\#[^\n]*\n|true\b|false\b|"[^"\\\n]*(?:\\.[^"\\\n]*)*")\s*)*\] )
+    | (?P<NUMBERS> \[[-+.\deE\s,]*(?:\#[^\n]*(?:\n|$)[-+.\deE\s,]*)*\] )
+    """,
+    re.VERBOSE,
+)
+"""The tokens. No grammar is needed: a directive is a name and all values up to the next name."""
 
-_GRAMMAR = r"""
-start: directive*
-directive: NAME value*
-value: STRING | NUMBER | NUMBERS | STRINGS | TRUTH
-TRUTH.2: /(true|false)\b/
-NAME: /[A-Za-z_]\w*/
-STRING: /"[^"\\\n]*(?:\\.[^"\\\n]*)*"/
-NUMBER: /[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])/
-NUMBERS: /\[[-+.\deE\s,]*(?:#[^\n]*(?:\n|$)[-+.\deE\s,]*)*\]/
-STRINGS: /\[\s*(?:(?:#[^\n]*\n|true\b|false\b|"[^"\\\n]*(?:\\.[^"\\\n]*)*")\s*)*\]/
-COMMENT: /#[^\n]*/
-%ignore /[\s]+/
-%ignore COMMENT
-"""
-
+_LONG = 256  # characters from which numbers are converted by NumPy
 _PIECE = 1 << 20  # characters of a list of numbers that are converted at a time
 
 Values = NDArray[np.float64] | tuple[str, ...]
@@ -48,16 +45,16 @@ Opener = Callable[[str, TextPosition, tuple[Path, ...]], tuple[str, Path]]
 open file is the last."""
 
 
-@lru_cache(maxsize=1)
-def _lexer() -> lark.Lark:
-    """The lexer. No parser is needed: a directive is a name and all values up to the next name."""
-    import lark
+class Token(NamedTuple):
+    """A token: its kind, which is a group of the pattern, its text, and the place where it begins."""
 
-    return lark.Lark(_GRAMMAR, parser=None, lexer="basic")
+    kind: str
+    text: str
+    line: int
+    column: int
 
 
-@dataclass(frozen=True)
-class Directive:
+class Directive(NamedTuple):
     """A directive: its name, its strings and numbers in order, and the file in which it begins."""
 
     name: str
@@ -158,75 +155,79 @@ def parse_directives(text: str, file: Path, opener: Opener) -> Iterator[Directiv
     Raises:
         SceneError: the text does not consist of directives; the message gives file, line and column.
     """
-    head, begun, values = None, file, []
+    head: Token | None = None
+    begun, name, values = file, file.name, list[Values]()
     for token, within in _spliced(text, (file,), opener):
-        if token.type == "NAME":
+        if token.kind == "NAME":
             if head is not None:
-                yield _directive(head, values, begun)
-            head, begun, values = token, within, []
+                yield Directive(head.text, tuple(values), TextPosition(name, head.line, head.column), begun)
+            if within is not begun:
+                begun, name = within, within.name
+            head, values = token, []
         elif head is None:
             place = TextPosition(within.name, token.line, token.column)
-            raise SceneError(f"{place}: expected a directive, got {str(token)[:20]!r}")
+            raise SceneError(f"{place}: expected a directive, got {token.text[:20]!r}")
         else:
-            values.append(_values(token, within.name))
+            values.append(_values(token, within))
     if head is not None:
-        yield _directive(head, values, begun)
+        yield Directive(head.text, tuple(values), TextPosition(name, head.line, head.column), begun)
 
 
-def _spliced(text: str, inside: tuple[Path, ...], opener: Opener) -> Iterator[tuple[Any, Path]]:
+def _spliced(text: str, inside: tuple[Path, ...], opener: Opener) -> Iterator[tuple[Token, Path]]:
     """Tokens of a text and of its includes, each with its file."""
     file = inside[-1]
-    tokens = _tokens(text, file.name)
+    tokens = _tokens(text, file)
     for token in tokens:
-        if token.type != "NAME" or str(token) != "Include":
+        if token.kind != "NAME" or token.text != "Include":
             yield token, file
             continue
         place, name = TextPosition(file.name, token.line, token.column), next(tokens, None)
-        found = _values(name, file.name) if name is not None and name.type in ("STRING", "STRINGS") else ()
+        found = _values(name, file) if name is not None and name.kind in ("STRING", "STRINGS") else ()
         if not isinstance(found, tuple) or len(found) != 1:
             raise SceneError(f"{place}: Include: expected a string")
         included, path = opener(found[0], place, inside)
         yield from _spliced(included, (*inside, path), opener)
 
 
-def _tokens(text: str, file: str) -> Iterator[Any]:
+def _tokens(text: str, file: Path) -> Iterator[Token]:
     """Tokens one by one, so that at most one list of numbers is held both as text and as numbers."""
-    import lark
+    at, line, begun = 0, 1, 0
+    while at < len(text):
+        found = _TOKEN.match(text, at)
+        if found is None:
+            place, got = TextPosition(file.name, line, at - begun + 1), text[at : at + 20].split("\n")[0]
+            raise SceneError(f"{place}: expected a directive, string or number, got {got!r}")
+        kind, end = str(found.lastgroup), found.end()
+        if kind != "BLANK":
+            yield Token(kind, found.group(), line, at - begun + 1)
+        if kind in ("BLANK", "STRINGS", "NUMBERS") and (ends := text.count("\n", at, end)):
+            line, begun = line + ends, text.rindex("\n", at, end) + 1
+        at = end
 
-    try:
-        yield from _lexer().lex(text)
-    except lark.exceptions.UnexpectedCharacters as error:
-        got = text[error.pos_in_stream : error.pos_in_stream + 20].split("\n")[0] if error.pos_in_stream else ""
-        place = TextPosition(file, error.line, error.column)
-        raise SceneError(f"{place}: expected a directive, string or number, got {got!r}") from None
 
-
-def _directive(head: Any, values: list[Values], file: Path) -> Directive:
-    return Directive(str(head), tuple(values), TextPosition(file.name, head.line, head.column), file)
-
-
-def _values(token: Any, file: str) -> Values:
-    if token.type == "STRING":
-        return (_unquoted(token),)
-    if token.type == "TRUTH":
-        return (str(token),)
-    if token.type == "STRINGS":
-        return tuple(str(part) if part.type == "TRUTH" else _unquoted(part) for part in _strings(token))
-    place = TextPosition(file, token.line, token.column)
-    if token.type == "NUMBER" and abs(value := float(token)) <= NUMBER_MAX:
+def _values(token: Token, file: Path) -> Values:
+    kind, body = token.kind, token.text
+    if kind == "STRING":
+        return (_unquoted(body),)
+    if kind == "TRUTH":
+        return (body,)
+    if kind == "STRINGS":
+        parts = [part for part in _TOKEN.finditer(body[1:-1]) if part.lastgroup != "BLANK"]
+        return tuple(part[0] if part.lastgroup == "TRUTH" else _unquoted(part[0]) for part in parts)
+    if kind == "NUMBER" and abs(value := float(body)) <= NUMBER_MAX:
         return np.array([value])
-    body = str(token) if token.type == "NUMBER" or "#" in token else token
+    place = TextPosition(file.name, token.line, token.column)
     if "#" in body:
         body = "[" + "\n".join(line.split("#")[0] for line in body[1:-1].splitlines()) + "]"
-    start, end = (0, len(body)) if token.type == "NUMBER" else (1, len(body) - 1)
-    parts = []
+    start, end = (0, len(body)) if kind == "NUMBER" else (1, len(body) - 1)
+    pieces = []
     while start < end:  # in pieces, so that the numbers of a large mesh are not copied as text
         cut = start + _PIECE
         while cut < end and body[cut] not in " \t\r\n,":
             cut += 1
-        parts.append(_parsed(body[start : min(cut, end)], place))
+        pieces.append(_parsed(body[start : min(cut, end)], place))
         start = cut
-    return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else np.zeros(0)
+    return pieces[0] if len(pieces) == 1 else np.concatenate(pieces) if pieces else np.zeros(0)
 
 
 def _parsed(text: str, place: TextPosition) -> NDArray[np.float64]:
@@ -234,24 +235,34 @@ def _parsed(text: str, place: TextPosition) -> NDArray[np.float64]:
     text = text.replace(",", " ")
     if not text or text.isspace():
         return np.zeros(0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            found = np.fromstring(text, dtype=np.float64, sep=" ")
-        except (DeprecationWarning, ValueError):
-            raise SceneError(f"{place}: expected numbers, got {text.strip()[:30]!r}") from None
+    found = _few(text) if len(text) < _LONG else None
+    if found is None:
+        found = _many(text, place)
     if not (np.abs(found) <= NUMBER_MAX).all():  # NaN fails as well
         raise SceneError(f"{place}: expected numbers up to {NUMBER_MAX:g}, got {text.strip()[:30]!r}")
     return found
 
 
-def _strings(token: Any) -> list[Any]:
-    inner = str(token)[1:-1]
-    return [part for part in _lexer().lex("x " + inner) if part.type in ("STRING", "TRUTH")]
+def _few(text: str) -> NDArray[np.float64] | None:
+    """Numbers between blanks, or None if a word is not one number."""
+    try:
+        return np.array([float(word) for word in text.split()])
+    except ValueError:
+        return None
 
 
-def _unquoted(token: Any) -> str:
-    return str(token)[1:-1].replace('\\"', '"').replace("\\\\", "\\")
+def _many(text: str, place: TextPosition) -> NDArray[np.float64]:
+    """Numbers, which may follow each other without a blank, as in ``1-2``."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            raise SceneError(f"{place}: expected numbers, got {text.strip()[:30]!r}") from None
+
+
+def _unquoted(text: str) -> str:
+    return text[1:-1].replace('\\"', '"').replace("\\\\", "\\")
 
 
 def parameters_of(directive: Directive, skip: int) -> Parameters:

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenes.arithmetic import product
+from scenes.arithmetic import determinant, product
 from scenes.canonical import Cube, Mesh, Shape, Sphere
 
 FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -50,9 +50,23 @@ def facing_normals(mesh: Mesh) -> Mesh:
     return Mesh(mesh.vertices, faces, mesh.normals, mesh.uvs, mesh.source)
 
 
+def scales_evenly(axes: np.ndarray) -> bool:
+    """Whether a matrix ``(3, 3)`` is a rotation or reflection with one scale, within 1e-4 of its square."""
+    x, y, z = axes.T.tolist()
+    squares, mixed = [_dot(x, x), _dot(y, y), _dot(z, z)], [_dot(x, y), _dot(y, z), _dot(z, x)]
+    total = sum(squares)
+    return all(abs(square - total / 3.0) <= 1e-4 * total for square in squares) and all(
+        abs(part) <= 1e-4 * total for part in mixed
+    )
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
     """A mesh and its transform; if the transform is a reflection, the mesh is reflected instead."""
-    if np.linalg.det(matrix[:3, :3]) > 0.0:
+    if determinant(matrix) > 0.0:
         return mesh, matrix
     away = np.array([1.0, 1.0, -1.0], np.float32)
     normals = None if mesh.normals is None else mesh.normals * away

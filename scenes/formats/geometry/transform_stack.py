@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.animation import continuous_quaternions, pose_at
-from scenes.arithmetic import inverse, norm, product, products, rotation_about, rotation_between
+from scenes.arithmetic import determinant, inverse, norm, product, products, rotation_about, rotation_between
 from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.losses import LossReport
 
@@ -49,9 +50,9 @@ def _rotation(angle_deg: float, x: float, y: float, z: float) -> Matrix:
 
 def invertible(matrix: Matrix) -> bool:
     """Whether a transform is finite and invertible."""
-    part = matrix[:3, :3]
-    size = np.abs(part).max(initial=0.0)
-    return bool(np.isfinite(matrix).all() and abs(np.linalg.det(part)) > 1e-30 * size * size * size > 0.0)
+    size = max(map(abs, matrix[:3, :3].ravel().tolist()))
+    finite = all(map(math.isfinite, matrix.ravel().tolist()))
+    return finite and abs(determinant(matrix)) > 1e-30 * size * size * size > 0.0
 
 
 def looking(
@@ -104,10 +105,14 @@ def rigid_motion(keys: Sequence[Matrix], times_s: Sequence[float]) -> RigidTrack
     return RigidTrack(float(times_s[0]), interval, shifts, continuous_quaternions(quaternions))
 
 
+def _same(keys: Sequence[Matrix]) -> bool:
+    return all(key is keys[0] or np.array_equal(keys[0], key) for key in keys[1:])
+
+
 def motion(keys: Sequence[Matrix], times_s: Sequence[float], where: str, report: LossReport) -> RigidTrack | None:
     """The motion through keys, applied outside the first of them, or None without motion; a motion that is not rigid is
     reported and becomes None."""
-    if all(np.array_equal(keys[0], key) for key in keys[1:]):
+    if _same(keys):
         return None
     track = rigid_motion(keys, times_s)
     if track is None:
@@ -129,6 +134,8 @@ def moved_by(matrix: Matrix, track: RigidTrack) -> RigidTrack | None:
 class TransformStack:
     """The current transform at the keys of a motion, the saved transforms, and the named transforms.
 
+    Matrices are replaced and never changed in place. Keys without motion share one, so that it is computed once.
+
     Attributes:
         current: one matrix per key.
         active: keys to which transforms apply.
@@ -137,7 +144,7 @@ class TransformStack:
     """
 
     def __init__(self) -> None:
-        self.current = [np.eye(4), np.eye(4)]
+        self.current: list[Matrix] = [np.eye(4)] * 2
         self.active: tuple[bool, ...] = (True, True)
         self.times_s: tuple[float, ...] = (0.0, 1.0)
         self.named: dict[str, list[Matrix]] = {}
@@ -145,7 +152,7 @@ class TransformStack:
 
     def push(self) -> None:
         """Saves the state."""
-        self._saved.append(([matrix.copy() for matrix in self.current], self.active, self.times_s))
+        self._saved.append((self.current, self.active, self.times_s))
 
     def pop(self) -> bool:
         """Restores the state that was saved last; False if none is saved."""
@@ -156,25 +163,26 @@ class TransformStack:
 
     def replace(self, matrix: Matrix) -> None:
         """Sets the transform, at the active keys."""
-        self.current = [matrix.copy() if on else old for on, old in zip(self.active, self.current, strict=True)]
+        self.current = [matrix if on else old for on, old in zip(self.active, self.current, strict=True)]
 
     def apply(self, matrix: Matrix) -> None:
         """Applies a transform inside the current one, at the active keys."""
-        self.current = [product(old, matrix) if on else old for on, old in zip(self.active, self.current, strict=True)]
+        made = {id(old): product(old, matrix) for old in {id(old): old for old in self.current}.values()}
+        self.current = [made[id(old)] if on else old for on, old in zip(self.active, self.current, strict=True)]
 
     def take(self, name: str) -> None:
         """Sets the transform at all keys to a named one; one with a different count of keys is replaced by its first
         key."""
         found = self.named[name]
         same = len(found) == len(self.current)
-        self.current = [part.copy() for part in (found if same else [found[0]] * len(self.current))]
+        self.current = list(found) if same else [found[0]] * len(self.current)
 
     def retime(self, times_s: Sequence[float]) -> None:
         """Sets new key times, all with the transform of the first key."""
-        self.current = [self.current[0].copy() for _ in times_s]
+        self.current = [self.current[0]] * len(times_s)
         self.active, self.times_s = (True,) * len(times_s), tuple(times_s)
 
     @property
     def moves(self) -> bool:
         """Whether the keys differ."""
-        return any(not np.array_equal(self.current[0], key) for key in self.current[1:])
+        return not _same(self.current)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.arithmetic import norm, product, sin
+from scenes.arithmetic import determinant, norm, product, sin
 from scenes.canonical import (
     ConstantTexture,
     EnvironmentLight,
@@ -273,7 +273,7 @@ class LuxReader(SceneReader):
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
         """Keeps a shape; a lamp emits towards the side from which its placed faces are counter-clockwise."""
-        if instance.emission is not None and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+        if instance.emission is not None and determinant(instance.to_world) < 0.0:
             instance = turned_over(instance)
         super()._keep(instance, directive)
 

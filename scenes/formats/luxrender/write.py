@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from scenes.arithmetic import power, product
+from scenes.arithmetic import determinant, power, product
 from scenes.canonical import (
     Camera,
     Cube,
@@ -85,7 +85,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         """Writes the camera with ``LookAt``, the only placement that LuxCore supports; a window from right to left
         mirrors it."""
         poses, times_s = motion_keys(getattr(camera, "track", None), camera.to_world)
-        size = power(abs(np.linalg.det(poses[0][:3, :3])), 1.0 / 3.0)
+        size = power(abs(determinant(poses[0])), 1.0 / 3.0)
         axes = poses[0][:3, :3] / size
         if np.abs(product(axes.T, axes) - np.eye(3)).max() > 1e-4:
             self.report.add("camera", "a sheared camera", "an upright one")
@@ -101,7 +101,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         elif isinstance(camera, PerspectiveCamera):
             plain = dataclasses.replace(camera, shift=(0.0, 0.0))
         # without a window LuxCore applies the field of view to the width, not to the shorter side
-        self.lines.append(self.camera_line(plain) + self.window(half, bool(np.linalg.det(axes) < 0.0), shift))
+        self.lines.append(self.camera_line(plain) + self.window(half, determinant(axes) < 0.0, shift))
 
     # --- lights --------------------------------------------------------------------------------------------------
 
@@ -167,7 +167,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     def write_instance(self, instance: Instance) -> None:
         """Writes a shape with its placement. LuxCore supports objects only for mesh files, and shows the last key of a
         motion."""
-        mirrored = np.linalg.det(instance.to_world[:3, :3]) < 0.0
+        mirrored = determinant(instance.to_world) < 0.0
         if mirrored and (isinstance(instance.shape, Sphere) or shines(instance)):
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
             instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +42,6 @@ _KINDS = {
 _TAGS = {kind: tag for tag, kinds in _KINDS.items() for kind in kinds.split()}
 
 
-@dataclass(frozen=True)
 class Key(TextPosition):
     """A place in a tree, given by the keys that lead to it."""
 

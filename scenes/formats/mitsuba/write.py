@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenes.arithmetic import product
+from scenes.arithmetic import determinant, product
 from scenes.canonical import (
     Camera,
     Cube,
     Disk,
     EnvironmentCamera,
     Instance,
+    Material,
     Mesh,
     OrthographicCamera,
     PerspectiveCamera,
@@ -27,7 +28,7 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
-from scenes.formats.geometry.orientation import FLIPPED, upright
+from scenes.formats.geometry.orientation import FLIPPED, scales_evenly, upright
 from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read_settings import FILTERS, FORWARD
@@ -35,6 +36,7 @@ from scenes.formats.mitsuba.write_elements import Element
 from scenes.formats.mitsuba.write_lights import MitsubaLightWriter
 from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
+from scenes.formats.text.xml_tree import xml_text
 
 _FILTERS = first_of(FILTERS)
 _DEVIATIONS = 4.0  # that the radius of a Gaussian filter of Mitsuba 3 is wide
@@ -50,6 +52,7 @@ class MitsubaWriter(MitsubaLightWriter):
 
     shared: frozenset[PartKey] = frozenset()
     _groups: dict[PartKey, str] = field(default_factory=dict)
+    _textured: dict[int, tuple[Material, bool]] = field(default_factory=dict)
 
     # --- the scene -----------------------------------------------------------------------------------------------
 
@@ -189,25 +192,30 @@ class MitsubaWriter(MitsubaLightWriter):
         if not np.array_equal(keys[0], np.eye(4)):
             self.matrix(made, "toWorld", keys[0])
 
+    def _depends_on_uv(self, material: Material) -> bool:
+        if id(material) not in self._textured:
+            self._textured[id(material)] = material, depends_on_uv(material)
+        return self._textured[id(material)][1]
+
     def _as_triangles(self, instance: Instance) -> bool:
         """Whether a shape must be written as triangles, because of its texture coordinates or as a non-uniformly scaled
         sphere."""
-        shape, textured = instance.shape, depends_on_uv(instance.material)
+        shape, textured = instance.shape, self._depends_on_uv(instance.material)
         if isinstance(shape, Cube | Disk):
             return textured
         if not isinstance(shape, Sphere):
             return False
         axes = instance.to_world[:3, :3]
-        even = product(axes.T, axes)
-        stretched = np.abs(even - even.trace() / 3.0 * np.eye(3)).max() > 1e-4 * even.trace()
-        return bool(stretched) or (textured and float(np.linalg.det(axes)) > 0.0)
+        return not scales_evenly(axes) or (textured and determinant(axes) > 0.0)
 
     def _shape(self, instance: Instance) -> tuple[Element, Matrix]:
         """The element of a shape without its placement, and the transform of its own size."""
         shape, material = instance.shape, instance.material
         if self._as_triangles(instance):
             if isinstance(shape, Disk | Sphere):
-                what = f"{'a textured' if depends_on_uv(material) else 'a stretched'} {type(shape).__name__.lower()}"
+                what = (
+                    f"{'a textured' if self._depends_on_uv(material) else 'a stretched'} {type(shape).__name__.lower()}"
+                )
                 became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
                 self.report.add(instance.name or "shape", what, became)
             shape = as_mesh(shape)
@@ -215,7 +223,7 @@ class MitsubaWriter(MitsubaLightWriter):
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
         made = self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):
-            if shines(instance) and np.linalg.det(instance.to_world[:3, :3]) < 0.0:
+            if shines(instance) and determinant(instance.to_world) < 0.0:
                 # a lamp emits towards the side from which its placed faces are counter-clockwise
                 shape, local = upright(shape, instance.to_world)[0], FLIPPED
             self.put(made, "string", "filename", self.output.mesh(shape))
@@ -223,7 +231,7 @@ class MitsubaWriter(MitsubaLightWriter):
                 self.put(made, "boolean", "faceNormals", "true")
         elif isinstance(shape, Sphere):
             self.put(made, "float", "radius", number(shape.radius))
-            local = FLIPPED if np.linalg.det(instance.to_world[:3, :3]) < 0.0 else local
+            local = FLIPPED if determinant(instance.to_world) < 0.0 else local
         elif isinstance(shape, Disk):
             local = np.diag([shape.radius, shape.radius, 1.0, 1.0])
         ElementTree.SubElement(made, "ref", {"id": label})
@@ -237,8 +245,7 @@ def save_mitsuba(scene: Scene, output: Output, report: LossReport, modern: bool 
     """Writes a scene and its files; they are not in place before the output is placed."""
     writer = MitsubaWriter(output, report, modern)
     writer.write(scene)
-    ElementTree.indent(writer.root, "\t")
-    output.text(output.path.name, ElementTree.tostring(writer.root, "unicode", xml_declaration=True) + "\n")
+    output.text(output.path.name, xml_text(writer.root))
 
 
 def save_mitsuba3(scene: Scene, output: Output, report: LossReport) -> None:

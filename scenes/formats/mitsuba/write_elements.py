@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
+from functools import cache
 
 from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture, Texture
 from scenes.canonical.values import Matrix, Rgb
@@ -20,6 +21,11 @@ from scenes.formats.text.output import Output
 Element = ElementTree.Element
 
 _NEW_NAMES = {"toWorld": "to_world", "intIOR": "int_ior", "extIOR": "ext_ior"}
+
+
+@cache
+def _new_name(text: str) -> str:
+    return _NEW_NAMES.get(text) or re.sub(r"(?<!^)(?=[A-Z])", "_", text).lower()
 
 
 @dataclass
@@ -39,7 +45,7 @@ class ElementWriter:
         """The name of a property in the version that is written."""
         if not self.modern:
             return text
-        return _NEW_NAMES.get(text) or re.sub(r"(?<!^)(?=[A-Z])", "_", text).lower()
+        return _new_name(text)
 
     def plugin(self, tag: str, kind: str, parent: Element | None = None, **named: str) -> Element:
         """Creates an element of a kind."""
@@ -55,7 +61,7 @@ class ElementWriter:
     def matrix(self, parent: Element, name: str, matrix: Matrix) -> None:
         """Writes a transform."""
         holder = ElementTree.SubElement(parent, "transform", {"name": self.name(name)})
-        ElementTree.SubElement(holder, "matrix", {"value": spaced(matrix.ravel())})
+        ElementTree.SubElement(holder, "matrix", {"value": spaced(matrix.ravel().tolist())})
 
     def color(self, parent: Element, name: str, value: Rgb) -> None:
         """Writes a linear colour."""

@@ -78,7 +78,7 @@ class PbrtV4Reader(PbrtReader):
         if target and self.attributes.assumed:
             pairs = (pair for (to, _), pair in self.attributes.assumed.items() if to == target)
             found = (value for pair in pairs for value in pair)
-            directive = dataclasses.replace(directive, values=(*directive.values, *found))
+            directive = directive._replace(values=(*directive.values, *found))
         super()._do(directive)
 
     def left_over(self, parameters: Parameters, what: str) -> None:

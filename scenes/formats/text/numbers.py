@@ -17,7 +17,7 @@ def number(value: float) -> str:
 
 def spaced(values: Iterable[float]) -> str:
     """Float64 numbers with all digits, separated by spaces."""
-    return " ".join(repr(float(value)) for value in values)
+    return " ".join([repr(float(value)) for value in values])
 
 
 def listed(values: Iterable[float]) -> str:

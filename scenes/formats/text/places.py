@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class TextPosition:
+class TextPosition(NamedTuple):
     """A place in a text; lines and columns count from 1."""
 
     file: str

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import codecs
 import io
+import re
+import xml.etree.ElementTree as ElementTree
 import xml.sax
 from dataclasses import dataclass, field
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 from scenes.canonical import SceneError
 from scenes.formats.text.places import TextPosition
 
 DEPTH_MAX = 64
 NODES_MAX = 2_000_000
+
+_SPECIAL = re.compile(r'[&<>"\r\n\t]')
 
 
 @dataclass
@@ -55,6 +60,28 @@ class _Builder(xml.sax.ContentHandler):
 
     def endElement(self, name: str) -> None:
         self.open.pop()
+
+
+def xml_text(root: ElementTree.Element) -> str:
+    """A document with an element a line, indented by tabs. Elements have attributes and children, and no text."""
+    lines = ["<?xml version='1.0' encoding='utf-8'?>"]
+    _write(root, "", lines)
+    return "\n".join([*lines, ""])
+
+
+def _write(element: ElementTree.Element, margin: str, lines: list[str]) -> None:
+    named = "".join([f' {name}="{_escaped(value)}"' for name, value in element.items()])
+    if not len(element):
+        lines.append(f"{margin}<{element.tag}{named} />")
+        return
+    lines.append(f"{margin}<{element.tag}{named}>")
+    for child in element:
+        _write(child, margin + "\t", lines)
+    lines.append(f"{margin}</{element.tag}>")
+
+
+def _escaped(value: str) -> str:
+    return quoteattr(value, {'"': "&quot;"})[1:-1] if _SPECIAL.search(value) else value
 
 
 def parse_xml(content: bytes, file: str) -> XmlNode:
