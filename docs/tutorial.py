@@ -146,14 +146,14 @@ class Quarters(Policy):
 
 
 # Both are handed to `compare` as they are, and go by their own names. A folder holds one run at a time, so this run
-# gets another folder; the reference is found in the cache.
+# gets another folder; the reference is found again.
 
 again = compare(
     "fly-by",
     ["thesis", "framed", Quarters],
     [worst_hundredth],
     out="out/tutorial-quarters",
-    cache="out/tutorial/cache",
+    references="out/tutorial/references",
     **options,
 )
 print(again.table()[["mse", "ratio", "worst_hundredth"]].round(4))

@@ -168,8 +168,15 @@ def _in_cache(folder: Path) -> Callable[[Any], list[Any]]:
 
 
 def _run(folder: Path) -> int:
-    reference = ("--reference-rate-hz", "30", "--reference-samples-per-axis", "1", "--cache", str(folder / "cache"))
-    rest = ("--rivals", "framed", "thesis", "--no-film", "--frames", "--out", str(folder / "out"))
+    reference = (
+        "--reference-rate-hz",
+        "30",
+        "--reference-samples-per-axis",
+        "1",
+        "--references",
+        str(folder / "cache"),
+    )
+    rest = ("--rivals", "framed", "thesis", "--no-film", "--write-frames", "--out", str(folder / "out"))
     return call("run", "fly-by", *_TINY, *reference, *rest)
 
 

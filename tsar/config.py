@@ -83,11 +83,11 @@ class ErrorConfig:
     spatial_offset: float = -7.0
     """log2 of the power tolerated per coefficient at the coarsest spatial octave (compressed luminance squared)."""
     spatial_slope: float = -1.0
-    """Change of that log2 per octave towards fine scales; steeper is more sensitive. The thesis sweeps to -8.6."""
+    """Slope of the template over spatial octaves; steeper is more sensitive. The thesis sweeps to -8.6."""
     temporal_offset: float = -9.0
     """As spatial_offset, for the temporal octants."""
     temporal_slope: float = -1.0
-    """As spatial_slope, for the temporal octants; the thesis sweeps to -9.6."""
+    """Slope of the template over temporal octaves; the thesis sweeps to -9.6."""
     norm: str = "l2"
     """Levelwise norm: l2 (total power), linf (the greatest power of one coefficient), or one that was added."""
     form: Literal["contrast", "difference"] = "contrast"
@@ -115,12 +115,12 @@ class ResponseConfig:
     """The control decision of the policy thesis (chapter 6)."""
 
     solver: str = "waterfill"
-    """Solver of density transport, which distributes freed density: waterfill, slow_greater, scale_lesser, square,
+    """Solver of density transport; it distributes freed density: waterfill, slow_greater, scale_lesser, square,
     descend, diffusion, trivial, or one that was added."""
     gain: float = 1.0
     """Distance moved in normalised density space per unit error (eq. 6.11 has 1), in [1e-6, 1e6]."""
     bias: float = 0.0
-    """Octaves by which each decision moves along the iso-product curve; positive is towards space."""
+    """Octaves towards space, negative towards time; each decision moves by them along the iso-product curve."""
     surplus_max: float = 1.0
     """Bound of the running surplus C as a share of the budget; at 1 a static, plain picture frees as much as it can."""
     temporal_min: float = 1.0 / 16.0
@@ -159,21 +159,20 @@ class TsarConfig:
     batch_size: int = 128
     """Framelets rendered per cycle."""
     resolution_px: int = RESOLUTION_DEFAULT
-    """Output image width and height, pixels, a power of two; not to be combined with width_px and height_px, from which
-    it then follows as the least that holds both."""
+    """Width and height of the pictures, pixels, a power of two; not to be combined with width_px and height_px, from
+    which it then follows as the least that holds both."""
     width_px: int = 0
-    """Output image width, pixels, 16 to 16384, of a picture of any shape; 0 for a square of resolution_px."""
+    """Width, pixels; 16 to 16384, of a picture of any shape; 0 for a square of resolution_px."""
     height_px: int = 0
-    """Output image height; given where width_px is."""
+    """Height, pixels; given where width_px is."""
     framelet_side: int = 16
     """Samples along a framelet's side, 16 or 32."""
     sdf_side: int = 128
     """Elements along a side of the density and error fields of the policy thesis, a power of two."""
     cache_size: int = 2048
-    """Framelets kept in the cache of the policy thesis (scaled up with the batch when that is larger than a quarter of
-    it)."""
+    """Framelets kept in the cache; of the policy thesis, and more for batches above a quarter of it."""
     seed: int = 0
-    """Seed of every random number, and of the phase in which tiles first fall due."""
+    """Seed of all random numbers; also of the phase in which tiles first fall due."""
     warmup_cycles: int = 48
     """Cycles run before the start time, so that measurement begins in the steady state."""
     tiling: TilingConfig = field(default_factory=TilingConfig)

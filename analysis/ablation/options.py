@@ -27,15 +27,17 @@ class AblationOptions:
     rows: tuple[int, ...] = (7,)
     """Rows of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as in the suitability study. quick: a quarter of the thesis' side, and half the rate of the reference."""
+    """Sizes of the runs: as in the suitability study. quick: a quarter of the thesis' side, and half the rate of the
+    reference."""
     repetitions: int = 3
-    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    """Repetitions of each: repetition r has seed r and phase r / repetitions."""
     parts: tuple[str, ...] = ()
     """Names of the parts to change, a run each; all parts where none is named. An unknown name prints the list."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The pipeline of all runs; batch and resolution come from the row, the seed from the repetition."""
     rivals: tuple[str, ...] = RIVALS
-    """Rivals whose lowest error at each moment is that of the best rival; framed is always one of them."""
+    """Rivals at equal cost; their lowest error at each moment is that of the best rival; framed is always one of
+    them."""
     before_s: float = 0.1
     """Seconds: a surface out of sight this long before counts as disocclusion, one whose light changed as a shadow."""
     ledger: Ledger = "thesis"
@@ -43,7 +45,7 @@ class AblationOptions:
     framed_rate_hz: float = 8.0
     """Images a second that the framed renderer shows at every resolution, which sets the speed of the machine."""
     trace_segments: float = SEGMENTS_DEFAULT
-    """Ray segments per sample in the cost model."""
+    """Ray segments per sample; of the cost model."""
     start_s: float = 0.0
     """Animation time at which the measurement starts, seconds."""
     markdown: bool = False
@@ -52,7 +54,7 @@ class AblationOptions:
     """Where the runs are computed."""
     out: Path = Path("out/ablation")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         require_inputs(self.inputs)

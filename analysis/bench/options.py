@@ -40,22 +40,22 @@ class BenchOptions:
     """The speed of the simulator beside its peers: rays, shaded samples, overhead, growth, start."""
 
     out: Path = Path("out/bench")
-    """Folder for bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
+    """Folder for the results; bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
-    """A group, or several with commas between; may be repeated. Without it all run: coherent, incoherent, shaded,
-    cores, order, hits, features, overhead, tsar, growth, conversion, start."""
+    """What to do, instead of everything; a group, or several with commas between; may be repeated. Without it all run:
+    coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, growth, conversion, start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of our side are compared; nothing is run."""
     device: Literal["cpu", "cuda:0"] = "cpu"
-    """Where our side runs; peers stay on the CPU."""
+    """Where rays are traced; peers stay on the CPU."""
     repetitions: int = 9
-    """Turns of each case; the medians are reported."""
+    """Repetitions of each; turns of a case; the medians are reported."""
     resolution_px: int = 512
-    """Side of the pictures, pixels, a power of two."""
+    """Width and height of the pictures, pixels, a power of two."""
     subdivisions: tuple[int, ...] = (4, 5, 6, 8)
     """Meshes of the groups coherent and incoherent, of 20 * 4^subdivisions triangles."""
     batch_size: int = 128
-    """Framelets per batch."""
+    """Framelets rendered per cycle."""
     cycles: int = 10_000
     """Cycles over which the group growth watches memory."""
     scenes: tuple[str, ...] = ()

@@ -77,7 +77,7 @@ def start_rows(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     task = bars.task("start", 2 * options.repetitions + COLD_REPETITIONS + 1)
     helped, warm = [], []
     with tempfile.TemporaryDirectory() as folder:
-        short = ("run.py", "fly-by", *_SHORT_RUN, "--out", f"{folder}/run", "--cache", f"{folder}/references")
+        short = ("run.py", "fly-by", *_SHORT_RUN, "--out", f"{folder}/run", "--references", f"{folder}/references")
         start({}, *short)  # fills the caches of kernels and references
         task.advance()
         for _ in range(options.repetitions):

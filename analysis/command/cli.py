@@ -111,14 +111,17 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     """
     import tyro
 
-    caught = io.StringIO()
+    from analysis.command.subjects import by_subject, renamed
+
+    caught, given = io.StringIO(), sys.argv[1:] if arguments is None else arguments
+    shown = by_subject(options) if {"-h", "--help"}.intersection(given) else options
     try:
         with contextlib.redirect_stderr(caught), bad_input():
-            return tyro.cli(options, description=_as_called(description), args=arguments)
+            return tyro.cli(shown, description=_as_called(description), args=given)
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise InputError(_one_line(caught.getvalue())) from None
+        raise InputError(renamed(options, given) or _one_line(caught.getvalue())) from None
 
 
 def _as_called(description: str) -> str:

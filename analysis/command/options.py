@@ -21,5 +21,19 @@ References = Annotated[Path, tyro.conf.arg(help="Folder for references, shared b
 REFERENCES = Path(".cache/reference")
 """The folder that commands share by default."""
 
+RENAMED = {
+    "--cache": ("--references",),
+    "--clock": ("--ledger",),
+    "--error-target": ("--mse-target",),
+    "--farm.scheduler": ("--scheduler",),
+    "--farm.workers": ("--workers",),
+    "--frames": ("--write-frames", "--ideal-frames"),
+    "--samples": ("--ideal-samples",),
+    "--scale": ("--image-scale",),
+    "--span-s": ("--jod-span-s",),
+    "--start-s": ("--ideal-start-s",),
+}
+"""Earlier names of options that had two meanings, with what a command may call each now."""
+
 Unprefixed = Annotated[Record, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes]
 """A record whose fields are options of the command itself, without the record's name as a prefix."""

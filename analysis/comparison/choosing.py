@@ -52,7 +52,7 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
         return options, None
     place = _place(options, asked, front or stored_front())
     pixels = options.tsar.pixels
-    capacity = place.flops[options.counted] * pixels
+    capacity = place.flops[options.ledger] * pixels
     batch = max(1, round(place.batch * pixels / _SIDE_PX**2))
     value = getattr(options, asked)
     try:
@@ -63,7 +63,7 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
         raise ConfigError(f"{asked}: expected a setting of the front that fits these options, got {error}") from error
     span = pixels * options.seconds
     predicted = {"flops": capacity * options.seconds, "wall_s": place.wall_s * span, "mse": place.mse}
-    limits = {"budget_flops": "flops", "budget_seconds": "wall_s", "error_target": "mse"}
+    limits = {"budget_flops": "flops", "budget_seconds": "wall_s", "mse_target": "mse"}
     limit = (limits[asked], float(value)) if asked in limits else None
     return found, Choice(f"{asked} {value if isinstance(value, str) else f'{value:g}'}", place, predicted, limit)
 
@@ -75,12 +75,12 @@ def _place(options: RunOptions, asked: str, front: Front) -> FrontPoint:
         return front.preset(options.preset)
     if asked == "budget_flops":
         assert options.budget_flops is not None
-        return front.within_flops(options.budget_flops / span, options.counted)
+        return front.within_flops(options.budget_flops / span, options.ledger)
     if asked == "budget_seconds":
         assert options.budget_seconds is not None
         return front.within_seconds(options.budget_seconds / span)
-    assert options.error_target is not None
-    return front.at_error(options.error_target)
+    assert options.mse_target is not None
+    return front.at_error(options.mse_target)
 
 
 def what_came(chosen: Choice, measured: Measured, capacity: float, seconds: float) -> dict[str, Any]:

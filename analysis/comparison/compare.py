@@ -88,7 +88,7 @@ def compare(
     *,
     image_times_s: Sequence[float] | None = None,
     out: str | PathLike[str] | None = None,
-    cache: str | PathLike[str] | None = None,
+    references: str | PathLike[str] | None = None,
     **more: Any,
 ) -> Result:
     """Compares policies on a scene at equal cost.
@@ -103,7 +103,7 @@ def compare(
         image_times_s: times at which images are kept, each at the last reference time that is not later; by default
             five, evenly spaced.
         out: folder for all files of ``tsar run``; by default one that is removed with the result.
-        cache: folder for references, which several comparisons may share; by default ``cache`` within ``out``.
+        references: folder for references, which several comparisons may share; by default that name within ``out``.
         more: further options of a run (:class:`analysis.comparison.options.RunOptions`), and fields of
             :class:`tsar.config.TsarConfig`, such as ``resolution_px``, ``batch_size`` or ``response``.
 
@@ -122,8 +122,8 @@ def compare(
     if not named:
         raise ConfigError("policies: expected at least one, got none")
     with POLICIES.lent(**makers), METRICS.lent(**functions):
-        references = folder / "cache" if cache is None else Path(fspath(cache))
-        usual = {"film": False, "cache": references, "metric_stride": 1}
+        shared = folder / "references" if references is None else Path(fspath(references))
+        usual = {"film": False, "references": shared, "metric_stride": 1}
         chosen = {"policy": named[0], "rivals": named[1:], "metrics": measured, "seconds": seconds, "out": folder}
         options = _options({"input": label, **usual, **chosen}, more)
         kept = _Kept(_numbers(options, image_times_s))

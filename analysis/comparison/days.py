@@ -22,7 +22,7 @@ from analysis.page.report import Report, flat
 from analysis.storage.results import SUMMARY
 
 _SAME_S = 1e-6  # closer times count as one
-_UNTOLD = ("out", "cache", "content", "config_hash")
+_UNTOLD = ("out", "references", "cache", "content", "config_hash")
 
 
 @dataclass(frozen=True)

@@ -64,8 +64,8 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
     with bad_input():
         scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
-        own_results(options.out, (*FILES, *(["frames/*.exr"] if options.frames else [])))
-        writable_folder(options.cache, "cache")
+        own_results(options.out, (*FILES, *(["frames/*.exr"] if options.write_frames else [])))
+        writable_folder(options.references, "references")
         renderer_of(1)  # an error of the scene's loader is bad input
     for loss in losses:
         print(loss)
@@ -168,7 +168,7 @@ def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Refe
     task = bars.task("reference", count)
     with bad_input():
         renderer = setup.renderer_of(1)
-        return obtain(options.cache, spec, lambda t: renderer.render_frame(t, width, height, axis), task)
+        return obtain(options.references, spec, lambda t: renderer.render_frame(t, width, height, axis), task)
 
 
 def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, PolicyRun]:
@@ -176,7 +176,7 @@ def _runs(options: RunOptions, setup: Setup, recording: Recording) -> dict[str, 
     with first_imports():
         from analysis.study.runs import Machine, begin
 
-    machine = Machine(options.counted, options.machine_flops, options.cost)
+    machine = Machine(options.ledger, options.machine_flops, options.cost)
     span_s = options.start_s, options.start_s + options.seconds
     with bad_input():
         return {
@@ -220,7 +220,7 @@ def _compare(
 
     def on_view(view: DisplayedImages) -> None:
         task.advance()
-        if options.frames:
+        if options.write_frames:
             write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
 
     viewers = [on_view, steps, *further, *filming]
@@ -284,7 +284,7 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
     )
     derived = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}
     summary = {
-        "ledger": options.counted,
+        "ledger": options.ledger,
         "capacity_flops": options.machine_flops,
         **summarise(measured),
         **best_rival(measured),

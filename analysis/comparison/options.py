@@ -36,7 +36,7 @@ OF_PICTURE = ("framed", "frameless")
 """Prefixes of the names of policies that store only the pixels of the picture."""
 
 
-CHOICES = ("preset", "budget_flops", "budget_seconds", "error_target")
+CHOICES = ("preset", "budget_flops", "budget_seconds", "mse_target")
 """Options that choose a point on the measured front."""
 
 
@@ -46,7 +46,8 @@ class RunOptions:
     """One comparison of a policy with its rivals at equal cost."""
 
     input: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="INPUT")]
-    """Built-in input (by name or number), a scene that was added, a scene file or a model."""
+    """Built-in input (corner-exit, chase, fly-by, approach or fast-crossing; or its number), a scene that was added, a
+    scene file or a model; tsar list scenes names all."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """Size, batch and seed of all policies, and the pipeline of the policy thesis."""
     seconds: float = 2.0
@@ -54,22 +55,20 @@ class RunOptions:
     start_s: float = 0.0
     """Animation time at which the measurement starts, seconds."""
     phase: float = 0.0
-    """Phase of the animation, in [0, 1], for repetitions."""
+    """Phase of the animation; a number in [0, 1], for repetitions."""
     camera_path: Literal["", "turntable", "fly-through"] = ""
-    """Camera motion for a scene file without one."""
-    clock: Literal["simulated", "wall"] = "simulated"
-    """Simulated time by the cost model, or measured time (the same as the ledger wall)."""
+    """Motion of the camera of a scene file that has none."""
     ledger: Ledger = "thesis"
-    """How cost is counted."""
+    """How cost is counted; wall takes measured time in place of simulated time."""
     capacity: float | None = None
     """Speed of the simulated machine, FLOP/s. None means 8.7e10 at 512², in proportion to the pixels at other sizes: 8
     framed images a second."""
     trace_segments: float = SEGMENTS_DEFAULT
-    """Ray segments per sample in the cost model; the thesis' inputs have about 4, its table says 5."""
+    """Ray segments per sample; the thesis' inputs have about 4, its table says 5."""
     policy: str = DEFAULT_POLICY
     """Policy that decides what is sampled, by name."""
     rivals: tuple[str, ...] = DEFAULT_RIVALS
-    """Policies to compare with at equal cost; ratios are to the first. The default leaves out the policy itself."""
+    """Rivals at equal cost; ratios are to the first. The default leaves out the policy itself."""
     metrics: tuple[str, ...] = ()
     """Further metrics beside the squared errors, such as flip, ssim or jod."""
     display: DisplayModel = field(default_factory=DisplayModel)
@@ -87,15 +86,15 @@ class RunOptions:
     """Most operations of the whole run by the ledger: chooses the most accurate setting of the front within them."""
     budget_seconds: float | None = None
     """Most wall seconds of all cycles of the policy: chooses the most accurate setting of the front within them."""
-    error_target: float | None = None
-    """Mean squared error to reach: chooses the cheapest setting of the front that reaches it."""
+    mse_target: float | None = None
+    """Mean squared error to reach; chooses the cheapest setting of the front that reaches it."""
     parts: Annotated[tuple[tuple[str, bool | int | float], ...], tyro.conf.Suppress] = ()
     """Options of the policy tsar that differ from its defaults; a preset or a budget sets them."""
     device: Device = "cpu"
     threads: Threads = 0
     stages: StagesName = "compiled"
     """Implementation of the stages around tracing: compiled kernels, or the tensor operations of the reference."""
-    frames: bool = False
+    write_frames: bool = False
     """Also write the image on the policy's display at every reference time to frames/, as EXR."""
     film: bool = True
     """Write comparison.mp4."""
@@ -103,7 +102,7 @@ class RunOptions:
     """Pictures in report.html: near has codes off by about 1 of 255, lossless is exact and three times as large."""
     out: Path = Path("out/run")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         limits.within(
@@ -132,8 +131,8 @@ class RunOptions:
         images = self.seconds * self.reference_rate_hz
         require(images >= 1e-6, "seconds", f"time for a reference image at {self.reference_rate_hz:g} Hz", self.seconds)
         limits.require_count("seconds", self.seconds, images, "reference images")
-        if self.counted != "wall":
-            priced = expected_ledger(self.counted)
+        if self.ledger != "wall":
+            priced = expected_ledger(self.ledger)
             if not set(ADAPTIVE_STAGES).isdisjoint(runs):
                 cycle_s = float(adaptive_flops(self.cost, priced)) / self.machine_flops
                 limits.require_pace("capacity", self.machine_flops, cycle_s, self.start_s, self.seconds, warmup)
@@ -151,8 +150,8 @@ class RunOptions:
             require(self.capacity is None, "capacity", f"none beside a {name}, which sets it", self.capacity)
             batch, default = self.tsar.batch_size, TsarConfig.batch_size
             require(batch == default, "batch_size", f"none beside a {name}, which sets it", batch)
-            require(self.counted != "wall", "ledger", f"a modelled one beside a {name}", self.counted)
-        limits.within(self, budget_flops=(1.0, 1e18), budget_seconds=(1e-6, 1e9), error_target=(1e-12, 1.0))
+            require(self.ledger != "wall", "ledger", f"a modelled one beside a {name}", self.ledger)
+        limits.within(self, budget_flops=(1.0, 1e18), budget_seconds=(1e-6, 1e9), mse_target=(1e-12, 1.0))
         require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
 
     @property
@@ -172,11 +171,11 @@ class RunOptions:
     @property
     def pace(self) -> str:
         """What a size other than the default changes in the experiment, in words; empty if it changes nothing."""
-        if self.capacity is not None or self.tsar.pixels == RESOLUTION_DEFAULT**2 or self.counted == "wall":
+        if self.capacity is not None or self.tsar.pixels == RESOLUTION_DEFAULT**2 or self.ledger == "wall":
             return ""
         if any(getattr(self, name) not in ("", None) for name in CHOICES):
             return ""
-        rate = self.machine_flops / float(nonadaptive_flops(self.cost, expected_ledger(self.counted)))
+        rate = self.machine_flops / float(nonadaptive_flops(self.cost, expected_ledger(self.ledger)))
         return (
             f"{self.size}: the machine has {self.machine_flops:.3g} FLOP/s, for {rate:.3g} framed images a second, "
             f"as at {RESOLUTION_DEFAULT}² (--capacity sets it)"
@@ -187,11 +186,6 @@ class RunOptions:
         """Pixels that all runs store: those of the picture or, for most policies, of the square around it."""
         squares = sum(name.partition("-")[0] not in OF_PICTURE for name in (self.policy, *self.rivals))
         return squares * self.tsar.resolution_px**2 + (1 + len(self.rivals) - squares) * self.tsar.pixels
-
-    @property
-    def counted(self) -> Ledger:
-        """The ledger in use."""
-        return "wall" if self.clock == "wall" else self.ledger
 
     @property
     def cost(self) -> CostParameters:
@@ -206,7 +200,7 @@ class ReportOptions:
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
     """Folders of finished runs."""
     out: Path = Path("out/report")
-    """Folder for the page."""
+    """Folder for the results; it gets the page."""
 
     def __post_init__(self) -> None:
         require(len(self.folders) >= 1, "folders", "at least one", self.folders)

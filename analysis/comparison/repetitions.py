@@ -30,24 +30,24 @@ class InputsOptions:
     vary: Literal["seed", "phase"] = "seed"
     """What differs between repetitions: the seed (0, 1, …) or the phase (0, 1/n, …)."""
     repetitions: int = 3
-    """Runs of each input."""
+    """Repetitions of each; runs of an input, which differ in what vary names."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """Size, batch and seed of all policies, and the pipeline of the policy thesis; repetitions set the seed if seeds
     vary."""
     policy: str = DEFAULT_POLICY
     """Policy that decides what is sampled, by name."""
     rivals: tuple[str, ...] = ("framed", "framed-1", "framed-super")
-    """Policies to compare with at equal cost; ratios are to the first."""
+    """Rivals at equal cost; ratios are to the first."""
     seconds: float = 2.0
     """Animation time to measure, seconds."""
     ledger: Ledger = "thesis"
-    """How cost is counted."""
+    """How cost is counted; wall takes measured time in place of simulated time."""
     capacity: float | None = None
     """Speed of the simulated machine, FLOP/s. None gives 8 framed images a second at every size."""
     reference_rate_hz: float = 30.0
     """Reference images per simulated second; half as many as run.py has, because references take most of the time."""
     out: Path = Path("out/inputs")
-    """Folder for the results, with one folder a run."""
+    """Folder for the results; it gets one folder a run."""
 
     def __post_init__(self) -> None:
         limits.within(self, repetitions=limits.REPETITIONS)

@@ -74,7 +74,7 @@ def content_of(options: RunOptions, scene: Scene) -> str:
     from analysis.storage.reference import content_hash
     from analysis.storage.source import code_hash
 
-    kept = {name: value for name, value in plain(options).items() if name not in ("out", "cache")}
+    kept = {name: value for name, value in plain(options).items() if name not in ("out", "references")}
     return content_hash((kept, scene, code_hash(run_experiment), *added_by(options)))
 
 

@@ -29,7 +29,7 @@ class ConvertOptions:
     report: Path | None = None
     """JSON file for the losses; by default the target's name with .losses.json."""
     root: Path | None = None
-    """Folder that the scene may read from; by default its own."""
+    """Folder that scenes may read from; by default its own."""
 
     def __post_init__(self) -> None:
         if self.to:
@@ -63,7 +63,7 @@ class CheckOptions:
     limit_s: float = 240.0
     """Most seconds for each picture."""
     out: Path = Path("out/conversion-check")
-    """Folder for the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
+    """Folder for the results; the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))

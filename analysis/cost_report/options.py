@@ -31,7 +31,7 @@ class MeasurementOptions:
     measured_resolution: int = 512
     """Output side at which batch sizes are compared, pixels."""
     repetitions: int = 10
-    """Turns of each setting."""
+    """Repetitions of each; turns of a setting."""
     cycles_per_turn: int = 4
     """Pipeline cycles that a setting runs in each turn."""
     cycle_s: float = 0.02
@@ -100,7 +100,7 @@ class CostReportOptions:
     measurement: Unprefixed[MeasurementOptions] = field(default_factory=MeasurementOptions)
     """The measurement on this machine."""
     ledger: Literal["thesis", "printed", "summed"] = "thesis"
-    """How the model counts cost; figures show this ledger, tables all of them."""
+    """How cost is counted; figures show this ledger, tables all of them."""
     batches: tuple[int, ...] = (32, 64, 128, 256, 512, 768, 1024)
     """Batch sizes that may be admitted."""
     resolutions: tuple[int, ...] = (256, 512, 1024)

@@ -39,19 +39,19 @@ class Controls:
     right: str = "tsar"
     """Policy on the right, or none."""
     batch_size: int = 128
-    """Framelets per cycle."""
+    """Framelets rendered per cycle."""
     resolution_px: int = 512
     """Width and height of the pictures, pixels, a power of two."""
     latency_cycles: int = 0
     """Cycles from sampling to display, 0 to 8; 0 for each policy's own."""
     spatial_slope: float = ErrorConfig.spatial_slope
-    """Of thesis: slope of the template of its error estimate over spatial octaves."""
+    """Slope of the template over spatial octaves; of the error estimate of thesis."""
     temporal_slope: float = ErrorConfig.temporal_slope
-    """Of thesis: the same over temporal octaves."""
+    """Slope of the template over temporal octaves; the same."""
     bias: float = ResponseConfig.bias
-    """Of thesis: octaves towards space, negative towards time."""
+    """Octaves towards space, negative towards time; of thesis."""
     solver: str = ResponseConfig.solver
-    """Of thesis: how density moves over the image."""
+    """Solver of density transport; of thesis."""
 
     def __post_init__(self) -> None:
         for side in ("left", "right"):
@@ -112,7 +112,7 @@ class LiveOptions:
     seed: Seed = 0
     threads: Threads = 0
     reference_samples_per_axis: int = 3
-    """Samples along a pixel's side of the truth that frozen pictures are compared with."""
+    """Samples along a pixel's side in the reference; the truth that frozen pictures are compared with."""
     host: str = "127.0.0.1"
     """Address to listen at. Any other than this machine's own lets other machines in, with the key that is printed."""
     port: int = 8090
@@ -122,7 +122,7 @@ class LiveOptions:
     bench_seconds: float = 5.0
     """Seconds of each of these drives."""
     out: Path = Path("out/live")
-    """Folder for recorded sessions."""
+    """Folder for the results; recorded sessions."""
 
     def __post_init__(self) -> None:
         limits.within(

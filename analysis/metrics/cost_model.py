@@ -57,7 +57,7 @@ class CostParameters:
     """
 
     batch_size: Value = 128
-    """Framelets rendered per pipeline cycle."""
+    """Framelets rendered per cycle."""
     sdf_size: Value = 128**2
     """Elements of the density and error fields."""
     framelet_size: Value = 16**2
@@ -65,13 +65,13 @@ class CostParameters:
     recon_res: Value = 512**2
     """Output resolution, pixels."""
     cache_size: Value = 2048
-    """Framelets in the cache."""
+    """Framelets kept in the cache."""
     recon_age_support: Value = 128
     """Width of the age smoothing operator, pixels."""
     recon_spa_support: Value = 3**2
     """Size of the spatial reconstruction filter, pixels."""
     trace_segments: Value = 5
-    """Ray segments per sample. The thesis' table says 5; its test inputs have about 4."""
+    """Ray segments per sample; the thesis' table says 5; its test inputs have about 4."""
     tiling_size: Value = 512
     """Framelets in the tiling."""
     dwt_coeffs: Value = 448

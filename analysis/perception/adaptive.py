@@ -42,9 +42,9 @@ def scores(options: AdaptiveOptions, task: Task) -> pd.DataFrame:
             framed = framed_config(config.resolution_px)
             own = framed if is_framed(options.policy) else config
             for policy, chosen in ((options.policy, own), ("framed", framed)):
-                case = Case(name, policy, chosen, scale, jod_span_s=options.span_s, display=options.display)
+                case = Case(name, policy, chosen, scale, jod_span_s=options.jod_span_s, display=options.display)
                 cases[name, row, policy] = case
-    place = Resources(options.out / "runs", Path(options.cache))
+    place = Resources(options.out / "runs", Path(options.references))
     keys, failures = run_cases(list(cases.values()), place, ClusterOptions(options.workers), task)
     if failures:
         for line in describe_failures({case.name: reason for case, reason in failures.items()}):

@@ -29,7 +29,7 @@ class StimuliOptions:
     jobs: Annotated[tuple[Path, ...], tyro.conf.Positional] = STUDY_JOBS
     """Job files; by default the thesis' study: two scenes, eight levels, three point sets, truncated box."""
     width_px: int = 768
-    """Width and height of a frame, pixels."""
+    """Width, pixels; of a frame, also its height."""
     first_frame: int = 60
     """First frame of the sequence."""
     frames: int = 60
@@ -41,10 +41,10 @@ class StimuliOptions:
     box_share: float = 0.5
     """Share of the shutter time, in its middle, that the box filter spans."""
     seed: int = 0
-    """Seed of point sets and shifts."""
+    """Seed of all random numbers; of point sets and shifts."""
     threads: Threads = 0
     out: Path = Path("out/perception")
-    """Folder for the stimuli, manifest.json and summary.json."""
+    """Folder for the results; the stimuli, manifest.json and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(
@@ -68,7 +68,7 @@ class SimulateOptions:
     observers: int = 12
     """Number of observers."""
     repetitions: int = 4
-    """Answers of each observer to each stimulus."""
+    """Repetitions of each; answers of an observer to a stimulus."""
     sigma_jod: float = 1.048
     """Noise of a single stimulus, JOD; 1.048 makes one JOD preferred in 75 % of pairs."""
     sensitivity_spread: float = 0.25
@@ -78,9 +78,9 @@ class SimulateOptions:
     display: DisplayModel = field(default_factory=DisplayModel)
     """Display that the JOD assume."""
     seed: int = 0
-    """Seed of observers, orders and answers."""
+    """Seed of all random numbers; of observers, orders and answers."""
     out: Path = Path("out/perception-simulated")
-    """Folder for trials-simulated.parquet, jod.csv and summary.json."""
+    """Folder for the results; trials-simulated.parquet, jod.csv and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(
@@ -105,7 +105,7 @@ class AnalyseOptions:
     bootstraps: int = 400
     """Data sets drawn for each interval."""
     seed: int = 0
-    """Seed of these data sets, and of the table of power."""
+    """Seed of all random numbers; of these data sets, and of the table of power."""
     psignifit: bool = False
     """Also fit with psignifit, an optional extra, and show its thresholds beside ours."""
     power_repetitions: int = 40
@@ -113,7 +113,7 @@ class AnalyseOptions:
     power_spread: float = 0.5
     """Standard deviation of the observers' thresholds in the table of power, octaves."""
     out: Path = Path("out/perception-analysis")
-    """Folder for fits.csv, tests.csv, power.csv, figures and summary.json."""
+    """Folder for the results; fits.csv, tests.csv, power.csv, figures and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(self, bootstraps=(0, 100_000), power_repetitions=(0, 10_000), seed=limits.SEEDS)
@@ -142,9 +142,9 @@ class RecoverOptions:
     bootstraps: int = 400
     """Data sets drawn for each interval."""
     seed: int = 0
-    """Seed of answers and bootstraps."""
+    """Seed of all random numbers; of answers and bootstraps."""
     out: Path = Path("out/perception-recovery")
-    """Folder for recovery.csv and summary.json."""
+    """Folder for the results; recovery.csv and summary.json."""
 
     def __post_init__(self) -> None:
         for jnd in self.jnds:
@@ -166,15 +166,15 @@ class ServeOptions:
     stimuli: Path = Path("out/perception")
     """Folder of the command ``stimuli``."""
     repetitions: int = 4
-    """Times that each stimulus is shown."""
+    """Repetitions of each; times that a stimulus is shown."""
     break_every: int = 24
     """Trials between breaks."""
     port: int = 0
-    """Port of the page, on this machine only; 0 takes a free one."""
+    """Port of the page; on this machine only; 0 takes a free one."""
     seed: int = 0
-    """Seed of orders and sides."""
+    """Seed of all random numbers; of orders and sides."""
     out: Path = Path("out/perception-human")
-    """Folder for the session: answers.sqlite, trials-human.parquet and summary.json."""
+    """Folder for the results; the session: answers.sqlite, trials-human.parquet and summary.json."""
 
     def __post_init__(self) -> None:
         require(bool(self.observer.strip()), "observer", "a name", self.observer)
@@ -189,22 +189,22 @@ class AdaptiveOptions:
     inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
     """Built-in inputs, or other scenes by their names."""
     policy: str = "thesis"
-    """Policy that the observer compares with framed."""
+    """Policy that decides what is sampled, by name; the observer compares it with framed."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Size of the runs."""
-    span_s: tuple[float, float] = (0.4, 0.9)
-    """Beginning and end of the scored part of each run, seconds after its start."""
+    """Sizes of the runs: as in the suitability study."""
+    jod_span_s: tuple[float, float] = (0.4, 0.9)
+    """Beginning and end of the part of each run that ColorVideoVDP scores, seconds after the start."""
     sigma_jod: float = 1.048
     """Noise of a single stimulus, JOD."""
     display: DisplayModel = field(default_factory=DisplayModel)
     """Display that the JOD assume."""
     workers: int = 0
-    """Processes; 0 takes one per core."""
+    """Processes of the local cluster; 0 takes one per core."""
     seed: int = 0
-    """Seed of the runs."""
-    cache: References = REFERENCES
+    """Seed of all random numbers; of the runs."""
+    references: References = REFERENCES
     out: Path = Path("out/perception-adaptive")
-    """Folder for the runs, adaptive.csv, thresholds.csv and summary.json."""
+    """Folder for the results; the runs, adaptive.csv, thresholds.csv and summary.json."""
 
     def __post_init__(self) -> None:
         require_distinct(self, "inputs")
@@ -212,7 +212,12 @@ class AdaptiveOptions:
         POLICIES.require(self.policy, "policy")
         require(self.policy != "framed", "policy", "one other than framed", self.policy)
         limits.within(self, sigma_jod=_SIGMAS_JOD, workers=limits.WORKERS, seed=limits.SEEDS)
-        require(0.0 <= self.span_s[0] < self.span_s[1] <= 2.0, "span_s", "from and to within the 2 s", self.span_s)
+        require(
+            0.0 <= self.jod_span_s[0] < self.jod_span_s[1] <= 2.0,
+            "jod_span_s",
+            "from and to within the 2 s",
+            self.jod_span_s,
+        )
 
 
 StepOptions = (

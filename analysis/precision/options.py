@@ -23,15 +23,15 @@ class PrecisionOptions:
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs, or other scenes by their names."""
     policies: tuple[Literal["tsar", "thesis"], ...] = ("tsar", "thesis")
-    """Policies to study."""
+    """Policies to compare; each with itself."""
     kept: tuple[str, ...] = ()
     """Names of the kinds of values to change, each alone; all where none is named. An unknown name prints the list."""
     row: int = 7
     """Row of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as in the suitability study."""
+    """Sizes of the runs: as in the suitability study."""
     repetitions: int = 1
-    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    """Repetitions of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The pipeline of all runs; batch and resolution come from the row, the seed from the repetition."""
     start_s: float = 0.0
@@ -39,12 +39,12 @@ class PrecisionOptions:
     tolerance: float = 0.01
     """A format is safe if no run breaks an invariant and the mean error of all runs grows by at most this share."""
     markdown: bool = False
-    """Print the table as Markdown."""
+    """Print the tables as Markdown."""
     farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
     """Where the runs are computed."""
     out: Path = Path("out/precision")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         require_inputs(self.inputs)

@@ -24,10 +24,10 @@ class SensitivityOptions:
     inputs: tuple[str, ...] = INPUTS
     """Built-in inputs, or other scenes by their names."""
     row: int = 7
-    """Row of table 7.2 that gives batch and resolution, 0 to 15; 7 is batch 128 at 512²."""
+    """Row of table 7.2, 0 to 15; it gives batch and resolution, 7 is batch 128 at 512²."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """thesis: its resolution and batch. half: half the side, and a quarter of samples, tiles and machine speed.
-    quick: a quarter of the side, and half the rate of the reference."""
+    """Sizes of the runs: thesis, its resolution and batch; half, half the side, and a quarter of samples, tiles and
+    machine speed; quick, a quarter of the side, and half the rate of the reference."""
     spatial_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
     """Spatial slopes of the grid, steepest first."""
     temporal_slopes: tuple[float, ...] = (-2.0, -1.0, 0.0)
@@ -37,7 +37,7 @@ class SensitivityOptions:
     biases: tuple[float, ...] = (-2.0, -1.0, 0.0, 1.0, 2.0)
     """Biases, octaves; positive towards space."""
     repetitions: int = 1
-    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    """Repetitions of each: repetition r has seed r and phase r / repetitions."""
     figure_input: str = "fast-crossing"
     """The input that is shown as pictures."""
     still_s: float = 0.65
@@ -50,7 +50,7 @@ class SensitivityOptions:
     """Where the runs are computed."""
     out: Path = Path("out/sensitivity")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         require_inputs(self.inputs)

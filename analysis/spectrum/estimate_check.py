@@ -152,11 +152,11 @@ def measure_example(options: SpectrumOptions, trace: Trace, task: Task) -> Examp
     tsar, level = options.tsar, torch.tensor([options.tile_level])
     cell = torch.tensor([[int(place * 2**options.tile_level)] for place in options.tile_at])
     index = interleave(*cell) if options.tile_index is None else torch.tensor([options.tile_index])
-    times_s = [options.start_s + options.span_s * frame / options.frames for frame in range(options.frames)]
-    volume = tile_volume(trace, level, index, options.samples, times_s, task)
-    octaves = options.samples.bit_length() - FRAMELET_SIDE.bit_length() + 1
-    space = tuple(1 << octave for octave in reversed(range(octaves)))
-    time = tuple(1 << octave for octave in range(1, options.frames.bit_length() - 2))
+    first_s, span_s, count = options.ideal_start_s, options.span_s, options.ideal_frames
+    times_s = [first_s + span_s * frame / count for frame in range(count)]
+    volume = tile_volume(trace, level, index, options.ideal_samples, times_s, task)
+    space = tuple(1 << octave for octave in reversed(range((options.ideal_samples // FRAMELET_SIDE).bit_length())))
+    time = tuple(1 << octave for octave in range(1, count.bit_length() - 2))
     tiles, power = measure(volume, Rates(space, time), tsar.error, tsar.elements_of(options.tile_level))
     f_s, f_t = ideal_band(share_of_total(tiles.norm), options.tau)
     per_picture = [FRAMELET_SIDE * 2.0**bound / tsar.resolution_px for bound in (tsar.level_min, tsar.level_max)]
@@ -167,7 +167,7 @@ def measure_example(options: SpectrumOptions, trace: Trace, task: Task) -> Examp
         level=options.tile_level,
         index=int(index),
         band=(int(f_s), int(f_t)),
-        unit=(2.0**options.tile_level / tsar.resolution_px, 1.0 / options.span_s),
+        unit=(2.0**options.tile_level / tsar.resolution_px, 1.0 / span_s),
         realizable=((per_picture[0], per_picture[1]), (refreshes[0], refreshes[1])),
     )
 

@@ -23,33 +23,32 @@ FRAMELET_SIDE = 16
 @dataclass(frozen=True)
 @closed_choices()
 class SpectrumOptions:
-    """Power-spectrum slopes, ideal sample density, and the agreement of the streaming estimate with it.
-
-    The size of the thesis' example is --only ideal --samples 1024 --frames 512; it needs about 16 GiB and 32 times the
-    time of the default.
-    """
+    """Power-spectrum slopes, ideal sample density, and the agreement of the streaming estimate with it. The size of the
+    thesis' example is --only ideal --ideal-samples 1024 --ideal-frames 512; it needs about 16 GiB and 32 times the time
+    of the default."""
 
     images: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Pictures to measure beside our own: PNG, JPEG or EXR of any size from 32 pixels."""
     only: Part | None = None
-    """Do one part only: slopes (figs 1.3, 1.4), ideal (figs 5.3–5.5) or agreement; without it all three."""
+    """What to do, instead of everything: slopes (figs 1.3, 1.4), ideal (figs 5.3–5.5) or agreement; without it all
+    three."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline: template of the error estimate, realizable rates, resolution, seed."""
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs whose slopes and tiles are measured."""
+    """Built-in inputs, or other scenes by their names; those whose slopes and tiles are measured."""
     frames_per_input: int = 4
     """Slopes: times at which frames and framelets of each input are taken."""
     samples_per_axis: int = 4
-    """Slopes: samples along a pixel's side of the supersampled frames."""
+    """Samples along a pixel's side; for the slopes, of the supersampled frames."""
     input: str = "fly-by"
-    """Ideal: the input of the tile."""
-    start_s: float = 0.75
+    """Built-in input, by name or number; the one of the tile of the ideal density."""
+    ideal_start_s: float = 0.75
     """Ideal: first time, seconds."""
     span_s: float = 0.5
     """Ideal and agreement: length of a volume, seconds."""
-    samples: int = 256
+    ideal_samples: int = 256
     """Ideal: samples along the tile's side."""
-    frames: int = 256
+    ideal_frames: int = 256
     """Ideal: times over the span."""
     tile_level: int = 5
     """Ideal: quad level of the tile; at level L it is 1 / 2^L of the picture wide."""
@@ -76,14 +75,19 @@ class SpectrumOptions:
         require(len(self.inputs) > 0, "inputs", "at least one", self.inputs)
         require_inputs((*self.inputs, self.input))
         limits.within(self, frames_per_input=(1, 100), samples_per_axis=(1, 16), threads=limits.THREADS)
-        limits.within(self, samples=(32, 1 << 15), frames=(8, 1 << 15))
+        limits.within(self, ideal_samples=(32, 1 << 15), ideal_frames=(8, 1 << 15))
         limits.within(self, agreement_samples=(64, 1 << 15), agreement_frames=(16, 1 << 15))
         limits.within(self, tile_level=(0, 10), agreement_level=(0, 9))
-        for name, low in (("samples", 32), ("frames", 8), ("agreement_samples", 64), ("agreement_frames", 16)):
+        for name, low in (
+            ("ideal_samples", 32),
+            ("ideal_frames", 8),
+            ("agreement_samples", 64),
+            ("agreement_frames", 16),
+        ):
             value = getattr(self, name)
             require(value >= low and value & (value - 1) == 0, name, f"a power of two from {low}", value)
         require(self.tsar.framelet_side == FRAMELET_SIDE, "framelet_side", "16", self.tsar.framelet_side)
-        for name, side in (("tile_level", self.samples), ("agreement_level", self.agreement_samples)):
+        for name, side in (("tile_level", self.ideal_samples), ("agreement_level", self.agreement_samples)):
             value = getattr(self, name)  # sample positions are multiples of 1 / 65536
             require(0 <= value and 2**value * side <= 2**15, name, "0 or more, at most 2^15 samples a picture", value)
         tiles, most = self.tiles_per_input, 4 ** (self.agreement_level + 1)
@@ -92,7 +96,8 @@ class SpectrumOptions:
         index, count = self.tile_index, 4**self.tile_level
         require(index is None or 0 <= index < count, "tile_index", f"between 0 and {count - 1}", index)
         require(0 < self.span_s <= 3, "span_s", "a number in (0, 3]", self.span_s)
-        require(-3 <= self.start_s <= 6 - self.span_s, "start_s", "within the animation, from -3 to 6 s", self.start_s)
+        start_s = self.ideal_start_s
+        require(-3 <= start_s <= 6 - self.span_s, "ideal_start_s", "within the animation, from -3 to 6 s", start_s)
         require(0 < self.tau < 1, "tau", "a share in (0, 1)", self.tau)
 
     def does(self, part: Part) -> bool:

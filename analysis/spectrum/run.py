@@ -38,8 +38,11 @@ def run_study(options: SpectrumOptions) -> dict[str, Any]:
     if options.does("slopes"):
         require_memory(_BYTES_PER_PIXEL * options.tsar.resolution_px**2, f"resolution_px: {options.tsar.resolution_px}")
     if options.does("ideal"):
-        need = _BYTES_PER_SAMPLE * options.samples**2 * options.frames
-        require_memory(need, f"samples, frames: a tile of {options.samples}² samples at {options.frames} times")
+        need = _BYTES_PER_SAMPLE * options.ideal_samples**2 * options.ideal_frames
+        require_memory(
+            need,
+            f"ideal_samples, ideal_frames: a tile of {options.ideal_samples}² samples at {options.ideal_frames} times",
+        )
     if options.does("agreement"):
         need = 16 * _BYTES_PER_SAMPLE * options.agreement_samples**2 * options.agreement_frames
         require_memory(need, f"agreement_samples: {options.agreement_samples}")
@@ -89,9 +92,9 @@ def _slopes(options: SpectrumOptions, pictures: list[Spectrum], shown_bars: Bars
 
 def _ideal(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:
     renderer, _ = open_input(options, options.input)
-    task = shown_bars.task("ideal", options.frames)
+    task = shown_bars.task("ideal", options.ideal_frames)
     example = measure_example(options, renderer.trace, task)
-    times_s = [options.start_s + options.span_s * i / (_FRAMES_SHOWN - 1) for i in range(_FRAMES_SHOWN)]
+    times_s = [options.ideal_start_s + options.span_s * i / (_FRAMES_SHOWN - 1) for i in range(_FRAMES_SHOWN)]
     side = options.tsar.resolution_px
     frames = [shown(renderer.render_frame(time_s, side, side, 2).numpy()) for time_s in times_s]
     renderer.close()

@@ -18,7 +18,7 @@ from analysis.storage.source import Brought
 
 _ROOT = Path(__file__).resolve().parents[2]
 _CPU_INFO = Path("/proc/cpuinfo")
-_WHERE = ("out", "cache")
+_WHERE = ("out", "references")
 """Fields of a configuration that say where results are written, and do not affect results."""
 
 

@@ -33,7 +33,7 @@ class StudyOptions(Protocol):
     @property
     def out(self) -> Path: ...
     @property
-    def cache(self) -> Path: ...
+    def references(self) -> Path: ...
     @property
     def farm(self) -> ClusterOptions: ...
 
@@ -54,10 +54,10 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
 
     with bad_input():
         own_results(options.out, tuple(written))
-        writable_folder(options.cache, "cache")
+        writable_folder(options.references, "references")
     out = options.out.resolve()
     (out / SUMMARY).unlink(missing_ok=True)  # so that a killed study leaves no older summary
-    place = Resources(out / "runs", options.cache.resolve(), options.farm.threads)
+    place = Resources(out / "runs", options.references.resolve(), options.farm.threads)
     with full_disk(out), bars() as shown:
         place.results.mkdir(exist_ok=True)
         return Outcomes(place, *run_cases(cases, place, options.farm, shown.task("runs", len(set(cases)))))

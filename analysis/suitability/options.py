@@ -29,16 +29,16 @@ class SuitabilityOptions:
     rows: tuple[int, ...] = tuple(range(len(ROWS)))
     """Rows of table 7.2, 0 to 15."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """thesis: its resolutions and batches. half: half the side, and a quarter of samples, tiles and machine speed.
-    quick: a quarter of the side, and half the rate of the reference. All runs last 2 s."""
+    """Sizes of the runs: thesis, its resolutions and batches; half, half the side, and a quarter of samples, tiles and
+    machine speed; quick, a quarter of the side, and half the rate of the reference. All runs last 2 s."""
     repetitions: int = 3
-    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    """Repetitions of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The adaptive pipeline; batch and resolution come from the row, the seed from the repetition."""
     policies: tuple[str, ...] = ("thesis",)
-    """Policies that are compared at every row with framed, and with the best of the rivals at each moment."""
+    """Policies to compare; at every row with framed, and with the best of the rivals at each moment."""
     rivals: tuple[str, ...] = RIVALS
-    """Rivals of these policies at every row; framed is always one of them."""
+    """Rivals at equal cost; at every row; framed is always one of them."""
     beside: tuple[str, ...] = ("oracle",)
     """Further policies, which are run at one row only, --policy-row."""
     solvers: tuple[str, ...] = ("trivial",)
@@ -50,7 +50,7 @@ class SuitabilityOptions:
     framed_rate_hz: float = 8.0
     """Images a second that the framed renderer shows at every resolution, which sets the speed of the machine."""
     trace_segments: float = SEGMENTS_DEFAULT
-    """Ray segments per sample in the cost model."""
+    """Ray segments per sample; of the cost model."""
     start_s: float = 0.0
     """Animation time at which the measurement starts, seconds."""
     stride: int = 6
@@ -67,7 +67,7 @@ class SuitabilityOptions:
     """Where the runs are computed."""
     out: Path = Path("out/suitability")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         require_inputs(self.inputs)

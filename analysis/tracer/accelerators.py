@@ -106,7 +106,7 @@ def render_report_image(name: str, options: AcceleratorOptions, bars: Bars) -> t
     from renderer.trace import Renderer
 
     scene = report.load(name)
-    width, height = (max(1, round(side * options.scale)) for side in (scene.film.width_px, scene.film.height_px))
+    width, height = (max(1, round(side * options.image_scale)) for side in (scene.film.width_px, scene.film.height_px))
     threads, work = options.threads or None, Counter[str]()
     renderer = Renderer(scene, threads=threads, seed=options.seed, structure=options.structure, count_work=True)
     plan = SamplePlan(report.SAMPLES, "hammersley", options.seed, "gaussian")

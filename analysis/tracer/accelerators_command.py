@@ -2,7 +2,7 @@
 
 Examples: python scripts/accelerators.py --out out/accelerators
           python scripts/accelerators.py --image report-one report-two --out out/report
-          python scripts/accelerators.py --image report-one --scale 0.2 --out out/report-small
+          python scripts/accelerators.py --image report-one --image-scale 0.2 --out out/report-small
 """
 
 from __future__ import annotations

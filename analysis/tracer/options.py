@@ -10,7 +10,7 @@ import tyro
 
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
-from analysis.command.options import Device, Seed, Threads
+from analysis.command.options import Device, Seed, Threads, Unprefixed
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
 
@@ -39,7 +39,7 @@ class GalleryOptions:
     device: Device = "cpu"
     threads: Threads = 0
     out: Path = Path("out/gallery")
-    """Folder for NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
+    """Folder for the results; NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
 
     def __post_init__(self) -> None:
         POINT_SETS.require(self.point_set, "point_set")
@@ -53,23 +53,23 @@ class AcceleratorOptions:
     """Ray-triangle tests per ray of brute force, kd-tree and tree of boxes, and the two images of the report."""
 
     out: Path = Path("out/accelerators")
-    """Folder for table.csv, tests.png, the images and summary.json."""
+    """Folder for the results; table.csv, tests.png, the images and summary.json."""
     triangles: tuple[int, ...] = (100, 1_000, 10_080, 100_000, 1_000_000)
     """Approximate numbers of triangles of the meshes."""
     repetitions: int = 5
-    """Turns of each structure; the medians are reported."""
+    """Repetitions of each; turns of a structure; the medians are reported."""
     image: tuple[Literal["report-one", "report-two"], ...] = ()
     """Images of the report to render, instead of the table."""
-    scale: float = 1.0
+    image_scale: float = 1.0
     """Scale of the images' sides; 1 is the report's size."""
     structure: Literal["kdtree", "bvh"] = "kdtree"
     """Structure over the triangles of the images."""
     seed: int = 0
-    """Seed of rays and samples."""
+    """Seed of all random numbers; of rays and samples."""
     threads: Threads = 0
 
     def __post_init__(self) -> None:
-        limits.within(self, triangles=(16, 4_000_000), repetitions=(1, 100), scale=(0.01, 4.0))
+        limits.within(self, triangles=(16, 4_000_000), repetitions=(1, 100), image_scale=(0.01, 4.0))
         limits.within(self, seed=limits.SEEDS, threads=limits.THREADS)
 
 
@@ -78,7 +78,7 @@ class PointSetOptions:
     """Measures point sets: discrepancy, distances, projections, strata, convergence on edges and smooth functions."""
 
     out: Path = Path("out/pointsets")
-    """Folder for tables, figures and summary.json."""
+    """Folder for the results; tables, figures and summary.json."""
     levels: tuple[int, ...] = LEVELS
     """Numbers of points, which must be cubes."""
     cases: int = 2048
@@ -115,18 +115,19 @@ class TileOptions:
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
     time_s: float = 0.0
-    """Animation time at which the frame begins, seconds."""
+    """Animation time of the first frame, seconds."""
     seed: Seed = 0
     chunk_tiles: int = 16
     """Tiles of 16 x 16 pixels in one task of a worker."""
-    farm: ClusterOptions = field(default_factory=ClusterOptions)
+    farm: Unprefixed[ClusterOptions] = field(default_factory=ClusterOptions)
     """Where tiles are rendered."""
     study: tuple[int, ...] = ()
     """Numbers of local workers to time instead on the same picture, such as 1 2 4."""
     repetitions: int = 3
-    """Turns of each number in a study; the medians are reported."""
+    """Repetitions of each; turns of each number in a study; the medians are reported."""
     out: Path = Path("out/tiles")
-    """Folder for the picture, summary.json, and the chunks from which an interrupted rendering continues."""
+    """Folder for the results; the picture, summary.json, and the chunks from which an interrupted rendering
+    continues."""
 
     def __post_init__(self) -> None:
         POINT_SETS.require(self.point_set, "point_set")
@@ -153,9 +154,9 @@ class JobOptions:
     scene: str = ""
     """A block file, or the built-in planescene or spheresscene; by default the scene in the job's name."""
     width_px: int = 0
-    """Width and height of a frame, pixels; 0 takes those of the file."""
+    """Width, pixels; of a frame, also its height; 0 takes those of the file."""
     first_frame: int = 0
-    """First frame of the sequence to render."""
+    """First frame of the sequence."""
     frames: int = 0
     """Number of frames; 0 takes all from the first frame on."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
@@ -167,11 +168,11 @@ class JobOptions:
     format: Literal["png", "exr"] = "png"
     """Format of the frames."""
     seed: int = 0
-    """Seed of point sets and shifts."""
+    """Seed of all random numbers; of point sets and shifts."""
     threads: Threads = 0
     out: Path = Path("out/job")
-    """Folder for summary.json and a folder of frames for each combination; frames that an interrupted run of the same
-    job left there are kept."""
+    """Folder for the results; summary.json and a folder of frames for each combination; frames that an interrupted run
+    of the same job left there are kept."""
 
     def __post_init__(self) -> None:
         limits.within(

@@ -31,9 +31,9 @@ class RenderOptions:
     size: str = ""
     """Width and height, pixels, such as 800x600; by default those of the scene's film."""
     width_px: int = 0
-    """Width, pixels, in place of size; the field of view spans the shorter side."""
+    """Width, pixels; in place of size; the field of view spans the shorter side."""
     height_px: int = 0
-    """Height, pixels, in place of size."""
+    """Height, pixels; in place of size."""
     crop: tuple[int, int, int, int] | None = None
     """Part of the picture to render: left column, upper row, width and height, pixels."""
     camera: tuple[float, float, float, float, float, float] | None = None
@@ -53,12 +53,13 @@ class RenderOptions:
     smooth_deg: float = 0.0
     """Greatest angle at which an edge of a mesh without normals is smooth, degrees; 0 keeps faces flat."""
     samples_per_axis: int = 2
-    """Samples along a pixel's side, all at the frame's time."""
+    """Samples along a pixel's side; all at the frame's time."""
     samples: int = 0
-    """Samples of a point set per pixel, in place of the regular grid; they also spread over the time the shutter is
-    open."""
+    """Samples per pixel; those of a point set, in place of the regular grid; they also spread over the time the shutter
+    is open."""
     point_set: str = "hammersley"
-    """The point set; stratified needs a cube as the number of samples."""
+    """Point set that places the samples in the pixel and in the shutter's time; stratified needs a cube as the number
+    of samples."""
     rounds: int = 0
     """Take the samples of a still in this many rounds of the point set, so that an interrupted still continues where it
     was and its error is known. 0 takes 16 if an error target or layers are asked for, else none."""
@@ -70,7 +71,7 @@ class RenderOptions:
     shift: Literal["white", "blue"] = "white"
     """Shift of the point set from pixel to pixel: independent, or by spatiotemporal blue noise."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
-    """Reconstruction filter over the picture, for point sets."""
+    """Reconstruction filter over the picture; for point sets."""
     time_filter: Literal["box", "triangle"] = "box"
     """Reconstruction filter over the time the shutter is open, for point sets."""
     seed: Seed = 0
@@ -81,9 +82,10 @@ class RenderOptions:
     fps: float = 30.0
     """Frames per second of animation time."""
     format: Literal["png", "exr", "ppm", "mp4"] = "png"
-    """Format of the stills (EXR is linear, the others are sRGB); mp4 writes PNG stills and joins them into film.mp4."""
+    """Format of the frames; EXR is linear, the others are sRGB, and mp4 writes PNG stills and joins them into
+    film.mp4."""
     phase: float = 0.0
-    """Phase of the animation, a fraction of a wheel's turn."""
+    """Phase of the animation; a fraction of a wheel's turn."""
     device: Device = "cpu"
     threads: Threads = 0
     explain: bool = False

@@ -2,7 +2,7 @@
 
 Examples: python scripts/tiles.py report-one --out out/tiles
           python scripts/tiles.py car.glb --samples 256 --out out/car
-          python scripts/tiles.py glass --farm.scheduler tcp://host:8786 --out out/far
+          python scripts/tiles.py glass --scheduler tcp://host:8786 --out out/far
           python scripts/tiles.py report-one --study 1 2 4 --out out/speedup
 """
 

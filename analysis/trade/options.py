@@ -23,15 +23,16 @@ class TradeOptions:
     on disk are not repeated."""
 
     inputs: tuple[str, ...] = INPUTS
-    """Built-in inputs, other scenes by their names, or scene files."""
+    """Built-in inputs, or other scenes by their names; or scene files."""
     camera_path: Literal["turntable", "fly-through"] = "fly-through"
-    """Motion of the camera of scene files."""
+    """Motion of the camera of a scene file that has none."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as in the suitability study. quick: a quarter of the thesis' side, and half the rate of the reference."""
+    """Sizes of the runs: as in the suitability study. quick: a quarter of the thesis' side, and half the rate of the
+    reference."""
     seconds: float = 2.0
-    """Simulated time of a run, seconds."""
+    """Animation time to measure, seconds."""
     repetitions: int = 2
-    """Runs of each: repetition r has seed r, and phase r / repetitions where the input has phases."""
+    """Repetitions of each: repetition r has seed r, and phase r / repetitions where the input has phases."""
     knobs: tuple[str, ...] = ()
     """Names of the knobs to turn; all where none is named. An unknown name prints the list."""
     search_knobs: tuple[str, ...] = ()
@@ -43,10 +44,10 @@ class TradeOptions:
     search_seed: int = 0
     """Seed of the search."""
     ledger: Ledger = "work"
-    """Ledger of the column cost_flops: by default the traced rays, each at the price of a segment, and the operations
-    around them; wall is refused, because its results are not repeatable."""
+    """How cost is counted; in the column cost_flops: by default the traced rays, each at the price of a segment, and
+    the operations around them; wall is refused, because its results are not repeatable."""
     trace_segments: float = SEGMENTS_DEFAULT
-    """Ray segments per sample, for ledgers that do not count them."""
+    """Ray segments per sample; for ledgers that do not count them."""
     jod_s: float = 0.5
     """Length of the part in the middle of a run that ColorVideoVDP scores, seconds; 0 for no score."""
     display: DisplayModel = field(default_factory=DisplayModel)
@@ -61,7 +62,7 @@ class TradeOptions:
     """Where the runs are computed."""
     out: Path = Path("out/trade")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         require_distinct(self, "inputs")

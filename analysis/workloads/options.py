@@ -33,9 +33,9 @@ class WorkloadOptions:
     """Output sides at the thesis' own size, powers of two up to 1024; batches have an eighth as many samples as there
     are pixels."""
     scale: Literal["thesis", "half", "quick"] = "quick"
-    """Sizes, as in the suitability study."""
+    """Sizes of the runs: as in the suitability study."""
     repetitions: int = 1
-    """Runs of each: repetition r has seed r and phase r / repetitions."""
+    """Repetitions of each: repetition r has seed r and phase r / repetitions."""
     tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
     """The pipeline of all runs; batch and resolution come from the side, the seed from the repetition."""
     markdown: bool = False
@@ -44,7 +44,7 @@ class WorkloadOptions:
     """Where the runs are computed."""
     out: Path = Path("out/workloads")
     """Folder for the results."""
-    cache: References = REFERENCES
+    references: References = REFERENCES
 
     def __post_init__(self) -> None:
         require_inputs(self.inputs)

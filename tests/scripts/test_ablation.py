@@ -18,7 +18,7 @@ SMALL = ("--inputs", "fly-by", "--rows", "0", "--repetitions", "1", "--rivals", 
 
 
 def test_a_small_study(runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    places = ("--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     assert call_script("ablation.py", monkeypatch, *SMALL, *places) == 0
     out, shown = tmp_path / "out", capsys.readouterr().out
     assert len(runs) == 4 and "4 of 4 runs" in shown and "no blending at display" in shown
@@ -47,7 +47,7 @@ def test_the_reasons_of_failures_are_said(tmp_path: Path, monkeypatch: pytest.Mo
         return keys, dict.fromkeys(keys, "OSError: No space left on device")
 
     monkeypatch.setattr("analysis.study.farm.run_cases", run_cases)
-    places = ("--out", str(tmp_path), "--cache", str(tmp_path))
+    places = ("--out", str(tmp_path), "--references", str(tmp_path))
     assert call_script("ablation.py", monkeypatch, *SMALL, *places) == 1
     shown = capsys.readouterr()
     assert shown.err.count("failed: ") == 1 and "and 3 more: OSError" in shown.err and "0 of 4 runs" in shown.out

@@ -33,7 +33,7 @@ def test_the_table_says_what_rays_take(tmp_path: Path, monkeypatch, capsys) -> N
 
 def test_the_reports_images_at_a_fraction_of_their_size(tmp_path: Path, monkeypatch, capsys) -> None:
     out = tmp_path / "out"
-    arguments = ("--image", *report.IMAGES, "--scale", "0.02", "--out", str(out))
+    arguments = ("--image", *report.IMAGES, "--image-scale", "0.02", "--out", str(out))
     assert call_script("accelerators.py", monkeypatch, *arguments) == 0
     images = json.loads((out / "summary.json").read_text())["images"]
     for name, polygons, kinds in (

@@ -39,7 +39,7 @@ def last_line(capsys: pytest.CaptureFixture) -> str:
 def test_a_comparison(
     stages: str, strict: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    places = ("--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     rest = ("--reference-samples-per-axis", "1", "--reference-rate-hz", "20", "--no-film", "--stages", stages)
     rest += ("--capacity", "8.7e10", "--policy", "thesis", "--rivals", "framed")  # thesis has invariants
     assert call_script("run.py", monkeypatch, "fly-by", *SMALL, *rest, *places) == 3
@@ -98,7 +98,7 @@ def test_adaptive_rendering_before_an_observer(tmp_path: Path, monkeypatch: pyte
         return {"key": key, "jod": 9.0, **({"invariants": BROKEN} if key.startswith("thesis-fly-by-b8-") else {})}
 
     monkeypatch.setattr(adaptive, "finished", finished)
-    options = AdaptiveOptions(inputs=("fly-by",), scale="quick", out=tmp_path, cache=tmp_path)
+    options = AdaptiveOptions(inputs=("fly-by",), scale="quick", out=tmp_path, references=tmp_path)
     with pytest.raises(BrokenInvariants, match="in 1 runs: thesis-fly-by-b8-128px"):
         adaptive.scores(options, Task())
     assert SCALES["quick"].config(7, TsarConfig()).batch_size == 8

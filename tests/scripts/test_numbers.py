@@ -171,7 +171,7 @@ ABSURD = {
     "ablation.py": [("--framed-rate-hz", "1e300"), ("--before-s", "inf"), ("--workers", "100000")],
     "suitability.py": [("--framed-rate-hz", "1e300"), ("--start-s", "nan"), ("--workers", "100000")],
     "perception.py": [("recover", "--experiments", "100000", "--bootstraps", "100000")],
-    "tiles.py": [("--farm.workers", "100000"), ("--time-s", "inf")],
+    "tiles.py": [("--workers", "100000"), ("--time-s", "inf")],
 }
 """Command lines that ended in a traceback or never, or would have."""
 
@@ -226,7 +226,7 @@ def test_a_run_that_shows_no_cycle_is_refused(
     size = ("--resolution-px", "64", "--batch-size", "16", "--reference-samples-per-axis", "1", "--threads", "1")
     span = ("--seconds", "0.01", "--reference-rate-hz", "20", "--capacity", "3e10")
     runs = ("--policy", "thesis", "--rivals", "framed")
-    places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    places = ("--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     assert call_script("run.py", monkeypatch, "fly-by", *size, *span, *runs, *places) == 2
     shown = capsys.readouterr()
     assert shown.out == "" and shown.err.splitlines()[-1].startswith("error: seconds: expected time for a cycle")

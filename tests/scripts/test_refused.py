@@ -25,7 +25,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "ablation --ledger wall": ("ledger", "wall"),
     "ablation --scale huge": ("--scale", "huge"),
     "accelerators --triangles 3": ("triangles", "between 16", "3"),
-    "accelerators --scale 0": ("scale", "0"),
+    "accelerators --image-scale 0": ("image_scale", "0"),
     "accelerators --image report-three": ("report-three",),
     "bench --only order,nonsense": ("only", "nonsense"),
     "bench --repetitions 3": ("repetitions", "3"),
@@ -117,10 +117,10 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "sensitivity --ledger wall": ("ledger", "wall"),
     "sensitivity --workers -1": ("workers", "-1"),
     "sensitivity --nonsense": ("--nonsense",),
-    "spectrum --samples 100": ("samples", "100"),
+    "spectrum --ideal-samples 100": ("ideal_samples", "100"),
     "spectrum --inputs car": ("inputs", "car"),
     "spectrum --only colours": ("only", "colours"),
-    "spectrum --only ideal --samples 1024 --frames 32768": ("samples", "GiB"),
+    "spectrum --only ideal --ideal-samples 1024 --ideal-frames 32768": ("ideal_samples", "GiB"),
     "spectrum --tau 2": ("tau", "2"),
     "suitability --inputs nowhere": ("inputs", "nowhere"),
     "suitability --rows 16": ("rows", "0 to 15"),
@@ -132,7 +132,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "suitability --framed-rate-hz 0": ("framed_rate_hz", "between 0.01 and 1000"),
     "tiles fog": ("scene", "one of", "fog"),
     "tiles plain --samples 9 --point-set stratified": ("expected a cube of samples", "9"),
-    "tiles plain --farm.scheduler nowhere": ("scheduler", "nowhere"),
+    "tiles plain --scheduler nowhere": ("scheduler", "nowhere"),
     "tiles plain --study 0": ("study", "0"),
 }
 """Command lines, and parts of the message of each."""
@@ -145,6 +145,6 @@ def test_bad_input_is_refused(
     monkeypatch.chdir(tmp_path)
     name, *arguments = shlex.split(line)
     arguments += ["--out", "out"] if line != "perception sing" else []
-    arguments += ["--cache", "cache"] if name in CACHED else []
+    arguments += ["--references", "cache"] if name in CACHED else []
     assert_refused(call_script(f"{name}.py", monkeypatch, *arguments), capsys, REFUSED[line])
     assert nothing_in(tmp_path / "out") and nothing_in(tmp_path / "cache")

@@ -45,7 +45,7 @@ def options(folder: Path, out: str, threads: int) -> RunOptions:
         threads=threads,
         film=False,
         out=folder / out,
-        cache=folder / "cache",
+        references=folder / "cache",
     )
 
 
@@ -57,7 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def done(folder: Path) -> subprocess.CompletedProcess[str]:
     """A run in a process of its own; its results lie in ``out``."""
-    where = ("--threads", "2", "--frames", "--out", "out", "--cache", "cache")
+    where = ("--threads", "2", "--write-frames", "--out", "out", "--references", "cache")
     done = run_script("run.py", folder, "fly-by", *SIZE, *SPAN, *THESIS, *where)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
@@ -211,7 +211,7 @@ def test_options_leave_out_what_they_say(folder: Path, again: tuple[dict[str, An
     [(("nonsense", *SIZE), "'nonsense'"), (("fly-by", "--batch-size", "-1"), "batch_size")],
 )
 def test_bad_input_of_a_process_of_its_own(arguments: tuple[str, ...], part: str, tmp_path: Path) -> None:
-    done = run_script("run.py", tmp_path, *arguments, "--out", "out", "--cache", "cache")
+    done = run_script("run.py", tmp_path, *arguments, "--out", "out", "--references", "cache")
     assert done.returncode == 2 and done.stdout == "" and one_line(done.stderr), done.stderr
     assert part in done.stderr and not any(tmp_path.iterdir())
 
@@ -234,7 +234,7 @@ def test_a_resolution_beyond_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     monkeypatch.setattr(cli, "free_memory_bytes", lambda: 2 * 2**30)
-    where = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    where = ("--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     status = call_script("run.py", monkeypatch, "fly-by", "--resolution-px", "8192", *where)
     shown = capsys.readouterr()
     assert status == 2 and shown.out == "" and one_line(shown.err), shown.err
@@ -267,7 +267,7 @@ def test_help_names_the_options(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["planescene", "spheresscene", "quad-light"])
 def test_other_built_in_scenes_run_too(name: str, tmp_path: Path, monkeypatch, capsys) -> None:
     """Block scenes of the motion-blur study, and one with lamps, whose samples draw random numbers."""
-    where = (*THESIS, "--no-film", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    where = (*THESIS, "--no-film", "--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     assert call_script("run.py", monkeypatch, name, *SIZE, *SPAN, *where) == 0, capsys.readouterr().err
     shown = capsys.readouterr().out
     assert "hold in every cycle" in shown and "MSE, median" in shown and "add --metrics flip jod" in shown

@@ -71,7 +71,7 @@ def test_results_on_disk_are_read_and_not_made_again(
     out, cache = tmp_path / "out", tmp_path / "cache"
     fill(out, runs(options(*SMALL)))
     before = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*") if path.is_file()}
-    assert call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(cache)) == 0
+    assert call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--references", str(cache)) == 0
     shown = capsys.readouterr().out
     assert all(part in shown for part in ("slopes, best", "slopes, flatness", "bias, best", "30 of 30 runs", str(out)))
     found = summary(out)
@@ -99,7 +99,9 @@ def test_broken_invariants_end_with_a_status_of_their_own(
     one = next(run.case for run in planned if run.case.policy == "thesis")
     fill(out, planned, {one: {"invariants": {"ok": False}}})
     monkeypatch.setattr(study, "write_all", lambda *_: [])
-    status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
+    status = call_script(
+        "sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--references", str(tmp_path / "cache")
+    )
     assert status == 3 and f"invariants are broken in 1 runs: {one.name}" in capsys.readouterr().err
     assert summary(out)["runs_done"] == 30
 
@@ -118,7 +120,9 @@ def test_failures_are_listed_and_the_rest_is_shown(
         return {case: case.key(source) for case in asked}, {failed[0].case: "RuntimeError: out of luck"}
 
     monkeypatch.setattr("analysis.study.farm.run_cases", no_workers)
-    status = call_script("sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--cache", str(tmp_path / "cache"))
+    status = call_script(
+        "sensitivity.py", monkeypatch, *SMALL, "--out", str(out), "--references", str(tmp_path / "cache")
+    )
     assert status == 1
     shown = capsys.readouterr()
     names = [f"{run.case.name} {run.setting}" for run in failed]
@@ -152,7 +156,7 @@ def test_a_study_from_end_to_end(
     assert sensitivity.SCALES is cases.SCALES
     out, cache = tmp_path / "out", tmp_path / "cache"
     chosen = ("--inputs", "fast-crossing", "--temporal-slopes", "-1", "--offsets", "--biases", "2", "--still-s", "0.1")
-    chosen = (*chosen, "--workers", "1", "--out", str(out), "--cache", str(cache))
+    chosen = (*chosen, "--workers", "1", "--out", str(out), "--references", str(cache))
     assert call_script("sensitivity.py", monkeypatch, *chosen) == 0
     assert "5 of 5 runs" in capsys.readouterr().out and "distributed" in sys.modules
     first = summary(out)

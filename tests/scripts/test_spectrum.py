@@ -16,7 +16,7 @@ from tests.scripts.commands import assert_refused, call_script, nothing_in, run_
 
 SLOPES = ("--frames-per-input", "1", "--samples-per-axis", "2")
 TSAR = ("--resolution-px", "64", "--sdf-side", "16", "--batch-size", "16", "--tile-count-max", "16")
-IDEAL = ("--samples", "32", "--frames", "16")
+IDEAL = ("--ideal-samples", "32", "--ideal-frames", "16")
 AGREEMENT = ("--tiles-per-input", "4", "--agreement-samples", "64", "--agreement-frames", "16")
 SMALL = ("--inputs", "fly-by", *SLOPES, *TSAR, *IDEAL, *AGREEMENT)
 

@@ -26,7 +26,15 @@ SMALL = ("--inputs", "fly-by", "--rows", "0", "6", "--repetitions", "2", "--jod-
 def test_a_scheduler_that_does_not_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    arguments = (*SMALL, "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path), "--cache", str(tmp_path / "cache"))
+    arguments = (
+        *SMALL,
+        "--scheduler",
+        "tcp://127.0.0.1:9",
+        "--out",
+        str(tmp_path),
+        "--references",
+        str(tmp_path / "cache"),
+    )
     assert call_script("suitability.py", monkeypatch, *arguments) == 2
     error = capsys.readouterr().err
     assert "error: scheduler: nothing answers at 'tcp://127.0.0.1:9'" in error and "Traceback" not in error
@@ -39,7 +47,7 @@ def tables(folder: Path) -> dict[str, bytes]:
 @pytest.mark.slow
 def test_a_study_killed_twice_gives_the_tables_of_an_unbroken_one(tmp_path: Path) -> None:
     """Killed by SIGKILL, including children and all survivors, each time when some more results are on disk."""
-    cache = ("--cache", str(tmp_path / "cache"))
+    cache = ("--references", str(tmp_path / "cache"))
 
     def command(name: str) -> list[str]:
         return [sys.executable, str(ROOT / "scripts/suitability.py"), *SMALL, "--out", str(tmp_path / name), *cache]
@@ -112,7 +120,7 @@ def test_the_reasons_of_failures_are_said_whatever_is_left(
         "2",
         "--out",
         str(tmp_path),
-        "--cache",
+        "--references",
         str(tmp_path),
     )
     status = call_script("suitability.py", monkeypatch, *arguments)
@@ -129,7 +137,7 @@ def test_the_reasons_of_failures_are_said_whatever_is_left(
 
 def test_an_interrupt_ends_a_study_with_one_line(tmp_path: Path) -> None:
     """As a terminal sends it: to the study and all of its workers, in the middle of a run."""
-    arguments = ("--inputs", "fly-by", "--rows", "0", "--workers", "2", "--out", str(tmp_path), "--cache", "cache")
+    arguments = ("--inputs", "fly-by", "--rows", "0", "--workers", "2", "--out", str(tmp_path), "--references", "cache")
     with started_script("suitability.py", tmp_path, *arguments) as study:
         deadline = time.monotonic() + 60
         while len(psutil.Process(study.pid).children(recursive=True)) < 3 and time.monotonic() < deadline:

@@ -19,7 +19,7 @@ SEARCH = ("--trials", "2", "--at-once", "2", "--search-knobs", "batch", "smoothi
 
 
 def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    places = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    places = ("--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     assert call_script("trade.py", monkeypatch, *SMALL, *KNOBS, *SEARCH, *places) == 0
     out, shown = tmp_path / "out", capsys.readouterr().out
     assert "The front" in shown and "left out at this scale: tsar, resolution 0.25" in shown and "tiles" in shown
@@ -69,5 +69,5 @@ def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytes
 def test_bad_options_are_refused(
     arguments: tuple[str, ...], parts: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
-    status = call_script("trade.py", monkeypatch, *arguments, "--out", str(tmp_path), "--cache", str(tmp_path))
+    status = call_script("trade.py", monkeypatch, *arguments, "--out", str(tmp_path), "--references", str(tmp_path))
     assert_refused(status, capsys, parts)

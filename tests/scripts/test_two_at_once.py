@@ -13,11 +13,11 @@ from tests.scripts.commands import one_line, run_script, started_script
 SMALL = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", "16", "--reference-rate-hz", "20")
 COMMANDS = {
     "render.py": ("plain", "--width-px", "256", "--height-px", "256", "--samples-per-axis", "4", "--frames", "200"),
-    "run.py": ("fly-by", *SMALL, "--reference-samples-per-axis", "1", "--no-film", "--cache", "cache"),
+    "run.py": ("fly-by", *SMALL, "--reference-samples-per-axis", "1", "--no-film", "--references", "cache"),
     "inputs.py": ("fly-by", *SMALL, "--repetitions", "1"),
     "suitability.py": (
         *("--inputs", "fly-by", "--rows", "0", "--repetitions", "1", "--jod-repetitions", "0", "--workers", "1"),
-        *("--cache", "cache", "--policies"),
+        *("--references", "cache", "--policies"),
     ),
 }
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in COMMANDS if name != "render.py"]

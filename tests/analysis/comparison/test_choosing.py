@@ -37,7 +37,7 @@ def asked(**choice: Any) -> RunOptions:
     [
         ({"preset": "draft"}, 0), ({"preset": "balanced"}, 2), ({"preset": "accurate"}, 3),
         ({"budget_flops": 0.99e5 * SPAN}, 1), ({"budget_flops": 1.0}, 0), ({"budget_seconds": 1.01e-5 * SPAN}, 2),
-        ({"error_target": 1.1e-3}, 2), ({"error_target": 1e-9}, 3),
+        ({"mse_target": 1.1e-3}, 2), ({"mse_target": 1e-9}, 3),
     ],
 )  # fmt: skip
 def test_a_choice_sets_machine_batch_and_parts(choice: dict[str, Any], expected: int) -> None:
@@ -57,12 +57,12 @@ def test_without_a_choice_nothing_changes() -> None:
 
 
 def test_what_came_is_set_beside_what_was_said() -> None:
-    options, chosen = settled(asked(error_target=1.1e-3), FRONT)
+    options, chosen = settled(asked(mse_target=1.1e-3), FRONT)
     assert chosen is not None
     totals = SimpleNamespace(seconds_of=lambda span_s: chosen.predicted["wall_s"] * 2.0)
     measured: Any = SimpleNamespace(own="tsar", mse={"tsar": np.array([1.0e-3, 1.2e-3])}, totals=totals)
     found = what_came(chosen, measured, options.capacity, options.seconds)
-    assert found["asked"] == "error_target 0.0011" and found["limit"] == {"mse": 1.1e-3}
+    assert found["asked"] == "mse_target 0.0011" and found["limit"] == {"mse": 1.1e-3}
     assert found["apart"] == pytest.approx({"flops": 0.0, "wall_s": 1.0, "mse": 0.1})
     assert found["close"] == {"flops": True, "wall_s": False, "mse": True}
     rows = {row[0]: row[1:] for row in choice_table(found).rows}
@@ -72,12 +72,12 @@ def test_what_came_is_set_beside_what_was_said() -> None:
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ({"preset": "draft", "error_target": 0.1}, "preset: expected only one of preset, budget_flops"),
+        ({"preset": "draft", "mse_target": 0.1}, "preset: expected only one of preset, budget_flops"),
         ({"preset": "draft", "policy": "thesis"}, "policy: expected tsar beside a preset"),
         ({"budget_flops": 1e9, "capacity": 1e9}, "capacity: expected none beside a budget_flops"),
         ({"budget_seconds": 1.0, "ledger": "wall"}, "ledger: expected a modelled one"),
         ({"budget_seconds": 0.0}, "budget_seconds: expected between"),
-        ({"error_target": 2.0}, "error_target: expected between"),
+        ({"mse_target": 2.0}, "mse_target: expected between"),
         ({"preset": "fast"}, "preset: expected"),
         ({"parts": (("reach", 0.1),), "policy": "thesis"}, "parts: expected none but of tsar"),
     ],

@@ -28,7 +28,7 @@ def test_the_machine_follows_the_size_unless_its_capacity_is_given() -> None:
     )
     given = dataclasses.replace(small, capacity=8.7e10)
     assert given.machine_flops == 8.7e10
-    assert given.pace == RunOptions("fly-by").pace == dataclasses.replace(small, clock="wall").pace == ""
+    assert given.pace == RunOptions("fly-by").pace == dataclasses.replace(small, ledger="wall").pace == ""
 
 
 def test_unknown_scenes_are_refused_by_name_before_anything_loads() -> None:

@@ -49,7 +49,14 @@ def broken_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
 def run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, dict[str, Any]]:
     """Exit status and summary of a small run."""
     small = ("--seconds", "0.2", "--resolution-px", "64", "--batch-size", str(BATCH), "--warmup-cycles", "4")
-    reference = ("--reference-samples-per-axis", "1", "--reference-rate-hz", "20", "--cache", str(folder / "cache"))
+    reference = (
+        "--reference-samples-per-axis",
+        "1",
+        "--reference-rate-hz",
+        "20",
+        "--references",
+        str(folder / "cache"),
+    )
     rest = (
         "--capacity",
         "8.7e10",

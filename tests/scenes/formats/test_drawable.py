@@ -185,7 +185,7 @@ def test_tsar_runs_on_a_file_with_a_turntable(tmp_path: Path, monkeypatch, capsy
         "framed",
         "thesis",
     )
-    folders = ("--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"))
+    folders = ("--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     status = call_script("run.py", monkeypatch, file, "--camera-path", "turntable", *size, *folders)
     assert status == 0, capsys.readouterr().err
     found = json.loads((tmp_path / "out" / "summary.json").read_text())

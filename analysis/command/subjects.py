@@ -1,0 +1,173 @@
+"""Help of a command with many options: a box for each subject, instead of one long list."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import itertools
+import textwrap
+import types
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import tyro
+
+from analysis.command.options import RENAMED
+
+MOST = 10
+"""Greatest number of options in a box."""
+
+SUBJECTS = {
+    "animation": "input inputs figure_input scene scenes scene_files scene_root root camera_path phase vary seconds"
+    " start_s time_s warmup_cycles frames first_frame fps still_s limit_s",
+    "picture": "size resolution_px width_px height_px sides_px crop frame_px",
+    "camera": "camera fov_deg up environment smooth_deg integrator bounces",
+    "sample": "samples_per_axis samples point_set rounds error_target shift space_filter time_filter sigma_px"
+    " box_share",
+    "pipeline": "batch_size framelet_side sdf_side cache_size latency_cycles spatial_slope temporal_slope bias solver"
+    " stages",
+    "policy": "policy policies rivals left right beside solvers policy_row parts kept",
+    "choice": "preset budget_flops budget_seconds mse_target",
+    "size": "row rows scale image_hz sample_flops subdivisions cycles",
+    "grid": "spatial_slopes temporal_slopes offsets biases",
+    "search": "knobs search_knobs trials at_once search_seed store",
+    "cost": "ledger capacity trace_segments framed_rate_hz tree_size per_bvh_node per_triangle per_shader",
+    "model": "sdf_size framelet_size recon_res recon_age_support recon_spa_support tiling_size dwt_coeffs"
+    " avg_recon_overdraw",
+    "admitted": "batches resolutions admitted_segments",
+    "measurement": "measure measured_batches measured_resolutions measured_batch measured_resolution measured_warmup"
+    " cycles_per_turn cycle_s memory_cycles memory_every",
+    "slopes": "frames_per_input",
+    "ideal": "ideal_start_s span_s ideal_samples ideal_frames tile_level tile_at tile_index tau",
+    "agreement": "tiles_per_input agreement_level agreement_samples agreement_frames",
+    "metric": "metrics metric_stride stride reference_rate_hz reference_samples_per_axis jod_s jod_repetitions"
+    " jod_span_s before_s tolerance draws",
+    "repetition": "seed repetitions bootstraps experiments study",
+    "observer": "jnds sigmas lapses spreads observers answers",
+    "page": "host port bench bench_seconds",
+    "machine": "device threads workers scheduler chunk_tiles",
+    "file": "out references write_frames film page layers format explain markdown only compare",
+}
+"""Subjects in the order of the boxes, each with its options."""
+
+_SUBJECT_OF = {name: subject for subject, names in SUBJECTS.items() for name in names.split()}
+_REST = "further"
+
+
+@dataclasses.dataclass(frozen=True)
+class _Option:
+    """An option: a field of a record, its type with all marks, and its documentation."""
+
+    field: dataclasses.Field
+    kind: Any
+    doc: str
+
+    @property
+    def marks(self) -> tuple[Any, ...]:
+        """Marks of its type."""
+        return get_args(self.kind)[1:] if get_origin(self.kind) is Annotated else ()
+
+    @property
+    def record(self) -> Any:
+        """The record that it holds; None if it is a value."""
+        kind = get_args(self.kind)[0] if get_origin(self.kind) is Annotated else self.kind
+        return kind if dataclasses.is_dataclass(kind) else None
+
+    @property
+    def subject(self) -> str | None:
+        """The box that it is shown in; None for positional arguments, and for records, which have their own."""
+        alone = self.record or {tyro.conf.Positional, tyro.conf.Suppress}.intersection(self.marks)
+        return None if alone else _SUBJECT_OF.get(self.field.name, _REST)
+
+    @property
+    def member(self) -> tuple[str, Any, Any]:
+        """The same as a field of a new record."""
+        told = any(getattr(mark, "help", None) for mark in self.marks)
+        kind = self.kind if told or not self.doc else Annotated[self.kind, tyro.conf.arg(help=self.doc)]
+        copied = dataclasses.field(default=self.field.default, default_factory=self.field.default_factory)  # type: ignore[call-overload]
+        return self.field.name, kind, copied
+
+
+def by_subject(options: Any) -> Any:
+    """The same options in nested records by subject, if they are more than ten; for the help only.
+
+    Args:
+        options: a record of options, or a union of such records, which are commands.
+
+    Returns:
+        A record, or a union, whose help has every option of the given one.
+    """
+    if get_origin(options) in (Union, types.UnionType):
+        parts = [(get_args(part)[0], get_args(part)[1:]) for part in get_args(options)]
+        return Union[tuple(Annotated[(by_subject(record), *marks)] for record, marks in parts)]  # noqa: UP007
+    found = list(_options(options, merged=False))
+    boxes = {box: [one.member for one in found if one.subject == box] for box in (*SUBJECTS, _REST)}
+    if sum(map(len, boxes.values())) < MOST:  # the help itself is one more
+        return options
+    members = [one.member for one in found if one.subject is None and not one.record]
+    for subject, inside in boxes.items():
+        if inside:
+            record = dataclasses.make_dataclass(subject, inside, namespace={"__doc__": ""})
+            members.append((subject, tyro.conf.OmitArgPrefixes[record], dataclasses.field(default_factory=record)))
+    members += [one.member for one in found if one.record]
+    named = {"__doc__": options.__doc__}
+    return dataclasses.make_dataclass(options.__name__, members, kw_only=True, namespace=named)
+
+
+def described(options: Any) -> dict[str, str]:
+    """The text of every option of a record, by the name that is typed."""
+    found = {}
+    for one in _options(options, merged=False):
+        name = one.field.name.replace("_", "-")
+        if one.record:
+            prefix = "" if tyro.conf.OmitArgPrefixes in one.marks else f"{name}."
+            found |= {f"--{prefix}{inner[2:]}": text for inner, text in described(one.record).items()}
+        elif one.subject is not None:
+            found[f"--{name}"] = one.doc or next(mark.help for mark in one.marks if getattr(mark, "help", None))
+    return found
+
+
+def renamed(options: Any, given: Sequence[str]) -> str:
+    """One line about the first argument that is the earlier name of an option; empty if none is.
+
+    Args:
+        options: a record of options, or a union of such records.
+        given: arguments of the command line.
+    """
+    records = [get_args(part)[0] for part in get_args(options)] or [options]
+    names = {name for record in records for name in described(record)}
+    for argument in given:
+        old = argument.partition("=")[0]
+        for new in RENAMED.get(old, ()):
+            if new in names and old not in names:
+                return f"{old}: expected {new}, the name of this option now"
+    return ""
+
+
+def _options(record: Any, merged: bool) -> Iterator[_Option]:
+    """Options of a record, with those of the records that are merged into it."""
+    kinds, docs = get_type_hints(record, include_extras=True), _docs_of(record)
+    for field in dataclasses.fields(record):
+        option = _Option(field, kinds[field.name], docs.get(field.name, ""))
+        if option.record and any(getattr(mark, "name", None) == "" for mark in option.marks):
+            yield from _options(option.record, merged=True)
+        elif option.record and merged:
+            yield dataclasses.replace(option, kind=tyro.conf.OmitArgPrefixes[option.kind])
+        else:
+            yield option
+
+
+def _docs_of(record: type) -> dict[str, str]:
+    """The documentation of every field of a record: the string below it."""
+    found = {}
+    for part in reversed(record.__mro__[:-1]):
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
+        for field, below in itertools.pairwise(tree.body):  # type: ignore[attr-defined]
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(below, ast.Expr)
+                and isinstance(below.value, ast.Constant)
+            ):
+                found[field.target.id] = " ".join(str(below.value.value).split())  # type: ignore[union-attr]
+    return found
