@@ -15,10 +15,10 @@ from analysis.command import cli
 from analysis.command.options import RENAMED
 from analysis.command.subjects import MOST, described
 from analysis.entry import COMMANDS
-from analysis.perception.options import Step
+from analysis.perception.options import StepOptions
 from tests.scripts.commands import one_line
 
-STEPS = {get_args(part)[1].name: get_args(part)[0] for part in get_args(Step)}
+STEPS = {get_args(part)[1].name: get_args(part)[0] for part in get_args(StepOptions)}
 CALLS = [(name,) for name in COMMANDS if name != "perception"] + [("perception", step) for step in STEPS]
 
 
