@@ -42,7 +42,7 @@ def test_any_policy_in_any_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         return {"key": case.name, "jod": jods[case.policy]}
 
     monkeypatch.setattr(adaptive, "finished", finished)
-    table = scores(AdaptiveOptions(inputs=("glass",), policy="tsar", out=tmp_path, cache=tmp_path), Task())
+    table = scores(AdaptiveOptions(inputs=("glass",), policy="tsar", out=tmp_path, references=tmp_path), Task())
     assert set(table["policy"]) == {"tsar"} and list(table["batch"]) == sorted(table["batch"])
     assert set(table["jod_policy"]) == {1.0} and set(table["jod_framed"]) == {2.5}
 
