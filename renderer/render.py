@@ -15,6 +15,7 @@ from renderer.tables.checks import check_frame_size
 from renderer.trace import Renderer
 from scenes import catalog
 from scenes.canonical import Scene
+from scenes.catalog import Look
 from tsar.checks import require
 
 
@@ -28,11 +29,12 @@ def render(
     space_filter: Literal["box", "gaussian"] = "gaussian",
     seed: int = 0,
     threads: int = 0,
+    look: Look | None = None,
 ) -> Float[NDArray[np.float32], "height width 3"]:
     """Renders a picture; the same arguments give the same bits.
 
     Args:
-        scene: a scene, the name of a built-in one or of one that was added, or a scene file.
+        scene: a scene, the name of a built-in one or of one that was added, a scene file, or a model.
         size: width and height, pixels, or one number for both.
         time_s: animation time at which the frame begins, seconds; samples spread over the time that the shutter is
             open.
@@ -41,6 +43,7 @@ def render(
         space_filter: reconstruction filter over the picture.
         seed: seed of all random numbers.
         threads: number of threads for tracing; 0 for one per core.
+        look: changes of the scene's view and lighting, and its integrator.
 
     Returns:
         Linear RGB, not clipped, rows from the top; :func:`renderer.film.files.write_image` writes it to a file.
@@ -52,6 +55,6 @@ def render(
     require(width_px >= 1 and height_px >= 1, "size", "at least one pixel", size)
     check_frame_size(width_px, height_px, 1)
     plan = SamplePlan(samples_per_pixel, point_set, seed, space_filter)
-    found, _ = catalog.load_any(scene if isinstance(scene, Scene) else fspath(scene))
+    found, _ = catalog.load_seen(scene if isinstance(scene, Scene) else fspath(scene), look or Look())
     renderer = Renderer(found, threads=threads or None, seed=seed)
     return pictures(renderer, plan, width_px, height_px)(0, time_s).numpy()

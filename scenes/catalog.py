@@ -144,6 +144,10 @@ class Look:
         environment: environment map that lights the scene, see :func:`scenes.viewing.with_environment`.
         integrator: integrator for the scene.
         bounces: greatest number of bounces; None for that of the scene.
+        lens_radius: radius of the aperture, scene units; None for that of the scene.
+        focal_distance: distance to the plane in focus, scene units; None for that of ``camera``'s target if
+            ``lens_radius`` is given, else for that of the scene.
+        camera_keys: file with keys of a moving camera (:mod:`scenes.camera_keys`).
     """
 
     up: Up | None = None
@@ -153,37 +157,53 @@ class Look:
     environment: Path | None = None
     integrator: IntegratorName = "whitted"
     bounces: int | None = None
+    lens_radius: float | None = None
+    focal_distance: float | None = None
+    camera_keys: Path | None = None
 
 
-def load_seen(scene: str, look: Look, phase: float = 0.0) -> tuple[Scene, tuple[str, ...]]:
+def load_seen(
+    scene: str | Path | Scene, look: Look, phase: float = 0.0, camera_path: str = ""
+) -> tuple[Scene, tuple[str, ...]]:
     """A scene as :func:`load_any` loads it, with changes of its view and lighting.
 
     Raises:
-        SceneError: as :func:`load_any`; or the environment map cannot be read, or eye and target of the camera
-            coincide.
+        SceneError: as :func:`load_any`; or the environment map or the keys of the camera cannot be read, eye and target
+            of the camera coincide, or the camera is given twice or does not support what is asked of it.
     """
+    from scenes.camera_keys import with_keys_of
+    from scenes.camera_paths import on_a_path
     from scenes.loading import read_image
     from scenes.models import MODEL_ENDINGS
     from scenes.models.smoothing import smoothed
-    from scenes.viewing import framed, up_of, with_camera, with_environment
+    from scenes.viewing import framed, up_of, with_camera, with_environment, with_lens
 
-    found, losses = load_any(scene, phase, integrator=look.integrator)
+    moved = [name for name in ("camera", "camera_keys") if getattr(look, name) is not None]
+    if look.camera_keys is not None and (camera_path or len(moved) > 1):
+        raise SceneError("camera_keys: expected neither a camera nor a camera_path beside them")
+    ending = "" if isinstance(scene, Scene) or str(scene) in SCENES else Path(scene).suffix.lower()
+    later = camera_path if ending not in ("", SESSION_ENDING) and look != Look() else ""
+    found, losses = load_any(scene, phase, "" if later else camera_path, look.integrator)
     if look.bounces is not None:
         found = dataclasses.replace(found, integrator=dataclasses.replace(found.integrator, depth=look.bounces))
     if look.smooth_deg > 0.0:
         found = dataclasses.replace(found, instances=smoothed(found.instances, look.smooth_deg))
-    if look.up and str(scene) not in SCENES and Path(scene).suffix.lower() in MODEL_ENDINGS:
+    if look.up and ending in MODEL_ENDINGS:
         found = framed(found.instances, look.up, found.name)
     up = look.up or up_of(found)
     if look.environment is not None:
         found = with_environment(found, read_image(look.environment), up, str(look.environment))
     if look.camera is not None:
         found = with_camera(found, look.camera[:3], look.camera[3:], up, look.fov_deg)
+    elif look.camera_keys is not None:
+        found = with_keys_of(found, look.camera_keys, up, look.fov_deg)
     elif look.fov_deg is not None:
         if not isinstance(found.camera, PerspectiveCamera):
             raise SceneError(f"fov_deg: expected a perspective camera, got {type(found.camera).__name__}")
         found = dataclasses.replace(found, camera=dataclasses.replace(found.camera, fov_deg=look.fov_deg))
-    return found, losses
+    if look.lens_radius is not None or look.focal_distance is not None:
+        found = with_lens(found, look.lens_radius, look.focal_distance, look.camera)
+    return (on_a_path(found, later) if later else found), losses  # type: ignore[arg-type]
 
 
 def load_any(

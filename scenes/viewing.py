@@ -85,6 +85,33 @@ def with_camera(
     return dataclasses.replace(scene, camera=camera)
 
 
+def with_lens(
+    scene: Scene, lens_radius: float | None, focal_distance: float | None, camera: Sequence[float] | None = None
+) -> Scene:
+    """The scene seen through a thin lens.
+
+    Args:
+        scene: scene with a perspective camera.
+        lens_radius: radius of the aperture, scene units; None for the camera's.
+        focal_distance: distance to the plane in focus, scene units; None for that of the target of ``camera``, or for
+            the camera's own.
+        camera: eye and target, six numbers.
+
+    Raises:
+        SceneError: the camera is not a perspective one, or a value is out of range.
+    """
+    before = scene.camera
+    if not isinstance(before, PerspectiveCamera):
+        raise SceneError(f"lens_radius: expected a perspective camera, got {type(before).__name__}")
+    if focal_distance is None:
+        focal_distance = before.focal_distance
+        if camera is not None:
+            focal_distance = float(norm(np.asarray(camera[3:], np.float64) - np.asarray(camera[:3], np.float64)))
+    radius = before.lens_radius if lens_radius is None else lens_radius
+    lens = dataclasses.replace(before, lens_radius=radius, focal_distance=focal_distance)
+    return dataclasses.replace(scene, camera=lens)
+
+
 def with_environment(scene: Scene, picture: Pixels, up: Up, source: str = "") -> Scene:
     """The scene lit by an environment map whose top is upwards.
 

@@ -62,7 +62,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
 
         require_extras(options.metrics)
     with bad_input():
-        scene, losses = catalog.load_any(scene or options.input, options.phase, options.camera_path)
+        scene, losses = catalog.load_seen(scene or options.input, options.look, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
         own_results(options.out, (*FILES, *(["frames/*.exr"] if options.write_frames else [])))
         writable_folder(options.references, "references")

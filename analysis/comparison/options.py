@@ -23,6 +23,7 @@ from analysis.metrics.cost_model import (
 )
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.cases import ADAPTIVE_STAGES
+from analysis.study.view_options import ViewOptions
 from tsar.config import RESOLUTION_DEFAULT, StagesName, TsarConfig, closed_choices, require
 from tsar.policies import POLICIES
 
@@ -42,7 +43,7 @@ CHOICES = ("preset", "budget_flops", "budget_seconds", "mse_target")
 
 @dataclass(frozen=True)
 @closed_choices()
-class RunOptions:
+class RunOptions(ViewOptions):
     """One comparison of a policy with its rivals at equal cost."""
 
     input: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="INPUT")]
@@ -105,6 +106,7 @@ class RunOptions:
     references: References = REFERENCES
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         limits.within(
             self,
             seconds=limits.SPANS_S,
@@ -152,6 +154,7 @@ class RunOptions:
             require(batch == default, "batch_size", f"none beside a {name}, which sets it", batch)
             require(self.ledger != "wall", "ledger", f"a modelled one beside a {name}", self.ledger)
         limits.within(self, budget_flops=(1.0, 1e18), budget_seconds=(1e-6, 1e9), mse_target=(1e-12, 1.0))
+        require(not (self.camera_path and self.camera_keys), "camera_path", "none beside camera_keys", self.camera_path)
         require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
 
     @property

@@ -61,7 +61,7 @@ def finished(options: RunOptions) -> dict[str, Any] | None:
         from scenes import catalog
 
     with bad_input():
-        scene, _ = catalog.load_any(options.input, options.phase, options.camera_path)
+        scene, _ = catalog.load_seen(options.input, options.look, options.phase, options.camera_path)
         store = Store(options.out, content_of(options, scene))
         found = store.read_json(SUMMARY, {"provenance": dict, "policy": str, "files": list[str]})
     return found if found and all(store.find(name) is not None for name in found["files"]) else None

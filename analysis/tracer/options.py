@@ -11,6 +11,7 @@ import tyro
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import Device, Seed, Threads, Unprefixed
+from analysis.study.view_options import ViewOptions
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
 
@@ -99,7 +100,7 @@ class PointSetOptions:
 
 @dataclass(frozen=True)
 @closed_choices()
-class TileOptions:
+class TileOptions(ViewOptions):
     """One picture of a scene, in tiles over processes or machines."""
 
     scene: Annotated[str, tyro.conf.Positional]
@@ -130,6 +131,7 @@ class TileOptions:
     continues."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         POINT_SETS.require(self.point_set, "point_set")
         limits.within(
             self,

@@ -5,24 +5,22 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from analysis.command import limits
 from analysis.command.options import Device, Seed, Threads
+from analysis.study.view_options import ViewOptions
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
-
-if TYPE_CHECKING:
-    from scenes.catalog import Look
 
 _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
 
 
 @dataclass(frozen=True)
 @closed_choices()
-class RenderOptions:
+class RenderOptions(ViewOptions):
     """A still, or a sequence of stills at a constant rate, of a scene or a model."""
 
     scene: Annotated[str, tyro.conf.Positional]
@@ -36,22 +34,6 @@ class RenderOptions:
     """Height, pixels; in place of size."""
     crop: tuple[int, int, int, int] | None = None
     """Part of the picture to render: left column, upper row, width and height, pixels."""
-    camera: tuple[float, float, float, float, float, float] | None = None
-    """A static camera in place of the scene's: its position and its target, in the scene's coordinates."""
-    fov_deg: float | None = None
-    """Field of view along the shorter side, degrees; by default that of the scene."""
-    environment: Path | None = None
-    """Environment map (.hdr, .exr, …) that lights the scene, in place of sky, sun and ambient light."""
-    up: Literal["y", "z"] | None = None
-    """Upward axis of the world, for the camera and the environment; by default y for OBJ and glTF, z for PLY and STL,
-    and that of the camera for a scene."""
-    integrator: Literal["whitted", "path"] = "whitted"
-    """Transport of light: direct light, mirrors and glass; or paths between all surfaces, which needs many samples and
-    supports more materials of files."""
-    bounces: int | None = None
-    """Greatest number of bounces, -1 for no limit; by default that of the scene."""
-    smooth_deg: float = 0.0
-    """Greatest angle at which an edge of a mesh without normals is smooth, degrees; 0 keeps faces flat."""
     samples_per_axis: int = 2
     """Samples along a pixel's side; all at the frame's time."""
     samples: int = 0
@@ -94,15 +76,12 @@ class RenderOptions:
     """Folder for the results; frames that an interrupted run of the same job left there are kept."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         POINT_SETS.require(self.point_set, "point_set")
         limits.within(
             self,
             width_px=(0, limits.SIDES_PX[1]),
             height_px=(0, limits.SIDES_PX[1]),
-            camera=(-1e12, 1e12),
-            fov_deg=(1e-3, 179.0),
-            smooth_deg=(0.0, 180.0),
-            bounces=(-1, 64),
             samples_per_axis=(1, 64),
             samples=(0, 1 << 16),
             rounds=(0, 1 << 12),
@@ -139,15 +118,6 @@ class RenderOptions:
         """Width and height of ``size``; empty if it is not valid."""
         parts = self.size.lower().split("x")
         return tuple(int(part) for part in parts) if all(part.isdecimal() for part in parts) else ()
-
-    @property
-    def look(self) -> Look:
-        """Camera and lighting of the scene."""
-        from scenes.catalog import Look
-
-        return Look(
-            self.up, self.smooth_deg, self.camera, self.fov_deg, self.environment, self.integrator, self.bounces
-        )
 
     def size_px(self, film_px: tuple[int, int]) -> tuple[int, int]:
         """Width and height of the picture, given those of the scene's film.

@@ -41,8 +41,8 @@ def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
         return scene, tuple(map(str, losses))
 
 
-def losses_of(scene: str) -> tuple[str, ...]:
-    """The losses from a scene's file.
+def losses_of(options: TileOptions) -> tuple[str, ...]:
+    """The losses from the scene's file.
 
     Raises:
         InputError: there is no such scene, or its file cannot be read.
@@ -50,7 +50,7 @@ def losses_of(scene: str) -> tuple[str, ...]:
     from scenes import catalog
 
     with bad_input():
-        return catalog.load_any(scene)[1]
+        return catalog.load_seen(options.scene, options.look)[1]
 
 
 def explained(scene: Scene) -> list[str]:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from renderer.trace import Renderer
+    from scenes.catalog import Look
 
 _RETRIES = 5
 
@@ -36,6 +37,7 @@ class PictureTask:
     """Complete description of a picture, small enough to send with every chunk."""
 
     scene: str
+    look: Look
     size_px: tuple[int, int]
     samples: int
     point_set: str
@@ -44,7 +46,7 @@ class PictureTask:
     seed: int
     threads: int
     source: str
-    """:func:`source_of` the scene."""
+    """:func:`source_of` the scene and its look."""
 
     @property
     def name(self) -> str:
@@ -58,8 +60,8 @@ class PictureTask:
 
 
 @lru_cache(maxsize=4)
-def source_of(scene: str, point_set: str) -> str:
-    """Hash of the content of a scene and of the code that renders it with a point set.
+def source_of(scene: str, look: Look, point_set: str) -> str:
+    """Hash of the content of a scene, with changes of its view and lighting, and of the code that renders it.
 
     It is taken once in a process, because the process keeps the modules that it has imported: a worker that was started
     before a change must not deliver tiles under the new hash.
@@ -68,7 +70,7 @@ def source_of(scene: str, point_set: str) -> str:
     from scenes import catalog
 
     added = brought((POINT_SETS, point_set))
-    return content_hash((catalog.load_any(scene)[0], code_hash(render_chunk), *added))
+    return content_hash((catalog.load_seen(scene, look)[0], code_hash(render_chunk), *added))
 
 
 def picture_of(options: TileOptions, threads: int) -> PictureTask:
@@ -82,14 +84,13 @@ def picture_of(options: TileOptions, threads: int) -> PictureTask:
     from renderer.tables.checks import check_frame_size
     from scenes import catalog
 
-    film = catalog.load_any(options.scene)[0].film
+    film = catalog.load_seen(options.scene, options.look)[0].film
     point_set(options.point_set, options.samples)
     size = options.width_px or film.width_px, options.height_px or film.height_px
     check_frame_size(*size, 1)
     kinds = options.samples, options.point_set, options.space_filter
-    return PictureTask(
-        options.scene, size, *kinds, options.time_s, options.seed, threads, source_of(options.scene, options.point_set)
-    )
+    source = source_of(options.scene, options.look, options.point_set)
+    return PictureTask(options.scene, options.look, size, *kinds, options.time_s, options.seed, threads, source)
 
 
 def chunks_of(picture: PictureTask, chunk_tiles: int) -> list[range]:
@@ -101,12 +102,12 @@ def chunks_of(picture: PictureTask, chunk_tiles: int) -> list[range]:
 
 
 @lru_cache(maxsize=1)
-def _renderer(scene: str, seed: int, threads: int) -> Renderer:
+def _renderer(scene: str, look: Look, seed: int, threads: int) -> Renderer:
     """A renderer of a scene, which a process builds once for all of its chunks."""
     from renderer.trace import Renderer
     from scenes import catalog
 
-    return Renderer(catalog.load_any(scene)[0], threads=threads, seed=seed)
+    return Renderer(catalog.load_seen(scene, look)[0], threads=threads, seed=seed)
 
 
 def render_chunk(picture: PictureTask, tiles: Sequence[int]) -> tuple[NDArray[np.float32], dict[str, int], float]:
@@ -118,9 +119,9 @@ def render_chunk(picture: PictureTask, tiles: Sequence[int]) -> tuple[NDArray[np
     from renderer.frames import render_tiles
     from renderer.sampling.plan import SamplePlan
 
-    if picture.source != source_of(picture.scene, picture.point_set):
+    if picture.source != source_of(picture.scene, picture.look, picture.point_set):
         raise ValueError(f"{picture.scene}: expected source {picture.source[:16]}, this worker runs another one")
-    renderer = _renderer(picture.scene, picture.seed, picture.threads)
+    renderer = _renderer(picture.scene, picture.look, picture.seed, picture.threads)
     plan = SamplePlan(picture.samples, picture.point_set, picture.seed, picture.space_filter)  # type: ignore[arg-type]
     start = time.perf_counter()
     colors, rays = render_tiles(renderer, plan, tiles, picture.size_px, picture.time_s, renderer.shutter_s)

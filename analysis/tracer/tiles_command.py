@@ -23,7 +23,7 @@ def main() -> None:
     from analysis.tracer.run import losses_of, tiles
     from analysis.tracer.tile_speedup import described
 
-    show(*losses_of(options.scene))
+    show(*losses_of(options))
     found = tiles(options)
     if options.study:
         show(frame_table(pd.DataFrame(found["rows"])), described(found))

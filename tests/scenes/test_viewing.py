@@ -113,3 +113,21 @@ def test_what_cannot_be_looked_at_is_said(tmp_path: Path) -> None:
         load_seen(str(CUBE), Look(camera=(1.0, 1.0, 1.0, 1.0, 1.0, 1.0)))
     with pytest.raises(SceneError, match="expected an image file, found none"):
         load_seen(str(CUBE), Look(environment=tmp_path / "gone.hdr"))
+
+
+def test_a_lens_is_focused_on_the_target() -> None:
+    eye = 3.0, 4.0, 0.0, 0.0, 0.0, 0.0
+    camera = load_seen(str(CUBE), Look(camera=eye, lens_radius=0.25))[0].camera
+    assert isinstance(camera, PerspectiveCamera) and (camera.lens_radius, camera.focal_distance) == (0.25, 5.0)
+    own = load_seen(str(CUBE), Look(camera=eye, lens_radius=0.25, focal_distance=2.0))[0].camera
+    assert isinstance(own, PerspectiveCamera) and own.focal_distance == 2.0
+    with pytest.raises(SceneError, match="expected a perspective camera, got OrthographicCamera"):
+        load_seen(Scene(OrthographicCamera(), ()), Look(lens_radius=0.1))
+
+
+def test_a_camera_path_goes_round_the_target_of_the_given_camera() -> None:
+    camera = load_seen(str(CUBE), Look(camera=(3.0, 4.0, 0.0, 0.0, 0.0, 0.0)), camera_path="turntable")[0].camera
+    assert isinstance(camera, PerspectiveCamera) and camera.track is not None
+    np.testing.assert_allclose(camera.to_world[:3, 3], (3.0, 4.0, 0.0))
+    with pytest.raises(SceneError, match="expected none for a built-in scene"):
+        load_seen("plain", Look(fov_deg=30.0), camera_path="turntable")

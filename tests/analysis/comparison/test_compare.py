@@ -13,6 +13,8 @@ import torch
 
 from analysis import METRICS, Result, compare, load
 from renderer import render
+from renderer.trace import Renderer
+from scenes.catalog import Look, load_seen
 from scenes.catalog import load as load_scene
 from tests.oracles.steps import read_limits
 from tsar import POLICIES, ConfigError
@@ -167,3 +169,20 @@ def test_a_picture_is_one_call() -> None:
         render("glass", 32, point_set="soboll")
     with pytest.raises(ConfigError, match="size: expected at least one pixel, got 0"):
         render("glass", 0)
+
+
+def test_policies_trace_paths_through_the_view_that_was_asked_for(tmp_path: Path) -> None:
+    """Each run gets the radiance of paths, from the camera given; a sample of the framed renderer, too."""
+    view: dict[str, Any] = {"camera": (4.0, -3.0, 2.0, 0.0, 0.0, 0.5), "bounces": 2}
+    small: dict[str, Any] = {**SMALL, "reference_samples_per_axis": 2}
+    found = compare("quad-light", ["tsar", "framed"], (), 0.1, out=tmp_path, integrator="path", **view, **small)
+    scene, _ = load_seen("quad-light", Look(integrator="path", **view))
+    assert scene.integrator.kind == "path" and scene.integrator.depth == 2
+    expected = Renderer(scene, footprint_resolution_px=64).render_frame(0.0, 64, 64, 2).numpy()
+    shown = found.images.isel(time_s=0)
+    np.testing.assert_allclose(shown.sel(run="reference").values, expected, atol=1e-3)  # half precision on disk
+    direct = Renderer(load_seen("quad-light", Look(**view))[0], footprint_resolution_px=64)
+    assert np.abs(direct.render_frame(0.0, 64, 64, 2).numpy() - expected).mean() > 0.02
+    for run in ("tsar", "framed"):
+        assert shown.sel(run=run).values.mean() == pytest.approx(expected.mean(), rel=0.1)
+    assert found.summary["config"]["integrator"] == "path" and not any(found.summary["nonfinite"].values())

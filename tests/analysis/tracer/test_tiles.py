@@ -31,10 +31,11 @@ from renderer.frames import render_image
 from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
 from scenes import catalog
+from scenes.catalog import Look
 from tsar.memory import core_count
 
 PICTURE = PictureTask(
-    "quad-light", (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", "hammersley")
+    "quad-light", Look(), (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", Look(), "hammersley")
 )
 
 
