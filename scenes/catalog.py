@@ -189,7 +189,8 @@ def load_seen(
     if look.smooth_deg > 0.0:
         found = dataclasses.replace(found, instances=smoothed(found.instances, look.smooth_deg))
     if look.up and ending in MODEL_ENDINGS:
-        found = framed(found.instances, look.up, found.name)
+        again = framed(found.instances, look.up, found.name)
+        found = dataclasses.replace(again, integrator=found.integrator, duration_s=found.duration_s)
     up = look.up or up_of(found)
     if look.environment is not None:
         found = with_environment(found, read_image(look.environment), up, str(look.environment))

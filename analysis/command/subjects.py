@@ -22,7 +22,7 @@ SUBJECTS = {
     "animation": "input inputs figure_input scene scenes scene_files scene_root root camera_path phase vary seconds"
     " start_s time_s warmup_cycles frames first_frame fps still_s limit_s",
     "picture": "size resolution_px width_px height_px sides_px crop frame_px",
-    "camera": "camera fov_deg up environment smooth_deg integrator bounces",
+    "camera": "camera camera_keys fov_deg lens_radius focal_distance up environment smooth_deg integrator bounces",
     "sample": "samples_per_axis samples point_set rounds error_target shift space_filter time_filter sigma_px"
     " box_share",
     "pipeline": "batch_size framelet_side sdf_side cache_size latency_cycles spatial_slope temporal_slope bias solver"

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from scenes.arithmetic import product
-from scenes.canonical import Instance, Material, Matrix, Mesh, SceneError
+from scenes.canonical import Instance, Material, Matrix, Mesh, RigidTrack, SceneError
 from scenes.canonical.values import vertices_of
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
 from scenes.models.gltf_materials import GltfMaterials
+from scenes.models.gltf_motion import GltfMotion, Poses, local_poses
 from scenes.models.smoothing import corner_normals, with_corners
 from scenes.models.sources import Sources
 
@@ -26,7 +26,9 @@ _DEPTH_MAX = 256
 
 
 def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
-    """Parts of the file's scene, or of all nodes if it names no scene; animations and skins are ignored.
+    """Parts of the file's scene, or of all nodes if it names no scene; those of animated nodes move rigidly.
+
+    Skins and morph targets are ignored.
 
     With ``facets`` materials are converted for path tracing, otherwise to Phong.
 
@@ -37,7 +39,7 @@ def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> tup
     """
     data = GltfData(sources)
     _check_extensions(data, report)
-    for name in ("animations", "skins", "cameras"):
+    for name in ("skins", "cameras"):
         if data.items(name):
             report.add(sources.path.stem, name)
     return _Reader(data, report, facets).parts()
@@ -59,12 +61,13 @@ class _Reader:
     def __init__(self, data: GltfData, report: LossReport, facets: bool) -> None:
         self.data, self.report = data, report
         self.materials = GltfMaterials(data, report, facets)
+        self.motion = GltfMotion(data, report)
         self._meshes: dict[int, list[tuple[Mesh, Material]]] = {}
 
     def parts(self) -> tuple[Instance, ...]:
         found: list[Instance] = []
         for root in self._roots():
-            self._node(root, np.eye(4), found, 0)
+            self._node(root, np.eye(4)[None], np.eye(4), None, found, 0)
         return tuple(found)
 
     def _roots(self) -> list[int]:
@@ -74,21 +77,39 @@ class _Reader:
         children = {child for node in nodes for child in node.get("children", ())}
         return [number for number in range(len(nodes)) if number not in children]
 
-    def _node(self, number: int, above: Matrix, found: list[Instance], depth: int) -> None:
+    def _node(
+        self, number: int, above: Poses, frame: Matrix, track: RigidTrack | None, found: list[Instance], depth: int
+    ) -> None:
+        """Adds the parts of a node and its children.
+
+        Args:
+            number: index of the node.
+            above: world transform of the nearest animated ancestor, at one or all times.
+            frame: transform from the parent to that ancestor.
+            track: rigid motion of that ancestor.
+            found: receives the parts.
+            depth: depth of the node.
+        """
         if depth > _DEPTH_MAX:
             raise SceneError(f"cannot be read: expected nodes at most {_DEPTH_MAX} deep")
         node = self.data.at("nodes", number)
-        matrix = product(above, _placed(node))
+        name = node.get("name", f"node{number}")
+        moved = self.motion.poses(number)
+        if moved is not None:
+            above, frame = product(above, product(frame, moved)), np.eye(4)
+            track = self.motion.track(above, name)
+        else:
+            frame = product(frame, local_poses(node)[0])
+        matrix = product(above[0], frame)
         if "mesh" in node:
-            name = node.get("name", f"node{number}")
             if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
                 self.report.add(name, "a node without extent")
             else:
                 stem = self.data.sources.path.stem
                 parts = self._mesh(node["mesh"])
-                found += [Instance(mesh, material, matrix, name=f"{stem}/{name}") for mesh, material in parts]
+                found += [Instance(mesh, material, matrix, track, name=f"{stem}/{name}") for mesh, material in parts]
         for child in node.get("children", ()):
-            self._node(child, matrix, found, depth + 1)
+            self._node(child, above, frame, track, found, depth + 1)
 
     def _mesh(self, number: int) -> list[tuple[Mesh, Material]]:
         if number not in self._meshes:
@@ -160,15 +181,3 @@ def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     if mode == 6:
         return np.stack([order[at + 1], order[at + 2], np.full(count, order[0] if len(order) else 0)], axis=1)
     raise SceneError(f"cannot be read: expected primitives of mode 0 to 6, got {mode}")
-
-
-def _placed(node: dict[str, Any]) -> Matrix:
-    """The transform from a node to its parent."""
-    if "matrix" in node:
-        return np.asarray(node["matrix"], np.float64).reshape(4, 4).T
-    matrix = np.eye(4)
-    turn = np.asarray(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), np.float64)
-    rotation = Rotation.from_quat(turn).as_matrix() if turn.any() else np.eye(3)
-    matrix[:3, :3] = rotation * np.asarray(node.get("scale", (1.0, 1.0, 1.0)), np.float64)
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
-from scenes.canonical import Scene
+from scenes.canonical import Instance, Scene
 from scenes.formats.losses import LossReport
 from scenes.formats.text.format import Format
 from scenes.models import MODEL_ENDINGS, read_model
@@ -35,7 +36,14 @@ def model_scene(
     Raises:
         SceneError: the model cannot be read.
     """
-    return framed(smoothed(read_model(path, report, facets), smooth_deg), up or model_up(path), path.stem)
+    scene = framed(smoothed(read_model(path, report, facets), smooth_deg), up or model_up(path), path.stem)
+    return dataclasses.replace(scene, duration_s=duration_of(scene.instances))
+
+
+def duration_of(instances: tuple[Instance, ...]) -> float:
+    """The time of the last key of all motions, seconds."""
+    tracks = [instance.track for instance in instances if instance.track is not None]
+    return max((track.start_s + track.interval_s * (len(track.translation) - 1) for track in tracks), default=0.0)
 
 
 def _read(path: Path, root: Path | None, report: LossReport) -> Scene:

@@ -34,9 +34,8 @@ from scenes import catalog
 from scenes.catalog import Look
 from tsar.memory import core_count
 
-PICTURE = PictureTask(
-    "quad-light", Look(), (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, source_of("quad-light", Look(), "hammersley")
-)
+SOURCE = source_of("quad-light", Look(), "hammersley")
+PICTURE = PictureTask("quad-light", Look(), (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, SOURCE)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,125 @@
+"""Animations of a glTF file as rigid motions of its nodes.
+
+Source: Khronos Group, "glTF 2.0 specification", section 3.11 and appendix C.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from scenes.animation import continuous_quaternions
+from scenes.arithmetic import inverse, product, rotation_between
+from scenes.canonical import RigidTrack, SceneError
+from scenes.formats.losses import LossReport
+from scenes.models.gltf_data import GltfData
+
+Poses = Float64[NDArray, "keys 4 4"]
+
+_INTERVAL_S = 1.0 / 120.0
+_KEYS_MOST = 1 << 16
+_UNEVEN_MOST = 1e-3  # deviation of a rotation from an orthogonal matrix
+_REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+
+
+def local_poses(values: dict[str, Any], count: int = 1) -> Poses:
+    """Transforms from a node to its parent, from its properties: each one value, or one for each key."""
+    found = np.zeros((count, 4, 4))
+    found[:] = np.eye(4)
+    if "matrix" in values:
+        found[:] = np.asarray(values["matrix"], np.float64).reshape(4, 4).T
+        return found
+    move, turn, scale = (np.asarray(values.get(name, rest), np.float64) for name, rest in _REST.items())
+    if turn.any():
+        found[:, :3, :3] = Rotation.from_quat(turn).as_matrix()
+    found[:, :3, :3] *= scale[..., None, :]
+    found[:, :3, 3] = move
+    return found
+
+
+class GltfMotion:
+    """The first animation of a file, at uniform times.
+
+    Attributes:
+        times_s: times of the keys, seconds; empty if nothing moves.
+    """
+
+    def __init__(self, data: GltfData, report: LossReport) -> None:
+        """Reads the channels.
+
+        Raises:
+            SceneError: a channel cannot be read, or the motion needs more than 65,536 keys.
+        """
+        self.data, self.report, stem = data, report, data.sources.path.stem
+        self._channels: dict[int, dict[str, tuple[NDArray, NDArray, str]]] = {}
+        animations = data.items("animations")
+        if len(animations) > 1:
+            report.add(stem, f"animations after the first ({len(animations) - 1})")
+        for channel in animations[0].get("channels", ()) if animations else ():
+            target = channel.get("target", {})
+            if "node" not in target or target.get("path") not in _REST:
+                report.add(stem, f"an animation of {target.get('path', 'nothing')}")
+                continue
+            sampler = animations[0]["samplers"][channel["sampler"]]
+            keys = data.numbers(sampler["input"])[:, 0]
+            values, kind = data.numbers(sampler["output"]), sampler.get("interpolation", "LINEAR")
+            if len(values) != len(keys) * (3 if kind == "CUBICSPLINE" else 1) or not (np.diff(keys) > 0.0).all():
+                raise SceneError(f"cannot be read: animation of node {target['node']}: keys and values do not match")
+            self._channels.setdefault(target["node"], {})[target["path"]] = keys, values, kind
+        spans = [keys for channels in self._channels.values() for keys, _, _ in channels.values() if len(keys)]
+        last_s = max((float(keys[-1]) for keys in spans), default=0.0)
+        steps = int(np.ceil(last_s / _INTERVAL_S - 1e-9))
+        if steps >= _KEYS_MOST:
+            raise SceneError(f"cannot be read: expected an animation of at most {_KEYS_MOST} keys, got {last_s:g} s")
+        self.times_s = np.linspace(0.0, last_s, steps + 1) if steps else np.zeros(0)
+
+    def poses(self, number: int) -> Poses | None:
+        """Transforms from a node to its parent at all times; None if it does not move."""
+        channels = self._channels.get(number)
+        if channels is None or not len(self.times_s):
+            return None
+        node = self.data.at("nodes", number)
+        moved = {path: _sampled(path, *channel, self.times_s) for path, channel in channels.items()}
+        return local_poses({name: value for name, value in node.items() if name != "matrix"} | moved, len(self.times_s))
+
+    def track(self, world: Poses, name: str) -> RigidTrack | None:
+        """The rigid motion of a node from its first pose on; None, with a loss, if the motion is not rigid."""
+        if np.linalg.det(world[0, :3, :3]) == 0.0:
+            self.report.add(name, "an animation that begins without extent", "the pose at its start")
+            return None
+        moved = product(world, inverse(world[0]))
+        turn = moved[:, :3, :3]
+        if np.abs(product(turn, np.swapaxes(turn, 1, 2)) - np.eye(3)).max() > _UNEVEN_MOST:
+            self.report.add(name, "an animation that scales or shears", "the pose at its start")
+            return None
+        rotation = continuous_quaternions(Rotation.from_matrix(turn).as_quat())
+        interval_s = float(self.times_s[1] - self.times_s[0])
+        return RigidTrack(0.0, interval_s, moved[:, :3, 3], rotation)
+
+
+def _sampled(path: str, keys: NDArray, values: NDArray, kind: str, times_s: NDArray) -> NDArray:
+    """Values of a channel at times; the first and last keys hold beyond them."""
+    at = np.clip(times_s, keys[0], keys[-1])
+    low = np.clip(np.searchsorted(keys, at, side="right") - 1, 0, max(len(keys) - 2, 0))
+    if kind == "STEP":
+        return values[np.searchsorted(keys, at, side="right") - 1]
+    if kind == "CUBICSPLINE":
+        values = values.reshape(len(keys), 3, -1)
+    if len(keys) == 1:
+        return np.repeat(values[:, 1] if kind == "CUBICSPLINE" else values, len(at), axis=0)
+    if kind == "CUBICSPLINE":
+        span = (keys[low + 1] - keys[low])[:, None]
+        u = (at - keys[low])[:, None] / span
+        rest = 1.0 - u
+        found = rest * rest * (1.0 + 2.0 * u) * values[low, 1] + u * u * (1.0 + 2.0 * rest) * values[low + 1, 1]
+        found = found + span * u * rest * (rest * values[low, 2] - u * values[low + 1, 0])
+        return found / np.linalg.norm(found, axis=1, keepdims=True) if path == "rotation" else found
+    share = (at - keys[low]) / (keys[low + 1] - keys[low])
+    if path == "rotation":
+        values = continuous_quaternions(values / np.linalg.norm(values, axis=1, keepdims=True))
+        return rotation_between(values[low], values[low + 1], share).as_quat()
+    return values[low] + share[:, None] * (values[low + 1] - values[low])
