@@ -256,7 +256,8 @@ def cropped(shown: Picture, window: Window) -> Picture:
         return shown
     samples, carried = shown.sample_map, shown.carried
     if samples is not None:
-        samples = SampleMap(window.parts(samples.newest_s), window.parts(samples.level))
+        inverse = None if samples.inverse is None else window.parts(samples.inverse)
+        samples = SampleMap(window.parts(samples.newest_s), window.parts(samples.level), inverse)
 
     def of_part(one: MapShown) -> MapShown:
         return replace(one, values=window.parts(one.values))

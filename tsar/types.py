@@ -174,10 +174,13 @@ class SampleMap:
     Attributes:
         newest_s: animation time of the newest sample, seconds; ``-inf`` where nothing has been sampled yet.
         level: quad level of its framelet, which determines the sampling density there.
+        inverse: reciprocal of the effective number of samples in a pixel; None where pixels show the newest samples
+            alone.
     """
 
     newest_s: Float64[Tensor, "rows columns"]
     level: Int64[Tensor, "rows columns"]
+    inverse: Float[Tensor, "h w"] | None = None
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ SUBJECTS = {
     "observer": "jnds sigmas lapses spreads observers answers",
     "page": "host port bench bench_seconds",
     "machine": "device threads workers scheduler chunk_tiles",
-    "file": "out references write_frames film page layers format explain markdown only compare",
+    "file": "out references write_frames layered_stills film page layers format explain markdown only compare",
 }
 """Subjects in the order of the boxes, each with its options."""
 

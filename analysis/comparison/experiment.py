@@ -16,7 +16,7 @@ from analysis.command.cli import InputError, bad_input, full_disk, require_memor
 from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
-from analysis.comparison.stored import FILES, Recording, added_by, complete_run, content_of
+from analysis.comparison.stored import FILES, Recording, added_by, complete_run, content_of, names_of
 from analysis.metrics import METRICS, require_extras
 from analysis.storage.results import SUMMARY, own_results
 
@@ -64,7 +64,7 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
     with bad_input():
         scene, losses = catalog.load_seen(scene or options.input, options.look, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
-        own_results(options.out, (*FILES, *(["frames/*.exr"] if options.write_frames else [])))
+        own_results(options.out, names_of(options))
         writable_folder(options.references, "references")
         renderer_of(1)  # an error of the scene's loader is bad input
     for loss in losses:
@@ -119,6 +119,7 @@ def measure(
     setup = prepare(options, scene)
     with first_imports():
         from analysis.command import progress
+        from analysis.comparison.stills import exr_writers
         from analysis.metrics.quality import reference_times
         from analysis.storage.records import StepWriter
         from renderer.film.files import FilmError
@@ -133,7 +134,8 @@ def measure(
             own, first_cycle_s = first_made(runs[options.policy].images, began_s, bars.say)
             runs[options.policy] = dataclasses.replace(runs[options.policy], images=own)
             reference = _reference(options, setup, len(times_s), bars)
-            measured = _compare(options, times_s, reference, runs, bars, viewers)
+            files = exr_writers(options, setup.renderer_of(1), len(times_s))
+            measured = _compare(options, times_s, reference, runs, bars, [*viewers, *files])
             measured = dataclasses.replace(measured, recorded=recording.name)
     if measured.seen[options.policy].images == 0 or (measured.totals.recorded and measured.totals.cycles == 0):
         (options.out / "steps.parquet").unlink(missing_ok=True)
@@ -208,7 +210,7 @@ def _compare(
     from analysis.comparison.viewers import EXACT, Filming, Steps
     from analysis.page.video import Scales
     from analysis.study.displays import Measuring, watch
-    from renderer.film.files import Mp4Writer, write_exr
+    from renderer.film.files import Mp4Writer
 
     scales = Scales(options.tsar.spatial_bounds, options.tsar.temporal_bounds)
     stride = max(1, round(options.reference_rate_hz / 60.0))
@@ -220,8 +222,6 @@ def _compare(
 
     def on_view(view: DisplayedImages) -> None:
         task.advance()
-        if options.write_frames:
-            write_exr(options.out / "frames" / f"{view.number:06d}.exr", view.shown[options.policy][1].image)
 
     viewers = [on_view, steps, *further, *filming]
     images = {name: run.images for name, run in runs.items()}

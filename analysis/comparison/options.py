@@ -97,6 +97,9 @@ class RunOptions(ViewOptions):
     """Implementation of the stages around tracing: compiled kernels, or the tensor operations of the reference."""
     write_frames: bool = False
     """Also write the image on the policy's display at every reference time to frames/, as EXR."""
+    layered_stills: int = 0
+    """Number of moments, evenly spaced, at which the reference and every picture shown are written to layers/, as
+    EXR with colour, depth, normal, albedo, instance, motion, age and sample count."""
     film: bool = True
     """Write comparison.mp4."""
     page: Literal["near", "lossless"] = "near"
@@ -118,6 +121,7 @@ class RunOptions(ViewOptions):
             reference_samples_per_axis=(1, 16),
             metric_stride=(1, 10**6),
             threads=limits.THREADS,
+            layered_stills=(0, 1000),
         )
         if self.rivals == DEFAULT_RIVALS:
             object.__setattr__(self, "rivals", tuple(name for name in DEFAULT_RIVALS if name != self.policy))

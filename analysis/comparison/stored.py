@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 FILES = ("steps.parquet", "error.png", "error.svg", "report.html", "comparison.mp4")
 
 
+def names_of(options: RunOptions) -> tuple[str, ...]:
+    """Names, or patterns of names, of all files that a run may write beside its summary."""
+    folders = {"frames/*.exr": options.write_frames, "layers/*.exr": options.layered_stills}
+    return (*FILES, *(name for name, asked in folders.items() if asked))
+
+
 @dataclass
 class Recording:
     """Writes the cycles of the first run that records any: the run's own policy, which begins first, or else the

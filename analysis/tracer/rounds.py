@@ -15,15 +15,14 @@ from analysis.command.progress import Bars, Task
 from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
 from analysis.storage.store import Store
+from analysis.tracer.layers import scene_layers
 from analysis.tracer.render_options import RenderOptions
 from renderer.film.files import count_nonfinite, write_image
 from renderer.film.layers import write_layers
 from renderer.frames import cut, tiles_of
-from renderer.guides import render_guides
 from renderer.rounds import Made, Rounds, render_rounds
 from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
-from tsar.projection import project
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -84,12 +83,7 @@ class StillRounds:
 
     def _layers(self, made: Made) -> Mapping[str, NDArray]:
         width, height = self.size_px
-        found = render_guides(self.renderer, width, height, self._time_s)
-        layers = {"depth": found.depth, "normal": found.normal, "albedo": found.albedo, "instance": found.instance}
-        number, point = torch.from_numpy(found.instance), torch.from_numpy(found.point)
-        times = self._time_s, self._time_s + 1.0 / self.options.fps
-        before, after = (project(self.renderer.viewpoint(at, width / height), number, point)[0] for at in times)
-        layers["motion"] = ((after - before) * torch.tensor([width, height])).numpy()
+        layers = scene_layers(self.renderer, width, height, self._time_s, 1.0 / self.options.fps)
         crop = self.options.crop
         whole = {name: cut(torch.from_numpy(np.ascontiguousarray(part)), crop).numpy() for name, part in layers.items()}
         return whole | {"samples": made.samples.numpy(), "variance": made.variance.numpy()}

@@ -180,7 +180,7 @@ class Filter(Policy[State]):
             return self._displayed(state, moment)
 
     def image(self, state: State, moment: Moment) -> Picture:
-        newest = SampleMap(state.estimates.time_s[0], self._level)
+        newest = SampleMap(state.estimates.time_s[0], self._level, state.estimates.inverse[0])
         carried = partial(self._carried, state, moment) if self._options.smoothing else None
         return Picture(state.shown.permute(1, 2, 0).contiguous(), newest, maps=_maps(state), carried=carried)
 
