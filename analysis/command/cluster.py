@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import importlib.util
 import logging
 import os
 import signal
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from analysis.command import limits
 from analysis.command.cli import InputError
 from analysis.command.interrupts import SIGNALS
+from tsar.config import closed_choices, require
 from tsar.memory import core_count
 
 if TYPE_CHECKING:
@@ -35,6 +37,7 @@ _QUIET = "ignore:resource_tracker:UserWarning"
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class ClusterOptions:
     """Where cases run."""
 
@@ -44,9 +47,25 @@ class ClusterOptions:
     """Address of a running Dask scheduler, such as tcp://host:8786; empty starts a local cluster, which listens on this
     machine only. Anyone who reaches a scheduler of your own can run code on its workers: keep it in a network that you
     trust, and its dashboard on loopback (--dashboard-address 127.0.0.1:8787)."""
+    workers_least: int = 0
+    """Least number of processes of the local cluster, which then starts with these and adds others while work waits; 0
+    starts all at once."""
+    memory_limit_gib: float = 0.0
+    """Most memory of each process of the local cluster, GiB; one that exceeds it is ended, and its run tried again. 0
+    sets no limit."""
+    retries: int = 0
+    """Number of times that what failed is tried again; 0 for no run of a study, and 5 times for tiles."""
+    worker_wait_s: float = WAIT_S
+    """Seconds without any worker after which the runs of a study fail; workers may wait long in a queue of jobs."""
+    log_level: Literal["critical", "error", "warning", "info"] = "warning"
+    """Least severe messages of Dask that are shown."""
 
     def __post_init__(self) -> None:
-        limits.within(self, workers=limits.WORKERS)
+        limits.within(self, workers=limits.WORKERS, workers_least=(0, self.processes), memory_limit_gib=(0.0, 1e5))
+        limits.within(self, retries=(0, 100), worker_wait_s=(1.0, 1e6))
+        alone = "none together with a scheduler, whose own cluster sets it"
+        for name in ("workers_least", "memory_limit_gib") if self.scheduler else ():
+            require(not getattr(self, name), name, alone, getattr(self, name))
 
     @property
     def processes(self) -> int:
@@ -60,8 +79,12 @@ class ClusterOptions:
 
 
 @contextlib.contextmanager
-def connected(options: ClusterOptions) -> Iterator[Client]:
+def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line: None) -> Iterator[Client]:
     """A client of the cluster; a local cluster ends with the block.
+
+    Args:
+        options: the cluster.
+        say: prints a line: the address of the dashboard.
 
     Raises:
         InputError: nothing answers at the address.
@@ -69,8 +92,9 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
     import dask.config
     from distributed import Client, LocalCluster
 
+    level = logging.getLevelNamesMapping()[options.log_level.upper()]
     dask.config.set({"distributed.worker.profile.enabled": False})
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # each failure is reported in one line
+    logging.getLogger("distributed").setLevel(level)
     if options.scheduler:
         try:
             _require_port(options.scheduler)
@@ -80,26 +104,38 @@ def connected(options: ClusterOptions) -> Iterator[Client]:
             reason = str(error) or f"it accepts connections, but sends no greeting within {WAIT_S} s"
             raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({reason})") from error
         with client:
+            say(dashboard_of(client))
             yield client
         return
     with contextlib.ExitStack() as held:
         with _interrupts_blocked():
             cluster = LocalCluster(
-                n_workers=options.processes,
+                n_workers=options.workers_least or options.processes,
                 threads_per_worker=1,
                 processes=True,
                 host=LOOPBACK,
                 dashboard_address=f"{LOOPBACK}:0",  # any free port, so that two studies do not collide
-                memory_limit=0,
-                silence_logs=logging.CRITICAL,
+                memory_limit=round(options.memory_limit_gib * 2**30),
+                silence_logs=level,
             )
             held.enter_context(cluster)
+        if options.workers_least:
+            cluster.adapt(minimum=options.workers_least, maximum=options.processes)
         client = held.enter_context(Client(cluster))
+        say(dashboard_of(client))
         try:
             yield client
         except KeyboardInterrupt:
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the end of workers is wanted
             _end_workers(cluster)
             raise
+
+
+def dashboard_of(client: Client) -> str:
+    """One line: the address of the dashboard, or why there is none."""
+    if importlib.util.find_spec("bokeh") is None:
+        return "dashboard of Dask: none, because the package bokeh is not installed"
+    return f"dashboard of Dask: {client.dashboard_link}"
 
 
 def _require_port(address: str) -> None:

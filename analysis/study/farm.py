@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.cluster import WAIT_S, ClusterOptions, connected
+from analysis.command.cluster import ClusterOptions, connected
 from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
@@ -60,11 +60,16 @@ def run_study(options: StudyOptions, cases: Sequence[Case], written: Sequence[st
     place = Resources(out / "runs", options.references.resolve(), options.farm.threads)
     with full_disk(out), bars() as shown:
         place.results.mkdir(exist_ok=True)
-        return Outcomes(place, *run_cases(cases, place, options.farm, shown.task("runs", len(set(cases)))))
+        task = shown.task("runs", len(set(cases)))
+        return Outcomes(place, *run_cases(cases, place, options.farm, task, shown.say))
 
 
 def run_cases(
-    cases: Sequence[Case], place: Resources, options: ClusterOptions, task: Task | None = None
+    cases: Sequence[Case],
+    place: Resources,
+    options: ClusterOptions,
+    task: Task | None = None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> tuple[dict[Case, str], dict[Case, str]]:
     """Runs every case whose result is not on disk yet; a case that fails does not stop the others.
 
@@ -73,6 +78,7 @@ def run_cases(
         place: destination of results and references; on a cluster, folders that all of its machines see.
         options: the cluster.
         task: progress, one step a case.
+        say: prints a line.
 
     Returns:
         The key of every case's result, and the reason of every failure.
@@ -88,10 +94,12 @@ def run_cases(
     if not missing:
         return keys, failures
     try:
-        with connected(options) as client:
+        with connected(options, say) as client:
             client.run(_keep_freed_memory, on_error="ignore")
             client.run(_forget_scenes, on_error="ignore")
-            for case, reason in _outcomes(client, _submit(client, missing, keys, place)):
+            for case, reason in _outcomes(
+                client, _submit(client, missing, keys, place, options.retries), options.worker_wait_s
+            ):
                 if reason is not None:
                     failures[case] = reason
                 task.advance()
@@ -110,7 +118,7 @@ def _forget_scenes() -> None:
     forget()
 
 
-def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Case, str | None]]:
+def _outcomes(client: Client, waiting: dict[Future, Case], wait_s: float) -> Iterator[tuple[Case, str | None]]:
     """Cases as they end, each with the reason for its failure, or None.
 
     If the scheduler is gone, or has had no worker for a while, all remaining cases fail.
@@ -131,8 +139,8 @@ def _outcomes(client: Client, waiting: dict[Future, Case]) -> Iterator[tuple[Cas
             yield waiting[future], _failure(future)
         if done or _has_workers(client):
             seen_s = time.monotonic()
-        elif time.monotonic() - seen_s > WAIT_S:
-            yield from ((waiting[future], f"no worker was there for {WAIT_S} s") for future in pending)
+        elif time.monotonic() - seen_s > wait_s:
+            yield from ((waiting[future], f"no worker was there for {wait_s:g} s") for future in pending)
             return
 
 
@@ -179,12 +187,16 @@ def _keep_freed_memory() -> None:
         tune(option, value)
 
 
-def _submit(client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Resources) -> dict[Future, Case]:
+def _submit(
+    client: Client, missing: Sequence[Case], keys: dict[Case, str], place: Resources, retries: int
+) -> dict[Future, Case]:
     """Futures of the cases, each after that of its reference, in an order that puts the references early."""
     references = {_reference_of(case): None for case in missing}
-    behind = {wanted: client.submit(_prepare, *wanted, place, pure=False) for wanted in references}
+    behind = {wanted: client.submit(_prepare, *wanted, place, pure=False, retries=retries) for wanted in references}
     return {
-        client.submit(_evaluate, case, keys[case], place, behind[_reference_of(case)], pure=False): case
+        client.submit(
+            _evaluate, case, keys[case], place, behind[_reference_of(case)], pure=False, retries=retries
+        ): case
         for case in missing
     }
 

@@ -140,7 +140,7 @@ def tiles(options: TileOptions) -> dict[str, Any]:
         picture = picture_of(options, 1 if options.study else farm.threads)
         own_results(options.out, [f"{picture.name}.png", f"{picture.name}.exr"])
     chunks = chunks_of(picture, options.chunk_tiles)
-    with bad_input(), connected(farm) as client, full_disk(options.out, FilmError), bars() as shown:
+    with bad_input(), bars() as shown, connected(farm, shown.say) as client, full_disk(options.out, FilmError):
         if options.study:
             task = shown.task("turns", len({1, *options.study}) * options.repetitions)
             found = study(client, picture, chunks, options.study, options.repetitions, task)

@@ -129,7 +129,11 @@ def render_chunk(picture: PictureTask, tiles: Sequence[int]) -> tuple[NDArray[np
 
 
 def rendered(
-    client: Client, picture: PictureTask, chunks: Sequence[range], workers: Sequence[str] | None = None
+    client: Client,
+    picture: PictureTask,
+    chunks: Sequence[range],
+    workers: Sequence[str] | None = None,
+    retries: int = _RETRIES,
 ) -> Iterator[tuple[int, tuple[NDArray[np.float32], dict[str, int], float]]]:
     """Renders chunks on a cluster, in any order; if a worker dies, others render its chunks again.
 
@@ -138,6 +142,7 @@ def rendered(
         picture: the picture.
         chunks: runs of tiles.
         workers: addresses of the workers to use; None for all.
+        retries: number of times that a chunk that failed is tried again.
 
     Yields:
         The number of a chunk and the result of :func:`render_chunk`.
@@ -145,7 +150,7 @@ def rendered(
     from distributed import as_completed
 
     futures = {
-        client.submit(render_chunk, picture, chunk, pure=False, retries=_RETRIES, workers=workers): number
+        client.submit(render_chunk, picture, chunk, pure=False, retries=retries, workers=workers): number
         for number, chunk in enumerate(chunks)
     }
     for future, result in as_completed(list(futures), with_results=True, raise_errors=True):
@@ -190,7 +195,9 @@ def render_resumed(
     missing = [number for number, name in enumerate(names) if store.find(name) is None]
     task.reach(len(chunks) - len(missing))
     start = time.perf_counter()
-    for place, (pixels, rays, seconds) in rendered(client, picture, [chunks[number] for number in missing]):
+    retries = options.farm.retries or _RETRIES
+    found = rendered(client, picture, [chunks[number] for number in missing], retries=retries)
+    for place, (pixels, rays, seconds) in found:
         with store.make(names[missing[place]]) as making:
             np.savez(making.path, pixels=pixels, seconds=seconds, kinds=list(rays), rays=list(rays.values()))
         task.advance()

@@ -46,6 +46,38 @@ def exit_as_a_run(*_: Any) -> None:
     os._exit(1)
 
 
+def fail_once(animation: Any, start_s: float, scale: Scale, place: Resources) -> None:
+    try:
+        (place.results / "tried").mkdir(parents=True)
+    except FileExistsError:
+        return
+    raise ValueError("the first try")
+
+
+def keep_nothing(case: Case, key: str, place: Resources, reference: None) -> str:
+    return key
+
+
+@pytest.mark.parametrize("retries", [0, 1])
+def test_what_failed_is_tried_again_if_asked(retries: int, place: Resources, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(farm, "_prepare", fail_once)
+    monkeypatch.setattr(farm, "_evaluate", keep_nothing)
+    asked, lines = cases(1), list[str]()
+    keys, failures = run_cases(asked, place, ClusterOptions(workers=1, retries=retries), say=lines.append)
+    assert list(keys) == asked and list(failures.values()) == ["ValueError: the first try"] * (1 - retries)
+    assert len(lines) == 1 and lines[0].startswith("dashboard of Dask: ")
+
+
+def test_a_local_cluster_adapts_and_limits_memory() -> None:
+    with connected(ClusterOptions(workers=2, workers_least=1, memory_limit_gib=1.5)) as client:
+        assert len(client.scheduler_info()["workers"]) == 1
+        waiting = [client.submit(time.sleep, 3.0, pure=False) for _ in range(8)]
+        client.wait_for_workers(2, timeout=120)
+        limits = {one["memory_limit"] for one in client.scheduler_info()["workers"].values()}
+        client.cancel(waiting)
+    assert limits == {3 * 2**29}
+
+
 def test_a_local_cluster_listens_on_loopback_only() -> None:
     with connected(ClusterOptions(workers=1)) as client:
         assert client.submit(int, 3).result() == 3
@@ -95,7 +127,6 @@ def test_a_cluster_that_ends_is_said(
 ) -> None:
     address, scheduler, workers = cluster
     monkeypatch.setattr(farm, "_prepare", sleep_as_a_run)
-    monkeypatch.setattr(farm, "WAIT_S", 3)
     asked = cases(3)
 
     def end() -> None:
@@ -110,7 +141,7 @@ def test_a_cluster_that_ends_is_said(
         return found
 
     monkeypatch.setattr(farm, "_submit", submit_and_end)
-    _, failures = run_cases(asked, place, ClusterOptions(scheduler=address))
+    _, failures = run_cases(asked, place, ClusterOptions(scheduler=address, worker_wait_s=3))
     assert set(failures) == set(asked)
     expected = "no worker was there" if ended == "workers" else "scheduler"
     assert all(expected in reason for reason in failures.values()), failures
