@@ -31,6 +31,7 @@ class Rate:
         wall_s: seconds in which they did.
         own_s: of these, seconds in which this run worked.
         cpu_s: seconds of all cores of this process, others' runs included.
+        error: why it stopped; empty where it did not.
     """
 
     resolution_px: int
@@ -40,6 +41,7 @@ class Rate:
     wall_s: float
     own_s: float
     cpu_s: float
+    error: str = ""
 
 
 def cycle_rates(options: LiveOptions) -> list[Table | str]:
@@ -61,6 +63,8 @@ def cycle_rates(options: LiveOptions) -> list[Table | str]:
 
 
 def _row(one: Rate) -> tuple[str, ...]:
+    if one.error:
+        return str(one.resolution_px), one.policy, one.beside or "–", f"failed: {one.error}", "–", "–", "–"
     cpu_ms = "–" if one.beside else f"{1e3 * one.cpu_s / max(one.cycles, 1):.1f}"
     pace = f"{one.cycles / one.wall_s:.1f}", f"{1e3 * one.own_s / max(one.cycles, 1):.1f}"
     return str(one.resolution_px), one.policy, one.beside or "–", *pace, cpu_ms, f"{one.cpu_s / one.wall_s:.2f}"
@@ -94,6 +98,7 @@ def driven(options: LiveOptions, resolution_px: int, pair: tuple[str, ...]) -> l
             wall_s,
             b[1] - a[1],
             cpu_s,
+            run.error,
         )
-        for name, a, b in zip(names, before, after, strict=True)
+        for run, name, a, b in zip(runs, names, before, after, strict=True)
     ]

@@ -17,7 +17,7 @@ import numpy as np
 
 from analysis.live.options import NOTHING, Controls, LiveOptions
 from analysis.live.runner import DisplayState, Runner, SessionTime
-from analysis.live.timeline import INTERVAL_S, Timeline
+from analysis.live.timeline import Timeline
 from analysis.live.turns import Turns
 from analysis.storage.files import write_json
 from analysis.study.runs import made
@@ -78,7 +78,6 @@ class Engine:
         timeline: the camera and the animation.
         losses: what was lost in reading the scene's file, a line each.
         distance: to what the scene's camera looks at, scene units.
-        recording: whether what happens is to be kept.
     """
 
     def __init__(
@@ -108,7 +107,6 @@ class Engine:
         self._lock = threading.RLock()
         self._runners: dict[tuple[Any, ...], Runner] = {}
         self._halted, self._begin = False, 0
-        self.recording = False
         self.distance = _distance(self.scene)
         self._halt()
         self._assign()
@@ -168,12 +166,17 @@ class Engine:
 
     def record(self) -> None:
         """Keeps what happens from now on."""
-        self._begin, self.recording = self.timeline.count - 1, True
+        self._begin, self.timeline.recording = self.timeline.count - 1, True
+
+    @property
+    def recording(self) -> bool:
+        """Whether what happens is kept for a session."""
+        return self.timeline.recording
 
     @property
     def recorded_s(self) -> float:
         """Seconds that would be saved now."""
-        return INTERVAL_S * (self.timeline.count - 1 - (self._begin if self.recording else 0))
+        return self.timeline.seconds(self._begin if self.recording else 0)
 
     def save(self, path: Path) -> float:
         """Writes what happened since :meth:`record`, or else since the beginning, to a session file.
@@ -205,7 +208,7 @@ class Engine:
             )
         require(session.seconds > 0.0, "session", "one of more than a moment", session.seconds)
         write_json(path, session.facts())
-        self.recording = False
+        self.timeline.recording = False
         return session.seconds
 
     def close(self) -> None:

@@ -4,30 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-import shlex
 import threading
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
-from analysis.live import camera as cameras
 from analysis.live.engine import SIDES, Engine
-from analysis.live.freeze import SAID, VIEWS, Frozen, held
-from analysis.live.options import Controls
+from analysis.live.freeze import SAID, VIEWS, Frozen
 from analysis.live.overlays import PLAIN, codes, laid_over, mean_newest_s, overlays, predicted_error
+from analysis.live.requests import REQUESTS, standing
 from analysis.live.runner import DisplayState, Runner
 from analysis.page.pictures import ColorScale, PagePixels, number
 from analysis.page.video import AGES
-from scenes.sessions import ENDING
 from tsar.checks import require
-
-FASTEST = 16.0
-"""Greatest speed of the animation, and of the camera in distances to what it looks at a second."""
-OF_THESIS = ("spatial_slope", "temporal_slope", "bias", "solver")
-"""Controls that a replay needs where they are not the defaults."""
-LABEL_MOST = 100
-"""Letters of the name of an overlay."""
 
 
 @dataclass
@@ -46,7 +35,7 @@ class Watcher:
 
 
 @dataclass
-class _Display:
+class DisplayChoices:
     """How the sides are shown, by side. Changes in place."""
 
     overlay: dict[str, str] = field(default_factory=lambda: dict.fromkeys(SIDES, PLAIN))
@@ -59,6 +48,7 @@ class Hub:
     Attributes:
         engine: what is seen.
         frozen: the moment that is held; None while the view goes on.
+        display: how the sides are shown.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -66,7 +56,7 @@ class Hub:
         self.frozen: Frozen | None = None
         self._watchers: dict[int, Watcher] = {}
         self._driver, self._came = 0, 0
-        self._display, self._lock = _Display(), threading.RLock()
+        self.display, self._lock = DisplayChoices(), threading.RLock()
         self._drawn: dict[str, tuple[Any, tuple[PagePixels, str]]] = {}
         self._told: dict[str, tuple[Any, tuple[float | None, float | None]]] = {}
 
@@ -85,7 +75,7 @@ class Hub:
         with self._lock:
             self._watchers.pop(watcher.number, None)
             if self._driver == watcher.number:
-                self.engine.timeline.change(_standing)
+                self.engine.timeline.change(standing)
                 self._driver = min(self._watchers, default=0)
             if not self._watchers:
                 self.engine.rest()
@@ -98,20 +88,22 @@ class Hub:
             asked = message.pop("do", None)
             with self._lock:
                 if asked == "drive":
-                    self.engine.timeline.change(_standing)
+                    self.engine.timeline.change(standing)
                     self._driver = watcher.number
                 elif self._driver == watcher.number:
-                    watcher.note = self._do(asked, message) or ""
+                    known = isinstance(asked, str) and asked in REQUESTS
+                    require(known, "do", "something that a page can ask for", asked)
+                    watcher.note = REQUESTS[asked](self, message) or ""
         except KeyError as error:
             watcher.note = f"expected a field {error}"
         except Exception as error:  # a page may ask for anything, and what a policy or a metric does may be anybody's
-            watcher.note = " ".join(f"{error}".split())[:300] or type(error).__name__
+            watcher.note = one_line(error)
 
     def frame(self, watcher: Watcher) -> bytes:
         """What a page is sent: the length of a header, four bytes, the header, and what pictures are new."""
         with self._lock:
             look, frozen, driver = self.engine.look(), self.frozen, self._driver
-            display = replace(self._display, overlay=dict(self._display.overlay))
+            display = replace(self.display, overlay=dict(self.display.overlay))
             note, watcher.note = watcher.note, ""
         sides: dict[str, Any] = {}
         pictures: list[bytes] = []
@@ -155,8 +147,12 @@ class Hub:
         if frozen is not None and overlay in VIEWS and side in frozen.errors:
             found = frozen.drawn(side, overlay), SAID.get(overlay, "")
         elif overlay in known:
-            one = known[overlay]()
-            found = laid_over(codes(seen.shown[1].image), one, strength), _scale(one.scale)
+            picture = codes(seen.shown[1].image)
+            try:
+                one = known[overlay]()
+                found = laid_over(picture, one, strength), _scale(one.scale)
+            except Exception as error:  # a map may be anybody's: the picture is shown without it
+                found = picture, f"cannot be drawn ({one_line(error)})"
         else:
             found = codes(seen.shown[1].image), ""
         self._drawn[side] = key, found
@@ -181,7 +177,7 @@ class Hub:
             }
         return _finite(found)
 
-    def _state(self, time_s: float, display: _Display, frozen: Frozen | None) -> dict[str, Any]:
+    def _state(self, time_s: float, display: DisplayChoices, frozen: Frozen | None) -> dict[str, Any]:
         engine = self.engine
         animation, timeline = engine.timeline.animation, engine.timeline
         held_at = None
@@ -199,97 +195,6 @@ class Hub:
             "frozen": held_at,
         }
 
-    def _do(self, asked: Any, given: dict[str, Any]) -> str | None:
-        """What a page asks for; what it is told of that."""
-        engine, timeline = self.engine, self.engine.timeline
-        animation = timeline.animation
-        if asked == "turn":
-            left, up = _number(given, "left", 100.0), _number(given, "up", 100.0)
-            distance = engine.distance if given.get("orbit") else 0.0
-            timeline.change(lambda drive: cameras.turned(drive, left, up, distance))
-        elif asked == "step":
-            ahead = _number(given, "ahead", 100.0) * engine.distance
-            timeline.change(lambda drive: cameras.moved(drive, (0.0, 0.0, ahead)))
-        elif asked == "go":
-            x, y, z = (_number(given, name, FASTEST) * engine.distance for name in ("right", "up", "ahead"))
-            turning = _number(given, "turn_left", 10.0), _number(given, "turn_up", 10.0)
-            timeline.change(lambda drive: replace(drive, velocity=(x, y, z), turning=turning))
-        elif asked == "set":
-            engine.change(given["name"], given["value"])
-        elif asked == "overlay":
-            require(given["side"] in SIDES, "side", " or ".join(SIDES), given["side"])
-            label = given["label"]
-            require(
-                isinstance(label, str) and len(label) <= LABEL_MOST, "label", f"at most {LABEL_MOST} letters", label
-            )
-            self._display.overlay[given["side"]] = label
-        elif asked == "strength":
-            self._display.strength = min(max(_number(given, "value", 1.0), 0.0), 1.0)
-        elif asked in ("playing", "repeats"):
-            setattr(animation, asked, bool(given["value"]))
-        elif asked == "speed":
-            animation.speed = abs(_number(given, "value", FASTEST))
-        elif asked == "scrub":
-            timeline.scrub(_number(given, "at_s", 1e9))
-        elif asked == "ride":
-            timeline.ride(bool(given["value"]))
-        elif asked == "reset":
-            timeline.reset()
-        elif asked == "record":
-            engine.record()
-        elif asked == "save":
-            return self._save()
-        elif asked == "freeze":
-            self.frozen = self.frozen or self._held()
-        elif asked == "go_on":
-            self.frozen = None
-            self._display.overlay = {s: PLAIN if o in VIEWS else o for s, o in self._display.overlay.items()}
-            engine.wake()
-        else:
-            require(False, "do", "something that a page can ask for", asked)
-        return None
-
-    def _held(self) -> Frozen:
-        """Holds the moment; where that fails the view goes on."""
-        try:
-            return held(self.engine)
-        except Exception:
-            self.engine.wake()
-            raise
-
-    def _save(self) -> str:
-        """Writes the session under a name that is free."""
-        folder, number = self.engine.options.out, 1
-        while (path := folder / f"drive-{number}{ENDING}").exists():
-            number += 1
-        seconds = self.engine.save(path)
-        return f"{seconds:.1f} s written to {path}; replay: {replay(self.engine, path, seconds)}"
-
-
-def replay(engine: Engine, path: Path, seconds: float) -> str:
-    """The command that measures a session as it was seen."""
-    c = engine.controls
-    named = f"--policy {c.sides[-1]}" + (f" --rivals {c.sides[0]}" if len(c.sides) > 1 else "") if c.sides else ""
-    changed = [
-        f"--{name.replace('_', '-')} {getattr(c, name)}"
-        for name in OF_THESIS
-        if getattr(c, name) != getattr(Controls, name)
-    ]
-    rest = " ".join([f"--batch-size {c.batch_size} --resolution-px {c.resolution_px}", *changed])
-    return f"python scripts/run.py {shlex.quote(str(path))} --seconds {max(seconds - 0.05, 0.05):.2f} {named} {rest}"
-
-
-def _standing(drive: cameras.Drive) -> cameras.Drive:
-    return replace(drive, velocity=(0.0, 0.0, 0.0), turning=(0.0, 0.0))
-
-
-def _number(given: Mapping[str, Any], name: str, most: float) -> float:
-    """A number of a message, 0 where it is not there."""
-    value = given.get(name, 0.0)
-    fits = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
-    require(fits, name, f"a number of at most {most:g}", value)
-    return float(value)
-
 
 def _finite(facts: Mapping[str, Any]) -> dict[str, Any]:
     """With None for numbers that JSON cannot hold."""
@@ -298,3 +203,8 @@ def _finite(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 def _scale(scale: ColorScale) -> str:
     return f"{number(scale.shown[0])} to {number(scale.shown[1])} {scale.unit}"
+
+
+def one_line(error: Exception) -> str:
+    """What an error says, in at most 300 letters."""
+    return " ".join(f"{error}".split())[:300] or type(error).__name__

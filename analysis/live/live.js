@@ -109,7 +109,11 @@ function show(header) {
   set("strength", "value", String(header.strength));
   for (const one of document.querySelectorAll("[data-control]")) {
     const value = String(controls[one.dataset.control]);
-    if (document.activeElement !== one && one.value !== value) {
+    if (one.dataset.steps) {
+      const at = steps(one).indexOf(value);
+      if (document.activeElement !== one && at >= 0) one.value = String(at);
+      one.setAttribute("aria-valuetext", value);
+    } else if (document.activeElement !== one && one.value !== value) {
       if (one.tagName === "SELECT" && ![...one.options].some((each) => each.value === value)) one.add(new Option(value));
       one.value = value;
     }
@@ -130,6 +134,11 @@ function show(header) {
   part("save").hidden = header.recording === null;
   part("save").textContent = `stop and save ${(header.recording || 0).toFixed(1)} s`;
   table(frozen);
+}
+
+// The values of a slider whose steps are not even.
+function steps(one) {
+  return one.dataset.steps.split(" ");
 }
 
 function said(side, facts, header) {
@@ -186,7 +195,8 @@ part("strength").addEventListener("input", (event) => tell({ do: "strength", val
 for (const one of document.querySelectorAll("[data-control]")) {
   one.addEventListener("change", () => {
     const now = state.controls[one.dataset.control];
-    tell({ do: "set", name: one.dataset.control, value: typeof now === "number" ? Number(one.value) : one.value });
+    const value = one.dataset.steps ? steps(one)[Number(one.value)] : one.value;
+    tell({ do: "set", name: one.dataset.control, value: typeof now === "number" ? Number(value) : value });
     if (one.tagName === "SELECT") one.blur();
   });
 }

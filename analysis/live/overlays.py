@@ -104,6 +104,10 @@ def mean_newest_s(seen: DisplayState) -> float | None:
 
 def predicted_error(seen: DisplayState) -> float | None:
     """Root of the mean square that the policy takes its errors to have; None where it does not tell."""
-    if EXPECTED not in seen.shown[1].maps:
+    maps = seen.shown[1].maps
+    if EXPECTED not in maps:
         return None
-    return float(np.sqrt(np.square(seen.shown[1].maps[EXPECTED].values.numpy(), dtype=np.float64).mean()))
+    try:
+        return float(np.sqrt(np.square(maps[EXPECTED].values.numpy(), dtype=np.float64).mean()))
+    except Exception:  # a map may be anybody's; the overlay says why it cannot be drawn
+        return None

@@ -132,10 +132,12 @@ def page(title: str, token: str) -> str:
     chosen = {
         "policies": [NOTHING, *policies()],
         "solvers": list(SOLVERS),
-        "resolutions": list(RESOLUTIONS),
-        "batches": list(BATCHES),
-        "latencies": [*range(LATENCY_MOST + 1)],
     }
+    steps = {"resolutions": RESOLUTIONS, "batches": BATCHES}
+    text = text.replace("{{latency_most}}", str(LATENCY_MOST))
+    for name, values in steps.items():
+        text = text.replace(f"{{{{{name}}}}}", " ".join(map(str, values)))
+        text = text.replace(f"{{{{{name}_last}}}}", str(len(values) - 1))
     for name, values in chosen.items():
         text = text.replace(f"{{{{{name}}}}}", "".join(f"<option>{html.escape(str(one))}</option>" for one in values))
     return text.replace("{{title}}", html.escape(title)).replace("{{token}}", token)

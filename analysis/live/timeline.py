@@ -19,13 +19,13 @@ from analysis.live import camera as cameras
 from analysis.live.camera import Drive
 from scenes.canonical import Scene
 from scenes.retiming import Keys, Motions, camera_track, instance_tracks, steady, still_keys, with_keys
-from scenes.sessions import Session
+from scenes.sessions import KEYS_MOST, Session
 
 INTERVAL_S = 1.0 / 120.0
 KEYS, PAST = 512, 384
 """Keys that a renderer sees at a time, and how many of them are settled: 3.2 s back, 1.1 s ahead."""
 KEPT_MOST = 72_000
-"""Settled keys that are kept for recording: ten minutes."""
+"""Settled keys that are kept while nothing is recorded: ten minutes."""
 _DROPPED = 1200
 
 
@@ -59,6 +59,7 @@ class Timeline:
 
     Attributes:
         scene: with the keys, for a renderer.
+        recording: whether as many keys are kept as a session can hold, which are those of more than two hours.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -78,6 +79,7 @@ class Timeline:
         drive, still = self.drive, np.zeros(KEYS)
         inner = np.tile(drive.translation, (KEYS, 1)), np.tile(drive.rotation, (KEYS, 1))
         self._camera, self._instances = self._keys_at(still, inner)
+        self.recording = False
         self._settled: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         self._dropped = 0
         self._keep(still[:1], (self._camera[0][:1], self._camera[1][:1]))
@@ -131,13 +133,17 @@ class Timeline:
         with self._lock:
             self.animation.at_s = float(np.clip(at_s, 0.0, max(self.animation.duration_s, 0.0)))
 
+    def seconds(self, begin: int) -> float:
+        """Of the session from a key to the newest, as far as it was kept."""
+        return INTERVAL_S * (self._newest - max(begin, self._dropped))
+
     @property
     def count(self) -> int:
         """Of the keys settled so far."""
         return self._newest + 1
 
     def session(self, begin: int, **facts: Any) -> Session:
-        """What happened from a key to the newest; of very long ones the last ten minutes.
+        """What happened from a key to the newest, as far as it was kept.
 
         Args:
             begin: number of its first key.
@@ -167,10 +173,11 @@ class Timeline:
         return found
 
     def _keep(self, times_s: NDArray[np.float64], camera: Keys) -> None:
+        count = max(_DROPPED, len(times_s))
         self._settled += list(zip(times_s.tolist(), *camera, strict=True))
-        if len(self._settled) > KEPT_MOST + _DROPPED:
-            del self._settled[:_DROPPED]
-            self._dropped += _DROPPED
+        if len(self._settled) > (KEYS_MOST - count if self.recording else KEPT_MOST + count):
+            del self._settled[:count]
+            self._dropped += count
 
     def _keys_ahead(self, count: int) -> tuple[Keys, Keys]:
         """Guessed keys of the camera and of instances, from the next one on."""

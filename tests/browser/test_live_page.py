@@ -114,9 +114,12 @@ def test_controls_act(page: Page, hub: Hub) -> None:
     page.locator("#strength").fill("1")
     expect(page.locator("#right-said")).to_contain_text("samples per element", timeout=PATIENCE_MS)
     assert apart(before, settled(page)) > 5
-    page.locator("#c-batch").select_option("1024")
+    page.locator("#c-batch").fill("7")
     expect(page.locator("#note")).to_contain_text("batch_size", timeout=PATIENCE_MS)
-    expect(page.locator("#c-batch")).to_have_value("16")
+    page.locator("#c-batch").blur()
+    expect(page.locator("#c-batch")).to_have_value("1")
+    expect(page.locator("#c-batch")).to_have_attribute("aria-valuetext", "16")
+    expect(page.locator("output[for=c-batch]")).to_have_text("16")
     page.locator("#scrub").fill("1.5")
     expect(page.locator("#at")).to_have_text("1.50 s", timeout=PATIENCE_MS)
     assert engine.timeline.animation.at_s == 1.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 from collections.abc import Iterator
@@ -14,9 +15,10 @@ import numpy as np
 import pytest
 
 from analysis.live.engine import Engine
-from analysis.live.hub import Hub, Watcher, replay
+from analysis.live.hub import Hub, Watcher
 from analysis.live.options import Controls
 from analysis.live.overlays import codes
+from analysis.live.requests import replay
 from analysis.metrics.quality import pixel_errors
 from analysis.page.video import to_pixels
 from scenes.sessions import read_session
@@ -257,3 +259,27 @@ def test_what_is_driven_is_saved(hub: Hub) -> None:
     assert names[0] != names[1] and names[0].parent == hub.engine.options.out
     assert read_session(names[0]).seconds > 0.1
     hub.engine.timeline.reset()
+
+
+def test_a_map_that_cannot_be_drawn_leaves_the_picture_and_is_said(hub: Hub) -> None:
+    class Broken(dict[str, Any]):
+        def __getitem__(self, name: str) -> Any:
+            raise RuntimeError("a map of another package")
+
+    watcher = hub.came()
+    before = shown(hub, watcher)
+    tell(hub, watcher, "freeze")
+    run = hub.engine.look().runs["right"]
+    assert run is not None
+    seen = run.at(hub.engine.now_s)
+    assert seen is not None
+    record, display = seen.shown
+    display = copy.copy(display)
+    object.__setattr__(display, "maps", Broken({"broken": 0, "expected error": 0}))
+    run._ready[0] = replace(seen, shown=(record, display), number=seen.number + 1)
+    tell(hub, watcher, "overlay", side="right", label="broken")
+    header, pictures = frame(hub, watcher)
+    assert "broken" in header["sides"]["right"]["overlays"] and header["sides"]["right"]["predicted"] is None
+    assert header["sides"]["right"]["scale"] == "cannot be drawn (a map of another package)"
+    assert pictures["right"].shape == before["right"].shape and frame(hub, watcher)[0]["sides"]["right"]["name"]
+    tell(hub, watcher, "go_on")

@@ -66,3 +66,13 @@ def test_the_table_has_every_size_alone_and_together(monkeypatch: pytest.MonkeyP
     assert len(asked) == 3 * len(SIZES) and len(table.rows) == 4 * len(SIZES)  # type: ignore[union-attr]
     assert table.rows[0] == ("256", "framed", "–", "50.0", "10.0", "5.0", "0.25")  # type: ignore[union-attr]
     assert "cores" in said and "batch 16" in said  # type: ignore[operator]
+
+
+def test_a_policy_that_stops_is_said_in_the_table_of_rates(monkeypatch: pytest.MonkeyPatch) -> None:
+    from analysis.live import bench
+
+    stopped = bench.Rate(64, "framed", "", 0, 2.0, 0.0, 0.5, "out of memory")
+    monkeypatch.setattr(bench, "driven", lambda *_: [stopped])
+    table, _ = cycle_rates(options())
+    assert not isinstance(table, str)
+    assert table.rows[0] == ("64", "framed", "–", "failed: out of memory", "–", "–", "–")

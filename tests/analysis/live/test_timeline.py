@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import analysis.live.timeline as timelines
 from analysis.live import camera as cameras
 from analysis.live.camera import Drive, at_rest, later, moved, riding, turned
 from analysis.live.timeline import INTERVAL_S, KEYS, PAST, Timeline
@@ -139,3 +140,26 @@ def test_a_session_holds_what_was_driven(scene: Scene) -> None:
     assert np.linalg.norm(gone) == pytest.approx(3.0 * session.seconds)
     assert np.allclose(np.diff(session.animation_s), INTERVAL_S)
     assert np.array_equal(session.translation[-1], timeline.keys()[1][0, PAST - 1])
+
+
+def test_a_recording_is_not_cut_as_long_as_a_session_can_hold_it(scene: Scene, monkeypatch) -> None:
+    monkeypatch.setattr(timelines, "KEPT_MOST", 240)
+    monkeypatch.setattr(timelines, "KEYS_MOST", 960)
+    monkeypatch.setattr(timelines, "_DROPPED", 60)
+    timeline = Timeline(scene)
+    timeline.animation.playing = False
+    timeline.advance(1.0)
+    begin, timeline.recording = timeline.count - 1, True
+    for second in range(2, 7):
+        timeline.advance(float(second))
+    facts = {"scene": "chase", "phase": 0.0, "camera_path": ""}
+    assert timeline.seconds(begin) == pytest.approx(5.0, abs=0.02)
+    assert timeline.session(begin, **facts).seconds == pytest.approx(timeline.seconds(begin))
+    for second in range(7, 20):
+        timeline.advance(float(second))
+    assert 5.9 < timeline.seconds(begin) <= 960 * INTERVAL_S, "no more keys than a session may have"
+    assert timeline.session(begin, **facts).seconds == pytest.approx(timeline.seconds(begin))
+    timeline.recording = False
+    for second in range(20, 40):
+        timeline.advance(float(second))
+    assert timeline.seconds(0) < 4.0
