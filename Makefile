@@ -32,7 +32,7 @@ live: $(BASE)
 
 lint: $(STAMP)
 	$(VENV)/bin/ruff check .
-	$(VENV)/bin/clang-format --dry-run --Werror renderer/*/native/*.h
+	$(VENV)/bin/clang-format --dry-run --Werror renderer/*/native/*.h analysis/bench/native/*.c
 	$(VENV)/bin/pyright
 
 # on all cores, as far as memory allows; a worker continues with neighbouring tests, which share fixtures

@@ -47,6 +47,14 @@ def versions() -> dict[str, str | None]:
     return found
 
 
+def uses_avx512(isa: str) -> bool:
+    """Whether code for an instruction set (``native``, ``avx2`` or ``avx512``) uses AVX-512 here."""
+    import torch
+
+    has = torch.backends.cpu.get_cpu_capability() == "AVX512"
+    return isa == "avx512" or (isa == "native" and has)
+
+
 def installed(module: str) -> bool:
     """Whether a peer can be imported."""
     return importlib.util.find_spec(module) is not None

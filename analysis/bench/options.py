@@ -30,6 +30,9 @@ GROUPS = (
 ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "conversion", "start")
 """Groups that do not run on a GPU."""
 
+ON_ANY_ISA = ("coherent", "incoherent", "cores", "order", "hits", "overhead", "tsar", "growth")
+"""Groups in which our side, and Embree, can be limited to an instruction set."""
+
 FRAMELET_SIDE = 16
 _FEWEST_REPETITIONS = 7
 
@@ -40,7 +43,7 @@ class BenchOptions:
     """The speed of the simulator beside its peers: rays, shaded samples, overhead, growth, start."""
 
     out: Path = Path("out/bench")
-    """Folder for the results; bench.json and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
+    """Folder for the results; bench.json, tables.md and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """What to do, instead of everything; a group, or several with commas between; may be repeated. Without it all run:
     coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, growth, conversion, start."""
@@ -48,6 +51,9 @@ class BenchOptions:
     """Two bench.json whose figures of our side are compared; nothing is run."""
     device: Literal["cpu", "cuda:0"] = "cpu"
     """Where rays are traced; peers stay on the CPU."""
+    isa: Literal["native", "avx2", "avx512"] = "native"
+    """Instruction set of our code and of Embree: native is this processor's. With another one, the groups run in which
+    both can be limited."""
     repetitions: int = 9
     """Repetitions of each; turns of a case; the medians are reported."""
     resolution_px: int = 512
@@ -68,6 +74,9 @@ class BenchOptions:
     def __post_init__(self) -> None:
         for name in self.groups:
             require(name in GROUPS, "only", f"one of {', '.join(GROUPS)}", name)
+        limited = self.isa == "native" or set(self.groups) <= set(ON_ANY_ISA)
+        require(limited, "isa", f"native, or only groups of {', '.join(ON_ANY_ISA)}", self.isa)
+        require(self.isa == "native" or self.device == "cpu", "isa", "native on a GPU", self.isa)
         least = _FEWEST_REPETITIONS
         limits.within(self, repetitions=(least, limits.REPETITIONS[1]), subdivisions=(0, 9), cycles=(100, 10**6))
         side = self.resolution_px
@@ -80,7 +89,8 @@ class BenchOptions:
     @property
     def groups(self) -> tuple[str, ...]:
         """Groups to run, in the order of the table."""
-        asked = [name.strip() for part in self.only for name in part.split(",")] or list(GROUPS)
+        every = GROUPS if self.isa == "native" else ON_ANY_ISA
+        asked = [name.strip() for part in self.only for name in part.split(",")] or list(every)
         known = [name for name in GROUPS if name in asked]
         return tuple(known + [name for name in asked if name not in GROUPS])
 

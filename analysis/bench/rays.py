@@ -1,17 +1,22 @@
-"""Groups coherent and incoherent: rays per second beside Embree, one thread each, on the same rays."""
+"""Groups coherent and incoherent: rays per second of CPU time beside Embree, one thread each, on the same rays.
+
+The peer is the fastest of Embree's modes for each question.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.bench.embree import EmbreeMesh
-from analysis.bench.machine import installed
+from analysis.bench.embree import MODES, EmbreeMesh, EmbreexMesh, Mode, missing
+from analysis.bench.machine import installed, uses_avx512
 from analysis.bench.options import BenchOptions
 from analysis.bench.rows import NOT_INSTALLED, Row, rate_row
 from analysis.bench.scenes import LIGHT, bumpy_sphere, camera_rays, morton_batches
@@ -22,10 +27,10 @@ if TYPE_CHECKING:
     from analysis.command.progress import Bars, Task
     from renderer.rays.queries import RayQueries
 
-CLOSEST_TARGETS = {5: 3.0, 8: 2.0}
-"""Least ratio of closest hits by subdivisions: meshes of 20 thousand and of a million triangles."""
-
-SHADOW_TARGET, INCOHERENT_TARGET = 2.0, 0.8
+TARGETS = {"camera rays": 2.0, "shadow rays": 1.5, "glossy bounces": 1.0, "random directions": 1.0}
+"""Least ratio to the fastest of Embree's modes."""
+GLOSSY_AVX512 = 1.1
+"""The same for glossy bounces where AVX-512 is used."""
 
 _OFFSET = 1.0e-4  # in units of the mesh's size, from the surface to the origin of a secondary ray
 _JITTER = 0.15  # of a glossy mirror: about the width of a Phong lobe of exponent 100
@@ -55,7 +60,6 @@ class Question:
 
     name: str
     calls: list[Rays]
-    target: float | None
 
 
 def coherent(options: BenchOptions, bars: Bars) -> Iterator[Row]:
@@ -68,7 +72,7 @@ def incoherent(options: BenchOptions, bars: Bars) -> Iterator[Row]:
     yield from _rows("incoherent", _incoherent_questions, options, bars)
 
 
-Ask = Callable[[Mesh, int, "RayQueries", BenchOptions], list[Question]]
+Ask = Callable[[Mesh, "RayQueries", BenchOptions], list[Question]]
 
 
 def _rows(group: str, ask: Ask, options: BenchOptions, bars: Bars) -> Iterator[Row]:
@@ -78,31 +82,66 @@ def _rows(group: str, ask: Ask, options: BenchOptions, bars: Bars) -> Iterator[R
     for subdivisions in options.subdivisions:
         mesh = bumpy_sphere(subdivisions)
         ours = RayQueries(mesh.vertices, mesh.faces, threads=1)
-        peer = EmbreeMesh(mesh.vertices, mesh.faces) if installed("embreex") else None
-        for question in ask(mesh, subdivisions, ours, options):
-            row = Row(group, f"{question.name}, {len(mesh.faces):,} triangles", "M rays/s", 0.0, "Embree")
-            yield compare(row, question, ours, peer, options.repetitions, task)
+        peer = EmbreexMesh(mesh.vertices, mesh.faces) if installed("embreex") else None
+        embree = EmbreeMesh(mesh.vertices, mesh.faces, options.isa) if not missing() else None
+        for question in ask(mesh, ours, options):
+            target = TARGETS[question.name]
+            if question.name == "glossy bounces" and uses_avx512(options.isa):
+                target = GLOSSY_AVX512
+            row = Row(group, f"{question.name}, {len(mesh.faces):,} triangles", "M rays/s", 0.0, target=target)
+            yield compare(row, question, ours, peer, embree, options.repetitions, task)
 
 
 def compare(
     row: Row,
     question: Question,
     ours: RayQueries,
-    peer: EmbreeMesh | None,
+    peer: EmbreexMesh | None,
+    embree: EmbreeMesh | None,
     repetitions: int,
     task: Task,
 ) -> Row:
-    """Fills a row: both sides answer all calls of a question in turns."""
-    cases: dict[str, Callable[[], object]] = {"ours": lambda: [_ask(ours, rays) for rays in question.calls]}
+    """Fills a row: all sides answer all calls of a question in turns, and the fastest peer counts.
+
+    Args:
+        row: group, name, unit and target.
+        question: the calls.
+        ours, peer, embree: our side, embreex, and Embree's own interface; None where a peer is missing.
+        repetitions: turns of each.
+        task: progress that advances by one step a round.
+    """
+    answers: dict[str, Callable[[Rays], object]] = {"ours": lambda rays: _ask(ours, rays)}
     note = NOT_INSTALLED
     if peer is not None:
-        cases["peer"] = lambda: [_ask(peer, rays) for rays in question.calls]
+        answers["embreex"] = lambda rays: _ask(peer, rays)
         wrong = sum(disagreements(ours, peer, rays) for rays in question.calls)
         note = f"{wrong} of {sum(rays.count for rays in question.calls):,} rays disagree"
-    seconds = take_turns(cases, repetitions, task)
+    if embree is not None:
+        answers |= {mode.name: _asking(embree, mode) for mode in MODES}
+    seconds = take_turns(
+        {name: _all_calls(answer, question) for name, answer in answers.items()}, repetitions, task,
+        clock=time.process_time,
+    )  # fmt: skip
     work = sum(rays.count for rays in question.calls) / 1e6
-    row = dataclasses.replace(row, note=note)
-    return rate_row(row, work, seconds["ours"], seconds.get("peer"), question.target)
+    peers = {name: median(taken) for name, taken in seconds.items() if name != "ours"}
+    best = min(peers, key=peers.__getitem__, default="")
+    others = [f"{name} {work / taken:.3g}" for name, taken in peers.items() if name != best]
+    without = f"without Embree's own modes: {missing()}" if peer is not None and embree is None else ""
+    row = dataclasses.replace(row, peer_name=best, note="; ".join(part for part in (note, *others, without) if part))
+    return rate_row(row, work, seconds["ours"], seconds.get(best), row.target)
+
+
+def _all_calls(answer: Callable[[Rays], object], question: Question) -> Callable[[], object]:
+    return lambda: [answer(rays) for rays in question.calls]
+
+
+def _asking(embree: EmbreeMesh, mode: Mode) -> Callable[[Rays], object]:
+    def asked(rays: Rays) -> object:
+        if rays.t_max is None:
+            return embree.closest(mode, rays.origin, rays.direction)
+        return embree.blocked(mode, rays.origin, rays.direction, rays.t_max)
+
+    return asked
 
 
 def _ask(side: Any, rays: Rays) -> object:
@@ -111,7 +150,7 @@ def _ask(side: Any, rays: Rays) -> object:
     return side.blocked(rays.origin, rays.direction, rays.t_max)
 
 
-def disagreements(ours: RayQueries, peer: EmbreeMesh, rays: Rays) -> int:
+def disagreements(ours: RayQueries, peer: EmbreexMesh, rays: Rays) -> int:
     """Rays of which one side alone hits something, or the two hit at different distances.
 
     Faces are not compared: on an edge shared by two faces, either is right.
@@ -171,21 +210,15 @@ def random_rays(mesh: Mesh, count: int, generator: np.random.Generator) -> Rays:
     return Rays(generator.uniform(low, high, (count, 3)).astype(np.float32), direction.astype(np.float32))
 
 
-def _coherent_questions(mesh: Mesh, subdivisions: int, ours: RayQueries, options: BenchOptions) -> list[Question]:
+def _coherent_questions(mesh: Mesh, ours: RayQueries, options: BenchOptions) -> list[Question]:
     calls = framelet_calls(options)
     shadows = [shadow_rays(mesh, ours, rays) for rays in calls]
-    return [
-        Question("camera rays", calls, CLOSEST_TARGETS.get(subdivisions)),
-        Question("shadow rays", shadows, SHADOW_TARGET),
-    ]
+    return [Question("camera rays", calls), Question("shadow rays", shadows)]
 
 
-def _incoherent_questions(mesh: Mesh, subdivisions: int, ours: RayQueries, options: BenchOptions) -> list[Question]:
+def _incoherent_questions(mesh: Mesh, ours: RayQueries, options: BenchOptions) -> list[Question]:
     generator = np.random.default_rng(0)
     calls = framelet_calls(options)
     bounces = [glossy_bounces(mesh, ours, rays, generator) for rays in calls]
     scattered = [random_rays(mesh, rays.count, generator) for rays in calls]
-    return [
-        Question("glossy bounces", bounces, INCOHERENT_TARGET),
-        Question("random directions", scattered, INCOHERENT_TARGET),
-    ]
+    return [Question("glossy bounces", bounces), Question("random directions", scattered)]

@@ -17,13 +17,16 @@ from analysis.bench.rows import SPREAD, Group, Row
 from analysis.bench.scenes import driving_scenes
 from analysis.bench.shading import shaded
 from analysis.bench.start import start_rows
+from analysis.bench.tables import group_tables
 from analysis.bench.threads import cores, hits, order
 from analysis.command import progress
 from analysis.command.cli import bad_input, full_disk
-from analysis.storage.files import write_json
+from analysis.command.console import markdown
+from analysis.storage.files import atomic, write_json
 from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 
+TABLES = "tables.md"
 MEASURED_BY: Mapping[str, Group] = {
     "coherent": coherent,
     "incoherent": incoherent,
@@ -50,15 +53,22 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
         InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
-        own_results(options.out, (f"bench{options.file_ending}.json", f"summary{options.file_ending}.json"))
+        own_results(options.out, (f"bench{options.file_ending}.json", f"summary{options.file_ending}.json", TABLES))
         driving_scenes(options)
-        from renderer.compute.device import pick
+        from renderer.compute.device import pick, use_instructions
 
         pick(options.device)
+        use_instructions(options.isa)
     ending = options.file_ending
     summary = options.out / f"summary{ending}.json"
     summary.unlink(missing_ok=True)
-    place = {"device": options.device, "machine": machine(options.device), "versions": versions(), "spread": SPREAD}
+    place = {
+        "device": options.device,
+        "isa": options.isa,
+        "machine": machine(options.device),
+        "versions": versions(),
+        "spread": SPREAD,
+    }
     rows: list[Row] = []
     found: dict[str, Any] = {**place, "rows": []}
     with progress.bars() as bars, full_disk(options.out):
@@ -68,6 +78,8 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
             rows += MEASURED_BY[name](options, bars)
             found = {**place, "rows": [row.record() for row in rows]}
             write_json(options.out / f"bench{ending}.json", found)
+        with atomic(options.out / TABLES) as file:
+            file.write_text(markdown(group_tables(found)), encoding="utf-8")
         write_json(summary, _summary(options, rows))
     return found
 

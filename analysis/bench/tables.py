@@ -22,28 +22,38 @@ def figure(value: float | None) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
 
 
+_COLUMNS = ("unit", "ours", "peer", "ratio", "spread", "target", "met")
+
+
 def rows_table(found: Mapping[str, Any]) -> Table:
     """All rows of a ``bench.json``, with numbered notes.
 
     Args:
         found: content of the file.
     """
-    header = ("group", "name", "unit", "ours", "peer", "ratio", "spread", "target", "met")
-    rows = [
-        (
-            row["group"],
-            row["name"],
-            row["unit"],
-            figure(row["ours"]),
-            " ".join(part for part in (figure(row["peer"]), row["peer_name"]) if part),
-            figure(row["ratio"]),
-            " – ".join(figure(value) for value in row["spread"] or ()),
-            figure(row["target"]),
-            _MET[row["met"]],
-        )
-        for row in found["rows"]
+    rows = [(row["group"], row["name"], *_figures(row)) for row in found["rows"]]
+    return Table(_title(found), ("group", "name", *_COLUMNS), rows, _caption(found), words=3, grouped=True)
+
+
+def group_tables(found: Mapping[str, Any]) -> list[Table]:
+    """The rows of a ``bench.json``, a table a group, without notes; the group is the name of the first column."""
+    groups = dict.fromkeys(row["group"] for row in found["rows"])
+    return [
+        Table(name, (name, *_COLUMNS), [(row["name"], *_figures(row)) for row in found["rows"] if row["group"] == name])
+        for name in groups
     ]
-    return Table(_title(found), header, rows, _caption(found), words=3, grouped=True)
+
+
+def _figures(row: Mapping[str, Any]) -> tuple[str, ...]:
+    return (
+        row["unit"],
+        figure(row["ours"]),
+        " ".join(part for part in (figure(row["peer"]), row["peer_name"]) if part),
+        figure(row["ratio"]),
+        " – ".join(figure(value) for value in row["spread"] or ()),
+        figure(row["target"]),
+        _MET[row["met"]],
+    )
 
 
 def _title(found: Mapping[str, Any]) -> str:
@@ -51,7 +61,8 @@ def _title(found: Mapping[str, Any]) -> str:
     gpu = f", {machine['gpu']}" if "gpu" in machine else ""
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in found["versions"].items())
     size = f"{machine['cores']} cores, {machine['memory_gib']} GiB{gpu}"
-    return f"{machine['cpu']}, {size}, load average before {machine['load_average']:.2f}\n{versions}"
+    isa = "" if found.get("isa", "native") == "native" else f", limited to {found['isa']}"
+    return f"{machine['cpu']}, {size}{isa}, load average before {machine['load_average']:.2f}\n{versions}"
 
 
 def _caption(found: Mapping[str, Any]) -> str:

@@ -76,6 +76,25 @@ def initialise() -> None:
         wp.init()
 
 
+INSTRUCTIONS = {"native": "-march=native", "avx2": "-target-cpu haswell", "avx512": "-target-cpu skylake-avx512"}
+"""Compiler options by the instruction set of the kernels; ``native`` is this processor's."""
+
+
+def use_instructions(isa: str) -> None:
+    """Limits kernels that are loaded from now on to an instruction set of :data:`INSTRUCTIONS`.
+
+    Raises:
+        DeviceError: this processor does not have it.
+    """
+    had = torch.backends.cpu.get_cpu_capability()
+    if (isa == "avx512" and had != "AVX512") or (isa == "avx2" and had not in ("AVX2", "AVX512")):
+        raise DeviceError(f"isa: expected instructions that this processor has, got {isa!r}")
+    options = wp.config.cpu_compiler_flags or ""
+    for one in INSTRUCTIONS.values():
+        options = options.replace(one, INSTRUCTIONS[isa])
+    wp.config.cpu_compiler_flags = options
+
+
 def pick(device: str) -> str:
     """Checks the name of a device and that the device exists.
 
