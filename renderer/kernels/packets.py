@@ -12,18 +12,15 @@ import warp as wp
 
 from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
-from renderer.compute.sizes import LANES
 from renderer.layout import sizes
 from renderer.layout.features import PACKETS, Feature
 from renderer.layout.structs import SceneData, ViewData
 
 
 @wp.struct
-class Queries:
+class SingleQueries:
     """Rays through one mesh, and arrays for their hits: ``face`` is -1 for a miss, or a flag where any hit suffices."""
 
-    nodes: wp.array(dtype=wp.float32)
-    blocks: wp.array(dtype=wp.float32)
     origin: wp.array(dtype=wp.vec3)
     direction: wp.array(dtype=wp.vec3)
     reach: wp.array(dtype=wp.float32)
@@ -56,12 +53,12 @@ def native_build_tree(
 
 @wp.func_native("packets::trace_single(scene, rays, ray, nearest != 0, (long long*)work.data);")
 def native_trace_single(
-    scene: SceneData, rays: Queries, ray: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)
+    scene: SceneData, rays: SingleQueries, ray: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)
 ): ...
 
 
-@wp.func_native("packets::trace_queries(rays, first, nearest != 0);")
-def native_trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32): ...
+@wp.func_native("packets::trace_queries(*(const packets::Queries*)rays, first, end, nearest != 0);")
+def native_trace_queries(rays: Address, first: wp.int32, end: wp.int32, nearest: wp.int32): ...
 
 
 @wp.func_native(
@@ -114,15 +111,17 @@ def build_tree(
 
 
 @wp.kernel(enable_backward=False)
-def trace_singles(scene: SceneData, rays: Queries, first: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)):
+def trace_singles(
+    scene: SceneData, rays: SingleQueries, first: wp.int32, nearest: wp.int32, work: wp.array(dtype=wp.int64)
+):
     """Traces one ray per thread through the scene's first mesh, from ray ``first`` on, and sums the work."""
     native_trace_single(scene, rays, first + wp.tid(), nearest, work)
 
 
 @wp.kernel(enable_backward=False)
-def trace_queries(rays: Queries, first: wp.int32, nearest: wp.int32):
-    """Traces sixteen rays per thread, from ray ``first`` on."""
-    native_trace_queries(rays, first + LANES * wp.tid(), nearest)
+def trace_queries(rays: Address, first: wp.int32, end: wp.int32, nearest: wp.int32):
+    """Traces the rays from ``first`` up to ``end`` of the record ``Queries`` in ``native/queries.h``."""
+    native_trace_queries(rays, first, end, nearest)
 
 
 @wp.kernel(enable_backward=False)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
+import torch
 from numpy.typing import ArrayLike, NDArray
 
-from renderer.compute.launching import shared
-from renderer.compute.sizes import LANES
+from renderer.compute.launching import Command, NativeRecord, address
 from renderer.kernels import packets
-from renderer.layout.sizes import FAR
+from renderer.layout.sizes import BLOCK_FLOATS, BLOCK_WIDTH, FAR
 from renderer.tables.trees import aligned, build_tree
 
-_RANGE_RAYS = 1 << 14
+_RANGE_RAYS = 1 << 14  # a multiple of the lanes
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,9 @@ class RayQueries:
         if threads < 1:
             raise ValueError(f"threads: expected at least 1, got {threads}")
         tree = build_tree(vertices, faces)
-        self._nodes, self._blocks = (shared(aligned(part), wp.float32) for part in (tree.nodes, tree.blocks))
+        self._nodes, self._blocks = aligned(tree.nodes), aligned(tree.blocks)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._of_thread = threading.local()
 
     def closest(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None = None) -> RayHits:
         """Nearest hits of rays ``(n, 3)`` up to ``t_max``, a number or ``(n,)``; directions need not be unit.
@@ -80,20 +81,27 @@ class RayQueries:
         if starts.ndim != 2 or starts.shape[1] != 3 or ways.shape != starts.shape:
             raise ValueError(f"rays: expected origins and directions (n, 3), got {starts.shape} and {ways.shape}")
         count = len(starts)
-        reach = np.full(count, FAR, np.float32)
+        reach = None
         if t_max is not None:
-            reach = np.minimum(reach, np.broadcast_to(np.asarray(t_max, np.float32), count))
+            reach = np.minimum(np.float32(FAR), np.broadcast_to(np.asarray(t_max, np.float32), count))
         hits = RayHits(np.empty(count, np.int32), *(np.empty(count if nearest else 0, np.float32) for _ in range(3)))
-        rays = packets.Queries()
-        rays.nodes, rays.blocks = self._nodes, self._blocks
-        rays.origin, rays.direction = shared(starts, wp.vec3), shared(ways, wp.vec3)
-        rays.reach, rays.face = shared(reach, wp.float32), shared(hits.face, wp.int32)
-        rays.t, rays.u, rays.v = (shared(part, wp.float32) for part in (hits.t, hits.u, hits.v))
+        rays, floats = NativeRecord("2Q2q7Q"), torch.float32
+        rays.set(
+            self._nodes.ctypes.data, self._blocks.ctypes.data, self._blocks.size // BLOCK_FLOATS * BLOCK_WIDTH, count,
+            address("origin", starts, floats, 3 * count), address("direction", ways, floats, 3 * count),
+            0 if reach is None else address("t_max", reach, floats, count),
+            hits.face.ctypes.data, hits.t.ctypes.data, hits.u.ctypes.data, hits.v.ctypes.data,
+        )  # fmt: skip
 
         def run(first: int) -> None:
-            dim = -(-min(_RANGE_RAYS, count - first) // LANES)
-            wp.launch(packets.trace_queries, dim=dim, inputs=[rays, first, int(nearest)], device="cpu")
+            self._launch()(rays.address, first, min(first + _RANGE_RAYS, count), int(nearest))
 
         for _ in (map if self._pool is None else self._pool.map)(run, range(0, count, _RANGE_RAYS)):
             pass
         return hits
+
+    def _launch(self) -> Command:
+        """The launch of this thread."""
+        if not hasattr(self._of_thread, "launch"):
+            self._of_thread.launch = Command(packets.trace_queries)
+        return self._of_thread.launch

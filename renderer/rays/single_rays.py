@@ -84,7 +84,7 @@ class SingleRays:
         count = len(starts)
         reach = np.full(count, t_max, np.float32)
         hits = RayHits(np.empty(count, np.int32), *(np.empty(count if nearest else 0, np.float32) for _ in range(3)))
-        rays = packets.Queries()
+        rays = packets.SingleQueries()
         rays.origin, rays.direction = shared(starts, wp.vec3), shared(ways, wp.vec3)
         rays.reach, rays.face = shared(reach, wp.float32), shared(hits.face, wp.int32)
         rays.t, rays.u, rays.v = (shared(part, wp.float32) for part in (hits.t, hits.u, hits.v))

@@ -65,6 +65,12 @@ template <class F, class T> inline F load(const T* from) {
 }
 template <class F, class T> inline void store(T* to, F value) { __builtin_memcpy(to, &value, sizeof(F)); }
 
+// Stores the first `used` of sixteen lanes.
+template <class F, class T> inline void put_first(T* to, const F& value, int used) {
+    if (used == LANES) return store(to, value);
+    __builtin_memcpy(to, &value, sizeof(T) * used);
+}
+
 // Reductions over all lanes, by halves.
 inline float least(f16 a) {
     f8 b = vmin((f8)a.lo, (f8)a.hi);

@@ -19,11 +19,6 @@ template <bool any> inline void take(PacketHit& hit, int lane, const RayHit& met
 }
 // The current hit of a lane.
 inline RayHit hit_of(const PacketHit& hit, int lane) { return {hit.t[lane], 0.0f, 0.0f, hit.face[lane]}; }
-inline Single single_of(const Vec16& from, const Vec16& along, int lane) {
-    const float origin[3] = {from.x[lane], from.y[lane], from.z[lane]};
-    const float direction[3] = {along.x[lane], along.y[lane], along.z[lane]};
-    return Single(origin, direction);
-}
 
 // Tests a few lanes of a packet against a leaf, each with four triangles at once. Returns those with a new hit; with
 // `any` they become idle.
@@ -43,10 +38,41 @@ inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& 
     return changed;
 }
 
+// Sixteen rays in memory, for access ray by ray: a lane of a vector is written, and often read, through a copy of the
+// whole vector.
+struct LaneRays {
+    alignas(64) float origin[3][LANES], direction[3][LANES];
+
+    LaneRays(const Vec16& from, const Vec16& along) {
+        for (int axis = 0; axis < 3; ++axis) store(origin[axis], from[axis]), store(direction[axis], along[axis]);
+    }
+    Single single(int lane) const {
+        const float from[3] = {origin[0][lane], origin[1][lane], origin[2][lane]};
+        const float along[3] = {direction[0][lane], direction[1][lane], direction[2][lane]};
+        return Single(from, along);
+    }
+};
+
+// Hits of sixteen rays in memory, likewise.
+struct LaneHits {
+    alignas(64) float t[LANES], u[LANES], v[LANES];
+    alignas(64) int face[LANES];
+
+    explicit LaneHits(const PacketHit& hit) {
+        store(t, hit.t), store(u, hit.u), store(v, hit.v), store(face, hit.face);
+    }
+    PacketHit joined() const { return {load<f16>(t), load<f16>(u), load<f16>(v), load<i16>(face)}; }
+    RayHit of(int lane) const { return {t[lane], 0.0f, 0.0f, face[lane]}; }
+    // Stores the hit of one lane; with `any` the lane becomes idle.
+    template <bool any> void take(int lane, const RayHit& met) {
+        t[lane] = any ? -1.0f : met.t, u[lane] = met.u, v[lane] = met.v, face[lane] = met.face;
+    }
+};
+
 // Traverses single lanes in turns: while one waits for memory the others continue. Returns those that found a hit; with
 // `any` they become idle.
 template <bool any>
-inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
+inline unsigned walk_by_turns(const Tree& tree, const LaneRays& rays, unsigned lanes, LaneHits& hits) {
     struct Walker {
         Single ray;
         Way way;
@@ -60,7 +86,7 @@ inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& 
         if (!lanes) return;
         const int lane = first_bit(lanes);
         Walker& one = walkers[number];
-        one.ray = single_of(from, along, lane), one.way = Way(hit_of(hit, lane)), one.lane = lane;
+        one.ray = rays.single(lane), one.way = Way(hits.of(lane)), one.lane = lane;
         lanes &= lanes - 1, busy |= 1u << number;
     };
     for (int number = 0; number < TURNS; ++number) start(number);
@@ -74,7 +100,7 @@ inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& 
             }
             if (one.way.found) {
                 changed |= 1u << one.lane;
-                take<any>(hit, one.lane, one.way.hit);
+                hits.take<any>(one.lane, one.way.hit);
             }
             start(number);
         }
@@ -82,16 +108,15 @@ inline unsigned walk_by_turns(const Tree& tree, const Vec16& from, const Vec16& 
 }
 
 // Traverses lanes one by one from the root. Returns those that found a hit; with `any` they become idle.
-template <bool any>
-inline unsigned walk_alone(const Tree& tree, const Vec16& from, const Vec16& along, unsigned lanes, PacketHit& hit) {
+template <bool any> inline unsigned walk_alone(const Tree& tree, const LaneRays& rays, unsigned lanes, LaneHits& hits) {
     unsigned changed = 0;
     for (; lanes; lanes &= lanes - 1) {
         const int lane = first_bit(lanes);
-        RayHit one = hit_of(hit, lane);
+        RayHit one = hits.of(lane);
         Uncounted none;
-        if (!walk<any>(tree, single_of(from, along, lane), one, none)) continue;
+        if (!walk<any>(tree, rays.single(lane), one, none)) continue;
         changed |= 1u << lane;
-        take<any>(hit, lane, one);
+        hits.take<any>(lane, one);
     }
     return changed;
 }
@@ -192,8 +217,12 @@ template <bool any> inline unsigned trace(const Tree& tree, const Vec16& from, c
     if (rays.together) return any ? walk_any(tree, rays, hit) : walk_nearest(tree, rays, hit);
     const unsigned busy = bits(hit.t >= 0.0f);
     // Coherent single rays find the data of the previous ray in the cache; incoherent ones do not.
-    return tree.large && rays.scattered ? walk_by_turns<any>(tree, from, along, busy, hit)
-                                        : walk_alone<any>(tree, from, along, busy, hit);
+    const LaneRays alone(from, along);
+    LaneHits hits(hit);
+    const unsigned found = tree.large && rays.scattered ? walk_by_turns<any>(tree, alone, busy, hits)
+                                                        : walk_alone<any>(tree, alone, busy, hits);
+    hit = hits.joined();
+    return found;
 }
 
 }  // namespace packets

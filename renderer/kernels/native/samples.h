@@ -77,13 +77,13 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
     int at = 0, within_x = 0, within_y = 0;  // pixel of the block, and sample of the pixel
     for (int packet = 0; packet < per_pixel; ++packet) {
         int pixel[LANES];
-        f16 x, y;
+        alignas(64) float place_x[LANES], place_y[LANES];
         unsigned busy = 0;
         for (int lane = 0; lane < LANES; ++lane) {
             const int column = left + column_of(at), row = top + row_of(at);
             pixel[lane] = at;
             busy |= (unsigned)(column < width && row < height) << lane;
-            x[lane] = (float)(column * samples + within_x), y[lane] = (float)(row * samples + within_y);
+            place_x[lane] = (float)(column * samples + within_x), place_y[lane] = (float)(row * samples + within_y);
             if (++within_x < samples) continue;
             within_x = 0;
             if (++within_y < samples) continue;
@@ -91,13 +91,12 @@ inline void render_block(const Scene& scene, const View& view, int block, int wi
         }
         if (!busy) continue;
         Vec16 origin, direction;
-        camera_rays(stage, (x + 0.5f) / across, (y + 0.5f) / down, origin, direction);
+        camera_rays(stage, (load<f16>(place_x) + 0.5f) / across, (load<f16>(place_y) + 0.5f) / down, origin, direction);
         i16 shadow_rays, bounces;
-        const Vec16 color = radiance(stage, origin, direction, busy, shadow_rays, bounces, nullptr);
-        for (int lane = 0; lane < LANES; ++lane) {
-            float* to = sums[pixel[lane]];
-            to[0] += color.x[lane], to[1] += color.y[lane], to[2] += color.z[lane];
-        }
+        float color[3 * LANES];
+        store_joined(color, radiance(stage, origin, direction, busy, shadow_rays, bounces, nullptr));
+        for (int lane = 0; lane < LANES; ++lane)
+            for (int channel = 0; channel < 3; ++channel) sums[pixel[lane]][channel] += color[3 * lane + channel];
     }
     const float share = 1.0f / (float)per_pixel;
     for (at = 0; at < LANES; ++at) {
@@ -121,16 +120,12 @@ struct Samples {
     int* occluder;
 };
 
-// Stores the first `used` of sixteen vectors, or numbers, consecutively.
+// Stores the first `used` of sixteen vectors consecutively.
 inline void put_first(float* to, const Vec16& value, int used) {
     if (used == LANES) return store_joined(to, value);
     float all[3 * LANES];
     store_joined(all, value);
     __builtin_memcpy(to, all, 3 * sizeof(float) * used);
-}
-inline void put_first(int* to, const i16& value, int used) {
-    if (used == LANES) return store(to, value);
-    __builtin_memcpy(to, &value, sizeof(int) * used);
 }
 
 // Shades the samples `first` to `first + 15`, or up to the last one. Adds the numbers of shadow and reflected rays to
