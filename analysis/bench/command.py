@@ -25,4 +25,5 @@ def main() -> None:
     from analysis.bench.run import run_bench
 
     ending = options.file_ending
-    show(rows_table(run_bench(options)), f"written to {options.out}: bench{ending}.json, tables.md, summary{ending}.json")
+    files = f"bench{ending}.json, tables.md, summary{ending}.json"
+    show(rows_table(run_bench(options)), f"written to {options.out}: {files}")

@@ -43,7 +43,8 @@ class BenchOptions:
     """The speed of the simulator beside its peers: rays, shaded samples, overhead, growth, start."""
 
     out: Path = Path("out/bench")
-    """Folder for the results; bench.json, tables.md and summary.json; on a GPU bench-cuda.json and summary-cuda.json."""
+    """Folder for the results; bench.json, tables.md and summary.json; on a GPU bench-cuda.json and
+    summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """What to do, instead of everything; a group, or several with commas between; may be repeated. Without it all run:
     coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, growth, conversion, start."""

@@ -46,7 +46,7 @@ SUBJECTS = {
     "repetition": "seed repetitions bootstraps experiments study",
     "observer": "jnds sigmas lapses spreads observers answers",
     "page": "host port bench bench_seconds",
-    "machine": "device threads workers workers_least scheduler memory_limit_gib retries worker_wait_s log_level"
+    "machine": "device isa threads workers workers_least scheduler memory_limit_gib retries worker_wait_s log_level"
     " chunk_tiles",
     "file": "out references write_frames layered_stills film page layers format explain markdown only compare",
 }
