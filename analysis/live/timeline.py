@@ -173,11 +173,11 @@ class Timeline:
         return found
 
     def _keep(self, times_s: NDArray[np.float64], camera: Keys) -> None:
-        count = max(_DROPPED, len(times_s))
         self._settled += list(zip(times_s.tolist(), *camera, strict=True))
-        if len(self._settled) > (KEYS_MOST - count if self.recording else KEPT_MOST + count):
-            del self._settled[:count]
-            self._dropped += count
+        over = len(self._settled) - (KEYS_MOST - _DROPPED if self.recording else KEPT_MOST)
+        if over > _DROPPED:
+            del self._settled[:over]
+            self._dropped += over
 
     def _keys_ahead(self, count: int) -> tuple[Keys, Keys]:
         """Guessed keys of the camera and of instances, from the next one on."""
