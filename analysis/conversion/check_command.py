@@ -2,6 +2,7 @@
 
 Examples: python scripts/conversion_check.py scene.xml other.lxs --out out/conversion-check
           python scripts/conversion_check.py --markers
+          python scripts/conversion_check.py --matrix --samples 64
 """
 
 from __future__ import annotations

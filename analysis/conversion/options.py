@@ -52,6 +52,8 @@ class CheckOptions:
     """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
     markers: bool = False
     """Check the places of known lamps in the pictures, from every format to every other."""
+    matrix: bool = False
+    """Compare every light and every material in every pair of formats."""
     plain: bool = False
     """Also compare both renderers on each scene with every surface matte: a difference is then not due to materials."""
     width_px: int = 160
@@ -63,10 +65,12 @@ class CheckOptions:
     limit_s: float = 240.0
     """Most seconds for each picture."""
     out: Path = Path("out/conversion-check")
-    """Folder for the results; the scenes, pictures, table.csv, markers.csv, pictures.jpg and summary.json."""
+    """Folder for the results; the scenes, pictures, table.csv, markers.csv, matrix.csv, worst.csv, pictures.jpg and
+    summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))
-        require(bool(self.scenes) or self.markers, "scenes", "scene files, or --markers", "neither")
+        given = bool(self.scenes) or self.markers or self.matrix
+        require(given, "scenes", "scene files, --markers or --matrix", "none of them")
         for scene in self.scenes:
             require(scene.is_file(), "scenes", "scene files", scene)

@@ -52,6 +52,9 @@ for parent in list(root.iter()):
                 node.set("up", ", ".join(map(str, np.eye(3)[np.abs(target - origin).argmin()])))
         elif old and node.get("name") in ("filterType", "strictNormals", "flipTexCoords", "maxAnisotropy"):
             parent.remove(node)
+        elif old and node.tag == "bsdf" and node.get("type") in ("difftrans", "mixturebsdf", "phong", "ward"):
+            node.set("type", "diffuse")
+            node[:] = []
         elif old and node.tag == "bsdf" and node.get("type") == "roughdiffuse":
             node.set("type", "diffuse")
             node[:] = [part for part in node if part.get("name") == "reflectance"]

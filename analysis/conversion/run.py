@@ -45,15 +45,24 @@ def check(options: CheckOptions) -> list[Table]:
     """
     from analysis.conversion.check import checked
     from analysis.conversion.markers import marker_offsets
+    from analysis.conversion.matrix import GROUPS, matrix_rows, worst
 
     with bad_input():
-        own_results(options.out, ("table.csv", "markers.csv", "pictures.jpg", "markers/*", "[0-9][0-9]-*/*"))
+        written = ("table.csv", "markers.csv", "pictures.jpg", "worst.csv", "matrix.csv", "markers/*",
+                    "matrix/*", "[0-9][0-9]-*/*")  # fmt: skip
+        own_results(options.out, written)
     with bad_input(), bars() as shown:
         rows = checked(options, shown.task("scenes", len(options.scenes)))
         markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []
-        found = {name: part for name, part in (("table", rows), ("markers", markers)) if part}
+        matrix = (
+            matrix_rows(options.out / "matrix", options.samples, options.limit_s, shown.task("matrix", len(GROUPS)))
+            if options.matrix
+            else []
+        )
+        tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix) if matrix else []}
+        found = {name: part for name, part in tables.items() if part}
         for name, part in found.items():
             write_table(options.out / f"{name}.csv", pd.DataFrame(part))
-        write_summary(options.out, {"rows": rows, "markers": markers}, options, seed=0)
+        write_summary(options.out, {"rows": rows, "markers": markers, "matrix": matrix}, options, seed=0)
     brief = [{**row, "losses": len(row["losses"])} for row in rows]
-    return [frame_table(pd.DataFrame(part)) for part in (brief, markers) if part]
+    return [frame_table(pd.DataFrame(part)) for part in (brief, markers, tables["worst"]) if part]

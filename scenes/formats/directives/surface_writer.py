@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from scenes.canonical import (
+    Bumped,
     CheckerboardTexture,
     ConstantTexture,
     Emissive,
@@ -16,12 +17,16 @@ from scenes.canonical import (
     ImageTexture,
     Material,
     Matte,
+    MetallicRough,
     Mirror,
     MixTexture,
+    NormalMapped,
     Rgb,
     ScaleTexture,
     Texture,
 )
+from scenes.formats.appearance.folding import folded, height_of
+from scenes.formats.appearance.simpler import simpler
 from scenes.formats.directives.textures import Pair
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import listed, number
@@ -130,11 +135,14 @@ class SurfaceWriter:
     def material_line(self, material: Material, name: str) -> str:
         """The definition of a material without its name; dialects override it for their own materials."""
         where = f"material {name!r}"
-        if isinstance(material, HeightField):
-            self.report.add(where, "a height field", "its material, flat")
-            return self.material_line(material.base, name)
-        kind, parameters = self.plain_material(material, where)
-        return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
+        if isinstance(material, HeightField | NormalMapped | MetallicRough):
+            return self.material_line(simpler(material, where, self.report), name)
+        return plain_line(*self.plain_material(material, where))
+
+    def bumped_line(self, material: Bumped, name: str, parameter: str) -> str:
+        """The definition of a material with its height; an even height, which LuxCore refuses, has no effect."""
+        line, height = self.material_line(material.base, name), folded(height_of(material))
+        return line if isinstance(height, ConstantTexture) else f"{line} {self.texture(height, parameter, 'float')}"
 
     def plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
         """Kind and parameters of a material that contains no other material."""
@@ -147,6 +155,11 @@ class SurfaceWriter:
             return "mirror", [self.texture(material.reflectance, "Kr")]
         assert isinstance(material, Emissive)
         return "matte", [self.constant("Kd", (0.0, 0.0, 0.0))]
+
+
+def plain_line(kind: str, parameters: list[str]) -> str:
+    """The definition of a material that contains no other material."""
+    return f'"string type" [ "{kind}" ] {" ".join(parameters)}'
 
 
 def mixture_line(first: str, second: str, amount: str) -> str:

@@ -57,16 +57,8 @@ SKY_UNIT, SUN_UNIT = 72_922.0, 66_000.0
 """Ratio of the radiance of LuxCore 2.10's sky2 and sun at a gain of 1 to that of Mitsuba 3 at a scale of 1. The sky
 model is the same, in luminous units (683 lm/W); the sun model differs and is dimmer in haze. Checked to 1 % and 15 % at
 a turbidity of 3 in ``tests/scripts/test_conversion_check.py``."""
-_TRANSFORMS = (
-    "Identity",
-    "Translate",
-    "Scale",
-    "Rotate",
-    "LookAt",
-    "Transform",
-    "ConcatTransform",
-    "CoordSysTransform",
-)
+_TRANSFORMS = ("Identity", "Translate", "Scale", "Rotate", "LookAt", "Transform", "ConcatTransform",
+               "CoordSysTransform")  # fmt: skip
 _LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 
 
@@ -154,6 +146,9 @@ class LuxReader(SceneReader):
         _, parameters = typed(directive)
         self._halt_samples = parameters.whole("haltspp", 0, 0, 1 << 24)
         self.read_size(parameters, 800, 600)
+        if "cropwindow" in parameters:
+            parameters.asked.add("cropwindow")
+            self.report.add(str(directive.place), "cropwindow of the film", "the whole picture")
         if parameters.unasked():
             self.report.hint(
                 str(directive.place), f"{len(parameters.unasked())} settings of the film", "linear radiance"
@@ -164,9 +159,11 @@ class LuxReader(SceneReader):
     def _read_sampler(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         name = self.report.kind(_SAMPLERS, kind, "sampler", directive.place, picture=False)
-        if kind in ("metropolis", "erpt"):
-            parameters.asked.update(parameters.given)
         count = parameters.whole("pixelsamples", self._halt_samples or 4, 1, 1 << 24)
+        rest = parameters.unasked() if kind in ("metropolis", "erpt") else []
+        if rest:
+            parameters.asked.update(rest)
+            self.report.hint(str(directive.place), f"{len(rest)} settings of the sampler {kind!r}")
         self.sampler = Sampler(name, self._halt_samples or count)  # type: ignore[arg-type]
         self.left_over(parameters, f"sampler {kind!r}")
 
@@ -174,7 +171,9 @@ class LuxReader(SceneReader):
         kind, parameters = typed(directive)
         name = self.report.kind(_INTEGRATORS, kind, "integrator", directive.place, kind not in SAME_PICTURE)
         depth = parameters.whole("eyedepth" if kind == "bidirectional" else "maxdepth", 16, 0, 1 << 20)
-        parameters.whole("lightdepth", depth, 0, 1 << 20)
+        light = parameters.whole("lightdepth", depth, 0, 1 << 20) if kind == "bidirectional" else depth
+        if light != depth:
+            self.report.add(str(directive.place), f"paths of {light} edges from the lights", f"of {depth}")
         # number of edges of a path, as measured with LuxCore
         self.integrator = Integrator(name, max(depth - 1, 0))  # type: ignore[arg-type]
         self.left_over(parameters, f"integrator {kind!r}")
@@ -267,7 +266,8 @@ class LuxReader(SceneReader):
     def _read_area_light(self, directive: Directive) -> None:
         _, parameters = typed(directive)
         self.attributes.emission = self._strength(parameters)
-        self.attributes.power = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
+        lumens = parameters.number("power", 100.0) * parameters.number("efficacy", 17.0)
+        self.attributes.power = lumens * parameters.number("gain", 1.0)  # which multiplies after the scaling, measured
         lights.lose_hints(parameters, self.report)
         self.left_over(parameters, "area light")
 

@@ -131,6 +131,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     def _daylight(self, light: SunSky) -> None:
         """Writes sun and sky. The zenith of LuxCore is z for any transform; a sky with another zenith becomes a map."""
         if light.part != "sky":
+            self.report.add("light", "the colour of the sun", "that of LuxCore's model, bluer by up to 15 %")
             self._sun_or_sky("sun", light.sun_direction, light.turbidity, light.scale / SUN_UNIT)
         if light.part == "sun":
             return

@@ -26,7 +26,7 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
-from scenes.formats.appearance.folding import height_of, mean_of, product_of
+from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.mixtures import added_coat, dimmed, lobes_of
 from scenes.formats.appearance.spectra import METALS, rgb
@@ -54,7 +54,7 @@ class LuxSurfaceWriter(SurfaceWriter):
     def material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"
         if isinstance(material, Bumped):
-            return f"{self.material_line(material.base, name)} {self.texture(height_of(material), 'bumpmap', 'float')}"
+            return self.bumped_line(material, name, "bumpmap")
         if isinstance(material, Uber):
             material = lobes_of(material, where, self.report, schlick=True)
         if isinstance(material, Masked):
@@ -94,6 +94,9 @@ class LuxSurfaceWriter(SurfaceWriter):
             return "mattetranslucent", [*sides, '"bool energyconserving" [ "true" ]']
         if isinstance(material, Glossy | Plastic | Phong):
             return self._coated(material, where)
+        if isinstance(material, Matte) and material.sigma_deg:
+            what = f"a roughness of {material.sigma_deg:g} degrees"
+            self.report.add(where, what, f"as much in LuxRender, {material.sigma_deg:g} radians in LuxCore")
         return super().plain_material(material, where)
 
     def _coated(self, material: Glossy | Plastic | Phong, where: str) -> tuple[str, list[str]]:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from scenes.canonical import ConstantTexture, Glass, Material, Metal, MixMaterial, Plastic, SceneError, Texture
+from scenes.canonical import ConstantTexture, Glass, Material, Plastic, SceneError, Texture
 from scenes.formats.appearance.folding import mean_of
-from scenes.formats.appearance.indices import index_of_reflectance
+from scenes.formats.appearance.simpler import ALPHA_MIN, metal_of, mixed
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_textures import MitsubaTextures
@@ -26,7 +26,7 @@ def principled(properties: Properties, textures: MitsubaTextures) -> Material:
     """
     base = textures.texture(properties, "baseColor", grey(0.5))
     roughness = _mean(properties, textures, "roughness", 0.5)
-    alpha = max(roughness * roughness, 1e-3)
+    alpha = max(roughness * roughness, ALPHA_MIN)
     specular = _mean(properties, textures, "specular", 0.5)
     root = math.sqrt(0.08 * specular)
     ior = properties.number("eta", (1.0 + root) / (1.0 - root))
@@ -38,23 +38,12 @@ def principled(properties: Properties, textures: MitsubaTextures) -> Material:
     made: Material = Plastic(base, ior=ior, roughness=alpha, layered=False)
     through = _amount(properties, textures, "specTrans")
     if through is not None:
-        made = _mixed(made, Glass(transmittance=base, ior=ior, roughness=(alpha, alpha)), through)
+        made = mixed(made, Glass(transmittance=base, ior=ior, roughness=(alpha, alpha)), through)
     metallic = _amount(properties, textures, "metallic")
     if metallic is not None:
-        made = _mixed(made, _metal(base, alpha), metallic)
+        made = mixed(made, metal_of(base, alpha), metallic)
     textures.report.add(properties.where, "material 'principled'", "plastic, metal and glass of its parameters")
     return made
-
-
-def _metal(base: Texture, alpha: float) -> Material:
-    """A metal with the base colour at normal incidence; with a texture, the colour is the same at all angles."""
-    if isinstance(base, ConstantTexture):
-        return Metal(*index_of_reflectance(base.value), (alpha, alpha))
-    return Metal(grey(0.0), grey(1.0), (alpha, alpha), base)
-
-
-def _mixed(first: Material, second: Material, amount: Texture) -> Material:
-    return second if amount == ConstantTexture(grey(1.0)) else MixMaterial(first, second, amount)
 
 
 def _amount(properties: Properties, textures: MitsubaTextures, name: str) -> Texture | None:

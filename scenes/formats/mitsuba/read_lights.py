@@ -90,7 +90,7 @@ class MitsubaLights:
         unit, up = rgb(direction / norm(direction)), rgb(turned[:, 1] / norm(turned[:, 1]))
         turbidity, scale = properties.number("turbidity", 3.0), properties.number("scale", 1.0)
         albedo = float(np.mean(properties.color("albedo", grey(0.15))))
-        shares = {part: properties.number(f"{part}Scale", 1.0) for part in ("sun", "sky")}
+        shares = {part: properties.number(f"{part}Scale", 1.0) if kind == "sunsky" else 1.0 for part in ("sun", "sky")}
         if kind != "sunsky" or shares["sun"] == shares["sky"]:
             part = "both" if kind == "sunsky" else kind
             factor = scale * (shares["sky"] if kind == "sunsky" else 1.0)

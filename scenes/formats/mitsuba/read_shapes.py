@@ -230,7 +230,7 @@ class MitsubaShapes:
         path = self.files.known(name, properties.where, self.report, f"the mesh {name!r}", "left out")
         if path is None:
             return None
-        index = properties.whole("shapeIndex", 0, 0, 1 << 20)
+        index = properties.whole("shapeIndex", 0, 0, 1 << 20) if kind == "serialized" else 0
         faceted, flipped = properties.truth("faceNormals", False), properties.truth("flipTexCoords", kind == "obj")
         if properties.number("maxSmoothAngle", 0.0):
             self.report.add(properties.where, "maxSmoothAngle of a mesh", "its normals as they are")

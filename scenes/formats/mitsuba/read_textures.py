@@ -71,10 +71,8 @@ class MitsubaTextures:
 
     def _texture(self, properties: Properties) -> Texture:
         kind = properties.node.get("type")
-        even = properties.number("uvscale", 1.0)
-        scale = properties.number("uscale", even), properties.number("vscale", even)
-        offset = properties.number("uoffset", 0.0), properties.number("voffset", 0.0)
         if kind == "checkerboard":
+            scale, offset = _placing(properties)
             if offset != (0.0, 0.0):
                 self.report.add(properties.where, "offset of a checkerboard", "none")
             parts = self.texture(properties, "color0", grey(0.4)), self.texture(properties, "color1", grey(0.2))
@@ -89,7 +87,7 @@ class MitsubaTextures:
         if kind == MISSING:
             return ConstantTexture(grey(0.5))
         if kind == "bitmap":
-            return self._bitmap(properties, scale, offset)
+            return self._bitmap(properties, *_placing(properties))
         properties.asked.update(properties.given)
         self.report.add(properties.where, f"texture {kind!r}", "the constant 0.5")
         return ConstantTexture(grey(0.5))
@@ -116,3 +114,10 @@ class MitsubaTextures:
         properties.number("maxAnisotropy", 20.0)
         size, start = first_row_below(scale, offset)
         return ImageTexture(image, size, start, _WRAPS[wrap], _FILTERS[kind], str(path))  # type: ignore[arg-type]
+
+
+def _placing(properties: Properties) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Scale and offset of texture coordinates."""
+    even = properties.number("uvscale", 1.0)
+    scale = properties.number("uscale", even), properties.number("vscale", even)
+    return scale, (properties.number("uoffset", 0.0), properties.number("voffset", 0.0))

@@ -25,8 +25,10 @@ from scenes.canonical import (
     Material,
     Matte,
     Metal,
+    MetallicRough,
     Mirror,
     MixMaterial,
+    NormalMapped,
     Phong,
     Plastic,
     Translucent,
@@ -35,6 +37,7 @@ from scenes.canonical import (
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.folding import height_of, mean_of
 from scenes.formats.appearance.mixtures import added_metal, lobes_of
+from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.mitsuba.write_elements import Element, ElementWriter
 from scenes.formats.text.numbers import number
@@ -96,9 +99,8 @@ class MitsubaSurfaceWriter(ElementWriter):
                 return self.bsdf(material.base, where)
             made.append(self.bsdf(material.base, where))
             return made
-        if isinstance(material, HeightField):
-            self.report.add(where, "a height field", "its material, flat")
-            return self.bsdf(material.base, where)
+        if isinstance(material, HeightField | NormalMapped | MetallicRough):
+            return self.bsdf(simpler(material, where, self.report), where)
         if isinstance(material, Glass):
             return self._glass(material, where)
         if isinstance(material, Translucent):

@@ -31,10 +31,10 @@ from scenes.canonical import (
 )
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.coats import with_bounces
-from scenes.formats.appearance.folding import folded, height_of, mean_of
+from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.mixtures import added_metal, dimmed, lobes_of
 from scenes.formats.appearance.spectra import grey
-from scenes.formats.directives.surface_writer import Kind
+from scenes.formats.directives.surface_writer import Kind, plain_line
 from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter, unmapped_roughness
 from scenes.formats.text.numbers import number
 
@@ -66,15 +66,15 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
     def material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"
         if isinstance(material, Bumped):
-            bump = self.texture(height_of(material), "displacement", "float")
-            return f"{self.material_line(material.base, name)} {bump}"
+            return self.bumped_line(material, name, "displacement")
         if isinstance(material, Uber):
             return self.material_line(lobes_of(material, where, self.report), name)
         if isinstance(material, Plastic) and not material.layered:
             return self.material_line(added_metal(material, where, self.report), name)
         if isinstance(material, Metal) and material.reflectance_scale != WHITE:
-            if (material.eta, material.k) != _MIRROR:
-                material = dimmed(material)
+            if (material.eta, material.k) == _MIRROR:
+                return plain_line(*self.plain_material(material, where))
+            material = dimmed(material)
         if isinstance(material, MixMaterial):
             names = " ".join(f'"{self.material(part)}"' for part in (material.first, material.second))
             amount = self.texture(material.amount, "amount", "float")

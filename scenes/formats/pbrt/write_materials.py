@@ -25,7 +25,7 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
-from scenes.formats.appearance.folding import folded, height_of, product_of
+from scenes.formats.appearance.folding import folded, product_of
 from scenes.formats.appearance.indices import mean_reflectance
 from scenes.formats.appearance.mixtures import dimmed
 from scenes.formats.appearance.spectra import grey, rgb
@@ -51,8 +51,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
     def material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"
         if isinstance(material, Bumped):
-            bump = self.texture(height_of(material), "bumpmap", "float")
-            return f"{self.material_line(material.base, name)} {bump}"
+            return self.bumped_line(material, name, "bumpmap")
         if isinstance(material, Masked):
             self.report.add(where, "holes in a material", "those of the shapes that have it")
             return self.material_line(material.base, name)

@@ -1,0 +1,191 @@
+"""Every light and every material in every pair of formats, compared by the pictures of the formats' own renderers.
+
+A specimen is written in one format, converted to another, and both files are drawn. Mitsuba 3 draws files of Mitsuba 3
+and, with their tree upgraded, of Mitsuba 0.5; LuxCore draws those of LuxRender. PBRT has no engine here: its files are
+read again and drawn by Mitsuba 3.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.command.progress import Task
+from analysis.conversion.peers import RenderedImage, rendered
+from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
+from scenes.canonical import Scene
+from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.losses import LossReport
+
+FORMATS_OF = {"pbrt": ".pbrt", "pbrt4": ".pbrt", "mitsuba": ".xml", "mitsuba3": ".xml", "luxrender": ".lxs"}
+"""Formats and the endings of their files."""
+
+ENGINES = {"mitsuba": "mitsuba", "mitsuba3": "mitsuba", "luxrender": "luxcore"}
+
+BOUND = 0.02
+"""Relative difference above which a cell is called off."""
+
+_GONE = re.compile(r'type="(phong|ward|difftrans|mixturebsdf|roughdiffuse|sun|sky)"')
+
+_DIM = 0.1  # of the mean of a specimen, below which differences count as of this share
+
+
+@dataclass
+class Gallery:
+    """Draws files, each content once.
+
+    Attributes:
+        folder: folder for files and pictures.
+        samples: samples per pixel.
+        limit_s: most seconds for each picture.
+    """
+
+    folder: Path
+    samples: int
+    limit_s: float
+    _drawn: dict[str, RenderedImage | str] = field(default_factory=dict)
+
+    def picture(self, kind: str, file: Path, size_px: tuple[int, int]) -> RenderedImage | str:
+        """The picture of a file of a format."""
+        if kind not in ENGINES:
+            again = file.with_name(f"{file.stem}-of-{kind}.xml")
+            save_scene_file(load_scene_file(file), again, "mitsuba3")
+            kind, file = "mitsuba3", again
+        name = hashlib.blake2b(kind.encode() + file.read_bytes(), digest_size=8).hexdigest()
+        if name not in self._drawn:
+            out = self.folder / f"{name}.npy"
+            self._drawn[name] = rendered(ENGINES[kind], file, out, size_px, self.samples, self.limit_s)
+        return self._drawn[name]
+
+
+GROUPS: dict[str, Callable[[], Specimens]] = {
+    "materials": materials,
+    **{name: partial(lamp, name) for name in LAMPS},
+    **{name: partial(distant, name) for name in DISTANT},
+}
+"""The scenes of the matrix by name."""
+
+
+def matrix_rows(
+    folder: Path, samples: int, limit_s: float, task: Task, groups: tuple[str, ...] = tuple(GROUPS)
+) -> list[dict[str, Any]]:
+    """A row for each specimen and each pair of formats, and for each format in which a specimen is written first.
+
+    Args:
+        folder: folder for the files and pictures, a folder in it for each group.
+        samples: samples per pixel.
+        limit_s: most seconds for each picture.
+        task: progress, a step a group.
+        groups: names in ``GROUPS``.
+    """
+    rows: list[dict[str, Any]] = []
+    for name in groups:
+        work = folder / name.replace(", ", "-").replace(" ", "-")
+        work.mkdir(parents=True, exist_ok=True)
+        rows += _rows(GROUPS[name](), Gallery(work, samples, limit_s))
+        task.advance()
+    return rows
+
+
+def _rows(found: Specimens, gallery: Gallery) -> Iterator[dict[str, Any]]:
+    scenes: dict[str, Scene] = {"scene": found.scene}
+    pictures: dict[str, RenderedImage | str] = {}
+    for source in ("scene", *FORMATS_OF):
+        for target, ending in FORMATS_OF.items():
+            file = gallery.folder / f"{source}-to-{target}{ending}"
+            save_scene_file(scenes[source], file, target)
+            picture = gallery.picture(target, file, found.size_px)
+            if source == "scene":
+                scenes[target], pictures[target] = load_scene_file(file), picture
+                if target == "mitsuba3":
+                    pictures["scene"] = picture
+        for target, ending in FORMATS_OF.items():
+            file = gallery.folder / f"{source}-to-{target}{ending}"
+            pair = pictures[source], gallery.picture(target, file, found.size_px)
+            off = differences(found, *pair)
+            for name, one in found.single.items():
+                lost, undrawn = losses(one, source, target, gallery.folder)
+                value, note = (float("nan"), undrawn) if undrawn else off[name]
+                yield {"specimen": name, "from": source, "to": target, "off": value, "note": note, "losses": lost}
+
+
+def losses(scene: Scene, source: str, target: str, folder: Path) -> tuple[list[str], str]:
+    """What a conversion says to have lost of the picture, with the losses of the ways to renderers, and a plugin that
+    Mitsuba 3 does not have, so that the file of Mitsuba 0.5 cannot be drawn."""
+    report, undrawn = LossReport(), ""
+    ways = [[source, target], [source]]
+    for way in [way if way[-1] in ENGINES else [*way, "mitsuba3"] for way in ways]:
+        one = scene
+        for kind in way:
+            if kind in FORMATS_OF:
+                file = folder / f"single{FORMATS_OF[kind]}"
+                save_scene_file(one, file, kind, report)
+                one = load_scene_file(file, None, report)
+                if kind == "mitsuba":
+                    gone = _GONE.search(file.read_text(encoding="utf-8"))
+                    undrawn = f"Mitsuba 3 has no plugin {gone[1]!r}" if gone else undrawn
+    return [f"{loss.what}: {loss.became}" for loss in report.losses if loss.picture], undrawn
+
+
+def differences(
+    found: Specimens, first: RenderedImage | str, second: RenderedImage | str
+) -> dict[str, tuple[float, str]]:
+    """For each specimen, how far its second picture is from the first, relative, and why there is none.
+
+    Each colour of each quarter counts, of lamps, or of each cell; the greatest difference is returned.
+    """
+    for one in (first, second):
+        if isinstance(one, str):
+            return dict.fromkeys(found.cells, (float("nan"), one))
+    assert not isinstance(first, str) and not isinstance(second, str)
+    made: dict[str, tuple[float, str]] = {}
+    for name in dict.fromkeys(found.cells):
+        pair = [
+            np.stack([part for cell in _cells(found, name) for part in _parts(found, picture, cell)])
+            for picture in (first, second)
+        ]
+        least = _DIM * pair[0].mean()
+        made[name] = float((np.abs(pair[1] - pair[0]) / np.maximum(pair[0], max(least, 1e-9))).max()), ""
+    return made
+
+
+def _cells(found: Specimens, name: str) -> list[int]:
+    return [number for number, cell in enumerate(found.cells) if cell == name]
+
+
+def _parts(found: Specimens, picture: RenderedImage, number: int) -> list[NDArray[np.float64]]:
+    """Mean colours of a cell, or of its quarters if its middle is hidden."""
+    columns = found.size_px[0] // CELL_PX
+    top, left = CELL_PX * (number // columns), CELL_PX * (number % columns)
+    cell = picture[top : top + CELL_PX, left : left + CELL_PX].astype(np.float64)
+    away = (np.arange(CELL_PX) + 0.5) / (0.5 * CELL_PX) - 1.0
+    down, across = away[:, None], away[None]
+    far = np.maximum(np.abs(down), np.abs(across))
+    inside = (far < found.reach) & (far >= found.hidden)
+    if not found.hidden:
+        return [cell[inside].mean(axis=0)]
+    return [cell[inside & (x * across > 0.0) & (y * down > 0.0)].mean(axis=0) for y in (-1, 1) for x in (-1, 1)]
+
+
+def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """For each specimen, its worst pair of formats without and with a loss that is reported; the worst come first."""
+    made = []
+    for specimen in dict.fromkeys(row["specimen"] for row in rows):
+        found = [row for row in rows if row["specimen"] == specimen and row["off"] == row["off"]]
+        line: dict[str, Any] = {"specimen": specimen, "pairs": len(found)}
+        for title, reported in (("silent", False), ("reported", True)):
+            part = [row for row in found if bool(row["losses"]) == reported]
+            top = max(part, key=lambda row: row["off"], default=None)
+            line[f"{title} beyond {BOUND:.0%}"] = sum(row["off"] > BOUND for row in part)
+            line[f"worst {title}"] = float("nan") if top is None else top["off"]
+            line[f"pair, {title}"] = "" if top is None else f"{top['from']} to {top['to']}"
+        made.append(line)
+    return sorted(made, key=lambda line: -np.nan_to_num(line["worst silent"]))

@@ -1,0 +1,89 @@
+"""Every light and every material in every pair of formats."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from analysis.command.progress import Task
+from analysis.conversion.matrix import BOUND, FORMATS_OF, GROUPS, differences, losses, matrix_rows, worst
+from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, MATERIALS
+from scenes.canonical import Material, Metal
+from scenes.formats.conversion import load_scene_file, save_scene_file
+
+SINGLE = {name: scene for make in GROUPS.values() for name, scene in make().single.items()}
+
+
+def test_the_matrix_has_every_material_of_the_canonical_scene() -> None:
+    assert set(get_args(Material)) == {type(material) for material, _ in MATERIALS.values()}
+    assert set(SINGLE) == {*MATERIALS, *LAMPS, *DISTANT}
+
+
+@pytest.mark.parametrize("target", FORMATS_OF)
+def test_every_specimen_is_written_and_read_again(target: str, tmp_path: Path) -> None:
+    for scene in SINGLE.values():
+        losses(scene, "scene", target, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("source", FORMATS_OF)
+def test_every_specimen_of_every_format_becomes_every_other(source: str, tmp_path: Path) -> None:
+    for scene in SINGLE.values():
+        for target in FORMATS_OF:
+            losses(scene, source, target, tmp_path)
+
+
+@pytest.mark.parametrize(("specimen", "loss"), [("normal-mapped", "a normal map"), ("height field", "a height field"),
+                         ("metallic-roughness", "a metallic-roughness surface")])  # fmt: skip
+def test_what_no_format_has_is_a_loss(specimen: str, loss: str, tmp_path: Path) -> None:
+    for target in FORMATS_OF:
+        assert any(one.startswith(loss) for one in losses(SINGLE[specimen], "scene", target, tmp_path)[0])
+
+
+def test_a_coloured_mirror_of_the_fourth_pbrt_is_a_metal(tmp_path: Path) -> None:
+    mirror = Metal((0.0,) * 3, (1.0,) * 3, reflectance_scale=MATERIALS["mirror"][0].reflectance)  # type: ignore[union-attr]
+    scene = SINGLE["mirror"]
+    (instance,) = scene.instances
+    save_scene_file(replace(scene, instances=(replace(instance, material=mirror),)), tmp_path / "a.pbrt", "pbrt4")
+    assert '"conductor"' in (text := (tmp_path / "a.pbrt").read_text()) and "namedmaterial1" not in text
+    assert isinstance(load_scene_file(tmp_path / "a.pbrt").instances[0].material, Metal)
+
+
+def test_an_even_height_is_left_out_as_luxcore_refuses_it(tmp_path: Path) -> None:
+    for name, to in (("a.lxs", "luxrender"), ("a.pbrt", "pbrt"), ("b.pbrt", "pbrt4")):
+        save_scene_file(SINGLE["matte, bumped"], tmp_path / name, to)
+        text = (tmp_path / name).read_text()
+        assert "bumpmap" not in text and "displacement" not in text
+
+
+def test_differences_are_those_of_the_cells() -> None:
+    found = GROUPS["materials"]()
+    first = np.ones((found.size_px[1], found.size_px[0], 3), np.float32)
+    second = first.copy()
+    second[CELL_PX // 2, CELL_PX + CELL_PX // 2] += 6.4  # one of the 8 x 8 pixels that count
+    off = differences(found, first, second)
+    names = list(MATERIALS)
+    assert off[names[1]][0] == pytest.approx(0.1, rel=1e-6)
+    assert all(off[name][0] == 0.0 for name in names if name != names[1])
+    assert math.isnan(differences(found, first, "no picture")["matte"][0])
+
+
+def test_the_worst_pair_of_a_specimen_is_named() -> None:
+    row = {"specimen": "a", "from": "pbrt", "to": "mitsuba3", "off": 0.1, "note": "", "losses": []}
+    rows = [row, {**row, "to": "pbrt", "off": 0.5, "losses": ["all"]}, {**row, "off": float("nan")}]
+    (found,) = worst(rows)
+    assert found["worst silent"] == 0.1 and found["pair, silent"] == "pbrt to mitsuba3" and found["pairs"] == 2
+    assert found["worst reported"] == 0.5 and found[f"silent beyond {BOUND:.0%}"] == 1
+
+
+@pytest.mark.slow
+def test_point_lights_are_as_bright_in_every_pair(tmp_path: Path) -> None:
+    pytest.importorskip("mitsuba")
+    pytest.importorskip("pyluxcore")
+    rows = matrix_rows(tmp_path, 64, 120.0, Task(), ("point",))
+    assert len(rows) == 30 and all(row["note"] == "" and row["off"] < BOUND for row in rows), rows
