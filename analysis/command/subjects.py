@@ -44,7 +44,7 @@ SUBJECTS = {
     "metric": "metrics metric_stride stride reference_rate_hz reference_samples_per_axis jod_s jod_repetitions"
     " jod_span_s before_s tolerance draws",
     "repetition": "seed repetitions bootstraps experiments study",
-    "observer": "jnds sigmas lapses spreads observers answers",
+    "observer": "jnds sigmas lapses spreads observers answers guess_rate threshold disturbed",
     "page": "host port bench bench_seconds",
     "machine": "device isa threads workers workers_least scheduler memory_limit_gib retries worker_wait_s log_level"
     " chunk_tiles",

@@ -12,7 +12,15 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from analysis.perception.peer import peer_fit
-from analysis.perception.psychometrics import FitError, correct_share, fit, paired, threshold_samples
+from analysis.perception.psychometrics import (
+    TWO_ALTERNATIVES,
+    FitError,
+    Rule,
+    correct_share,
+    fit,
+    paired,
+    threshold_samples,
+)
 from analysis.perception.trials import CONDITIONS
 
 THESIS_JND = {"planescene": 40.0, "spheresscene": 100.0}
@@ -35,27 +43,32 @@ _GROUPS = (
 )
 
 
-def fits(trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> pd.DataFrame:
+def fits(
+    trials: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False, rule: Rule = TWO_ALTERNATIVES
+) -> pd.DataFrame:
     """Fits by scene, by scene and filter, by set and filter, and by all three; one row a fit.
 
     Args:
         trials: answered trials.
         bootstraps, seed: number of bootstrap data sets of each interval, and their seed.
         peer: whether psignifit also fits the data.
+        rule: guess rate and threshold.
     """
     rows = []
     for keys in _GROUPS:
         for values in pd.DataFrame(trials, columns=list(keys)).drop_duplicates().to_dict("records"):
             same = np.all([trials[str(key)] == value for key, value in values.items()], axis=0)
-            rows.append({**values, **fit_row(trials.loc[same], bootstraps, seed, peer)})
+            rows.append({**values, **fit_row(trials.loc[same], bootstraps, seed, peer, rule)})
     return pd.DataFrame(rows)
 
 
-def fit_row(part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False) -> dict[str, Any]:
+def fit_row(
+    part: pd.DataFrame, bootstraps: int, seed: int, peer: bool = False, rule: Rule = TWO_ALTERNATIVES
+) -> dict[str, Any]:
     """One fit as a row; if it fails, the reason in place of the numbers."""
     levels, correct, asked = counts(part)
     try:
-        found = fit(levels.tolist(), correct, asked, bootstraps, seed)
+        found = fit(levels.tolist(), correct, asked, bootstraps, seed, rule)
     except FitError as error:
         return {"status": str(error), "trials": len(part), "observers": part["observer"].nunique()}
     low, high = found.interval or (np.nan, np.nan)

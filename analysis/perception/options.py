@@ -80,7 +80,7 @@ class SimulateOptions:
     seed: int = 0
     """Seed of all random numbers; of observers, orders and answers."""
     out: Path = Path("out/perception-simulated")
-    """Folder for the results; trials-simulated.parquet, jod.csv and summary.json."""
+    """Folder for the results; trials-simulated.parquet and .csv, jod.csv and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(
@@ -97,11 +97,21 @@ class SimulateOptions:
 
 
 @dataclass(frozen=True)
+@closed_choices()
 class AnalyseOptions:
     """Fits psychometric functions to trials, compares scenes and point sets, draws figures 19 to 25 of the thesis."""
 
-    trials: Annotated[Path, tyro.conf.Positional] = Path("out/perception-simulated/trials-simulated.parquet")
-    """Table of trials, either of people or of simulated observers."""
+    trials: Annotated[tuple[Path, ...], tyro.conf.Positional] = (
+        Path("out/perception-simulated/trials-simulated.parquet"),
+    )
+    """Tables of trials (CSV or Parquet), such as several sessions; either of people or of simulated observers. They
+    have at least the columns observer, samples and correct."""
+    guess_rate: float = 0.5
+    """Share of right answers by chance."""
+    threshold: float = 0.75
+    """Share of right answers at the just-noticeable difference."""
+    disturbed: Literal["leave-out", "keep"] = "leave-out"
+    """Trials that did not fit the window or dropped frames, where the table says so."""
     bootstraps: int = 400
     """Data sets drawn for each interval."""
     seed: int = 0
@@ -118,6 +128,10 @@ class AnalyseOptions:
     def __post_init__(self) -> None:
         limits.within(self, bootstraps=(0, 100_000), power_repetitions=(0, 10_000), seed=limits.SEEDS)
         limits.within(self, power_spread=(0.0, 6.0))
+        limits.within(self, guess_rate=(0.0, 0.99), threshold=(0.0, 1.0))
+        require(len(self.trials) >= 1, "trials", "at least one table", self.trials)
+        usual = (self.guess_rate, self.threshold) == (0.5, 0.75)
+        require(usual or not self.psignifit, "psignifit", "the default guess_rate and threshold", self.psignifit)
 
 
 @dataclass(frozen=True)
@@ -174,7 +188,7 @@ class ServeOptions:
     seed: int = 0
     """Seed of all random numbers; of orders and sides."""
     out: Path = Path("out/perception-human")
-    """Folder for the results; the session: answers.sqlite, trials-human.parquet and summary.json."""
+    """Folder for the results; the session: answers.sqlite, trials-human.parquet and .csv, and summary.json."""
 
     def __post_init__(self) -> None:
         require(bool(self.observer.strip()), "observer", "a name", self.observer)

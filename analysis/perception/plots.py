@@ -11,13 +11,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.page.figures import line_style
-from analysis.perception.psychometrics import GUESS, THRESHOLD, correct_share
+from analysis.perception.psychometrics import TWO_ALTERNATIVES, Rule, correct_share
 
 _INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "0.45")
 
 
 def psychometric_figure(
-    trials: pd.DataFrame, column: str, fitted: Mapping[str, Mapping[str, Any]], kind: str
+    trials: pd.DataFrame,
+    column: str,
+    fitted: Mapping[str, Mapping[str, Any]],
+    kind: str,
+    rule: Rule = TWO_ALTERNATIVES,
 ) -> Figure:
     """A curve for each value of a column.
 
@@ -26,15 +30,16 @@ def psychometric_figure(
         column: ``scene`` or ``point_set``.
         fitted: rows of fits by value of the column; failed fits have no ``mu``.
         kind: kind of the observers, which the title of every figure states.
+        rule: guess rate and threshold of the fits.
     """
     figure = Figure(figsize=(5.6, 3.9), layout="constrained")
     axis = figure.subplots()
     for ink, (value, row) in zip(_INK * 3, fitted.items(), strict=False):
-        _curve(axis, trials.loc[trials[column] == value], row, str(value), ink)
-    axis.axhline(THRESHOLD, color="#b02a2a", ls="--", lw=0.9)
-    axis.axhline(GUESS, color="#2a8f4d", ls="--", lw=0.9)
+        _curve(axis, trials.loc[trials[column] == value], row, str(value), ink, rule.guess)
+    axis.axhline(rule.threshold, color="#b02a2a", ls="--", lw=0.9)
+    axis.axhline(rule.guess, color="#2a8f4d", ls="--", lw=0.9)
     levels = sorted(trials["samples"].unique())
-    axis.set(xscale="log", xlabel="samples per pixel", ylabel="share right", ylim=(0.35, 1.02))
+    axis.set(xscale="log", xlabel="samples per pixel", ylabel="share right", ylim=(rule.guess - 0.15, 1.02))
     apart = [levels[0]]
     for level in levels[1:]:
         if level > 1.25 * apart[-1]:  # labels of nearer levels would overlap
@@ -46,7 +51,7 @@ def psychometric_figure(
     return figure
 
 
-def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, ink: str) -> None:
+def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, ink: str, guess: float) -> None:
     """Means over observers with their standard errors, and the fitted function."""
     shares = part.pivot_table("correct", "observer", "samples")
     levels = np.asarray(shares.columns, np.float64)
@@ -56,7 +61,8 @@ def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, i
     if np.isfinite(row.get("mu", np.nan)):
         x = np.geomspace(levels[0], levels[-1], 200)
         jnd = f"{row['jnd']:.0f}" if 0.0 < row["jnd"] < np.inf else str(row["status"])
-        axis.plot(x, correct_share(x, row["mu"], row["sigma"], row["lapse"]), color=ink, label=f"{label}, JND {jnd}")
+        shares = correct_share(x, row["mu"], row["sigma"], row["lapse"], guess)
+        axis.plot(x, shares, color=ink, label=f"{label}, JND {jnd}")
     else:
         axis.plot([], [], color=ink, label=f"{label}, no fit")
 

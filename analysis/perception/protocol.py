@@ -20,7 +20,7 @@ from analysis.perception.answers import Answers, answers_of_lines
 from analysis.perception.observers import COLUMNS
 from analysis.perception.stimuli import COLUMNS as STIMULUS
 from analysis.perception.stimuli import check_frames, png_of, read_manifest
-from analysis.storage.files import atomic
+from analysis.storage.files import atomic, write_table
 
 HUMAN_TASK = "dual pair"
 TABLE = "trials-human.parquet"
@@ -202,6 +202,7 @@ class TrialSession:
         """Writes the table; returns its path."""
         with atomic(self.folder / TABLE) as path:
             self.table().to_parquet(path, index=False)
+        write_table(self.folder / Path(TABLE).with_suffix(".csv"), self.table())
         return self.folder / TABLE
 
 

@@ -1,7 +1,8 @@
 """Psychometric functions of the number of samples: fits, just-noticeable differences, intervals, t-tests, power.
 
 The share of correct answers falls with the samples per pixel ``n`` from nearly 1 to the guess rate:
-``p(n) = 1/2 + (1/2 - λ) Φ((μ - log2 n) / σ)``. The just-noticeable difference is the ``n`` at which ``p = 0.75``.
+``p(n) = γ + (1 - γ - λ) Φ((μ - log2 n) / σ)``. The guess rate ``γ`` is 1/2 for two alternatives. The just-noticeable
+difference is the ``n`` at which ``p`` is the threshold, by default 0.75.
 
 Observers differ, and the answers of one observer are correlated. So intervals resample observers, and tests count one
 entry per observer.
@@ -22,6 +23,8 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
+from tsar.checks import require
+
 GUESS = 0.5
 THRESHOLD = 0.75
 LAPSE_MAX = 0.08
@@ -30,6 +33,27 @@ LAPSE_MAX = 0.08
 _OCTAVES_BEYOND = 2.0  # octaves by which a fitted μ may lie beyond the levels
 _SIGMA_LIMITS = 0.25, 6.0
 _GRID = 161, 25, 5
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a task asks for.
+
+    Attributes:
+        guess: share of right answers by chance.
+        threshold: share of right answers at the just-noticeable difference.
+    """
+
+    guess: float = GUESS
+    threshold: float = THRESHOLD
+
+    def __post_init__(self) -> None:
+        require(0.0 <= self.guess < 1.0 - LAPSE_MAX, "guess_rate", f"in [0, {1.0 - LAPSE_MAX:g})", self.guess)
+        reached = self.guess < self.threshold < 1.0 - LAPSE_MAX
+        require(reached, "threshold", f"between the guess rate and {1.0 - LAPSE_MAX:g}", self.threshold)
+
+
+TWO_ALTERNATIVES = Rule()
 
 
 class FitError(ValueError):
@@ -41,7 +65,7 @@ class Fit:
     """A fitted function.
 
     Attributes:
-        mu: log2 of the samples at which the lapse-free function is at the threshold.
+        mu: log2 of the samples at which the lapse-free function is halfway between the guess rate and 1.
         sigma: width, octaves.
         lapse: rate of answers that do not depend on the stimulus.
         jnd: samples per pixel at the threshold; infinite if it lies above the levels, 0 if below.
@@ -62,15 +86,16 @@ class Fit:
 
 
 def correct_share(
-    samples: Float[NDArray[np.float64], "*n"], mu: float, sigma: float, lapse: float
+    samples: Float[NDArray[np.float64], "*n"], mu: float, sigma: float, lapse: float, guess: float = GUESS
 ) -> Float[NDArray[np.float64], "*n"]:
-    """Probability ``1/2 + (1/2 - λ) Φ((μ - log2 n) / σ)`` of a correct answer at ``samples`` per pixel."""
-    return GUESS + (1.0 - GUESS - lapse) * stats.norm.cdf((mu - np.log2(samples)) / sigma)
+    """Probability ``γ + (1 - γ - λ) Φ((μ - log2 n) / σ)`` of a correct answer at ``samples`` per pixel."""
+    return guess + (1.0 - guess - lapse) * stats.norm.cdf((mu - np.log2(samples)) / sigma)
 
 
-def threshold_samples(mu: float, sigma: float, lapse: float) -> float:
+def threshold_samples(mu: float, sigma: float, lapse: float, rule: Rule = TWO_ALTERNATIVES) -> float:
     """Samples per pixel at which a function crosses the threshold."""
-    return float(2.0 ** (mu - sigma * stats.norm.ppf((THRESHOLD - GUESS) / (1.0 - GUESS - lapse))))
+    reached = (rule.threshold - rule.guess) / (1.0 - rule.guess - lapse)
+    return float(2.0 ** (mu - sigma * stats.norm.ppf(reached)))
 
 
 def fit(
@@ -79,6 +104,7 @@ def fit(
     trials: Sequence[int] | Int[NDArray[np.int64], "observers levels"],
     bootstraps: int = 0,
     seed: int = 0,
+    rule: Rule = TWO_ALTERNATIVES,
 ) -> Fit:
     """Fits the answers of all observers together, by maximum likelihood.
 
@@ -93,16 +119,17 @@ def fit(
             several.
         bootstraps: number of data sets that are drawn for the interval; 0 leaves it out.
         seed: seed of these data sets.
+        rule: guess rate and threshold.
 
     Raises:
         FitError: fewer than two levels with answers, more right answers than answers, or a level below 1.
     """
     x, by_observer, asked = _checked(levels, correct, trials)
     k, n = by_observer.sum(axis=0), asked.sum(axis=0)
-    grid = _grid(tuple(x))
-    mu, sigma, lapse = _polished(x, k, n, *_best(grid, k[None], n[None])[0])
-    jnd, status = _placed(threshold_samples(mu, sigma, lapse), x)
-    share = np.clip(correct_share(x, mu, sigma, lapse), 1e-9, 1.0 - 1e-9)
+    grid = _grid(tuple(x), rule.guess)
+    mu, sigma, lapse = _polished(x, k, n, *_best(grid, k[None], n[None])[0], guess=rule.guess)
+    jnd, status = _placed(threshold_samples(mu, sigma, lapse, rule), x)
+    share = np.clip(correct_share(x, mu, sigma, lapse, rule.guess), 1e-9, 1.0 - 1e-9)
     log_likelihood = float((k * np.log(share) + (n - k) * np.log1p(-share)).sum())
     interval = None
     if bootstraps:
@@ -115,7 +142,7 @@ def fit(
             drawn = rng.binomial(n, share, (bootstraps, len(x)))
             counts = np.broadcast_to(n, drawn.shape)
         found = _best(grid, drawn, counts)
-        jnds = np.array([_placed(threshold_samples(*row), x)[0] for row in found])
+        jnds = np.array([_placed(threshold_samples(*row, rule=rule), x)[0] for row in found])
         tail = tail_share(people)
         low, high = np.quantile(jnds, [tail, 1.0 - tail], method="nearest")
         interval = min(float(low), jnd), max(float(high), jnd)
@@ -164,7 +191,7 @@ def _placed(jnd: float, x: NDArray[np.float64]) -> tuple[float, str]:
 
 @lru_cache(maxsize=16)
 def _grid(
-    levels: tuple[float, ...],
+    levels: tuple[float, ...], guess: float
 ) -> tuple[Float[NDArray[np.float64], "g 3"], NDArray[np.float64], NDArray[np.float64]]:
     """The grid of parameters, and logarithms of their shares of right and wrong answers at the levels ``(levels,
     g)``."""
@@ -173,7 +200,7 @@ def _grid(
     sigma = np.geomspace(*_SIGMA_LIMITS, _GRID[1])
     lapse = np.linspace(0.0, LAPSE_MAX, _GRID[2])
     rows = np.stack(np.meshgrid(mu, sigma, lapse, indexing="ij"), axis=-1).reshape(-1, 3)
-    share = GUESS + (1.0 - GUESS - rows[:, 2]) * stats.norm.cdf((rows[:, 0] - octaves[:, None]) / rows[:, 1])
+    share = guess + (1.0 - guess - rows[:, 2]) * stats.norm.cdf((rows[:, 0] - octaves[:, None]) / rows[:, 1])
     share = np.clip(share, 1e-9, 1.0 - 1e-9)
     return rows, np.log(share), np.log1p(-share)
 
@@ -192,12 +219,19 @@ def _best(
 
 
 def _polished(
-    x: NDArray[np.float64], k: NDArray[np.int64], n: NDArray[np.int64], mu: float, sigma: float, lapse: float
+    x: NDArray[np.float64],
+    k: NDArray[np.int64],
+    n: NDArray[np.int64],
+    mu: float,
+    sigma: float,
+    lapse: float,
+    guess: float,
 ) -> tuple[float, float, float]:
     """Parameters of the nearest maximum of the likelihood."""
 
     def cost(parameters: NDArray[np.float64]) -> float:
-        share = np.clip(correct_share(x, parameters[0], math.exp(parameters[1]), parameters[2]), 1e-9, 1.0 - 1e-9)
+        shares = correct_share(x, parameters[0], math.exp(parameters[1]), parameters[2], guess)
+        share = np.clip(shares, 1e-9, 1.0 - 1e-9)
         return -float((k * np.log(share) + (n - k) * np.log1p(-share)).sum())
 
     octaves = np.log2(x)

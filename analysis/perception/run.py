@@ -25,9 +25,10 @@ from analysis.perception.options import (
     StimuliOptions,
 )
 from analysis.perception.protocol import TrialSession
+from analysis.perception.psychometrics import Rule
 from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, render_stimuli
-from analysis.perception.trials import CONDITIONS, checked_trials
+from analysis.perception.trials import CONDITIONS, read_trials, undisturbed
 from analysis.storage.files import atomic, write_table
 from analysis.storage.results import own_results
 from analysis.storage.summary import write_summary
@@ -45,7 +46,7 @@ _TABLES = ("*.csv", "*.png")
 _FILES = {
     StimuliOptions: ("manifest.json",),
     SimulateOptions: (*_TABLES, "trials-simulated.parquet"),
-    ServeOptions: ("trials-human.parquet",),
+    ServeOptions: ("trials-human.parquet", "trials-human.csv"),
 }
 
 
@@ -91,6 +92,7 @@ def simulate(options: SimulateOptions, bars: Bars) -> Found:
     write_table(options.out / "jod.csv", jod)
     with atomic(options.out / "trials-simulated.parquet") as path:
         trials.to_parquet(path, index=False)
+    write_table(options.out / "trials-simulated.csv", trials)
     sweep = []
     for sigma in SIGMAS:
         swept = simulated_trials(jod, people, options.repetitions, options.seed, sigma)
@@ -177,17 +179,18 @@ def recover(options: RecoverOptions, bars: Bars) -> Found:
 
 def analyse(options: AnalyseOptions, bars: Bars) -> Found:
     """Fits, tests, power and figures from a table of trials."""
-    try:
-        table = pd.read_parquet(options.trials)
-    except (OSError, ValueError) as error:
-        raise InputError(f"trials: {options.trials}: cannot be read as Parquet ({error})") from None
-    trials, kind = checked_trials(table, str(options.trials))
+    rule = Rule(options.guess_rate, options.threshold)
+    trials, kind = read_trials(options.trials)
+    kept = undisturbed(trials) if options.disturbed == "leave-out" else trials
+    if kept.empty:
+        raise InputError("disturbed: expected trials that fit the window and dropped no frame, got none")
+    left_out, trials = len(trials) - len(kept), kept
     task = bars.task("analysis", 4)
-    fitted = analyses.fits(trials, options.bootstraps, options.seed, options.psignifit)
+    fitted = analyses.fits(trials, options.bootstraps, options.seed, options.psignifit, rule)
     task.advance()
     tested = analyses.comparisons(trials)
     task.advance()
-    _figures(options, trials, fitted, kind)
+    _figures(options, trials, kind, rule)
     task.advance()
     pairs = analyses.strongest(tested)
     tables = {"fits": fitted, "tests": tested, "pairs": pairs}
@@ -203,27 +206,33 @@ def analyse(options: AnalyseOptions, bars: Bars) -> Found:
     for name, rows in tables.items():
         write_table(options.out / f"{name}.csv", rows)
     found = {name: rows.to_dict("records") for name, rows in tables.items()}
-    return {"observer_kind": kind, "thesis_jnd": analyses.THESIS_JND, **found}, _text(fitted, tested, pairs, kind)
+    found = {"observer_kind": kind, "left_out": left_out, "thesis_jnd": analyses.THESIS_JND, **found}
+    said = f"{left_out} trials left out (they did not fit the window, or dropped frames)\n" if left_out else ""
+    return found, said + _text(fitted, tested, pairs, kind)
 
 
-def _figures(options: AnalyseOptions, trials: pd.DataFrame, fitted: pd.DataFrame, kind: str) -> None:
+def _figures(options: AnalyseOptions, trials: pd.DataFrame, kind: str, rule: Rule) -> None:
     """Figures 19 to 25: shares of right answers by scene and by point set, each value alone and all together, for the
     first filter; and one figure by filter if there are several.
     """
     from analysis.page.figures import save
 
+    def fitted(part: pd.DataFrame) -> dict[str, Any]:
+        return analyses.fit_row(part, 0, options.seed, rule=rule)
+
     filters = list(dict.fromkeys(trials["time_filter"]))
     alone = trials.loc[trials["time_filter"] == filters[0]]
     for column, name in (("scene", "scenes"), ("point_set", "point_sets")):
         values = sorted(set(alone[column]))
-        rows = {value: analyses.fit_row(alone.loc[alone[column] == value], 0, options.seed) for value in values}
-        save(plots.psychometric_figure(alone, column, rows, kind), options.out / f"{name}.png")
+        rows = {value: fitted(alone.loc[alone[column] == value]) for value in values}
+        save(plots.psychometric_figure(alone, column, rows, kind, rule), options.out / f"{name}.png")
         for value in values:
-            save(plots.psychometric_figure(alone, column, {value: rows[value]}, kind), options.out / f"{value}.png")
+            one = plots.psychometric_figure(alone, column, {value: rows[value]}, kind, rule)
+            save(one, options.out / f"{value}.png")
     if len(filters) > 1:
         column = "time_filter"
-        rows = {value: analyses.fit_row(trials.loc[trials[column] == value], 0, options.seed) for value in filters}
-        save(plots.psychometric_figure(trials, column, rows, kind), options.out / "time_filters.png")
+        rows = {value: fitted(trials.loc[trials[column] == value]) for value in filters}
+        save(plots.psychometric_figure(trials, column, rows, kind, rule), options.out / "time_filters.png")
 
 
 def _text(fitted: pd.DataFrame, tested: pd.DataFrame, pairs: pd.DataFrame, kind: str) -> str:

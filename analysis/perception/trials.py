@@ -2,19 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis.command.cli import InputError
-from analysis.perception.observers import COLUMNS
 
 CONDITIONS = ("scene", "point_set", "time_filter")
 """Columns in which trials differ besides the level."""
 
+REQUIRED = ("observer", "samples", "correct")
+"""Columns that every table of trials has."""
+
+_USUAL = {"observer_kind": "unknown", **dict.fromkeys(CONDITIONS, "all")}
+"""Values of columns that a table may lack."""
+
 _RIGHT = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+_UNFIT = ("false", "0", "0.0")
 _SIDES = ("left", "right")
+
+
+def read_trials(paths: Sequence[Path]) -> tuple[pd.DataFrame, str]:
+    """The answered trials of all tables, and the kind of their observers.
+
+    Args:
+        paths: files, read as CSV where their names end in ``.csv``, else as Parquet.
+
+    Raises:
+        InputError: a file cannot be read, as :func:`checked_trials`, or the kinds of two files differ.
+    """
+    tables, kinds = [], dict[str, Path]()
+    for path in paths:
+        comma = path.suffix.lower() == ".csv"
+        try:
+            table = pd.read_csv(path) if comma else pd.read_parquet(path)
+        except (OSError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"trials: {path}: cannot be read as {'CSV' if comma else 'Parquet'} ({reason})") from None
+        trials, kind = checked_trials(table, str(path))
+        tables.append(trials)
+        kinds.setdefault(kind, path)
+    if len(kinds) > 1:
+        found = ", ".join(f"{kind} in {path}" for kind, path in kinds.items())
+        raise InputError(f"trials: expected observers of one kind, got {found}")
+    return pd.concat(tables, ignore_index=True), next(iter(kinds))
+
+
+def undisturbed(trials: pd.DataFrame) -> pd.DataFrame:
+    """The trials that fit the window and dropped no frame, as far as their table says."""
+    kept = np.ones(len(trials), bool)
+    if "fits_window" in trials:
+        kept &= ~trials["fits_window"].astype(str).str.strip().str.lower().isin(_UNFIT).to_numpy()
+    if "dropped_frames" in trials:
+        kept &= ~(np.asarray(pd.to_numeric(trials["dropped_frames"], errors="coerce"), np.float64) > 0)
+    return trials.loc[kept]
 
 
 def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
@@ -30,9 +74,10 @@ def checked_trials(table: pd.DataFrame, name: str) -> tuple[pd.DataFrame, str]:
     Raises:
         InputError: a column is missing or has an invalid value, kinds are mixed, or there is no answer.
     """
-    missing = [column for column in COLUMNS if column not in table.columns]
+    missing = [column for column in REQUIRED if column not in table.columns]
     if missing:
         raise InputError(f"{name}: expected a table of trials, found no column {', '.join(missing)}")
+    table = table.assign(**{column: value for column, value in _USUAL.items() if column not in table.columns})
     answered = table.loc[table["correct"].notna()]
     if answered.empty:
         raise InputError(f"{name}: expected answered trials, got none")
@@ -96,6 +141,8 @@ def _check_sides(trials: pd.DataFrame, name: str) -> None:
     Raises:
         InputError: a trial contradicts its sides.
     """
+    if not {"answer", "differing_side"} <= set(trials.columns):
+        return
     given = trials["answer"].isin(_SIDES) & trials["differing_side"].isin(_SIDES)
     wrong = np.flatnonzero(given & ((trials["answer"] == trials["differing_side"]) != trials["correct"]))
     if len(wrong):

@@ -88,7 +88,11 @@ def test_simulated_answers_and_their_analysis(tmp_path: Path, monkeypatch, capsy
     for name in ("scenes", "point_sets", "planescene", "hammersley"):
         assert (found / f"{name}.png").stat().st_size > 5_000
     assert len(pd.read_csv(found / "power.csv")) == 8 and len(pd.read_csv(found / "fits.csv")) == 2 + 2 + 1 + 2
-    assert summary(found)["observer_kind"] == "simulated"
+    assert summary(found)["observer_kind"] == "simulated" and summary(found)["left_out"] == 0
+    by_parquet = (found / "fits.csv").read_bytes()
+    again = (*analyse[:1], file.replace(".parquet", ".csv"), *analyse[2:])
+    assert call_script("perception.py", monkeypatch, *again) == 0, capsys.readouterr().err
+    assert (found / "fits.csv").read_bytes() == by_parquet, "the table is the same as CSV"
     assert "simulated observers" in capsys.readouterr().out
 
 

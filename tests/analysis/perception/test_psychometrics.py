@@ -11,7 +11,8 @@ import pytest
 from analysis.command.cli import InputError
 from analysis.perception.analysis import recovery
 from analysis.perception.peer import peer_fit
-from analysis.perception.psychometrics import FitError, correct_share, fit, paired, tail_share, threshold_samples
+from analysis.perception.psychometrics import FitError, Rule, correct_share, fit, paired, tail_share, threshold_samples
+from tsar.checks import ConfigError
 
 LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
 
@@ -169,3 +170,19 @@ def test_without_psignifit_there_is_one_line(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "psignifit", None)
     with pytest.raises(InputError, match=r"expected the package psignifit, found none; the extra 'psignifit'"):
         peer_fit(LEVELS, [10] * 8, [20] * 8)
+
+
+def test_guess_rate_and_threshold_are_those_of_the_task() -> None:
+    """Four alternatives: a share of 1/4 by chance; exact counts of a known function give its threshold."""
+    rule = Rule(0.25, 0.6)
+    levels = np.array([1.0, 4.0, 16.0, 64.0, 256.0])
+    asked = np.full(5, 100_000)
+    right = np.round(asked * correct_share(levels, 4.0, 1.5, 0.02, rule.guess)).astype(int)
+    found = fit(levels.tolist(), right.tolist(), asked.tolist(), rule=rule)
+    expected = threshold_samples(4.0, 1.5, 0.02, rule)
+    assert float(correct_share(np.array([expected]), 4.0, 1.5, 0.02, rule.guess)[0]) == pytest.approx(0.6)
+    assert found.jnd == pytest.approx(expected, rel=0.02)
+    assert fit(levels.tolist(), right.tolist(), asked.tolist()).jnd != pytest.approx(expected, rel=0.1)
+    for guess, threshold in ((0.5, 0.4), (0.95, 0.99), (0.5, 0.95)):
+        with pytest.raises(ConfigError, match="expected"):
+            Rule(guess, threshold)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from analysis.command.cli import InputError
 from analysis.perception.analysis import comparisons, fits, strongest
 from analysis.perception.observers import drawn_observers, simulated_trials
-from analysis.perception.trials import checked_trials
+from analysis.perception.trials import checked_trials, read_trials, undisturbed
 
 STIMULI = pd.DataFrame(
     [
@@ -88,7 +89,7 @@ def test_an_answer_that_contradicts_its_sides_is_named() -> None:
 @pytest.mark.parametrize(
     ("bad", "message"),
     [
-        (GOOD.drop(columns="answer"), "no column answer"),
+        (GOOD.drop(columns="samples"), "no column samples"),
         (GOOD.assign(observer_kind=["human", "simulated"] * (len(GOOD) // 2)), "one kind, got human, simulated"),
         (GOOD.assign(correct=None), "answered trials, got none"),
         (GOOD.iloc[:0], "answered trials, got none"),
@@ -106,3 +107,32 @@ def test_one_condition_has_fits_and_nothing_to_compare() -> None:
     best = strongest(tested)
     assert best.empty and "corrected_p" in best.columns
     assert len(fits(trials, 10, 0)) == 4
+
+
+def test_sessions_are_read_together_from_csv_and_parquet_with_the_columns_that_are_used(tmp_path: Path) -> None:
+    first, second = tmp_path / "a.csv", tmp_path / "b.parquet"
+    short = GOOD[["observer", "samples", "correct"]]
+    short.iloc[::2].assign(correct=lambda rows: rows["correct"].map({True: "yes", False: "no"})).to_csv(first)
+    short.iloc[1::2].to_parquet(second)
+    trials, kind = read_trials([first, second])
+    assert kind == "unknown" and len(trials) == len(GOOD) and set(trials["scene"]) == {"all"}
+    assert trials["correct"].sum() == GOOD["correct"].sum() and set(trials["observer"]) == set(GOOD["observer"])
+    assert list(fits(trials, 0, 0)["trials"]) == [len(GOOD)] * 4
+    GOOD.to_parquet(second)
+    with pytest.raises(InputError, match=r"of one kind, got unknown in .*a\.csv, simulated in .*b\.parquet"):
+        read_trials([first, second])
+    for path in (tmp_path / "gone.csv", tmp_path / "gone.parquet"):
+        with pytest.raises(InputError, match=f"{path}: cannot be read as") as error:
+            read_trials([path])
+        assert "\n" not in str(error.value)
+    first.write_text("observer,samples\nA,8\n")
+    with pytest.raises(InputError, match=r"a\.csv: expected a table of trials, found no column correct"):
+        read_trials([first])
+
+
+def test_trials_that_did_not_fit_or_dropped_frames_are_left_out(tmp_path: Path) -> None:
+    file, rows = tmp_path / "a.csv", GOOD.head(6)
+    rows.assign(fits_window=[True, False, True, True, True, True], dropped_frames=[0, 0, 2, -1, 0, 1]).to_csv(file)
+    trials, _ = read_trials([file])
+    assert list(undisturbed(trials).index) == [0, 3, 4]
+    assert len(undisturbed(GOOD)) == len(GOOD), "nothing is said of them"
