@@ -50,9 +50,7 @@ def _bitmap(mitsuba: Any, picture: NDArray, values: dict[str, Any], encoded: boo
             "filter_type": values.get("filter", "bilinear"), "wrap_mode": values.get("wrap", "repeat")}  # fmt: skip
 
 
-def _one(
-    mitsuba: Any, picture: NDArray, channel: int, values: dict[str, Any], cutoff: float | None = None
-) -> dict[str, Any]:
+def _one(mitsuba: Any, picture: NDArray, channel: int, cutoff: float | None = None) -> dict[str, Any]:
     """A channel as numbers."""
     numbers = picture[..., channel : channel + 1].astype(np.float32) / 255.0
     numbers = numbers if cutoff is None else (numbers >= cutoff).astype(np.float32)

@@ -12,6 +12,7 @@ import numpy as np
 
 from renderer.layout.kinds import ScatterKind
 from renderer.tables.checks import check_light
+from renderer.tables.coats import rough_coat
 from scenes.arithmetic import sin
 from scenes.canonical import (
     Bumped,
@@ -55,7 +56,10 @@ EMPTY: Row = {
     "thin": 0,
     "eta": (1.0, 1.0, 1.0),
     "k": (0.0, 0.0, 0.0),
+    "beckmann": 0,
     "inner": 0.0,
+    "passed_low": (0.0, 0.0, 0.0, 0.0),
+    "passed_high": (0.0, 0.0, 0.0, 0.0),
     "glow": -1,
     "emission": (0.0, 0.0, 0.0),
     "opacity": -1,
@@ -94,11 +98,8 @@ def _glass(material: Glass, textures: Textures, where: str) -> Row:
 
 def _metal(material: Metal, textures: Textures, where: str) -> Row:
     alpha = mean_alpha(material.roughness)
-    if material.distribution != "ggx" and alpha > 0.0:
-        raise SceneError(
-            f"{where}: Metal.distribution: expected ggx (all that paths support), got {material.distribution}"
-        )
     return {
+        "beckmann": int(material.distribution == "beckmann"),
         "kind": ScatterKind.METAL,
         "specular": textures.add_texture(material.reflectance_scale, where),
         "alpha": alpha,
@@ -110,13 +111,17 @@ def _metal(material: Metal, textures: Textures, where: str) -> Row:
 def _plastic(material: Plastic, textures: Textures, where: str) -> Row:
     if not material.layered:
         raise SceneError(f"{where}: Plastic.layered: expected True (all that paths support), got False")
+    rough = {"inner": thrown_back(material.ior)}
+    if material.roughness > 0.0:
+        passed, inner = rough_coat(material.ior, material.roughness)
+        rough = {"inner": inner, "passed_low": tuple(passed[:4]), "passed_high": tuple(passed[4:])}
     return {
+        **rough,
         "kind": ScatterKind.COATED,
         "base": textures.add_texture(material.diffuse, where),
         "specular": textures.add_texture(material.specular, where),
         "ior": material.ior,
         "alpha": material.roughness,
-        "inner": thrown_back(material.ior),
     }
 
 

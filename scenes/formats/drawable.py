@@ -89,6 +89,10 @@ class Approximation:
         if (depth < 0 or depth > DEPTH_MAX) and not self.paths:
             self.report.add("integrator", f"{'endless' if depth < 0 else depth} bounces", f"{DEPTH_MAX}")
             depth = DEPTH_MAX
+        if self.paths and scene.integrator.kind != "whitted":
+            depth = (
+                depth - 1 if depth > 0 else depth
+            )  # files count the bounce whose light is direct, the renderer does not
         kind = "path" if self.paths else "direct" if scene.integrator.kind == "direct" else "whitted"
         if scene.integrator.kind not in (kind, "whitted", "direct"):
             became = "paths from the camera" if self.paths else "direct light, mirrors, glass"
@@ -205,9 +209,6 @@ class Approximation:
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
             self.report.add(where, f"facets of two alphas {material.roughness}", f"of one, {alpha:.3g}")
             changed["roughness"] = alpha, alpha
-        if isinstance(material, Metal) and material.distribution != "ggx" and max(material.roughness) > 0.0:
-            self.report.add(where, f"facets of the {material.distribution} distribution", "of GGX")
-            changed["distribution"] = "ggx"
         if isinstance(material, Glass) and material.thin and max(material.roughness) > 0.0:
             self.report.add(where, "a rough pane", "a clear one")
             changed["roughness"] = 0.0, 0.0

@@ -1,7 +1,7 @@
 """A dielectric coat over a diffuse base, smooth or rough.
 
-The coat transmits light to the base and back; its internal reflections are summed. Deviation: the transmittance of a
-rough coat is that of a smooth one.
+The coat transmits light to the base and back; its internal reflections are summed. The transmittance of a rough coat is
+that of a smooth one plus a polynomial (:mod:`renderer.tables.coats`).
 """
 
 from __future__ import annotations
@@ -22,15 +22,28 @@ def coat_chance(lobes: Lobes, reflectance: wp.float32) -> wp.float32:
 
 
 @wp.func
+def coat_passed(lobes: Lobes, cosine: wp.float32) -> wp.float32:
+    """Transmittance of the coat for a direction with this cosine to the normal."""
+    found = 1.0 - dielectric_reflectance(cosine, lobes.ratio)
+    if lobes.alpha > 0.0:
+        x = 2.0 * cosine - 1.0
+        low = lobes.passed_low
+        high = lobes.passed_high
+        upper = high[0] + x * (high[1] + x * (high[2] + x * high[3]))
+        found = found + low[0] + x * (low[1] + x * (low[2] + x * (low[3] + x * upper)))
+    return wp.clamp(found, 0.0, 1.0)
+
+
+@wp.func
 def coated_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Response:
-    """``albedo (1 - F_o) (1 - F_i) ratio² cos / (pi (1 - inner))``, plus the facets of a rough coat."""
+    """``albedo T_o T_i ratio² cos / (pi (1 - inner))``, plus the facets of a rough coat."""
     response = Response()
     if arriving[2] <= 0.0 or outgoing[2] <= 0.0:
         return response
     reflectance = dielectric_reflectance(outgoing[2], lobes.ratio)
-    let_in = 1.0 - dielectric_reflectance(arriving[2], lobes.ratio)
+    let_in = coat_passed(lobes, arriving[2])
     chance = coat_chance(lobes, reflectance)
-    passed = (1.0 - reflectance) * let_in * lobes.ratio * lobes.ratio / (1.0 - lobes.inner)
+    passed = coat_passed(lobes, outgoing[2]) * let_in * lobes.ratio * lobes.ratio / (1.0 - lobes.inner)
     response.value = lobes.base * (passed * arriving[2] / wp.pi)
     response.density = (1.0 - chance) * arriving[2] / wp.pi
     if lobes.alpha > 0.0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from renderer.kernels.scattering.beckmann import beckmann_normal
 from renderer.kernels.scattering.coated import coated_chosen, coated_response
 from renderer.kernels.scattering.diffuse import diffuse_response
 from renderer.kernels.scattering.facets import visible_normal
@@ -64,7 +65,10 @@ def lobes_at(
     elif (features & Feature.FACETS) != 0:
         lobes.eta = record.eta
         lobes.k = record.k
+        lobes.beckmann = record.beckmann
         lobes.inner = record.inner
+        lobes.passed_low = record.passed_low
+        lobes.passed_high = record.passed_high
         if record.kind == ScatterKind.METALLIC:
             parts = looked_up(features, scene, record.parts, surface, footprint)
             roughness = wp.clamp(record.roughness * parts[1], 0.0, 1.0)
@@ -110,7 +114,10 @@ def chosen_of(features: wp.int32, lobes: Lobes, outgoing: wp.vec3, choice: wp.fl
         chosen = glass_chosen(lobes, outgoing, choice, point)
     elif (features & Feature.FACETS) != 0:
         if lobes.kind == ScatterKind.METAL and lobes.alpha > 0.0:
-            chosen.direction = mirrored(outgoing, visible_normal(lobes.alpha, outgoing, point))
+            if lobes.beckmann != 0:
+                chosen.direction = mirrored(outgoing, beckmann_normal(lobes.alpha, point))
+            else:
+                chosen.direction = mirrored(outgoing, visible_normal(lobes.alpha, outgoing, point))
             chosen.density = 1.0
         elif lobes.kind == ScatterKind.METAL:
             chosen.direction = mirrored(outgoing, wp.vec3(0.0, 0.0, 1.0))

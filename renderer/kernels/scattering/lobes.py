@@ -22,7 +22,10 @@ class Lobes:
     thin: wp.int32
     eta: wp.vec3
     k: wp.vec3
+    beckmann: wp.int32
     inner: wp.float32
+    passed_low: wp.vec4
+    passed_high: wp.vec4
     exponent: wp.float32
     cos_spread: wp.float32
 

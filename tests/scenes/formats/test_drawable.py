@@ -206,3 +206,14 @@ def test_a_cube_that_shines_is_six_rectangles_facing_outwards() -> None:
         assert normal @ (side.to_world[:3, 3] - place[:3, 3]) > 0.0 and side.emission == (1.0, 2.0, 3.0)
         total += 4.0 * float(np.linalg.norm(normal))
     assert total == pytest.approx(8.0 * (2.0 + 3.0 + 6.0))
+
+
+@pytest.mark.parametrize(("edges", "depth"), [(2, 0), (3, 1), (-1, -1)])
+def test_paths_have_as_many_edges_as_the_file_allows(edges: int, depth: int, tmp_path: Path) -> None:
+    """Two edges to the light are direct light, which is a depth of 0 here. A model has no limit of its own."""
+    file = tmp_path / "in.xml"
+    limit = f'<integrator type="path"><integer name="maxDepth" value="{edges}"/></integrator>'
+    file.write_text(f'<scene version="0.5.0">{limit}<sensor type="perspective"/><shape type="sphere"/></scene>')
+    assert catalog.load_any(str(file), integrator="path")[0].integrator.depth == depth
+    plain = drawable(Scene(PerspectiveCamera(), ()), LossReport(), "path")
+    assert plain.integrator.depth == Scene(PerspectiveCamera(), ()).integrator.depth
