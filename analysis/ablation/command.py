@@ -18,6 +18,7 @@ from analysis.command.extras import require_extra
 def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(AblationOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study", "perception")
     from analysis.ablation.run import study
     from analysis.ablation.shown import shown_tables

@@ -67,6 +67,17 @@ class ClusterOptions:
         for name in ("workers_least", "memory_limit_gib") if self.scheduler else ():
             require(not getattr(self, name), name, alone, getattr(self, name))
 
+    def require_port(self) -> None:
+        """Checks that something listens at the scheduler's address, without importing Dask.
+
+        Raises:
+            InputError: nothing does.
+        """
+        try:
+            _require_port(self.scheduler)
+        except (OSError, OverflowError) as error:
+            raise _silent(self.scheduler, error) from error
+
     @property
     def processes(self) -> int:
         """Processes of the local cluster."""
@@ -102,7 +113,7 @@ def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line:
             client = Client(options.scheduler, timeout=WAIT_S)
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error) or f"it accepts connections, but sends no greeting within {WAIT_S} s"
-            raise InputError(f"scheduler: nothing answers at {options.scheduler!r} ({reason})") from error
+            raise _silent(options.scheduler, reason) from error
         with client:
             say(dashboard_of(client))
             yield client
@@ -140,12 +151,15 @@ def dashboard_of(client: Client) -> str:
 
 def _require_port(address: str) -> None:
     """Raises OSError if nothing listens at an address: a client would retry until its timeout."""
-    from distributed.comm.addressing import parse_address, parse_host_port
+    transport, _, place = address.rpartition("://")
+    host, _, port = place.rpartition(":")
+    if transport in ("", "tcp", "tls", "ws", "wss") and host and port.isdecimal():
+        socket.create_connection((host.strip("[]"), int(port)), CONNECT_S).close()
 
-    transport, place = parse_address(address)
-    if transport in ("tcp", "tls", "ws", "wss"):
-        host, port = parse_host_port(place)
-        socket.create_connection((host, port), CONNECT_S).close()
+
+def _silent(address: str, reason: object) -> InputError:
+    """The error to report if nothing answers at an address."""
+    return InputError(f"scheduler: nothing answers at {address!r} ({reason})")
 
 
 async def _greeted(address: str) -> None:

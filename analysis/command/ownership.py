@@ -11,8 +11,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from filelock import lock_descriptor
-
 
 @contextmanager
 def owned(path: Path, what: str) -> Iterator[None]:
@@ -30,6 +28,8 @@ def owned(path: Path, what: str) -> Iterator[None]:
 
 def _taken(path: Path, what: str) -> TextIO:
     """A lock file that names this process, which holds it until the file is closed."""
+    from filelock import lock_descriptor  # here, so that a Python without packages can say that they are missing
+
     while True:
         file = path.open("a+", encoding="utf-8")
         if not lock_descriptor(file.fileno(), blocking=False):

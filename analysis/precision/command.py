@@ -21,6 +21,7 @@ from analysis.precision.options import PrecisionOptions
 def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(PrecisionOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study", "perception")
     from analysis.study.written import end_study
 

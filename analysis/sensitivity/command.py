@@ -15,6 +15,7 @@ from analysis.sensitivity.options import SensitivityOptions
 def main() -> None:
     """Makes missing runs; prints the best settings, and the flatness of the optimum."""
     options = parse(SensitivityOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study", "perception")
     from analysis.command.console import show
     from analysis.sensitivity.run import study

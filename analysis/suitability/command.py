@@ -15,6 +15,7 @@ from analysis.suitability.options import SuitabilityOptions
 def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(SuitabilityOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study", "perception")
     from analysis.command.console import show
     from analysis.study.written import end_study

@@ -16,6 +16,7 @@ from analysis.tracer.options import TileOptions
 def main() -> None:
     """Parses, renders or measures, prints the time."""
     options = parse(TileOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study")
     import pandas as pd
 

@@ -19,6 +19,7 @@ from analysis.trade.options import TradeOptions
 def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(TradeOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study", "perception", *(["search"] if options.trials else []))
     from analysis.command.console import markdown, show
     from analysis.study.written import end_study

@@ -20,6 +20,7 @@ from analysis.workloads.options import WorkloadOptions
 def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(WorkloadOptions, __doc__ or "")
+    options.farm.require_port()  # before slow imports
     require_extra("study", "perception")
     from analysis.study.written import end_study
 

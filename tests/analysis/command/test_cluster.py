@@ -44,6 +44,9 @@ def test_a_closed_port_is_told_before_a_client_tries_for_long(
     with pytest.raises(InputError) as caught, cluster.connected(cluster.ClusterOptions(scheduler=address)):
         pass
     told = str(caught.value)
+    with pytest.raises(InputError) as early:
+        cluster.ClusterOptions(scheduler=address).require_port()
+    assert str(early.value) == told
     assert told.startswith(f"scheduler: nothing answers at '{address}' (") and "refused" in told and "\n" not in told
 
 
@@ -55,3 +58,15 @@ def test_a_port_that_accepts_but_does_not_speak_the_protocol_is_refused(
     address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
     with pytest.raises(InputError, match="sends no greeting"), cluster.connected(cluster.ClusterOptions(0, address)):
         pass
+
+
+def test_a_dead_scheduler_is_told_before_slow_imports(port: socket.socket) -> None:
+    address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
+    program = (
+        f"import sys; sys.argv = ['suitability', '--scheduler', '{address}']\n"
+        "from analysis.suitability.command import main\ntry: main()\n"
+        "except ValueError as error:\n"
+        "    print('refused' in str(error), *(one in sys.modules for one in ('torch', 'distributed')))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "True False False\n", done.stderr

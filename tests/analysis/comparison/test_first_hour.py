@@ -64,6 +64,14 @@ def test_a_python_without_the_packages_is_told_what_to_do(monkeypatch: pytest.Mo
     assert shown.count("\n") == 1 and "expected the package tyro" in shown and ". .venv/bin/activate" in shown
 
 
+@pytest.mark.parametrize("script", ["run", "render", "live", "suitability"])
+def test_a_script_run_by_a_python_without_packages_ends_with_one_line(script: str) -> None:
+    command = [sys.executable, "-I", "-S", f"scripts/{script}.py", "fly-by"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
+    assert done.stderr.startswith("error: expected the package ") and ". .venv/bin/activate" in done.stderr
+
+
 def test_a_command_that_ends_well_ends_at_once() -> None:
     """Its exit functions and threads have run, and what it printed is there."""
     program = (
