@@ -7,7 +7,7 @@ namespace packets {
 // Padding of a triangle's rectangle, in units of the padding of a box: it has three more roundings.
 constexpr float CORNER_SLACK = 5.0f;
 // Packets whose directions differ by more than this along an axis are traversed ray by ray.
-constexpr float SPREAD_MAX = 0.25f;
+constexpr float SPREAD_MAX = 0.9f;
 // Rays whose directions differ by more than this share of the longest component are incoherent.
 constexpr float SCATTERED = 1.0f;
 
