@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import importlib.util
 import logging
-import os
 import signal
 import socket
 import sys
@@ -178,6 +177,9 @@ def _interrupts_blocked() -> Iterator[None]:
     An earlier thread can still take the signal. Python would then raise KeyboardInterrupt here, inside libraries that
     may lose it, so the signal is recorded instead.
     """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
     if _QUIET not in sys.warnoptions:
         sys.warnoptions.append(_QUIET)
     resource_tracker.ensure_running()  # its start unblocks interrupts, so it must start before the block
@@ -196,8 +198,10 @@ def _interrupts_blocked() -> Iterator[None]:
 
 def _end_workers(cluster: LocalCluster) -> None:
     """Kills the workers. Finished results are on disk, and waiting would take as long as a run."""
+    import psutil
+
     for nanny in cluster.workers.values():
         nanny.auto_restart = False
         if nanny.pid is not None:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(nanny.pid, signal.SIGKILL)
+            with contextlib.suppress(psutil.NoSuchProcess):
+                psutil.Process(nanny.pid).kill()

@@ -11,7 +11,8 @@ from types import FrameType
 
 _AGAIN_S = 0.5
 
-SIGNALS = (signal.SIGINT, signal.SIGALRM)
+_TIMED = hasattr(signal, "setitimer")  # not on Windows
+SIGNALS = (signal.SIGINT, signal.SIGALRM) if _TIMED else (signal.SIGINT,)
 """Signals that interrupt: Ctrl-C, and the timer that repeats it."""
 
 
@@ -21,10 +22,10 @@ def heeded() -> Iterator[None]:
 
     Cleaning up is not disturbed. An error that follows a lost KeyboardInterrupt, such as that of a module that could
     not be loaded, counts as the KeyboardInterrupt. Outside the main thread, or if Ctrl-C has another handler
-    already, nothing changes.
+    already, or where the system has no timer, nothing changes.
     """
     ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    if not ours or not _TIMED or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
     before = {number: signal.signal(number, _interrupt) for number in SIGNALS}
@@ -42,7 +43,8 @@ def heeded() -> Iterator[None]:
 
 def settled() -> None:
     """Marks a Ctrl-C as handled: it is not raised again."""
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    if _TIMED:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -149,3 +149,29 @@ run_cli(main)
         [sys.executable, "-c", program], cwd=root, capture_output=True, text=True, timeout=60, preexec_fn=heed
     )
     assert (done.returncode, done.stdout) == (130, "") and done.stderr.startswith("interrupted; "), done
+
+
+ELSEWHERE = """
+import os, signal, sys
+for name in ("SIGALRM", "SIGKILL", "ITIMER_REAL", "setitimer", "getitimer", "pthread_sigmask"):
+    delattr(signal, name)
+del os.sched_getaffinity
+sys.modules["resource"] = None
+from analysis.command.cli import run_cli
+from analysis.command.cluster import _interrupts_blocked
+from tsar.memory import core_count, free_memory_bytes
+
+def main():
+    with _interrupts_blocked():
+        print(core_count() > 0, free_memory_bytes() > 0)
+    signal.raise_signal(signal.SIGINT)
+
+run_cli(main)
+"""
+
+
+def test_a_system_without_timers_and_masks_of_signals_is_interrupted_all_the_same() -> None:
+    """Windows has none of these names; the rest of it is not here to be tried."""
+    done = subprocess.run([sys.executable, "-c", ELSEWHERE], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (130, "True True\n", 1), done.stderr
+    assert done.stderr.startswith("interrupted; ")
