@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
 from scenes.canonical import (
+    Bumped,
     ConstantTexture,
+    Emissive,
     Glass,
     Glossy,
     Masked,
@@ -16,11 +19,14 @@ from scenes.canonical import (
     Metal,
     MixMaterial,
     Plastic,
+    Scene,
     Texture,
+    Translucent,
     Uber,
 )
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.folding import folded, greatest_of, product_of
+from scenes.formats.appearance.graphs import once_a_node, parts_of
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 
@@ -33,6 +39,25 @@ NOTHING = Masked(BLACK, ConstantTexture(grey(0.0)))
 def is_nothing(material: Material) -> bool:
     """Whether a surface is invisible."""
     return isinstance(material, Masked) and material.opacity == NOTHING.opacity
+
+
+def direct_if_same(scene: Scene) -> Scene:
+    """The scene with direct light in place of Whitted's method, if nothing mirrors, refracts or has holes: rays of this
+    method go on from such surfaces alone, so the picture is the same."""
+    whitted = scene.integrator.kind == "whitted" and scene.integrator.depth != 0
+    if not whitted or any(once_a_node(_has_sharp_parts, one.material) for one in scene.instances):
+        return scene
+    return dataclasses.replace(scene, integrator=dataclasses.replace(scene.integrator, kind="direct", depth=1))
+
+
+def _has_sharp_parts(part: Material | Texture, again: Callable[[Material | Texture], bool]) -> bool:
+    if isinstance(part, MixMaterial | Bumped):
+        return any(again(inner) for inner in parts_of(part) if not isinstance(inner, Texture))
+    if isinstance(part, Metal | Glossy):
+        return min(part.roughness) == 0.0
+    if isinstance(part, Plastic):
+        return part.roughness == 0.0
+    return not isinstance(part, Matte | Translucent | Emissive)
 
 
 def mixture_of(first: Material, second: Material, amount: Texture) -> Material:

@@ -30,6 +30,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix, Rgb
 from scenes.daylight import sky_map
+from scenes.formats.appearance.mixtures import direct_if_same
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.directives.scene_reader import FILTERS
 from scenes.formats.directives.scene_writer import SceneWriter, quoted
@@ -56,6 +57,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     """Collects the lines of a LuxRender scene."""
 
     def write_settings(self, scene: Scene) -> None:
+        scene = direct_if_same(scene)
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
         kind = _INTEGRATORS[integrator.kind]
         if integrator.kind in ("whitted", "metropolis"):

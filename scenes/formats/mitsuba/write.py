@@ -26,6 +26,7 @@ from scenes.canonical import (
     Sphere,
 )
 from scenes.canonical.values import Matrix
+from scenes.formats.appearance.mixtures import direct_if_same
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.orientation import FLIPPED, scales_evenly, upright
@@ -75,6 +76,7 @@ class MitsubaWriter(MitsubaLightWriter):
             self._instance(instance)
 
     def _integrator(self, scene: Scene) -> None:
+        scene = direct_if_same(scene)
         kind, depth = _INTEGRATORS[scene.integrator.kind], scene.integrator.depth
         if self.modern and kind in ("bdpt", "photonmapper", "pssmlt"):
             self.report.hint("integrator", scene.integrator.kind, "path")

@@ -13,6 +13,7 @@ import numpy as np
 from scenes import loading
 from scenes.canonical import Camera, EnvironmentLight, Light, PerspectiveCamera, Scene, SpotLight
 from scenes.formats.appearance.equal_area import equal_area, latitude_longitude
+from scenes.formats.appearance.mixtures import direct_if_same
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.directives.scene_writer import quoted
 from scenes.formats.losses import LossReport
@@ -40,6 +41,7 @@ class PbrtV4Writer(PbrtV4SurfaceWriter, PbrtWriter):
         assert self.lines.pop() == "WorldEnd"
 
     def write_settings(self, scene: Scene) -> None:
+        scene = direct_if_same(scene)
         self.write_times(scene)
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
         kind = _INTEGRATORS.get(integrator.kind, "volpath")

@@ -132,10 +132,10 @@ def test_scenes_in_one_folder_keep_their_meshes(tmp_path: Path) -> None:
     ("to", "ending", "count"),
     [
         ("pbrt", ".pbrt", 10),
-        ("pbrt4", ".pbrt", 5),
-        ("mitsuba", ".xml", 7),
-        ("mitsuba3", ".xml", 6),
-        ("luxrender", ".lxs", 3),
+        ("pbrt4", ".pbrt", 9),
+        ("mitsuba", ".xml", 11),
+        ("mitsuba3", ".xml", 10),
+        ("luxrender", ".lxs", 6),
     ],
 )
 def test_how_many_real_scenes_keep_their_picture(to: str, ending: str, count: int, tmp_path: Path) -> None:

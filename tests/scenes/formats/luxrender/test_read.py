@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from scenes.canonical import ConstantTexture, Matte
 from scenes.formats.conversion import load_scene_file
 from scenes.formats.losses import LossReport
 from tests.scenes.formats.files import HEAD
@@ -31,3 +32,22 @@ def test_spectra_of_lamps_are_textures_in_luxrender(tmp_path: Path) -> None:
     assert warm.intensity[0] > 2.0 * warm.intensity[2] > 0.0  # type: ignore[union-attr]
     assert even.intensity == pytest.approx((0.7 / (4.0 * math.pi),) * 3)  # type: ignore[union-attr]
     assert not report.losses
+
+
+def test_the_gain_of_a_lamp_multiplies_its_power(tmp_path: Path) -> None:
+    """LuxCore 2.10 draws this square with a radiance of 135.28, and of 270.56 at a gain of 2."""
+    square = '\nShape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]\n'
+    for gain, radiance in ((1.0, 135.28), (2.0, 270.56)):
+        lamp = f'AreaLightSource "area" "color L" [1 1 1] "float gain" [{gain}] "float power" [100]{square}'
+        (tmp_path / "a.lxs").write_text(HEAD + lamp)
+        (found,) = load_scene_file(tmp_path / "a.lxs").instances
+        assert found.emission == pytest.approx((radiance,) * 3, rel=1e-4)
+
+
+def test_materials_and_objects_in_files_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "a.lxm").write_text('MakeNamedMaterial "red" "string type" ["matte"] "color Kd" [.8 .1 .1]\n')
+    (tmp_path / "a.lxo").write_text('AttributeBegin\nNamedMaterial "red"\nShape "sphere"\nAttributeEnd\n')
+    (tmp_path / "a.lxs").write_text(HEAD + 'Include "a.lxm"\nInclude "a.lxo"\nWorldEnd\n')
+    report = LossReport()
+    (found,) = load_scene_file(tmp_path / "a.lxs", None, report).instances
+    assert found.material == Matte(ConstantTexture((0.8, 0.1, 0.1))) and not report.losses

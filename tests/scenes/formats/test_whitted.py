@@ -1,0 +1,36 @@
+"""Whitted's method in formats that do not have it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenes.canonical import (
+    ConstantTexture,
+    Glass,
+    Instance,
+    Integrator,
+    Matte,
+    Mirror,
+    MixMaterial,
+    PerspectiveCamera,
+    Rectangle,
+    Scene,
+)
+from scenes.formats.conversion import save_scene_file
+from scenes.formats.losses import LossReport
+
+
+@pytest.mark.parametrize(("kind", "ending", "wanted"), [
+    ("mitsuba3", ".xml", '<integrator type="direct" />'), ("mitsuba", ".xml", '<integrator type="direct" />'),
+    ("pbrt4", ".pbrt", 'Integrator "volpath" "integer maxdepth" [ 1 ]'),
+    ("luxrender", ".lxs", 'SurfaceIntegrator "directlighting" "integer maxdepth" [ 2 ]')])  # fmt: skip
+def test_whitted_is_direct_light_where_nothing_mirrors(kind: str, ending: str, wanted: str, tmp_path: Path) -> None:
+    base = Matte(ConstantTexture((0.5, 0.5, 0.5)))
+    for material, same in ((base, True), (MixMaterial(base, Mirror(), base.reflectance), False), (Glass(), False)):
+        scene = Scene(PerspectiveCamera(), (Instance(Rectangle(), material),), integrator=Integrator("whitted", 5))
+        report = LossReport()
+        save_scene_file(scene, tmp_path / f"a{ending}", kind, report)
+        assert ("whitted" in report.text()) is not same
+        assert (wanted in (tmp_path / f"a{ending}").read_text()) is same
