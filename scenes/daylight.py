@@ -88,6 +88,7 @@ def sky_radiance(light: SunSky, directions: NDArray[np.float64]) -> NDArray[np.f
     return np.where(height >= 0.0, np.maximum(radiance, 0.0), 0.0)
 
 
+@lru_cache(maxsize=4)
 def sky_map(light: SunSky, height: int = MAP_HEIGHT) -> EnvironmentLight:
     """The sky as an environment map of ``height`` rows and twice as many columns."""
     to_world = facing_up(light.up)

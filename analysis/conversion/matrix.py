@@ -33,9 +33,13 @@ ENGINES = {"mitsuba": "mitsuba", "mitsuba3": "mitsuba", "luxrender": "luxcore"}
 BOUND = 0.02
 """Relative difference above which a cell is called off."""
 
-_GONE = re.compile(r'type="(phong|ward|difftrans|mixturebsdf|roughdiffuse|sun|sky)"')
+_GONE = re.compile(r'type="(phong|ward|difftrans|mixturebsdf|roughdiffuse|sun|sky|sunsky)"')
 
 _DIM = 0.1  # of the mean of a specimen, below which differences count as of this share
+
+
+Known = dict[tuple[str, ...], tuple[Scene, tuple[str, ...], str]]
+"""The scene after some formats, what it lost, and the plugin that Mitsuba 3 lacks, by the formats."""
 
 
 @dataclass
@@ -98,6 +102,7 @@ def matrix_rows(
 def _rows(found: Specimens, gallery: Gallery) -> Iterator[dict[str, Any]]:
     scenes: dict[str, Scene] = {"scene": found.scene}
     pictures: dict[str, RenderedImage | str] = {}
+    gone: dict[str, Known] = {}
     for source in ("scene", *FORMATS_OF):
         for target, ending in FORMATS_OF.items():
             file = gallery.folder / f"{source}-to-{target}{ending}"
@@ -112,27 +117,37 @@ def _rows(found: Specimens, gallery: Gallery) -> Iterator[dict[str, Any]]:
             pair = pictures[source], gallery.picture(target, file, found.size_px)
             off = differences(found, *pair)
             for name, one in found.single.items():
-                lost, undrawn = losses(one, source, target, gallery.folder)
+                lost, undrawn = losses(one, source, target, gallery.folder, gone.setdefault(name, {}))
                 value, note = (float("nan"), undrawn) if undrawn else off[name]
                 yield {"specimen": name, "from": source, "to": target, "off": value, "note": note, "losses": lost}
 
 
-def losses(scene: Scene, source: str, target: str, folder: Path) -> tuple[list[str], str]:
+def losses(scene: Scene, source: str, target: str, folder: Path, known: Known | None = None) -> tuple[list[str], str]:
     """What a conversion says to have lost of the picture, with the losses of the ways to renderers, and a plugin that
     Mitsuba 3 does not have, so that the file of Mitsuba 0.5 cannot be drawn."""
-    report, undrawn = LossReport(), ""
-    ways = [[source, target], [source]]
-    for way in [way if way[-1] in ENGINES else [*way, "mitsuba3"] for way in ways]:
-        one = scene
-        for kind in way:
-            if kind in FORMATS_OF:
-                file = folder / f"single{FORMATS_OF[kind]}"
-                save_scene_file(one, file, kind, report)
-                one = load_scene_file(file, None, report)
-                if kind == "mitsuba":
-                    gone = _GONE.search(file.read_text(encoding="utf-8"))
-                    undrawn = f"Mitsuba 3 has no plugin {gone[1]!r}" if gone else undrawn
-    return [f"{loss.what}: {loss.became}" for loss in report.losses if loss.picture], undrawn
+    ways = [(source, target), (source,)]
+    found = [
+        _after(scene, way if way[-1] in ENGINES else (*way, "mitsuba3"), folder, {} if known is None else known)
+        for way in ways
+    ]
+    lost = dict.fromkeys(loss for one in found for loss in one[1])
+    return list(lost), next((one[2] for one in found if one[2]), "")
+
+
+def _after(scene: Scene, way: tuple[str, ...], folder: Path, known: Known) -> tuple[Scene, tuple[str, ...], str]:
+    """A scene after some formats, what it lost on the way, and the missing plugin; each way is gone once."""
+    if way in ((), ("scene",)):
+        return scene, (), ""
+    if way not in known:
+        before, lost, undrawn = _after(scene, way[:-1], folder, known)
+        report, file = LossReport(), folder / f"single{FORMATS_OF[way[-1]]}"
+        save_scene_file(before, file, way[-1], report)
+        after = load_scene_file(file, None, report)
+        lost += tuple(f"{loss.what}: {loss.became}" for loss in report.losses if loss.picture)
+        if way[-1] == "mitsuba" and (gone := _GONE.search(file.read_text(encoding="utf-8"))):
+            undrawn = f"Mitsuba 3 has no plugin {gone[1]!r}"
+        known[way] = after, lost, undrawn
+    return known[way]
 
 
 def differences(

@@ -65,8 +65,7 @@ class MitsubaWriter(MitsubaLightWriter):
         one_sided = {id(one.material) for one in scene.instances if one.one_sided}
         for name, material in scene.materials.items():
             self.material(material, name, id(material) in one_sided)
-        for light in (*scene.lights, *([scene.background] if scene.background is not None else [])):
-            self.emitter(light)
+        self.emitters([*scene.lights, *([scene.background] if scene.background is not None else [])])
         if scene.background is not None:
             self.report.add(scene.name or "scene", "a background that lights nothing", "one that lights")
         if scene.ambient != (0.0, 0.0, 0.0):

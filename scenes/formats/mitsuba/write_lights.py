@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from scenes.canonical import DirectionalLight, Light, PointLight, SpotLight, SunSky
+from scenes.canonical import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, SunSky
 from scenes.daylight import facing_up
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.appearance.spot_profiles import reshaped
@@ -20,6 +21,22 @@ from scenes.formats.text.numbers import number
 
 class MitsubaLightWriter(MitsubaSurfaceWriter):
     """Collects the elements of lights, materials and textures."""
+
+    def emitters(self, lights: Sequence[Light]) -> None:
+        """Writes lights. Mitsuba 3 has one light all around: sun and sky of the same air are joined, others are left
+        out, which is reported."""
+        around = [light for light in lights if isinstance(light, SunSky | EnvironmentLight)] if self.modern else []
+        if len(around) == 2 and all(isinstance(one, SunSky) for one in around):
+            parts = {one.part: one for one in around if isinstance(one, SunSky)}
+            airs = {dataclasses.replace(one, part="both", scale=1.0) for one in parts.values()}
+            if set(parts) == {"sun", "sky"} and len(airs) == 1:
+                self._daylight(parts["sun"], {part: one.scale for part, one in parts.items()})
+                lights, around = [one for one in lights if not isinstance(one, SunSky)], []
+        for light in lights:
+            if any(light is one for one in around[1:]):
+                self.report.add("light", "a further light all around")
+            else:
+                self.emitter(light)
 
     def emitter(self, light: Light) -> None:
         """Writes a light."""
@@ -58,7 +75,7 @@ class MitsubaLightWriter(MitsubaSurfaceWriter):
             self.put(made, "float", "scale", number(light.scale))
             self.matrix(made, "toWorld", light.to_world)
 
-    def _daylight(self, light: SunSky) -> None:
+    def _daylight(self, light: SunSky, scales: Mapping[str, float] | None = None) -> None:
         """Writes sun and sky in world directions; the transform rotates the zenith (y, or z in Mitsuba 3)."""
         kind = "sunsky" if self.modern or light.part == "both" else light.part
         made = self.plugin("emitter", kind, self.root)
@@ -72,7 +89,8 @@ class MitsubaLightWriter(MitsubaSurfaceWriter):
         self.color(made, "albedo", grey(light.ground_albedo))
         if self.modern:
             for part in ("sun", "sky"):
-                self.put(made, "float", f"{part}Scale", number(light.scale if light.part in (part, "both") else 0.0))
+                own = light.scale if light.part in (part, "both") else 0.0
+                self.put(made, "float", f"{part}Scale", number(scales[part] if scales else own))
         else:
             self.put(made, "float", "scale", number(light.scale))
         turn = facing_up(light.up, 2 if self.modern else 1)
