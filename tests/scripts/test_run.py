@@ -175,7 +175,7 @@ def test_provenance_tells_where_it_comes_from(summary: dict[str, Any]) -> None:
     expected = {"seed": 0, "device": "cpu", "threads": 2, "scene": "fly-by"}
     assert {name: source[name] for name in expected} == expected
     assert isinstance(source["commit"], str) and len(source["config_hash"]) == 16
-    assert summary["config"]["tsar"]["batch_size"] == BATCH and summary["config"]["frames"] is True
+    assert summary["config"]["tsar"]["batch_size"] == BATCH and summary["config"]["write_frames"] is True
 
 
 def test_the_table_shows_the_summary(printed: str, summary: dict[str, Any]) -> None:
@@ -216,12 +216,12 @@ def test_bad_input_of_a_process_of_its_own(arguments: tuple[str, ...], part: str
     assert part in done.stderr and not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("what", ["out", "cache"])
+@pytest.mark.parametrize("what", ["out", "references"])
 def test_folders_that_cannot_be_written(
     what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     (tmp_path / "file").write_text("kept")
-    places = {"out": tmp_path / "out", "cache": tmp_path / "cache", what: tmp_path / "file" / "below"}
+    places = {"out": tmp_path / "out", "references": tmp_path / "references", what: tmp_path / "file" / "below"}
     where = [part for name, path in places.items() for part in (f"--{name}", str(path))]
     status = call_script("run.py", monkeypatch, "fly-by", *SIZE, *where)
     shown = capsys.readouterr()

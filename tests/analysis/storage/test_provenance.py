@@ -25,7 +25,7 @@ def test_configuration_versions_and_machine_are_named() -> None:
 
 
 def test_where_results_are_written_decides_none() -> None:
-    hashes = {provenance({"a": 1, "out": out, "cache": Path(out)})["config_hash"] for out in ("x", "y")}
+    hashes = {provenance({"a": 1, "out": out, "references": Path(out)})["config_hash"] for out in ("x", "y")}
     assert hashes == {provenance({"a": 1})["config_hash"]}
 
 
