@@ -15,6 +15,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "perception": {"pycvvdp": "cvvdp", "torchvision": "torchvision", "flip_evaluator": "flip-evaluator"},
     "formats": {"astral": "astral", "defusedxml": "defusedxml"},
     "peers": {"embreex": "embreex", "mitsuba": "mitsuba", "pyluxcore": "pyluxcore", "pywt": "PyWavelets"},
+    "denoise": {"pyoidn": "pyoidn"},
     "psignifit": {"psignifit": "psignifit"},
 }
 """For each extra its modules and their distributions, as in the project file."""

@@ -23,7 +23,7 @@ SUBJECTS = {
     " start_s time_s warmup_cycles frames first_frame fps still_s limit_s",
     "picture": "size resolution_px width_px height_px sides_px crop frame_px",
     "camera": "camera camera_keys fov_deg lens_radius focal_distance up environment smooth_deg integrator bounces",
-    "sample": "samples_per_axis samples point_set rounds error_target shift space_filter time_filter sigma_px"
+    "sample": "samples_per_axis samples point_set rounds error_target denoise shift space_filter time_filter sigma_px"
     " box_share",
     "pipeline": "batch_size framelet_side sdf_side cache_size latency_cycles spatial_slope temporal_slope bias solver"
     " stages",

@@ -12,12 +12,14 @@ Examples: python scripts/render.py fly-by --time-s 1 --out out/still
 from __future__ import annotations
 
 from analysis.command.cli import parse
+from analysis.command.extras import require_extra
 from analysis.tracer.render_options import RenderOptions
 
 
 def main() -> None:
     """Parses, renders, prints the names of the files."""
     options = parse(RenderOptions, __doc__ or "")
+    require_extra(*(("denoise",) if options.denoise else ()))
     from analysis.command.console import show
     from analysis.tracer.run import explained, opened, render
 

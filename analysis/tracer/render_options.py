@@ -50,6 +50,8 @@ class RenderOptions(ViewOptions):
     all samples."""
     layers: bool = False
     """Also write depth, normal, albedo, instance, motion, sample count and variance as layers of the EXR files."""
+    denoise: bool = False
+    """Filter the stills by Open Image Denoise, guided by albedo and normals (extra denoise)."""
     shift: Literal["white", "blue"] = "white"
     """Shift of the point set from pixel to pixel: independent, or by spatiotemporal blue noise."""
     space_filter: Literal["box", "gaussian"] = "gaussian"

@@ -69,6 +69,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
     """
     from analysis.storage.reference import content_hash
     from analysis.storage.source import brought, code_hash
+    from analysis.tracer.denoising import Picture, denoised
     from analysis.tracer.rounds import StillRounds
     from analysis.tracer.stills import render_stills
     from renderer.film.files import FilmError
@@ -90,17 +91,25 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
             SamplePlan(count, *kinds, time_filter=options.time_filter, shift=options.shift) if options.samples else None
         )
         picture = pictures(renderer, plan or options.samples_per_axis, *size, options.crop)
+
+    def cleared(made: Picture) -> Picture:
+        return denoised(made, renderer, size, options.crop) if options.denoise else made
+
     points = [(POINT_SETS, options.point_set)] if options.samples else []
     added = brought(*points, *tables_of(options.scene))
-    key = content_hash((options.job, scene, code_hash(Renderer, pictures, render_stills, StillRounds), *added))
+    key = content_hash(
+        (options.job, scene, code_hash(Renderer, pictures, render_stills, StillRounds, denoised), *added)
+    )
     out, ending = options.out, options.still_ending
     with bad_input(), full_disk(out, FilmError), bars() as shown:
         times = dict(enumerate(options.times_s))
         if plan is not None and options.in_rounds:
             made = StillRounds(renderer, plan, options, size, shown)
-            rendered, nonfinite = render_stills(made.picture, times, out, ending, key, made.frames, made.write)
+            picture = cleared(made.picture)
+            rendered, nonfinite = render_stills(picture, times, out, ending, key, made.frames, made.write)
         else:
-            rendered, nonfinite = render_stills(picture, times, out, ending, key, shown.task("frames", options.frames))
+            task = shown.task("frames", options.frames)
+            rendered, nonfinite = render_stills(cleared(picture), times, out, ending, key, task)
         if options.format == "mp4":
             stills = [still_path(out, number, ending) for number in range(options.frames)]
             write_film(stills, out / "film.mp4", options.fps)

@@ -68,3 +68,18 @@ def test_rounds_that_cannot_be(arguments, message: str, tmp_path: Path, monkeypa
     assert call_script("render.py", monkeypatch, *STILL, *arguments, "--out", str(tmp_path / "out")) == 2
     shown = capsys.readouterr()
     assert one_line(shown.err) and message in shown.err
+
+
+def test_a_denoised_still_keeps_its_layers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    pytest.importorskip("pyoidn")
+    for name, more in (("noisy", ()), ("clear", ("--denoise",))):
+        arguments = (*STILL, "--layers", *more, "--out", str(tmp_path / name))
+        assert call_script("render.py", monkeypatch, *arguments) == 0, capsys.readouterr().err
+    with (
+        OpenEXR.File(str(tmp_path / "noisy" / "frame00000.exr"), separate_channels=True) as first,
+        OpenEXR.File(str(tmp_path / "clear" / "frame00000.exr"), separate_channels=True) as second,
+    ):
+        noisy, clear = ({key: one.pixels for key, one in file.channels().items()} for file in (first, second))
+    assert noisy.keys() == clear.keys()
+    changed = {key for key in noisy if not np.array_equal(noisy[key], clear[key])}
+    assert changed == {"R", "G", "B"}

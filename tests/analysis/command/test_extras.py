@@ -32,6 +32,7 @@ LACKING = [
     ("sensitivity.py", (), "flip_evaluator", "perception"),
     ("run.py", ("fly-by", "--metrics", "flip"), "flip_evaluator", "perception"),
     ("run.py", ("fly-by", "--metrics", "ssim", "jod"), "pycvvdp", "perception"),
+    ("render.py", ("glass", "--denoise"), "pyoidn", "denoise"),
     ("tiles.py", ("glass",), "dask", "study"),
     ("perception.py", ("adaptive", "fly-by"), "distributed", "study"),
     ("perception.py", ("simulate", "stimuli"), "torchvision", "perception"),
