@@ -36,12 +36,16 @@ def rows_table(found: Mapping[str, Any]) -> Table:
 
 
 def group_tables(found: Mapping[str, Any]) -> list[Table]:
-    """The rows of a ``bench.json``, a table a group, without notes; the group is the name of the first column."""
-    groups = dict.fromkeys(row["group"] for row in found["rows"])
-    return [
-        Table(name, (name, *_COLUMNS), [(row["name"], *_figures(row)) for row in found["rows"] if row["group"] == name])
-        for name in groups
-    ]
+    """The rows of a ``bench.json``, a table a group, without notes.
+
+    The first column has the name of the group, and of the instruction set if our side was limited to one.
+    """
+    isa = "" if found.get("isa", "native") == "native" else f", {found['isa']}"
+    tables = []
+    for group in dict.fromkeys(row["group"] for row in found["rows"]):
+        rows = [(row["name"], *_figures(row)) for row in found["rows"] if row["group"] == group]
+        tables.append(Table(f"{group}{isa}", (f"{group}{isa}", *_COLUMNS), rows))
+    return tables
 
 
 def _figures(row: Mapping[str, Any]) -> tuple[str, ...]:

@@ -50,3 +50,17 @@ def test_a_missing_gpu_is_refused(
     status = call_script("bench.py", monkeypatch, *arguments)
     assert_refused(status, capsys, ("cuda:0",))
     assert nothing_in(tmp_path)
+
+
+@pytest.mark.parametrize("isa", ["avx2", "avx512"])
+def test_an_instruction_set_that_a_group_or_the_processor_lacks_is_refused(
+    isa: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    import torch
+
+    status = call_script("bench.py", monkeypatch, "--isa", isa, "--only", "shaded", "--out", str(tmp_path))
+    assert_refused(status, capsys, ("isa", "coherent, incoherent"))
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "DEFAULT")
+    status = call_script("bench.py", monkeypatch, "--isa", isa, "--only", "coherent", *SMALL, "--out", str(tmp_path))
+    assert_refused(status, capsys, ("isa", "this processor has"))
+    assert nothing_in(tmp_path)

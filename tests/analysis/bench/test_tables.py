@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from analysis.bench.rows import SPREAD, Row, limit_row, rate_row
-from analysis.bench.tables import better_by, comparison_table, figure, rows_table
+from analysis.bench.tables import better_by, comparison_table, figure, group_tables, rows_table
 from analysis.command.console import Table, show
 
 RATE = rate_row(Row("coherent", "camera rays", "M rays/s", 0.0, "Embree"), 30.0, [1.0] * 7, [3.5] * 7, 3.0)
@@ -43,6 +43,15 @@ def test_a_table_names_machine_versions_figures_and_notes(capsys: pytest.Capture
     for part in ("M rays/s", "30", "8.571 Embree", "3.5", "3.5 – 3.5", "yes"):
         assert part in line
     assert "NO" in next(line for line in shown.splitlines() if "exponent" in line)
+
+
+def test_tables_of_a_page_name_group_and_instruction_set() -> None:
+    rays, growth = group_tables(FOUND)
+    assert (rays.title, growth.title) == ("coherent", "growth") and rays.header[:3] == ("coherent", "unit", "ours")
+    assert rays.rows == [("camera rays", "M rays/s", "30", "8.571 Embree", "3.5", "3.5 – 3.5", "3", "yes")]
+    limited = group_tables({**FOUND, "isa": "avx2"})
+    assert [table.header[0] for table in limited] == ["coherent, avx2", "growth, avx2"]
+    assert "limited to avx2" in rows_table({**FOUND, "isa": "avx2"}).title
 
 
 @pytest.mark.parametrize(("value", "shown"), [(None, ""), (0.12341, "0.1234"), (12345.6, "12,346"), (3.0, "3")])
