@@ -69,7 +69,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
     """
     from analysis.storage.reference import content_hash
     from analysis.storage.source import brought, code_hash
-    from analysis.tracer.denoising import Picture, denoised
+    from analysis.tracer.denoising import StillOf, denoised
     from analysis.tracer.rounds import StillRounds
     from analysis.tracer.stills import render_stills
     from renderer.film.files import FilmError
@@ -92,7 +92,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
         )
         picture = pictures(renderer, plan or options.samples_per_axis, *size, options.crop)
 
-    def cleared(made: Picture) -> Picture:
+    def cleared(made: StillOf) -> StillOf:
         return denoised(made, renderer, size, options.crop) if options.denoise else made
 
     points = [(POINT_SETS, options.point_set)] if options.samples else []
