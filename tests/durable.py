@@ -206,11 +206,11 @@ def _tiles(folder: Path) -> int:
     """Without a cluster: chunks come from this process."""
     from analysis.tracer.tiles import render_chunk
 
-    def rendered(client: Any, picture: Any, chunks: list[range]) -> Iterator[tuple[int, Any]]:
+    def rendered(client: Any, picture: Any, chunks: list[range], retries: int) -> Iterator[tuple[int, Any]]:
         yield from ((number, render_chunk(picture, chunk)) for number, chunk in enumerate(chunks))
 
     size = ("--width-px", "48", "--height-px", "32", "--samples", "4", "--chunk-tiles", "1")
-    alone = patch("analysis.tracer.run.connected", lambda farm: nullcontext())
+    alone = patch("analysis.tracer.run.connected", lambda farm, say: nullcontext())
     with alone, patch("analysis.tracer.tiles.rendered", rendered):
         return call("tiles", "plain", *size, "--out", str(folder / "out"))
 

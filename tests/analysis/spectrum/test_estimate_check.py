@@ -165,7 +165,9 @@ def test_an_example_in_physical_units() -> None:
     slow, fast = found["realizable"]["refreshes_per_s"]
     assert fast == pytest.approx(1 / SMALL.cycle_s()) and slow == pytest.approx(fast / 16)
     assert [row["tau"] for row in found["other_tau"]] == [0.003, 0.01, 0.03, 0.1]
-    by_index = measure_example(SpectrumOptions(ideal_samples=32, ideal_frames=8, tile_level=2, tile_index=9), disk, Task())
+    by_index = measure_example(
+        SpectrumOptions(ideal_samples=32, ideal_frames=8, tile_level=2, tile_index=9), disk, Task()
+    )
     assert by_index.index == 9 and by_index.place(512) == (128.0, 256.0, 128.0)
 
 

@@ -59,7 +59,7 @@ def test_the_pace_is_that_of_the_machine_of_the_other_studies() -> None:
     """At row 7 a cycle of tsar takes as long as on the machine that shows 8 framed images a second."""
     from analysis.metrics.cost_model import CAPACITY_DEFAULT, parameters_of, policy_flops
     from tsar.policies.filter import Filter
-    from tsar.policy import KnobSetting as OfAPolicy
+    from tsar.policy import Setting as OfAPolicy
 
     config = TsarConfig()
     price = Filter(OfAPolicy(config)).price
