@@ -77,7 +77,7 @@ class RayQueries:
         return self._trace(origin, direction, t_max, nearest=False).face != 0
 
     def _trace(self, origin: ArrayLike, direction: ArrayLike, t_max: ArrayLike | None, nearest: bool) -> RayHits:
-        starts, ways = np.ascontiguousarray(origin, np.float32), np.ascontiguousarray(direction, np.float32)
+        starts, ways = (np.require(values, np.float32, "CW") for values in (origin, direction))
         if starts.ndim != 2 or starts.shape[1] != 3 or ways.shape != starts.shape:
             raise ValueError(f"rays: expected origins and directions (n, 3), got {starts.shape} and {ways.shape}")
         count = len(starts)

@@ -198,3 +198,16 @@ def test_odd_queries_are_refused() -> None:
     with pytest.raises(ValueError, match=r"expected origins and directions \(n, 3\)"):
         queries.closest(np.zeros((4, 3)), np.zeros((5, 3)))
     assert queries.closest(np.zeros((0, 3)), np.zeros((0, 3))).face.shape == (0,)
+
+
+@pytest.mark.filterwarnings("error")
+def test_arrays_that_cannot_be_written_are_read_in_silence_and_an_empty_list_is_answered() -> None:
+    rays = RayQueries(*bumpy(1))
+    origin, direction = random_rays(40)
+    expected = rays.closest(origin, direction, 2.0)
+    for values in (origin, direction):
+        values.flags.writeable = False
+    found = rays.closest(origin, direction, 2.0)
+    assert np.array_equal(found.face, expected.face) and np.array_equal(found.t, expected.t)
+    nothing = np.empty((0, 3), np.float32)
+    assert len(rays.closest(nothing, nothing).face) == 0 == len(rays.blocked(nothing, nothing, 1.0))
