@@ -1,6 +1,7 @@
-"""Groups coherent and incoherent: rays per second of CPU time beside Embree, one thread each, on the same rays.
+"""Groups coherent and incoherent: rays per second beside Embree, one thread each, on the same rays.
 
-The peer is the fastest of Embree's modes for each question.
+Time is CPU time of the thread that asks: Embree's other threads may spin. The peer is the fastest of its modes for each
+question.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def compare(
         answers |= {mode.name: _asking(embree, mode) for mode in MODES}
     seconds = take_turns(
         {name: _all_calls(answer, question) for name, answer in answers.items()}, repetitions, task,
-        clock=time.process_time,
+        clock=time.thread_time,
     )  # fmt: skip
     work = sum(rays.count for rays in question.calls) / 1e6
     peers = {name: median(taken) for name, taken in seconds.items() if name != "ours"}
