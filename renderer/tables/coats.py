@@ -1,7 +1,7 @@
-"""Transmittance and internal reflectance of rough dielectric coats.
+"""Transmittance and internal reflectance of dielectric coats.
 
-Both are means over the facets visible from a direction: of ``(1 - F) G₁``, and of ``F G₁`` from inside. Light that
-meets several facets is lost, as in the reflection of rough surfaces here and in Mitsuba.
+Those of rough coats are means over the facets visible from a direction: of ``(1 - F) G₁``, and of ``F G₁`` from
+inside. Light that meets several facets is lost, as in the reflection of rough surfaces here and in Mitsuba.
 
 Source: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz 2018, "Sampling the GGX
 Distribution of Visible Normals".
@@ -32,6 +32,20 @@ def smooth_reflectance(cosine: NDArray[np.float64], ratio: float) -> NDArray[np.
     across = (ratio * cosine - beyond) / (ratio * cosine + beyond)
     within = (cosine - ratio * beyond) / (cosine + ratio * beyond)
     return np.where(squared >= 1.0, 1.0, 0.5 * (across * across + within * within))
+
+
+def thrown_back(ior: float) -> float:
+    """Internal diffuse reflectance of a smooth dielectric: ``1 - (1 - r) / ior²`` with the external one ``r``.
+
+    ``r = ∫ 2 F sin cos`` over the external angle from 0 to 90 degrees, by Simpson's rule.
+    """
+    angle = np.linspace(0.0, np.pi / 2.0, 2049)
+    cosine = np.asarray(sin(np.pi / 2.0 - angle))
+    value = 2.0 * smooth_reflectance(cosine, 1.0 / ior) * np.asarray(sin(angle)) * cosine
+    weights = np.full(len(angle), 2.0)
+    weights[1::2], weights[[0, -1]] = 4.0, 1.0
+    outside = float((weights * value).sum() * (angle[1] / 3.0))
+    return 1.0 - (1.0 - outside) / ior**2
 
 
 def rough_shares(cosine: float, ratio: float, alpha: float) -> tuple[float, float]:

@@ -12,8 +12,7 @@ import numpy as np
 
 from renderer.layout.kinds import ScatterKind
 from renderer.tables.checks import check_light
-from renderer.tables.coats import rough_coat
-from scenes.arithmetic import sin
+from renderer.tables.coats import rough_coat, thrown_back
 from scenes.canonical import (
     Bumped,
     Emissive,
@@ -212,20 +211,3 @@ def unwrapped(material: Material) -> Material:
 def mean_alpha(roughness: tuple[float, float]) -> float:
     """One alpha for both axes: their geometric mean."""
     return float(np.sqrt(roughness[0] * roughness[1]))
-
-
-def thrown_back(ior: float) -> float:
-    """Internal diffuse reflectance of a smooth dielectric: ``1 - (1 - r) / ior²`` with the external one ``r``.
-
-    ``r = ∫ 2 F sin cos`` over the external angle from 0 to 90 degrees, by Simpson's rule.
-    """
-    angle = np.linspace(0.0, np.pi / 2.0, 2049)
-    s, c = sin(angle), sin(np.pi / 2.0 - angle)
-    beyond = np.sqrt(1.0 - (s / ior) ** 2)
-    across = (c - ior * beyond) / (c + ior * beyond)
-    within = (ior * c - beyond) / (ior * c + beyond)
-    value = (across**2 + within**2) * s * c  # 2 F sin cos
-    weights = np.full(len(angle), 2.0)
-    weights[1::2], weights[[0, -1]] = 4.0, 1.0
-    outside = float((weights * value).sum() * (angle[1] / 3.0))
-    return 1.0 - (1.0 - outside) / ior**2

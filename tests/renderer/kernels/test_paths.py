@@ -12,8 +12,8 @@ import pytest
 
 from renderer.layout.features import Feature
 from renderer.sampling.plan import SamplePlan
+from renderer.tables.coats import thrown_back
 from renderer.tables.requirements import required
-from renderer.tables.scattering import thrown_back
 from renderer.trace import Renderer
 from scenes.canonical import (
     ConstantTexture,
