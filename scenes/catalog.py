@@ -102,7 +102,11 @@ def require_known(scene: str) -> None:
 
 
 def load_file(
-    name: str, camera_path: str = "", integrator: IntegratorName = "whitted"
+    name: str,
+    camera_path: str = "",
+    integrator: IntegratorName = "whitted",
+    up: Up | None = None,
+    camera: str = "",
 ) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a file, converted to what this project's renderer supports, and the losses.
 
@@ -110,9 +114,11 @@ def load_file(
         name: name of the file, whose ending determines the format.
         camera_path: ``turntable`` or ``fly-through`` to move the camera of a static file; empty for none.
         integrator: integrator for the scene; path tracing supports more materials.
+        up: upward axis of a model, in place of that of its file.
+        camera: name of a camera of a model; the first one if empty.
 
     Raises:
-        SceneError: the file cannot be read.
+        SceneError: the file cannot be read, or has no camera of this name.
     """
     from scenes.camera_paths import on_a_path
     from scenes.formats.conversion import load_scene_file
@@ -122,8 +128,10 @@ def load_file(
     from scenes.models.scenes_of_models import model_scene
 
     losses = LossReport()
-    if integrator == "path" and Path(name).suffix.lower() in MODEL_ENDINGS:
-        found = model_scene(Path(name), losses, facets=True)
+    if Path(name).suffix.lower() in MODEL_ENDINGS:
+        found = model_scene(Path(name), losses, up, integrator == "path", camera)
+    elif camera:
+        raise SceneError(f"camera: expected six numbers, since {name} has no cameras by name, got {camera!r}")
     else:
         found = load_scene_file(Path(name), None, losses)
     scene = drawable(found, losses, integrator)
@@ -139,7 +147,7 @@ class Look:
     Attributes:
         up: upward axis of the world; None for that of a model's file, or the one nearer to the camera's.
         smooth_deg: greatest angle between faces, degrees, at which edges of meshes without normals are smooth.
-        camera: eye and target of a static camera, six numbers.
+        camera: eye and target of a static camera, six numbers; or the name of a camera of a model.
         fov_deg: full angle of the camera along the shorter image axis; None for that of the scene.
         environment: environment map that lights the scene, see :func:`scenes.viewing.with_environment`.
         integrator: integrator for the scene.
@@ -152,7 +160,7 @@ class Look:
 
     up: Up | None = None
     smooth_deg: float = 0.0
-    camera: tuple[float, ...] | None = None
+    camera: tuple[float, ...] | str | None = None
     fov_deg: float | None = None
     environment: Path | None = None
     integrator: IntegratorName = "whitted"
@@ -175,27 +183,33 @@ def load_seen(
     from scenes.camera_paths import on_a_path
     from scenes.loading import read_image
     from scenes.models import MODEL_ENDINGS
+    from scenes.models.scenes_of_models import model_up
     from scenes.models.smoothing import smoothed
-    from scenes.viewing import framed, up_of, with_camera, with_environment, with_lens
+    from scenes.viewing import up_of, with_camera, with_environment, with_lens
 
     moved = [name for name in ("camera", "camera_keys") if getattr(look, name) is not None]
     if look.camera_keys is not None and (camera_path or len(moved) > 1):
         raise SceneError("camera_keys: expected neither a camera nor a camera_path beside them")
     ending = "" if isinstance(scene, Scene) or str(scene) in SCENES else Path(scene).suffix.lower()
     later = camera_path if ending not in ("", SESSION_ENDING) and look != Look() else ""
-    found, losses = load_any(scene, phase, "" if later else camera_path, look.integrator)
+    name, place = (look.camera, None) if isinstance(look.camera, str) else ("", look.camera)
+    if ending in MODEL_ENDINGS and (name or look.up):
+        found, losses = load_file(str(scene), "" if later else camera_path, look.integrator, look.up, name)
+    elif name:
+        raise SceneError(f"camera: expected six numbers, since only models have cameras by name, got {name!r}")
+    else:
+        found, losses = load_any(scene, phase, "" if later else camera_path, look.integrator)
     if look.bounces is not None:
         found = dataclasses.replace(found, integrator=dataclasses.replace(found.integrator, depth=look.bounces))
     if look.smooth_deg > 0.0:
         found = dataclasses.replace(found, instances=smoothed(found.instances, look.smooth_deg))
-    if look.up and ending in MODEL_ENDINGS:
-        again = framed(found.instances, look.up, found.name)
-        found = dataclasses.replace(again, integrator=found.integrator, duration_s=found.duration_s)
-    up = look.up or up_of(found)
+    up = look.up
+    if up is None:
+        up = model_up(Path(str(scene)), look.integrator == "path") if ending in MODEL_ENDINGS else up_of(found)
     if look.environment is not None:
         found = with_environment(found, read_image(look.environment), up, str(look.environment))
-    if look.camera is not None:
-        found = with_camera(found, look.camera[:3], look.camera[3:], up, look.fov_deg)
+    if place is not None:
+        found = with_camera(found, place[:3], place[3:], up, look.fov_deg)
     elif look.camera_keys is not None:
         found = with_keys_of(found, look.camera_keys, up, look.fov_deg)
     elif look.fov_deg is not None:
@@ -203,7 +217,7 @@ def load_seen(
             raise SceneError(f"fov_deg: expected a perspective camera, got {type(found.camera).__name__}")
         found = dataclasses.replace(found, camera=dataclasses.replace(found.camera, fov_deg=look.fov_deg))
     if look.lens_radius is not None or look.focal_distance is not None:
-        found = with_lens(found, look.lens_radius, look.focal_distance, look.camera)
+        found = with_lens(found, look.lens_radius, look.focal_distance, place)
     return (on_a_path(found, later) if later else found), losses  # type: ignore[arg-type]
 
 

@@ -11,20 +11,34 @@ from scenes.canonical import Instance, Material, Matrix, RigidTrack, SceneError
 from scenes.formats.losses import Loss, LossReport
 from scenes.loading import FileState, one_line, state_of
 from scenes.models.gltf_files import read_gltf
+from scenes.models.model import Model
 from scenes.models.obj_files import read_obj
 from scenes.models.plain_files import read_plain
 from scenes.models.smoothing import smoothed
 from scenes.models.sources import Sources
 
-Read = Callable[[Sources, LossReport], tuple[Instance, ...]]
+Read = Callable[[Sources, LossReport, bool], Model]
 
+
+def _parts_by(read: Callable[[Sources, LossReport], tuple[Instance, ...]]) -> Read:
+    return lambda sources, report, facets: Model(read(sources, report))
+
+
+def _read_usd(sources: Sources, report: LossReport, facets: bool) -> Model:
+    from scenes.models.usd_files import read_usd  # needs the extra usd
+
+    return read_usd(sources, report, facets)
+
+
+_USD = (".usd", ".usda", ".usdc", ".usdz")
 _READERS: dict[str, Read] = {
-    ".obj": read_obj, ".ply": read_plain, ".stl": read_plain, ".glb": read_gltf, ".gltf": read_gltf,
+    ".obj": _parts_by(read_obj), ".ply": _parts_by(read_plain), ".stl": _parts_by(read_plain),
+    ".glb": read_gltf, ".gltf": read_gltf, **dict.fromkeys(_USD, _read_usd),
 }  # fmt: skip
 MODEL_ENDINGS = tuple(_READERS)
 
 _KEPT_MAX = 32
-_Kept = tuple[dict[Path, FileState | None], tuple[Instance, ...], tuple[Loss, ...]]
+_Kept = tuple[dict[Path, FileState | None], Model, tuple[Loss, ...]]
 _kept: dict[tuple[Path, bool], _Kept] = {}
 """Cache of models, by path and facets, with the files on which each depends."""
 
@@ -34,23 +48,34 @@ def read_model(path: Path, report: LossReport | None = None, facets: bool = Fals
 
     A part without normals has flat faces, unless its file requests smoothing (smoothing groups of OBJ);
     :func:`scenes.models.smoothing.smoothed` smooths it. Materials become Phong, mirrors, panes and lamps:
-    :mod:`scenes.models.mtl_files` converts those of MTL, :mod:`scenes.models.gltf_materials` those of glTF. Vertex
-    colours become an image (:mod:`scenes.models.vertex_colours`). Files without materials are grey (STL, most PLY).
+    :mod:`scenes.models.mtl_files` converts those of MTL, :mod:`scenes.models.gltf_materials` those of glTF and USD.
+    Vertex colours become an image (:mod:`scenes.models.vertex_colours`). Files without materials are grey (STL, most
+    PLY).
 
     Args:
-        path: OBJ, PLY, STL, GLB or glTF.
+        path: OBJ, PLY, STL, GLB, glTF or USD.
         report: receives the losses.
-        facets: whether glTF materials are converted for path tracing (:mod:`scenes.models.gltf_facets`).
+        facets: whether materials of glTF and USD are converted for path tracing (:mod:`scenes.models.gltf_facets`).
 
     Returns:
         Instances whose transforms are those of the file's nodes.
 
     Raises:
+        SceneError: as :func:`read_whole`.
+    """
+    return read_whole(path, report, facets).parts
+
+
+def read_whole(path: Path, report: LossReport | None = None, facets: bool = False) -> Model:
+    """A model with its lights and cameras; arguments as for :func:`read_model`.
+
+    Raises:
+        ModuleNotFoundError: USD needs the package usd-core.
         SceneError: the file is missing, has an unsupported format or cannot be read; it has no faces or non-finite
             vertices; or one of its texture or material files is missing.
     """
     path, report = Path(path), report or LossReport()
-    files, kept, losses = _kept.pop((path, facets), ({}, (), ()))
+    files, kept, losses = _kept.pop((path, facets), ({}, Model(()), ()))
     if not files or any(state_of(file) != state for file, state in files.items()):
         sources, found = Sources(path), LossReport()
         kept = _read(path, sources, found, facets)
@@ -63,21 +88,22 @@ def read_model(path: Path, report: LossReport | None = None, facets: bool = Fals
     return kept
 
 
-def _read(path: Path, sources: Sources, report: LossReport, facets: bool) -> tuple[Instance, ...]:
+def _read(path: Path, sources: Sources, report: LossReport, facets: bool) -> Model:
     if path.suffix.lower() not in _READERS:
         raise SceneError(f"model {path}: expected a file that ends in {', '.join(MODEL_ENDINGS)}")
     if not path.is_file():
         raise SceneError(f"model {path}: expected a file, found none")
     try:
-        read = _READERS[path.suffix.lower()]
-        parts = read_gltf(sources, report, facets=True) if facets and read is read_gltf else read(sources, report)
+        model = _READERS[path.suffix.lower()](sources, report, facets)
+    except ModuleNotFoundError:
+        raise
     except SceneError as error:
         raise SceneError(f"model {path}: {str(error).removeprefix(f'{path}: ')}") from None
     except Exception as error:  # parsers raise arbitrary exceptions on broken files
         raise SceneError(f"model {path}: cannot be read: {one_line(error)}") from error
-    if not parts:
+    if not model.parts:
         raise SceneError(f"model {path}: expected at least one face, found none")
-    return parts
+    return model
 
 
 def place_model(

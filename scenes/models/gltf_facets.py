@@ -17,7 +17,7 @@ import numpy as np
 from scenes.canonical import ConstantTexture, Masked, Material, MetallicRough, NormalMapped, Texture
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
-from scenes.models.gltf_textures import GltfTextures, Lookup, lookup_of
+from scenes.models.gltf_textures import Lookup, Textures, lookup_of
 
 ALONG_PATHS = {"KHR_materials_clearcoat"}
 """Extensions that only this module reads."""
@@ -41,7 +41,7 @@ def lookups_beside(given: dict[str, Any]) -> Iterator[tuple[str, Lookup]]:
 class FacetMaterials:
     """Creates materials from the textures of one file."""
 
-    def __init__(self, textures: GltfTextures, report: LossReport) -> None:
+    def __init__(self, textures: Textures, report: LossReport) -> None:
         self.textures, self.report = textures, report
 
     def material(self, given: dict[str, Any], base: Texture, shared: Lookup | None, where: str) -> Material:

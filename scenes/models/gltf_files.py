@@ -1,4 +1,4 @@
-"""Reader of glTF 2.0 and GLB: one part for each primitive of each node.
+"""Reader of glTF 2.0 and GLB: one part for each primitive of each node, and lights and cameras.
 
 Source: Khronos Group, "glTF 2.0 specification", sections 3.5 (scenes, nodes) and 3.7 (meshes).
 """
@@ -11,24 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.arithmetic import product
-from scenes.canonical import Instance, Material, Matrix, Mesh, RigidTrack, SceneError
+from scenes.canonical import Instance, Light, Material, Matrix, Mesh, RigidTrack, SceneError
 from scenes.canonical.values import vertices_of
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
 from scenes.models.gltf_materials import GltfMaterials
-from scenes.models.gltf_motion import GltfMotion, Poses, local_poses
-from scenes.models.smoothing import corner_normals, with_corners
+from scenes.models.gltf_motion import GltfMotion, local_poses
+from scenes.models.gltf_skins import bends, bent, joint_matrices
+from scenes.models.gltf_textures import GltfTextures
+from scenes.models.gltf_views import camera_at_node, light_at_node
+from scenes.models.model import Model, ModelCamera
+from scenes.models.motion import Poses, rigid_track
+from scenes.models.smoothing import unit_normals, with_corners
 from scenes.models.sources import Sources
 
 _KINDS = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual"}
 _DEPTH_MAX = 256
+_Part = tuple[Mesh, Material]
 
 
-def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
-    """Parts of the file's scene, or of all nodes if it names no scene; those of animated nodes move rigidly.
+def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> Model:
+    """The file's scene, or all nodes if it names no scene; parts and cameras of animated nodes move rigidly.
 
-    Skins and morph targets are ignored.
+    Meshes with a skin have the pose of their joints at the start of the animation. Morph targets are ignored.
 
     With ``facets`` materials are converted for path tracing, otherwise to Phong.
 
@@ -39,10 +45,7 @@ def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> tup
     """
     data = GltfData(sources)
     _check_extensions(data, report)
-    for name in ("skins", "cameras"):
-        if data.items(name):
-            report.add(sources.path.stem, name)
-    return _Reader(data, report, facets).parts()
+    return _Reader(data, report, facets).model()
 
 
 def _check_extensions(data: GltfData, report: LossReport) -> None:
@@ -51,7 +54,7 @@ def _check_extensions(data: GltfData, report: LossReport) -> None:
     if required:
         raise SceneError(f"requires the extension {', '.join(map(str, required))}, which is not known here")
     for name in sorted(map(str, data.items("extensionsUsed"))):
-        if not known(name) or name == "KHR_lights_punctual":
+        if not known(name):
             report.add(data.sources.path.stem, f"the extension {name}")
 
 
@@ -60,15 +63,22 @@ class _Reader:
 
     def __init__(self, data: GltfData, report: LossReport, facets: bool) -> None:
         self.data, self.report = data, report
-        self.materials = GltfMaterials(data, report, facets)
+        self.materials = GltfMaterials(data, GltfTextures(data, report), report, facets)
         self.motion = GltfMotion(data, report)
-        self._meshes: dict[int, list[tuple[Mesh, Material]]] = {}
+        self._meshes: dict[int, list[_Part]] = {}
+        self._parts: list[Instance] = []
+        self._lights: list[Light] = []
+        self._cameras: dict[str, ModelCamera] = {}
+        self._world: dict[int, Matrix] = {}
+        self._moving: set[int] = set()
+        self._skinned: list[tuple[dict[str, Any], str]] = []
 
-    def parts(self) -> tuple[Instance, ...]:
-        found: list[Instance] = []
+    def model(self) -> Model:
         for root in self._roots():
-            self._node(root, np.eye(4)[None], np.eye(4), None, found, 0)
-        return tuple(found)
+            self._node(root, np.eye(4)[None], np.eye(4), None, False, 0)
+        for node, name in self._skinned:
+            self._add_skinned(node, name)
+        return Model(tuple(self._parts), tuple(self._lights), self._cameras, "y")
 
     def _roots(self) -> list[int]:
         scenes, nodes = self.data.items("scenes"), self.data.items("nodes")
@@ -78,16 +88,16 @@ class _Reader:
         return [number for number in range(len(nodes)) if number not in children]
 
     def _node(
-        self, number: int, above: Poses, frame: Matrix, track: RigidTrack | None, found: list[Instance], depth: int
+        self, number: int, above: Poses, frame: Matrix, track: RigidTrack | None, moving: bool, depth: int
     ) -> None:
-        """Adds the parts of a node and its children.
+        """Adds what a node and its children hold.
 
         Args:
             number: index of the node.
             above: world transform of the nearest animated ancestor, at one or all times.
             frame: transform from the parent to that ancestor.
             track: rigid motion of that ancestor.
-            found: receives the parts.
+            moving: whether there is such an ancestor.
             depth: depth of the node.
         """
         if depth > _DEPTH_MAX:
@@ -96,30 +106,59 @@ class _Reader:
         name = node.get("name", f"node{number}")
         moved = self.motion.poses(number)
         if moved is not None:
-            above, frame = product(above, product(frame, moved)), np.eye(4)
-            track = self.motion.track(above, name)
+            above, frame, moving = product(above, product(frame, moved)), np.eye(4), True
+            track = rigid_track(above, self.motion.times_s, name, self.report)
         else:
             frame = product(frame, local_poses(node)[0])
         matrix = product(above[0], frame)
-        if "mesh" in node:
+        self._world[number] = matrix
+        if moving:
+            self._moving.add(number)
+        if "camera" in node:
+            names = name if "name" in node else self.data.at("cameras", node["camera"]).get("name", name)
+            self._cameras.setdefault(str(names), camera_at_node(self.data, node["camera"], matrix, track))
+        if "KHR_lights_punctual" in node.get("extensions", {}):
+            self._add_light(node, matrix, name, moving)
+        if "mesh" in node and "skin" in node:
+            self._skinned.append((node, name))
+        elif "mesh" in node:
             if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
                 self.report.add(name, "a node without extent")
             else:
                 stem = self.data.sources.path.stem
                 parts = self._mesh(node["mesh"])
-                found += [Instance(mesh, material, matrix, track, name=f"{stem}/{name}") for mesh, material in parts]
+                self._parts += [Instance(*part, matrix, track, name=f"{stem}/{name}") for part in parts]
         for child in node.get("children", ()):
-            self._node(child, above, frame, track, found, depth + 1)
+            self._node(child, above, frame, track, moving, depth + 1)
 
-    def _mesh(self, number: int) -> list[tuple[Mesh, Material]]:
+    def _add_light(self, node: dict[str, Any], matrix: Matrix, name: str, moving: bool) -> None:
+        light = light_at_node(
+            self.data, node["extensions"]["KHR_lights_punctual"].get("light"), matrix, name, self.report
+        )
+        if light is not None and moving:
+            self.report.add(name, "a moving light", "the pose at its start")
+        self._lights += [] if light is None else [light]
+
+    def _add_skinned(self, node: dict[str, Any], name: str) -> None:
+        """Adds the parts of a mesh that is bent by its joints; its node's own transform does not count."""
+        if not self._moving.isdisjoint(self.data.at("skins", node["skin"]).get("joints", ())):
+            self.report.add(name, "a skin that moves", "the pose at its start")
+        matrices = joint_matrices(self.data, node["skin"], self._world)
+        name = f"{self.data.sources.path.stem}/{name}"
+        self._parts += [Instance(*part, name=name) for part in self._mesh_parts(node["mesh"], matrices)]
+
+    def _mesh(self, number: int) -> list[_Part]:
         if number not in self._meshes:
-            mesh = self.data.at("meshes", number)
-            name = mesh.get("name", f"mesh{number}")
-            made = [self._primitive(primitive, name) for primitive in mesh.get("primitives", ())]
-            self._meshes[number] = [part for part in made if part is not None]
+            self._meshes[number] = self._mesh_parts(number, None)
         return self._meshes[number]
 
-    def _primitive(self, primitive: dict[str, Any], name: str) -> tuple[Mesh, Material] | None:
+    def _mesh_parts(self, number: int, matrices: NDArray[np.float64] | None) -> list[_Part]:
+        mesh = self.data.at("meshes", number)
+        name = mesh.get("name", f"mesh{number}")
+        made = [self._primitive(primitive, name, matrices) for primitive in mesh.get("primitives", ())]
+        return [part for part in made if part is not None]
+
+    def _primitive(self, primitive: dict[str, Any], name: str, matrices: NDArray[np.float64] | None) -> _Part | None:
         mode, attributes = primitive.get("mode", 4), primitive.get("attributes", {})
         if mode in _KINDS or "POSITION" not in attributes:
             self.report.add(name, _KINDS.get(mode, "a primitive without positions"))
@@ -127,6 +166,9 @@ class _Reader:
         if primitive.get("targets"):
             self.report.add(name, "morph targets")
         points = self.data.numbers(attributes["POSITION"])
+        normals = self._of_vertices("NORMAL", attributes, len(points), name)
+        if matrices is not None:
+            points, normals = bent(bends(self.data, attributes, matrices, len(points)), points, normals)
         if not np.isfinite(points).all():
             raise SceneError("vertices hold non-finite values")
         indices = primitive.get("indices")
@@ -137,36 +179,31 @@ class _Reader:
         if not len(faces):
             return None
 
-        def corners(attribute: str) -> NDArray[np.float64] | None:
-            values = self.data.numbers(attributes[attribute]) if attribute in attributes else None
-            if values is not None and len(values) != len(points):
-                raise SceneError(f"cannot be read: {name}: expected {len(points)} of {attribute}, got {len(values)}")
-            return None if values is None else values[faces]
-
-        sets = {number: corners(f"TEXCOORD_{number}") for number in range(4) if f"TEXCOORD_{number}" in attributes}
-        colors, normals = corners("COLOR_0"), corners("NORMAL")
+        sets = {index: self._of_vertices(f"TEXCOORD_{index}", attributes, len(points), name) for index in range(4)}
+        colors = self._of_vertices("COLOR_0", attributes, len(points), name)
         painted = self.materials.painted(
             primitive.get("material"),
-            {number: values for number, values in sets.items() if values is not None},
-            None if colors is None else colors[..., :3],
+            {index: values[faces] for index, values in sets.items() if values is not None},
+            None if colors is None else colors[faces][..., :3],
         )
         if normals is None and painted.uvs is None:
             mesh = Mesh(vertices_of(points), faces.astype(np.int32), source=str(self.data.sources.path))
             return mesh, painted.material
-        shading = None if normals is None else _unit(normals, points[faces])
+        shading = None if normals is None else unit_normals(normals[faces], points[faces])
         source = str(self.data.sources.path)
         mesh = with_corners(points[faces], shading, painted.uvs, source, None if painted.baked else faces)
         return mesh, painted.material
 
-
-def _unit(normals: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Unit normals; face normals where the file has no usable ones."""
-    length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    usable = np.isfinite(length) & (length > 0.0)
-    if usable.all():
-        return (normals / length).astype(np.float32)
-    found = normals / np.where(usable, length, 1.0)
-    return np.where(usable, found, corner_normals(corners)).astype(np.float32)
+    def _of_vertices(
+        self, attribute: str, attributes: dict[str, Any], count: int, name: str
+    ) -> NDArray[np.float64] | None:
+        """Values of the vertices; None without the attribute."""
+        if attribute not in attributes:
+            return None
+        values = self.data.numbers(attributes[attribute])
+        if len(values) != count:
+            raise SceneError(f"cannot be read: {name}: expected {count} of {attribute}, got {len(values)}")
+        return values
 
 
 def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:

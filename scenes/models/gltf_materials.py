@@ -21,9 +21,8 @@ from scenes.canonical import ConstantTexture, Emissive, Glass, Material, Phong, 
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
-from scenes.models.gltf_data import GltfData
 from scenes.models.gltf_facets import ALONG_PATHS, PARTS, FacetMaterials, lookups_beside
-from scenes.models.gltf_textures import GltfTextures, Lookup, Uvs, lookup_of, multiplied
+from scenes.models.gltf_textures import Document, Lookup, Textures, Uvs, lookup_of, multiplied
 from scenes.models.phong_of_parts import diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.vertex_colours import coloured
 
@@ -50,12 +49,12 @@ class Painted:
 class GltfMaterials:
     """Materials of a file; for meshes without vertex colours each is created once."""
 
-    def __init__(self, data: GltfData, report: LossReport, facets: bool = False) -> None:
+    def __init__(self, data: Document, textures: Textures, report: LossReport, facets: bool = False) -> None:
         """Materials are read on demand; with ``facets`` they are converted for path tracing
         (:mod:`scenes.models.gltf_facets`)."""
         self.data, self.report = data, report
-        self.textures = GltfTextures(data, report)
-        self._facets = FacetMaterials(self.textures, report) if facets else None
+        self.textures = textures
+        self._facets = FacetMaterials(textures, report) if facets else None
         self._made: dict[int, Material] = {}
 
     def painted(

@@ -8,21 +8,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.animation import continuous_quaternions
-from scenes.arithmetic import inverse, product, rotation_between
-from scenes.canonical import RigidTrack, SceneError
+from scenes.arithmetic import rotation_between
+from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
+from scenes.models.motion import Poses, uniform_times
 
-Poses = Float64[NDArray, "keys 4 4"]
-
-_INTERVAL_S = 1.0 / 120.0
-_KEYS_MOST = 1 << 16
-_UNEVEN_MOST = 1e-3  # deviation of a rotation from an orthogonal matrix
 _REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 
@@ -71,11 +66,7 @@ class GltfMotion:
                 raise SceneError(f"cannot be read: animation of node {target['node']}: keys and values do not match")
             self._channels.setdefault(target["node"], {})[target["path"]] = keys, values, kind
         spans = [keys for channels in self._channels.values() for keys, _, _ in channels.values() if len(keys)]
-        last_s = max((float(keys[-1]) for keys in spans), default=0.0)
-        steps = int(np.ceil(last_s / _INTERVAL_S - 1e-9))
-        if steps >= _KEYS_MOST:
-            raise SceneError(f"cannot be read: expected an animation of at most {_KEYS_MOST} keys, got {last_s:g} s")
-        self.times_s = np.linspace(0.0, last_s, steps + 1) if steps else np.zeros(0)
+        self.times_s = uniform_times(max((float(keys[-1]) for keys in spans), default=0.0))
 
     def poses(self, number: int) -> Poses | None:
         """Transforms from a node to its parent at all times; None if it does not move."""
@@ -85,20 +76,6 @@ class GltfMotion:
         node = self.data.at("nodes", number)
         moved = {path: _sampled(path, *channel, self.times_s) for path, channel in channels.items()}
         return local_poses({name: value for name, value in node.items() if name != "matrix"} | moved, len(self.times_s))
-
-    def track(self, world: Poses, name: str) -> RigidTrack | None:
-        """The rigid motion of a node from its first pose on; None, with a loss, if the motion is not rigid."""
-        if np.linalg.det(world[0, :3, :3]) == 0.0:
-            self.report.add(name, "an animation that begins without extent", "the pose at its start")
-            return None
-        moved = product(world, inverse(world[0]))
-        turn = moved[:, :3, :3]
-        if np.abs(product(turn, np.swapaxes(turn, 1, 2)) - np.eye(3)).max() > _UNEVEN_MOST:
-            self.report.add(name, "an animation that scales or shears", "the pose at its start")
-            return None
-        rotation = continuous_quaternions(Rotation.from_matrix(turn).as_quat())
-        interval_s = float(self.times_s[1] - self.times_s[0])
-        return RigidTrack(0.0, interval_s, moved[:, :3, 3], rotation)
 
 
 def _sampled(path: str, keys: NDArray, values: NDArray, kind: str, times_s: NDArray) -> NDArray:

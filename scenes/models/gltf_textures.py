@@ -6,8 +6,9 @@ KHR_texture_transform.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -18,10 +19,12 @@ from scenes.canonical import ImageTexture
 from scenes.formats.losses import LossReport
 from scenes.loading import decode_srgb
 from scenes.models.gltf_data import GltfData
+from scenes.models.sources import Sources
 from scenes.pictures import Pixels, alpha_of, by_pillow, decoded
 
 Uvs = Float[NDArray[np.float64], "*n 2"]
 _NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
+BORDER = 33069  # black outside; not a mode of glTF
 
 
 @dataclass(frozen=True)
@@ -71,16 +74,66 @@ def lookup_of(info: dict[str, Any] | None) -> Lookup | None:
     )
 
 
-class GltfTextures:
+class Document(Protocol):
+    """A file with materials in the terms of glTF."""
+
+    sources: Sources
+
+    def at(self, name: str, index: Any) -> dict[str, Any]:
+        """An object of a top-level list."""
+        ...
+
+
+class Textures(ABC):
     """Images and samplers of a file; each image is read once."""
 
+    def __init__(self, document: Document, report: LossReport) -> None:
+        self.document, self.report = document, report
+
+    @abstractmethod
+    def picture(self, lookup: Lookup, numbers: bool = False) -> Pixels:
+        """Texels ``(h, w, 3)`` of a texture: linear colours, or raw values with ``numbers``."""
+
+    @abstractmethod
+    def opacity(self, lookup: Lookup) -> Pixels:
+        """Texels ``(h, w, 3)`` of the opacity of a texture; 1 if it has none."""
+
+    def texture(self, lookup: Lookup, image: Pixels, where: str) -> ImageTexture:
+        """A texture of these texels, with the sampler of the file."""
+        sampler = self._sampler(lookup)
+        wraps = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
+        scale, offset = [1.0, 1.0], [0.0, 0.0]
+        for axis, wrap in enumerate(wraps):
+            if wrap == _MIRRORED:  # twice as large, with the second half mirrored
+                along = 1 - axis
+                image = np.concatenate([image, np.flip(image, along)], axis=along)
+                scale[axis] = 0.5
+                offset[axis] = 0.5 * axis  # the first half of rows is the upper one
+        kinds = {wrap if wrap in (_CLAMP, BORDER) else _REPEAT for wrap in wraps}
+        if len(kinds) > 1:
+            self.report.add(where, "a texture clamped along one axis and repeated along the other", "one that repeats")
+        wrap: Literal["clamp", "black", "repeat"] = "repeat"
+        if len(kinds) == 1 and wraps[0] in (_CLAMP, BORDER):
+            wrap = "clamp" if wraps[0] == _CLAMP else "black"
+        kind: Literal["nearest", "mipmap"] = "nearest" if sampler.get("magFilter") == _NEAREST else "mipmap"
+        source = str(self.document.sources.path)
+        return ImageTexture(image, (scale[0], scale[1]), (offset[0], offset[1]), wrap, kind, source)
+
+    def _sampler(self, lookup: Lookup) -> dict[str, Any]:
+        texture = self.document.at("textures", lookup.texture)
+        return self.document.at("samplers", texture["sampler"]) if "sampler" in texture else {}
+
+
+class GltfTextures(Textures):
+    """Images of a glTF file."""
+
     def __init__(self, data: GltfData, report: LossReport) -> None:
-        self.data, self.report = data, report
+        super().__init__(data, report)
+        self.data = data
         self._pictures: dict[tuple[int, bool], Pixels] = {}
         self._opacities: dict[int, Pixels] = {}
 
     def picture(self, lookup: Lookup, numbers: bool = False) -> Pixels:
-        """Texels ``(h, w, 3)`` of a texture: linear colours, or raw values with ``numbers``."""
         source = self._source(lookup)
         key = (source, numbers)
         if key not in self._pictures:
@@ -96,7 +149,6 @@ class GltfTextures:
         return self._pictures[key]
 
     def opacity(self, lookup: Lookup) -> Pixels:
-        """Texels ``(h, w, 3)`` of the alpha channel of a texture; 1 if its image has none."""
         source = self._source(lookup)
         if source not in self._opacities:
             name, content = self.data.image_bytes(source)
@@ -107,29 +159,6 @@ class GltfTextures:
     def _source(self, lookup: Lookup) -> Any:
         texture = self.data.at("textures", lookup.texture)
         return texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
-
-    def texture(self, lookup: Lookup, image: Pixels, where: str) -> ImageTexture:
-        """A texture of these texels, with the sampler of the file."""
-        sampler = self._sampler(lookup)
-        wraps = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
-        scale, offset = [1.0, 1.0], [0.0, 0.0]
-        for axis, wrap in enumerate(wraps):
-            if wrap == _MIRRORED:  # twice as large, with the second half mirrored
-                along = 1 - axis
-                image = np.concatenate([image, np.flip(image, along)], axis=along)
-                scale[axis] = 0.5
-                offset[axis] = 0.5 * axis  # the first half of rows is the upper one
-        kinds = {wrap == _CLAMP for wrap in wraps}
-        if len(kinds) > 1:
-            self.report.add(where, "a texture clamped along one axis and repeated along the other", "one that repeats")
-        wrap: Literal["clamp", "repeat"] = "clamp" if kinds == {True} else "repeat"
-        kind: Literal["nearest", "mipmap"] = "nearest" if sampler.get("magFilter") == _NEAREST else "mipmap"
-        source = str(self.data.sources.path)
-        return ImageTexture(image, (scale[0], scale[1]), (offset[0], offset[1]), wrap, kind, source)
-
-    def _sampler(self, lookup: Lookup) -> dict[str, Any]:
-        texture = self.data.at("textures", lookup.texture)
-        return self.data.at("samplers", texture["sampler"]) if "sampler" in texture else {}
 
 
 def resized(image: Pixels, height: int, width: int) -> Pixels:

@@ -4,40 +4,51 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
-from scenes.canonical import Instance, Scene
+from scenes.canonical import Instance, Scene, SceneError
 from scenes.formats.losses import LossReport
 from scenes.formats.text.format import Format
-from scenes.models import MODEL_ENDINGS, read_model
-from scenes.models.smoothing import smoothed
+from scenes.models import MODEL_ENDINGS, read_whole
 from scenes.viewing import Up, framed
 
 _Y_UP = (".obj", ".gltf", ".glb")
 """Endings of formats whose files have y upwards: glTF by its specification, OBJ by convention."""
 
 
-def model_up(path: Path) -> Up:
-    """The upward axis of a model, by the ending of its file name."""
-    return "y" if path.suffix.lower() in _Y_UP else "z"
+def model_up(path: Path, facets: bool = False) -> Up:
+    """The upward axis of a model: the one that its file names, or that of the ending of its name."""
+    return read_whole(path, facets=facets).up or ("y" if path.suffix.lower() in _Y_UP else "z")
 
 
-def model_scene(
-    path: Path, report: LossReport, up: Up | None = None, smooth_deg: float = 0.0, facets: bool = False
-) -> Scene:
-    """A model with lights and a camera that shows all of it (:func:`scenes.viewing.framed`).
+def model_scene(path: Path, report: LossReport, up: Up | None = None, facets: bool = False, camera: str = "") -> Scene:
+    """A model with the lights and the first camera of its file; without such, with those of
+    :func:`scenes.viewing.framed`, which show all of it.
 
     Args:
         path: see :func:`scenes.models.read_model`.
         report: receives the losses.
         up: upward axis; by default :func:`model_up`.
-        smooth_deg: see :func:`scenes.models.place_model`.
         facets: see :func:`scenes.models.read_model`.
+        camera: name of a camera of the file; the first one if empty.
 
     Raises:
-        SceneError: the model cannot be read.
+        SceneError: the model cannot be read, or has no camera of this name.
     """
-    scene = framed(smoothed(read_model(path, report, facets), smooth_deg), up or model_up(path), path.stem)
-    return dataclasses.replace(scene, duration_s=duration_of(scene.instances))
+    model = read_whole(path, report, facets)
+    if camera and camera not in model.cameras:
+        known = ", ".join(model.cameras) or "none"
+        raise SceneError(f"camera: expected one of the cameras of {path} ({known}), got {camera!r}")
+    shown = tuple(part for part in model.parts if part.emission is None) or model.parts
+    scene = framed(shown, up or model_up(path, facets), path.stem)
+    changed: dict[str, Any] = {}
+    if model.lit:
+        changed |= {"lights": model.lights, "ambient": (0.0, 0.0, 0.0), "background": None}
+    if model.cameras:
+        found = model.cameras[camera] if camera else next(iter(model.cameras.values()))
+        changed |= {"camera": found.camera, "film": found.film}
+    duration_s = duration_of(model.parts)
+    return dataclasses.replace(scene, instances=model.parts, duration_s=duration_s, **changed)
 
 
 def duration_of(instances: tuple[Instance, ...]) -> float:

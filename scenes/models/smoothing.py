@@ -83,6 +83,16 @@ def _angles(corners: Float[NDArray[np.float64], "f 3 3"]) -> Float[NDArray[np.fl
     return np.where(lengths > 0.0, arccos(np.clip(cosines, -1.0, 1.0)), 0.0)
 
 
+def unit_normals(normals: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Unit normals; face normals where the file has no usable ones."""
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    usable = np.isfinite(length) & (length > 0.0)
+    if usable.all():
+        return (normals / length).astype(np.float32)
+    found = normals / np.where(usable, length, 1.0)
+    return np.where(usable, found, corner_normals(corners)).astype(np.float32)
+
+
 def with_corners(
     corners: Float[NDArray[np.floating], "f 3 3"],
     normals: Float[NDArray[np.float32], "f 3 3"] | None,

@@ -1,0 +1,52 @@
+"""Rigid motion of the parts of a model, at uniform times."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from scenes.animation import continuous_quaternions
+from scenes.arithmetic import inverse, product
+from scenes.canonical import RigidTrack, SceneError
+from scenes.formats.losses import LossReport
+
+Poses = Float64[NDArray, "keys 4 4"]
+
+_INTERVAL_S = 1.0 / 120.0
+_KEYS_MOST = 1 << 16
+_UNEVEN_MOST = 1e-3  # deviation of a rotation from an orthogonal matrix
+
+
+def uniform_times(last_s: float) -> NDArray[np.float64]:
+    """Times of keys from 0 to ``last_s``, seconds, at most 1/120 s apart; none if nothing moves.
+
+    Raises:
+        SceneError: the motion needs more than 65,536 keys.
+    """
+    if not last_s < _KEYS_MOST * _INTERVAL_S:
+        raise SceneError(f"cannot be read: expected an animation of at most {_KEYS_MOST} keys, got {last_s:g} s")
+    steps = int(np.ceil(last_s / _INTERVAL_S - 1e-9))
+    return np.linspace(0.0, last_s, steps + 1) if steps > 0 else np.zeros(0)
+
+
+def rigid_track(world: Poses, times_s: NDArray[np.float64], name: str, report: LossReport) -> RigidTrack | None:
+    """The rigid motion of a node from its first pose on; None, with a loss, if the motion is not rigid.
+
+    Args:
+        world: transforms from the node to the world.
+        times_s: their times, uniform.
+        name: name of the node, for the loss.
+        report: receives the loss.
+    """
+    if np.linalg.det(world[0, :3, :3]) == 0.0:
+        report.add(name, "an animation that begins without extent", "the pose at its start")
+        return None
+    moved = product(world, inverse(world[0]))
+    turn = moved[:, :3, :3]
+    if not np.abs(product(turn, np.swapaxes(turn, 1, 2)) - np.eye(3)).max() <= _UNEVEN_MOST:
+        report.add(name, "an animation that scales or shears", "the pose at its start")
+        return None
+    rotation = continuous_quaternions(Rotation.from_matrix(turn).as_quat())
+    return RigidTrack(0.0, float(times_s[1] - times_s[0]), moved[:, :3, 3], rotation)

@@ -1,0 +1,263 @@
+"""Reader of USD: the imageable prims of a stage at its start, with their rigid motion.
+
+Coordinates are those of the file, whatever ``metersPerUnit`` is: nothing in a picture depends on the unit.
+
+Source: OpenUSD documentation, UsdGeom (Imageable, Xformable, PointInstancer), UsdShade, UsdSkel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from scenes.arithmetic import product
+from scenes.canonical import Instance, Light, Material, Matrix, Mesh, RigidTrack, SceneError
+from scenes.canonical.values import vertices_of
+from scenes.formats.losses import LossReport
+from scenes.loading import state_of
+from scenes.models.gltf_materials import GltfMaterials
+from scenes.models.model import Model, ModelCamera
+from scenes.models.smoothing import unit_normals, with_corners
+from scenes.models.sources import Sources
+from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils
+from scenes.models.usd_materials import UsdMaterials
+from scenes.models.usd_meshes import (
+    Triangles,
+    normals_at_corners,
+    primvar_at_corners,
+    subsets_of,
+    triangles_of,
+)
+from scenes.models.usd_motion import UsdMotion
+from scenes.models.usd_shapes import KINDS as SHAPES
+from scenes.models.usd_shapes import shapes_of
+from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
+from scenes.models.usd_views import LAMP, camera_of, light_of
+
+_INSTANCES_MOST = 1 << 20
+_DEPTH_MAX = 32
+_GREY = 0.18
+_Part = tuple[Any, Material, Matrix]
+
+
+def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Model:
+    """The stage of a file: its meshes, primitives and instances, lights and cameras.
+
+    Prims that are invisible, or proxies or guides, are left out. Meshes of a skeleton have its pose at the start.
+
+    Raises:
+        SceneError: the file cannot be read.
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # its messages would go to standard error
+    try:
+        stage = Usd.Stage.Open(str(sources.path))
+        for layer in stage.GetUsedLayers():
+            if layer.realPath:
+                path = sources.path.parent / layer.realPath
+                sources.files.setdefault(path, state_of(path))
+        for error in stage.GetCompositionErrors():
+            report.add(sources.path.stem, " ".join(str(error).split())[:200])
+        return _Reader(stage, sources, report, facets).model()
+    except Tf.ErrorException as error:
+        raise SceneError(f"cannot be read: {_first_line(error)}") from None
+    finally:
+        quiet.TakeCoalescedDiagnostics()
+        del quiet
+
+
+def _first_line(error: Exception) -> str:
+    """The message of an error of the library, without its place in the source."""
+    return " ".join(str(error).split()).rpartition("--")[2].strip(" '") or "unknown error"
+
+
+class _Reader:
+    """Reads the prims of a stage, each mesh once."""
+
+    def __init__(self, stage: Any, sources: Sources, report: LossReport, facets: bool) -> None:
+        self.stage, self.sources, self.report = stage, sources, report
+        self.motion = UsdMotion(stage)
+        self.code = self.motion.start
+        document = UsdDocument(sources)
+        self.pictures = Pictures(sources)
+        self.described = UsdMaterials(document, self.pictures, self.code, report)
+        self.materials = GltfMaterials(document, UsdTextures(document, report), report, facets)
+        self.up_is_z = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
+        self._made: dict[str, list[_Part]] = {}
+        self._parts: list[Instance] = []
+        self._lights: list[Light] = []
+        self._cameras: dict[str, ModelCamera] = {}
+
+    def model(self) -> Model:
+        self._bend()
+        shown = list(self._prims(self.stage.GetPseudoRoot()))
+        tracks = self.motion.tracks(shown, self.report)
+        for prim in shown:
+            self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)), 0)
+        return Model(tuple(self._parts), tuple(self._lights), self._cameras, "z" if self.up_is_z else "y")
+
+    def _bend(self) -> None:
+        """Moves points of skinned meshes to the pose of their skeletons at the start, in memory alone."""
+        roots = [prim for prim in self.stage.Traverse() if prim.IsA(UsdSkel.Root)]
+        if not roots:
+            return
+        self.stage.SetEditTarget(self.stage.GetSessionLayer())
+        at = self.code.GetValue()
+        for root in roots:
+            animations = [prim for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Animation)]
+            if any(UsdSkel.Animation(prim).GetRotationsAttr().ValueMightBeTimeVarying() for prim in animations):
+                self.report.add(root.GetName(), "a skeleton that moves", "the pose at its start")
+            UsdSkel.BakeSkinning(UsdSkel.Root(root), Gf.Interval(at, at))
+
+    def _prims(self, root: Any) -> Iterator[Any]:
+        """Visible prims below a root, within instances too; those below a point instancer are its prototypes."""
+        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+        for prim in walk:
+            if prim.IsPseudoRoot():
+                continue
+            imageable = UsdGeom.Imageable(prim)
+            if not imageable:
+                continue
+            visible = imageable.GetVisibilityAttr()
+            if visible.ValueMightBeTimeVarying():
+                self.report.add(prim.GetName(), "an animation of the visibility", "that at its start")
+            if visible.Get(self.code) == UsdGeom.Tokens.invisible:
+                walk.PruneChildren()
+                continue
+            if imageable.ComputePurpose() in (UsdGeom.Tokens.proxy, UsdGeom.Tokens.guide):
+                continue
+            if prim.IsA(UsdGeom.PointInstancer):
+                walk.PruneChildren()
+            yield prim
+
+    def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None, depth: int) -> None:
+        """Adds what a prim itself holds."""
+        name = f"{self.sources.path.stem}/{prim.GetName()}"
+        if prim.IsA(UsdGeom.PointInstancer):
+            self._instances(prim, matrix, track, depth)
+        elif prim.IsA(UsdGeom.Camera):
+            key = prim.GetName() if prim.GetName() not in self._cameras else str(prim.GetPath())
+            self._cameras[key] = camera_of(prim, self.code, matrix, track, self.report)
+        elif prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdGeom.Gprim):
+            self._light(prim, matrix, track, name)
+        elif prim.IsA(UsdGeom.Gprim):
+            if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
+                self.report.add(prim.GetName(), "a node without extent")
+                return
+            if len(self._parts) > _INSTANCES_MOST:
+                raise SceneError(f"cannot be read: expected at most {_INSTANCES_MOST:,} instances")
+            for shape, material, local in self._shapes(prim):
+                self._parts.append(Instance(shape, material, product(matrix, local), track, name))
+
+    def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None, name: str) -> None:
+        light, lamp = light_of(prim, self.code, matrix, self.pictures, self.up_is_z, self.report)
+        if light is not None:
+            self._lights.append(light)
+            if track is not None:
+                self.report.add(prim.GetName(), "a moving light", "the pose at its start")
+        elif lamp is not None:
+            shape, place, radiance = lamp
+            self._parts.append(Instance(shape, LAMP, place, track, name, radiance))
+
+    def _instances(self, prim: Any, matrix: Matrix, track: RigidTrack | None, depth: int) -> None:
+        """Adds the instances of a point instancer."""
+        given = UsdGeom.PointInstancer(prim)
+        if depth > _DEPTH_MAX:
+            raise SceneError(f"cannot be read: expected point instancers at most {_DEPTH_MAX} deep")
+        if given.GetPositionsAttr().ValueMightBeTimeVarying() or given.GetOrientationsAttr().ValueMightBeTimeVarying():
+            self.report.add(prim.GetName(), "instances that move", "their poses at the start")
+        paths = given.GetPrototypesRel().GetForwardedTargets()
+        chosen = np.array(given.GetProtoIndicesAttr().Get(self.code) or [], np.int64)
+        kinds = given.ExcludeProtoXform, given.IgnoreMask
+        poses = np.array(given.ComputeInstanceTransformsAtTime(self.code, self.code, *kinds), np.float64)
+        poses = poses.reshape(-1, 4, 4)
+        if len(poses) != len(chosen) or (len(chosen) and not 0 <= chosen.min() <= chosen.max() < len(paths)):
+            what = f"a pose and one of {len(paths)} prototypes for each instance"
+            raise SceneError(f"cannot be read: {prim.GetName()}: expected {what}")
+        if len(poses) > _INSTANCES_MOST or not np.isfinite(poses).all():
+            raise SceneError(f"cannot be read: {prim.GetName()}: expected at most {_INSTANCES_MOST:,} finite poses")
+        mask = given.ComputeMaskAtTime(self.code)
+        for number, path in enumerate(paths):
+            root = self.stage.GetPrimAtPath(path)
+            if not root:
+                self.report.add(prim.GetName(), f"a prototype {path}, which is not there")
+                continue
+            inner = [(one, self.motion.matrix_below(one, root)) for one in self._prims(root)]
+            at = np.flatnonzero(chosen == number)
+            for instance in at[np.array(mask, bool)[at]] if len(mask) else at:
+                place = product(matrix, poses[instance].T)
+                for one, local in inner:
+                    self._add(one, product(place, local), track, depth + 1)
+
+    def _shapes(self, prim: Any) -> list[_Part]:
+        """Shapes of a prim with their materials, in its space; instances of one prototype share them."""
+        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        key = str(source.GetPath())
+        if key not in self._made:
+            self._made[key] = self._read(prim)
+        return self._made[key]
+
+    def _read(self, prim: Any) -> list[_Part]:
+        name, kind = prim.GetName(), prim.GetTypeName()
+        if prim.IsA(UsdGeom.Mesh):
+            return self._mesh(UsdGeom.Mesh(prim), name)
+        if kind not in SHAPES:
+            self.report.add(name, f"a prim of kind {kind}")
+            return []
+        number, colors = self.described.number(self._bound(prim))
+        if self.described.coordinates(number):
+            self.report.add(name, f"textures of a {kind.lower()}, which has no texture coordinates")
+        color = None
+        if colors:
+            shown = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(colors)
+            found = shown.ComputeFlattened(self.code) if shown and shown.HasValue() else None
+            color = np.broadcast_to(_GREY if not found else np.array(found[0], np.float64), (1, 3, 3))
+        material = self.materials.painted(number, {}, color).material
+        return [(shape, material, local) for shape, local in shapes_of(prim, self.code)]
+
+    def _mesh(self, mesh: Any, name: str) -> list[_Part]:
+        """The parts of a mesh, one for each material."""
+        if mesh.GetPointsAttr().GetNumTimeSamples() > 1:
+            self.report.add(name, "vertices that move", "their places at the start")
+        whole = triangles_of(mesh, self.code, name, self.report)
+        if whole is None:
+            return []
+        rest, found = np.ones(whole.polygons, bool), []
+        for prim, marks in subsets_of(mesh, self.code, whole.polygons):
+            found.append((prim, marks & rest))
+            rest &= ~marks
+        found.append((mesh.GetPrim(), rest))
+        made = []
+        for prim, marks in found:
+            kept = marks[whole.polygon]
+            if kept.any():
+                part = self._part(mesh, whole.of(kept), self._bound(prim) or self._bound(mesh.GetPrim()), name)
+                made.append((*part, np.eye(4)))
+        return made
+
+    def _part(self, mesh: Any, triangles: Triangles, bound: Any, name: str) -> tuple[Mesh, Material]:
+        prim, source = mesh.GetPrim(), str(self.sources.path)
+        number, shown = self.described.number(bound)
+        sets = {}
+        for index, primvar in self.described.coordinates(number).items():
+            values = primvar_at_corners(prim, primvar, 2, triangles, self.code, name, self.report)
+            if values is not None:
+                sets[index] = values * (1.0, -1.0)
+        colors = primvar_at_corners(prim, shown, 3, triangles, self.code, name, self.report) if shown else None
+        if shown and colors is None:
+            colors = np.full((1, 3, 3), _GREY)
+        painted = self.materials.painted(number, sets, colors)
+        normals = normals_at_corners(mesh, triangles, self.code, name, self.report)
+        corners = triangles.points[triangles.at]
+        if normals is None and painted.uvs is None:
+            used, place = np.unique(triangles.at, return_inverse=True)
+            points = vertices_of(triangles.points[used])
+            return Mesh(points, place.reshape(-1, 3).astype(np.int32), source=source), painted.material
+        shading = None if normals is None else unit_normals(normals, corners)
+        return with_corners(corners, shading, painted.uvs, source), painted.material
+
+    def _bound(self, prim: Any) -> Any:
+        """The material that is bound to a prim; None without one."""
+        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        return material if material else None

@@ -1,0 +1,159 @@
+"""Polygons of a USD mesh as triangles, and the values at their corners.
+
+Source: OpenUSD documentation, UsdGeomMesh and UsdGeomPrimvar.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+from numpy.typing import NDArray
+
+from scenes.canonical import SceneError
+from scenes.formats.losses import LossReport
+from scenes.models.usd_library import UsdGeom
+
+_POLYGONS_MOST = 1 << 28
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Triangles of polygons.
+
+    Attributes:
+        points: points of the mesh ``(p, 3)``.
+        at: index of the point at each corner.
+        corner: index of each corner among the corners of all polygons.
+        polygon: index of the polygon of each triangle.
+        polygons: number of polygons, of which some may have no triangles.
+    """
+
+    points: NDArray[np.float64]
+    at: Int[NDArray[np.int64], "f 3"]
+    corner: Int[NDArray[np.int64], "f 3"]
+    polygon: Int[NDArray[np.int64], " f"]
+    polygons: int
+
+    def of(self, kept: NDArray[np.bool_]) -> Triangles:
+        """Some of the triangles."""
+        return Triangles(self.points, self.at[kept], self.corner[kept], self.polygon[kept], self.polygons)
+
+
+def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triangles | None:
+    """The triangles of a mesh: polygons are split into fans about their first corner, and holes are left out.
+
+    Args:
+        mesh: ``UsdGeom.Mesh``.
+        code: time.
+        where: place for messages.
+        report: receives the losses.
+
+    Returns:
+        None if there are none.
+
+    Raises:
+        SceneError: counts or indices do not match, or points are not finite.
+    """
+    points = array_of(mesh.GetPointsAttr().Get(code), 3)
+    counts = array_of(mesh.GetFaceVertexCountsAttr().Get(code), 0).astype(np.int64)
+    indices = array_of(mesh.GetFaceVertexIndicesAttr().Get(code), 0).astype(np.int64)
+    if not np.isfinite(points).all():
+        raise SceneError(f"{where}: vertices hold non-finite values")
+    if len(counts) and (counts.min() < 0 or len(counts) > _POLYGONS_MOST):
+        raise SceneError(f"cannot be read: {where}: expected polygons of at least 0 corners, got {counts.min()}")
+    if counts.sum() != len(indices):
+        raise SceneError(f"cannot be read: {where}: expected {counts.sum()} indices of corners, got {len(indices)}")
+    if len(indices) and not (indices.min() >= 0 and indices.max() < len(points)):
+        wrong = indices[(indices < 0) | (indices >= len(points))][0]
+        raise SceneError(f"cannot be read: {where}: a face refers to vertex {wrong} of {len(points)}")
+    scheme = mesh.GetSubdivisionSchemeAttr().Get()
+    if scheme != "none":
+        report.add(where, f"subdivision {scheme}", "the cage")
+    parts = np.maximum(counts - 2, 0)
+    holes = array_of(mesh.GetHoleIndicesAttr().Get(code), 0).astype(np.int64)
+    parts[holes[(holes >= 0) & (holes < len(parts))]] = 0
+    polygon = np.repeat(np.arange(len(counts)), parts)
+    if not len(polygon):
+        return None
+    within = np.arange(len(polygon)) - np.repeat(np.cumsum(parts) - parts, parts)
+    first = (np.cumsum(counts) - counts)[polygon]
+    corner = np.stack([first, first + within + 1, first + within + 2], axis=1)
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        corner = corner[:, ::-1]
+    return Triangles(points, indices[corner], corner, polygon, len(counts))
+
+
+def array_of(values: Any, width: int) -> NDArray[np.float64]:
+    """Values of an attribute ``(n, width)``, or ``(n,)`` for a width of 0; empty without a value."""
+    if values is None:
+        return np.zeros((0, width) if width else 0)
+    found = np.array(values, np.float64)
+    return found.reshape(-1, width) if width else found.reshape(-1)
+
+
+def at_corners(
+    values: NDArray[np.float64], interpolation: str, triangles: Triangles, what: str, where: str, report: LossReport
+) -> NDArray[np.float64] | None:
+    """Values ``(f, 3, width)`` at the corners; None, with a loss, if their number does not fit.
+
+    Args:
+        values: values ``(n, width)`` without indices.
+        interpolation: of the primvar.
+        triangles: triangles.
+        what: name of the values, for the loss.
+        where: place for messages.
+        report: receives the loss.
+    """
+    polygon = np.repeat(triangles.polygon[:, None], 3, axis=1)
+    index = {"constant": np.zeros_like(polygon), "uniform": polygon, "faceVarying": triangles.corner}.get(
+        interpolation, triangles.at
+    )
+    if len(values) <= index.max(initial=0):
+        report.add(where, f"{what} ({interpolation}) with {len(values)} values")
+        return None
+    if not np.isfinite(values).all():
+        raise SceneError(f"{where}: {what}: holds non-finite values")
+    return values[index]
+
+
+def primvar_at_corners(
+    prim: Any, name: str, width: int, triangles: Triangles, code: Any, where: str, report: LossReport
+) -> NDArray[np.float64] | None:
+    """Values ``(f, 3, width)`` of a primvar, inherited where it is constant; None if there is none that fits."""
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    if not primvar or not primvar.HasValue():
+        return None
+    flat = primvar.ComputeFlattened(code)
+    found = None if flat is None else np.array(flat, np.float64)
+    if found is None or found.ndim != (2 if width > 1 else 1) or (width > 1 and found.shape[1] < width):
+        report.add(where, f"primvar {name} of type {primvar.GetTypeName()}")
+        return None
+    values = found.reshape(len(found), -1)[:, :width]
+    return at_corners(values, primvar.GetInterpolation(), triangles, f"primvar {name}", where, report)
+
+
+def normals_at_corners(
+    mesh: Any, triangles: Triangles, code: Any, where: str, report: LossReport
+) -> NDArray[np.float64] | None:
+    """Normals ``(f, 3, 3)`` of a mesh, not normalised; None if it has none."""
+    primvar = UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvar("normals")
+    if primvar and primvar.HasValue():
+        return primvar_at_corners(mesh.GetPrim(), "normals", 3, triangles, code, where, report)
+    values = array_of(mesh.GetNormalsAttr().Get(code), 3)
+    if not len(values):
+        return None
+    return at_corners(values, mesh.GetNormalsInterpolation(), triangles, "normals", where, report)
+
+
+def subsets_of(mesh: Any, code: Any, polygons: int) -> list[tuple[Any, NDArray[np.bool_]]]:
+    """Subsets of a mesh to which materials are bound: each prim, and a mark for each polygon."""
+    found = []
+    for subset in UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, "materialBind"):
+        indices = array_of(subset.GetIndicesAttr().Get(code), 0).astype(np.int64)
+        marks = np.zeros(polygons, bool)
+        marks[indices[(indices >= 0) & (indices < polygons)]] = True
+        found.append((subset.GetPrim(), marks))
+    return found

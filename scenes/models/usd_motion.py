@@ -1,0 +1,90 @@
+"""Transforms of the prims of a USD stage, and their rigid motion at uniform times."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from scenes.arithmetic import inverse, product
+from scenes.canonical import Matrix, RigidTrack, SceneError
+from scenes.formats.losses import LossReport
+from scenes.models.motion import rigid_track, uniform_times
+from scenes.models.usd_library import Usd, UsdGeom
+
+
+class UsdMotion:
+    """The animation of a stage.
+
+    Attributes:
+        start: time code of the start: that of the stage, or the first time sample of a transform.
+    """
+
+    def __init__(self, stage: Any) -> None:
+        self._rate = float(stage.GetTimeCodesPerSecond()) or 24.0
+        moving = [prim for prim in stage.Traverse(Usd.TraverseInstanceProxies()) if prim.IsA(UsdGeom.Xformable)]
+        samples = [code for prim in moving for code in UsdGeom.Xformable(prim).GetTimeSamples()]
+        given = stage.HasAuthoredTimeCodeRange()
+        first = stage.GetStartTimeCode() if given else min(samples, default=0.0)
+        last = stage.GetEndTimeCode() if given else max(samples, default=first)
+        self.start = Usd.TimeCode(first)
+        self._last_s = (last - first) / self._rate if samples else 0.0
+        self._cache = UsdGeom.XformCache(self.start)
+        self._movers: dict[str, str] = {"/": ""}
+
+    def matrix(self, prim: Any) -> Matrix:
+        """The transform from a prim to the world at the start.
+
+        Raises:
+            SceneError: it is not finite.
+        """
+        return _finite(self._cache.GetLocalToWorldTransform(prim), prim)
+
+    def matrix_below(self, prim: Any, root: Any) -> Matrix:
+        """The transform from a prim of a prototype to the space of its instances, with that of its root."""
+        above = self._cache.GetParentToWorldTransform(root)
+        return product(inverse(_finite(above, root)), self.matrix(prim))
+
+    def mover(self, prim: Any) -> str:
+        """The path of the nearest prim at or above a prim that moves; empty if there is none."""
+        path = str(prim.GetPath())
+        if path not in self._movers:
+            xform = UsdGeom.Xformable(prim)
+            if xform and xform.TransformMightBeTimeVarying():
+                self._movers[path] = path
+            elif xform and xform.GetResetXformStack():
+                self._movers[path] = ""
+            else:
+                self._movers[path] = self.mover(prim.GetParent())
+        return self._movers[path]
+
+    def tracks(self, prims: list[Any], report: LossReport) -> dict[str, RigidTrack]:
+        """The rigid motion of all prims that move, by their paths; motion that is not rigid is reported.
+
+        Raises:
+            SceneError: the animation is too long.
+        """
+        times_s = uniform_times(self._last_s)
+        paths = sorted({self.mover(prim) for prim in prims} - {""}) if len(times_s) else []
+        if not paths:
+            return {}
+        stage = prims[0].GetStage()
+        moving = [stage.GetPrimAtPath(path) for path in paths]
+        world = np.empty((len(paths), len(times_s), 4, 4))
+        cache = UsdGeom.XformCache()
+        for key, time_s in enumerate(times_s):
+            cache.SetTime(Usd.TimeCode(self.start.GetValue() + time_s * self._rate))
+            for number, prim in enumerate(moving):
+                world[number, key] = _finite(cache.GetLocalToWorldTransform(prim), prim)
+        found = {
+            path: rigid_track(poses, times_s, prim.GetName(), report)
+            for path, poses, prim in zip(paths, world, moving, strict=True)
+        }
+        return {path: track for path, track in found.items() if track is not None}
+
+
+def _finite(matrix: Any, prim: Any) -> Matrix:
+    found = np.array(matrix, np.float64).T
+    if not np.isfinite(found).all():
+        raise SceneError(f"cannot be read: {prim.GetName()}: expected a finite transform")
+    return found

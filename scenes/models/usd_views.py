@@ -1,0 +1,178 @@
+"""Cameras and lights of a USD file.
+
+Source: OpenUSD documentation, UsdGeomCamera and UsdLux (LightAPI, and the light of each kind).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.arithmetic import product, sin
+from scenes.canonical import (
+    ConstantTexture,
+    DirectionalLight,
+    Disk,
+    EnvironmentLight,
+    Light,
+    Matrix,
+    Matte,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    Rectangle,
+    RigidTrack,
+    SceneError,
+    Shape,
+    Sphere,
+    SpotLight,
+)
+from scenes.formats.appearance.spectra import rgb
+from scenes.formats.losses import LossReport
+from scenes.models.model import ModelCamera, axis_of, shorter_fov_deg, unscaled
+from scenes.models.usd_library import UsdGeom, UsdLux
+from scenes.models.usd_textures import Pictures, Reading
+from scenes.viewing import turned_up
+
+LAMP = Matte(ConstantTexture((0.0, 0.0, 0.0)))
+"""Material of lamps, which reflect nothing."""
+
+KINDS = ("DistantLight", "SphereLight", "DiskLight", "RectLight", "DomeLight", "DomeLight_1")
+_IDENTITY = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
+
+
+def camera_of(prim: Any, code: Any, matrix: Matrix, track: RigidTrack | None, report: LossReport) -> ModelCamera:
+    """A camera with this transform and motion.
+
+    Raises:
+        SceneError: apertures or focal length are not positive.
+    """
+    lens = UsdGeom.Camera(prim).GetCamera(code)
+    wide, high = lens.horizontalAperture, lens.verticalAperture
+    if not (0.0 < min(wide, high, lens.focalLength) and max(wide, high, lens.focalLength) < math.inf):
+        raise SceneError(f"cannot be read: camera {prim.GetName()}: expected positive apertures and focal length")
+    if tuple(lens.clippingPlanes):
+        report.add(prim.GetName(), "clipping planes of a camera")
+    placed, tenth = unscaled(matrix), 0.1  # apertures and focal length are in tenths of a scene unit
+    shift = lens.horizontalApertureOffset / wide, lens.verticalApertureOffset / high
+    if str(lens.projection).endswith("Orthographic"):
+        if shift != (0.0, 0.0):
+            report.add(prim.GetName(), "a picture off the viewing direction", "one about it")
+        return ModelCamera(OrthographicCamera(placed, tenth * min(wide, high) / 2.0, track), wide / high)
+    fov_deg = shorter_fov_deg(2.0 * math.atan(high / (2.0 * lens.focalLength)), wide / high)
+    focus = lens.focusDistance if lens.focusDistance > 0.0 else 1.0
+    sharp = lens.fStop <= 0.0 or lens.focusDistance <= 0.0
+    radius = 0.0 if sharp else tenth * lens.focalLength / (2.0 * lens.fStop)
+    return ModelCamera(PerspectiveCamera(placed, fov_deg, radius, focus, track, shift=shift), wide / high)
+
+
+def light_of(
+    prim: Any, code: Any, matrix: Matrix, pictures: Pictures, up_is_z: bool, report: LossReport
+) -> tuple[Light | None, tuple[Shape, Matrix, tuple[float, float, float]] | None]:
+    """A light without an area; or the shape, the transform and the radiance of a lamp. Both None if there is no light.
+
+    Raises:
+        SceneError: its strength is not finite, or its picture cannot be read.
+    """
+    name, kind = prim.GetName(), prim.GetTypeName()
+    if kind not in KINDS:
+        report.add(name, f"a light of kind {kind}")
+        return None, None
+    radiance = _radiance(prim, code, report)
+    if not np.any(radiance > 0.0):
+        return None, None
+    if kind.startswith("DomeLight"):
+        return _dome(prim, code, matrix, radiance, pictures, up_is_z, report), None
+    normalized = bool(_value(prim, "normalize", code, False))
+    if kind == "DistantLight":
+        half_deg = float(_value(prim, "angle", code, 0.53)) / 2.0
+        solid = math.pi * float(sin(math.radians(min(max(half_deg, 0.0), 90.0)))) ** 2
+        shown = radiance if normalized or solid == 0.0 else radiance * solid
+        return DirectionalLight(axis_of(matrix, 2), rgb(shown), 2.0 * min(half_deg, 90.0)), None
+    shape, local, area = _lamp(prim, kind, code, matrix)
+    if normalized:
+        radiance = radiance / area
+    point = kind == "SphereLight" and bool(_value(prim, "treatAsPoint", None, False))
+    cone = prim.GetAttribute("inputs:shaping:cone:angle")
+    if cone and cone.HasAuthoredValue() and float(cone.Get(code)) < 90.0:
+        return _spot(prim, code, matrix, radiance * area / (4.0 if kind == "SphereLight" else 1.0), kind, report), None
+    if point:
+        x, y, z = (float(part) for part in matrix[:3, 3])
+        return PointLight((x, y, z), rgb(radiance * area / 4.0)), None
+    if kind == "RectLight" and _value(prim, "texture:file", code, None):
+        report.add(name, "a texture of a lamp")
+    return None, (shape, product(matrix, local), rgb(radiance))
+
+
+def _value(prim: Any, name: str, code: Any, rest: Any) -> Any:
+    attribute = prim.GetAttribute(f"inputs:{name}" if name != "treatAsPoint" else name)
+    found = attribute.Get() if attribute and code is None else attribute.Get(code) if attribute else None
+    return rest if found is None else found
+
+
+def _radiance(prim: Any, code: Any, report: LossReport) -> NDArray[np.float64]:
+    """Colour times intensity times 2 to the exposure, and the colour of its temperature."""
+    exposure = min(float(_value(prim, "exposure", code, 0.0)), 99.0)
+    strength = float(_value(prim, "intensity", code, 1.0)) * 2.0**exposure
+    color = np.array(_value(prim, "color", code, (1.0, 1.0, 1.0)), np.float64)
+    if _value(prim, "enableColorTemperature", code, False):
+        kelvin = float(_value(prim, "colorTemperature", code, 6500.0))
+        color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+    if not np.isfinite(color * strength).all():
+        raise SceneError(f"cannot be read: light {prim.GetName()}: expected a finite strength")
+    for name, rest in (("diffuse", 1.0), ("specular", 1.0), ("shaping:focus", 0.0), ("shadow:enable", True)):
+        if _value(prim, name, code, rest) != rest:
+            report.add(prim.GetName(), f"{name} of a light")
+    if _value(prim, "shaping:ies:file", code, None):
+        report.add(prim.GetName(), "a profile of a light (IES)")
+    return np.maximum(color * strength, 0.0)
+
+
+def _lamp(prim: Any, kind: str, code: Any, matrix: Matrix) -> tuple[Shape, Matrix, float]:
+    """Shape, local transform and area in the world of a lamp; flat ones emit along -z."""
+    axes = [float(np.linalg.norm(matrix[:3, axis])) for axis in range(3)]
+    flat = np.diag([-1.0, 1.0, -1.0, 1.0])
+    if kind == "SphereLight":
+        radius = max(float(_value(prim, "radius", code, 0.5)), 1e-6)
+        size = radius * float(np.prod(axes)) ** (1.0 / 3.0)
+        return Sphere(radius), np.eye(4), 4.0 * math.pi * size * size
+    if kind == "DiskLight":
+        radius = max(float(_value(prim, "radius", code, 0.5)), 1e-6)
+        return Disk(radius), flat, math.pi * radius * radius * axes[0] * axes[1]
+    wide, high = (max(float(_value(prim, name, code, 1.0)), 1e-6) for name in ("width", "height"))
+    return Rectangle(), product(flat, np.diag([wide / 2.0, high / 2.0, 1.0, 1.0])), wide * high * axes[0] * axes[1]
+
+
+def _spot(
+    prim: Any, code: Any, matrix: Matrix, intensity: NDArray[np.float64], kind: str, report: LossReport
+) -> SpotLight:
+    """A lamp with a cone as a spot without an area, with its intensity on the axis."""
+    report.add(prim.GetName(), f"the extent of a {kind} with a cone", "a spot")
+    outer_deg = max(float(_value(prim, "shaping:cone:angle", code, 90.0)), 1e-3)
+    softness = min(max(float(_value(prim, "shaping:cone:softness", code, 0.0)), 0.0), 1.0)
+    (x, y, z), along = (float(part) for part in matrix[:3, 3]), axis_of(matrix, 2)
+    target = x + along[0], y + along[1], z + along[2]
+    return SpotLight((x, y, z), target, rgb(intensity), outer_deg * min(1.0 - softness, 0.999), outer_deg)
+
+
+def _dome(
+    prim: Any, code: Any, matrix: Matrix, radiance: NDArray[np.float64], pictures: Pictures, up_is_z: bool,
+    report: LossReport,
+) -> EnvironmentLight:  # fmt: skip
+    """An environment: its top is along +y, or for a DomeLight_1 along the pole that it names."""
+    turn = unscaled(matrix)
+    turn[:3, 3] = 0.0
+    pole = str(prim.GetAttribute("poleAxis").Get() or "scene") if prim.GetTypeName() == "DomeLight_1" else "Y"
+    if pole == "Z" or (pole == "scene" and up_is_z):
+        turn = product(turn, product(turned_up("z"), turned_up("y").T))
+    image = np.ones((1, 1, 3), np.float32)
+    file = _value(prim, "texture:file", code, None)
+    if file is not None and file.path:
+        path = file.resolvedPath or str(pictures.sources.require(file.path, "an environment map at"))
+        if str(_value(prim, "texture:format", code, "automatic")) not in ("automatic", "latlong"):
+            report.add(prim.GetName(), "the layout of an environment map", "latitude and longitude")
+        image = pictures.values(Reading(path, "rgb", "auto", *_IDENTITY, ()))
+    return EnvironmentLight((image * radiance.astype(np.float32)).astype(np.float32), turn, source=str(prim.GetName()))
