@@ -14,6 +14,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "search": {"optuna": "optuna"},
     "perception": {"pycvvdp": "cvvdp", "torchvision": "torchvision", "flip_evaluator": "flip-evaluator"},
     "formats": {"astral": "astral", "defusedxml": "defusedxml"},
+    "usd": {"pxr": "usd-core"},
     "peers": {"embreex": "embreex", "mitsuba": "mitsuba", "pyluxcore": "pyluxcore", "pywt": "PyWavelets"},
     "denoise": {"pyoidn": "pyoidn"},
     "psignifit": {"psignifit": "psignifit"},

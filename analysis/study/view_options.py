@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 class ViewOptions:
     """Changes of a scene's view and lighting, and its integrator."""
 
-    camera: tuple[float, float, float, float, float, float] | None = None
-    """A static camera in place of the scene's: its position and its target, in the scene's coordinates."""
+    camera: tuple[float, float, float, float, float, float] | str | None = None
+    """A static camera in place of the scene's: its position and its target, in the scene's coordinates; or the name of
+    a camera of a glTF or USD file, in place of its first one."""
     camera_keys: Path | None = None
     """A moving camera in place of the scene's: a CSV file with the columns time_s, eye_x, eye_y, eye_z, target_x,
     target_y and target_z."""
@@ -32,8 +33,8 @@ class ViewOptions:
     environment: Path | None = None
     """Environment map (.hdr, .exr, …) that lights the scene, in place of sky, sun and ambient light."""
     up: Literal["y", "z"] | None = None
-    """Upward axis of the world, for the camera and the environment; by default y for OBJ and glTF, z for PLY and STL,
-    and that of the camera for a scene."""
+    """Upward axis of the world, for the camera and the environment; by default that of a USD file, y for OBJ and
+    glTF, z for PLY and STL, and that of the camera for a scene."""
     integrator: Literal["whitted", "path"] = "whitted"
     """Transport of light: direct light, mirrors and glass; or paths between all surfaces, which needs many samples and
     supports more materials of files."""
@@ -45,7 +46,7 @@ class ViewOptions:
     def __post_init__(self) -> None:
         limits.within(
             self,
-            camera=(-1e12, 1e12),
+            **({} if isinstance(self.camera, str) else {"camera": (-1e12, 1e12)}),
             fov_deg=(1e-3, 179.0),
             lens_radius=(0.0, 1e12),
             focal_distance=(1e-12, 1e12),

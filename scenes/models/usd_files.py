@@ -61,15 +61,11 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Mode
             report.add(sources.path.stem, " ".join(str(error).split())[:200])
         return _Reader(stage, sources, report, facets).model()
     except Tf.ErrorException as error:
-        raise SceneError(f"cannot be read: {_first_line(error)}") from None
+        said = " ".join(str(error.args[0].commentary).split())
+        raise SceneError(f"cannot be read: {said.removeprefix(f'{sources.path}:')}") from None
     finally:
         quiet.TakeCoalescedDiagnostics()
         del quiet
-
-
-def _first_line(error: Exception) -> str:
-    """The message of an error of the library, without its place in the source."""
-    return " ".join(str(error).split()).rpartition("--")[2].strip(" '") or "unknown error"
 
 
 class _Reader:
