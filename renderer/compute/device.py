@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from pathlib import Path
 from types import ModuleType
 
 import torch
@@ -125,7 +126,8 @@ def load_kernels(
 
     Compiling a module that is not in the cache takes seconds; loading a cached one takes milliseconds. Loading before
     the first launch also keeps worker threads from compiling the same module at once. Several modules are compiled in
-    parallel: Warp holds its lock while it generates their source, but not while it compiles.
+    parallel: Warp holds its lock while it generates their source, but not while it compiles. Of several processes that
+    need the same module for the CPU, one compiles it, and the others wait for it.
 
     Args:
         modules: modules to load.
@@ -139,11 +141,37 @@ def load_kernels(
         if not missing:
             return
         with ThreadPoolExecutor(min(len(missing), core_count())) as pool:
-            loads = {pool.submit(wp.load_module, module, device=device): _name(module) for module in missing}
+            loads = {pool.submit(_load, module, device): _name(module) for module in missing}
             _watch(loads, device, report)
         for load, name in loads.items():
             load.result()
             _loaded.add((name, device))
+
+
+def _load(module: Kernels, device: str) -> None:
+    with _one_process(module) if device == "cpu" else contextlib.nullcontext():
+        wp.load_module(module, device=device)
+
+
+@contextlib.contextmanager
+def _one_process(module: Kernels) -> Iterator[None]:
+    """Holds the lock of a module that is not in the cache.
+
+    Warp moves what it has compiled into the cache whole. So the lock saves work, and nothing depends on it.
+    """
+    made = module if isinstance(module, wp.Module) else wp.get_module(module.__name__)
+    # launches on the CPU have blocks of one thread
+    kept = Path(wp.config.kernel_cache_dir or "") / made.get_module_identifier(block_dim=1)
+    if kept.is_dir():
+        yield
+        return
+    from filelock import lock_descriptor  # here, because it takes long to import
+
+    lock = kept.with_name(f"{kept.name}.lock")
+    with lock.open("w") as file:
+        lock_descriptor(file.fileno())
+        yield
+    lock.unlink(missing_ok=True)
 
 
 def _name(module: Kernels) -> str:

@@ -1,9 +1,17 @@
 """Module options with which kernels can call the C++ in the ``native/`` folders; Warp's compiler builds it with
-them."""
+them.
+
+Warp keeps compiled modules under a hash of their code and options. A path in the options would become part of it, and
+every checkout would compile again. So a module gets the text of the headers that it needs, and no path. The hash then
+follows from the content: of the kernels, of these headers and their constants, and of the compiler's options; Warp adds
+its own version, that of LLVM, and the instruction set.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +20,8 @@ import warp as wp
 
 from renderer.compute import sizes
 
-_NATIVE = sorted(path for path in Path(__file__).resolve().parents[1].glob("*/native"))
+_RENDERER = Path(__file__).resolve().parents[1]
+_DIRECTIVE = re.compile(r'^#(?:include "(?P<header>[^"]+)"|pragma once)$', re.MULTILINE)
 _QUIET = '#pragma clang diagnostic ignored "-Wpsabi"\n'
 """Where registers are narrower than sixteen floats, Clang warns at every function that takes or returns a vector that
 its calling convention differs from that of code for wider registers. That does not apply: a module is compiled as a
@@ -28,12 +37,37 @@ def module_options(*headers: str, given: Mapping[str, float] | None = None) -> d
             :mod:`renderer.compute.sizes`.
     """
     constants = declarations({**sizes.GIVEN, **(given or {})})
-    build = wp.ModuleBuildOptions(
-        extra_cpu_include_dirs=[str(folder) for folder in _NATIVE],
-        extra_cpu_preamble=_QUIET + constants + "".join(f'#include "{header}"\n' for header in headers),
-        extra_build_dependencies=[str(header) for folder in _NATIVE for header in sorted(folder.glob("*.h"))],
-    )
-    return {"enable_backward": False, "extra_build_options": build}
+    code = _QUIET + constants + "".join(texts(*headers)) + '#line 1 "kernels"\n'
+    return {"enable_backward": False, "extra_build_options": wp.ModuleBuildOptions(extra_cpu_preamble=code)}
+
+
+def texts(*headers: str) -> Iterator[str]:
+    """Texts of headers and of all that they include, each once and after those that it includes.
+
+    Each text begins with a line directive that names its file from ``renderer`` on, and has the lines of its file:
+    directives that a text in one piece does not need are empty lines.
+    """
+    seen: set[str] = set()
+    for header in headers:
+        yield from _texts(header, seen)
+
+
+def _texts(header: str, seen: set[str]) -> Iterator[str]:
+    if header in seen:
+        return
+    seen.add(header)
+    path = _paths()[header]
+    text = path.read_text()
+    for found in _DIRECTIVE.finditer(text):
+        if found["header"]:
+            yield from _texts(found["header"], seen)
+    yield f'#line 1 "{path.relative_to(_RENDERER.parent).as_posix()}"\n{_DIRECTIVE.sub("", text)}'
+
+
+@cache
+def _paths() -> dict[str, Path]:
+    """Headers by name, of all rooms."""
+    return {path.name: path for path in _RENDERER.glob("*/native/*.h")}
 
 
 def declarations(given: Mapping[str, float]) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import warp as wp
 
 from renderer.kernels.camera import camera_ray, track_rotation, track_translation
-from renderer.kernels.packets import MODULE_OPTIONS
+from renderer.kernels.intersect import MODULE_OPTIONS
 from renderer.kernels.paths import path_radiance
 from renderer.kernels.randomness import group_draw
 from renderer.kernels.shading import radiance

@@ -7,8 +7,7 @@ from functools import cache
 import warp as wp
 
 from renderer.kernels.camera import camera_ray
-from renderer.kernels.intersect import closest_hit
-from renderer.kernels.packets import MODULE_OPTIONS
+from renderer.kernels.intersect import MODULE_OPTIONS, closest_hit
 from renderer.kernels.randomness import group_draw
 from renderer.kernels.surface import surface_at
 from renderer.kernels.textures import texture_color

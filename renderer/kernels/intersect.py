@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import warp as wp
 
+from renderer.compute.native_code import module_options
 from renderer.kernels.camera import track_rotation, track_translation
 from renderer.kernels.heightfield import relief_distance
 from renderer.kernels.shapes import cube_distance, meets_box, misses_sphere, plane_distance, reciprocal, sphere_distance
+from renderer.layout import sizes
 from renderer.layout.features import Feature
 from renderer.layout.kinds import Shape
 from renderer.layout.sizes import LIT
 from renderer.layout.structs import GroupRecord, Hit, InstanceRecord, SceneData, ViewData
+
+MODULE_OPTIONS = module_options("structures.h", given=sizes.GIVEN)
+"""Options of a module whose kernels call functions of this one."""
 
 # On a GPU every mesh has a tree of Warp's, so this is never called there.
 _NATIVE = """

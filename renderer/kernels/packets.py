@@ -35,8 +35,7 @@ def suffice_for(features: Feature) -> bool:
     return features | PACKETS == PACKETS
 
 
-MODULE_OPTIONS = module_options("queries.h", "samples.h", given=sizes.GIVEN)
-wp.set_module_options(MODULE_OPTIONS)
+wp.set_module_options(module_options("queries.h", "samples.h", given=sizes.GIVEN))
 
 
 @wp.func_native("packets::build_tree(vertices, faces, boxes, order, nodes, blocks, counts);")
