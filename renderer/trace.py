@@ -116,7 +116,7 @@ class Renderer:
         )
         self._kernels = packet_kernels if self.packets else kernels.specialised(self.features)
         # before the buffers are built, which takes those of packets too: they are compiled side by side
-        devices.load_kernels([kernels, packet_kernels] if self.packets else kernels, self.device)
+        devices.load_kernels([packet_kernels, kernels] if self.packets else kernels, self.device)
         self.buffers = build_buffers(scene, self.device, own)
         if not self.packets:  # these are compiled for the scene, now that it is known to be supported
             devices.load_kernels(self._kernels.module, self.device)

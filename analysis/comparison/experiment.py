@@ -75,10 +75,11 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
 def _renderer(options: RunOptions, scene: Scene, axis: float) -> Renderer:
     """A renderer that filters textures for ``axis`` samples along a pixel's side."""
     with first_imports():
+        from renderer.stages.control import expect_stages
         from renderer.trace import Renderer
 
-    side = min(options.tsar.shape) * axis
-    return Renderer(scene, options.device, options.threads or None, footprint_resolution_px=side)
+    expect_stages(options.stages)
+    return Renderer(scene, options.device, options.threads or None, min(options.tsar.shape) * axis)
 
 
 def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[str, Any]:

@@ -94,12 +94,14 @@ class Engine:
             ValueError: the scene cannot be had, or its camera cannot be driven.
         """
         from renderer.motion import Motion
+        from renderer.stages.control import expect_stages
         from renderer.trace import Renderer
 
         self.options, self.controls = options, options.controls
         given = options.input if scene is None else scene
         self.scene, self.losses = catalog.load_any(given, options.phase, options.camera_path)
         self.timeline = Timeline(self.scene)
+        expect_stages("compiled")
         side = float(options.controls.resolution_px)
         self._renderer = Renderer(self.timeline.scene, "cpu", options.threads or None, side)
         self._motion = Motion(self._renderer, self.timeline.scene)

@@ -28,6 +28,7 @@ _LINE_INTERVAL_S = 2.0
 _STATUS_INTERVAL_S = 0.2
 _WARNINGS_ONLY = 30
 _loaded: set[tuple[str, str]] = set()
+_expected: dict[str, list[Kernels]] = {}
 _lock = threading.Lock()
 
 
@@ -136,8 +137,9 @@ def load_kernels(
             lines on standard error.
     """
     with _lock:
-        asked = [modules] if isinstance(modules, Kernels) else modules
-        missing = [module for module in asked if (_name(module), device) not in _loaded]
+        asked = [modules] if isinstance(modules, Kernels) else list(modules)
+        asked += _expected.pop(device, [])
+        missing = [module for module in dict.fromkeys(asked) if (_name(module), device) not in _loaded]
         if not missing:
             return
         with ThreadPoolExecutor(min(len(missing), core_count())) as pool:
@@ -146,6 +148,13 @@ def load_kernels(
         for load, name in loads.items():
             load.result()
             _loaded.add((name, device))
+
+
+def expect_kernels(modules: Sequence[Kernels], device: str) -> None:
+    """Adds modules to those that :func:`load_kernels` loads next on a device: what a program needs anyway, but later,
+    is then compiled beside the rest."""
+    with _lock:
+        _expected.setdefault(device, []).extend(modules)
 
 
 def _load(module: Kernels, device: str) -> None:

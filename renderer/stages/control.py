@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from renderer.compute import device as devices
+from renderer.compute import team_kernels
 from renderer.compute.launching import Command, address, require_same
 from renderer.compute.memory import Memory
 from renderer.compute.team import TEAM
@@ -36,6 +37,9 @@ from tsar.stages import REFERENCE, Stages, reference
 from tsar.tiling import split_bounds
 from tsar.types import Densities, Errors, FrameletBatch, Tiling
 
+KERNELS = kernels, reconstruction_kernels, filtering_kernels, picture_kernels
+"""Modules of kernels of all stages."""
+
 _F32, _F64, _I32, _I64 = torch.float32, torch.float64, torch.int32, torch.int64
 
 
@@ -51,9 +55,15 @@ def stages(config: TsarConfig, name: StagesName = "compiled", threads: int = 1) 
     return compiled_stages(config, threads) if name == "compiled" else reference(config)
 
 
+def expect_stages(name: StagesName) -> None:
+    """Has the kernels of a run's stages compiled beside those that are loaded next, such as the renderer's."""
+    if name == "compiled":
+        devices.expect_kernels((*KERNELS, team_kernels), "cpu")
+
+
 def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
     """Kernels for all stages, except where they do not cover the configuration (:mod:`renderer.stages.coverage`)."""
-    devices.load_kernels((kernels, reconstruction_kernels, filtering_kernels, picture_kernels), "cpu")
+    devices.load_kernels(KERNELS, "cpu")
     control, reconstructor = Control(config, threads), Reconstructor(config, threads)
     return Stages(
         observe=control.observe,

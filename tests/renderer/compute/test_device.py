@@ -112,6 +112,17 @@ def test_modules_load_once_each_device(loads) -> None:
     assert made.names == ["kernels.a", "kernels.b", "kernels.b"]
 
 
+def test_what_is_expected_loads_beside_the_next(loads) -> None:
+    made = loads(slow_s=60.0)
+    device.expect_kernels([B, A], "cpu")
+    device.load_kernels(C, "cuda:0")
+    assert made.names == ["kernels.c"]
+    device.load_kernels(A, "cpu")
+    assert sorted(made.names) == ["kernels.a", "kernels.b", "kernels.c"]
+    device.load_kernels(C, "cpu")
+    assert made.names[3:] == ["kernels.c"]
+
+
 def test_what_is_quick_is_not_talked_about(loads, capsys: pytest.CaptureFixture) -> None:
     loads(slow_s=60.0)
     lines: list[str] = []
