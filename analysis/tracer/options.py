@@ -11,7 +11,7 @@ import tyro
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import Device, Seed, Threads, Unprefixed
-from analysis.study.view_options import ViewOptions
+from analysis.tracer.film_options import FilmOptions
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
 
@@ -100,15 +100,11 @@ class PointSetOptions:
 
 @dataclass(frozen=True)
 @closed_choices()
-class TileOptions(ViewOptions):
+class TileOptions(FilmOptions):
     """One picture of a scene, in tiles over processes or machines."""
 
     scene: Annotated[str, tyro.conf.Positional]
     """Built-in scene by name, a scene file or a model, which all workers can read."""
-    width_px: int = 0
-    """Width, pixels; 0 takes that of the scene's film."""
-    height_px: int = 0
-    """Height, pixels; 0 takes that of the scene's film."""
     samples: int = 32
     """Samples per pixel; a cube for the point set stratified."""
     point_set: str = "hammersley"
@@ -135,8 +131,6 @@ class TileOptions(ViewOptions):
         POINT_SETS.require(self.point_set, "point_set")
         limits.within(
             self,
-            width_px=(0, limits.SIDES_PX[1]),
-            height_px=(0, limits.SIDES_PX[1]),
             samples=(1, 1 << 16),
             time_s=limits.TIMES_S,
             seed=limits.SEEDS,

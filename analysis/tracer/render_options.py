@@ -11,7 +11,7 @@ import tyro
 
 from analysis.command import limits
 from analysis.command.options import Device, Seed, Threads
-from analysis.study.view_options import ViewOptions
+from analysis.tracer.film_options import FilmOptions
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
 
@@ -20,20 +20,12 @@ _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
 
 @dataclass(frozen=True)
 @closed_choices()
-class RenderOptions(ViewOptions):
+class RenderOptions(FilmOptions):
     """A still, or a sequence of stills at a constant rate, of a scene or a model."""
 
     scene: Annotated[str, tyro.conf.Positional]
-    """Built-in scene, by name or number; a scene file; or a model (OBJ, PLY, STL, GLB, glTF), by default seen as a
+    """Built-in scene, by name or number; a scene file; or a model (OBJ, PLY, STL, GLB, glTF, USD), by default seen as a
     whole from the front."""
-    size: str = ""
-    """Width and height, pixels, such as 800x600; by default those of the scene's film."""
-    width_px: int = 0
-    """Width, pixels; in place of size; the field of view spans the shorter side."""
-    height_px: int = 0
-    """Height, pixels; in place of size."""
-    crop: tuple[int, int, int, int] | None = None
-    """Part of the picture to render: left column, upper row, width and height, pixels."""
     samples_per_axis: int = 2
     """Samples along a pixel's side; all at the frame's time."""
     samples: int = 0
@@ -82,8 +74,6 @@ class RenderOptions(ViewOptions):
         POINT_SETS.require(self.point_set, "point_set")
         limits.within(
             self,
-            width_px=(0, limits.SIDES_PX[1]),
-            height_px=(0, limits.SIDES_PX[1]),
             samples_per_axis=(1, 64),
             samples=(0, 1 << 16),
             rounds=(0, 1 << 12),
@@ -98,11 +88,6 @@ class RenderOptions(ViewOptions):
 
         cube = round(self.samples ** (1 / 3)) ** 3 == self.samples
         require(self.point_set != "stratified" or cube, "samples", "a cube for the point set stratified", self.samples)
-        require(not self.size or len(self.sides_px) == 2, "size", "such as 800x600", self.size)
-        limits.within(self, sides_px=limits.SIDES_PX)
-        two = self.size and (self.width_px or self.height_px)
-        require(not two, "size", "none together with width_px and height_px", self.size)
-
         require(not self.layers or self.format == "exr", "layers", "the format exr", self.format)
         if self.in_rounds:
             require(self.rounds != 1, "rounds", "at least 2", self.rounds)
@@ -114,25 +99,6 @@ class RenderOptions(ViewOptions):
     def in_rounds(self) -> int:
         """Rounds of a still; 0 if its samples are taken at once."""
         return self.rounds or (16 if self.error_target or self.layers else 0)
-
-    @property
-    def sides_px(self) -> tuple[int, ...]:
-        """Width and height of ``size``; empty if it is not valid."""
-        parts = self.size.lower().split("x")
-        return tuple(int(part) for part in parts) if all(part.isdecimal() for part in parts) else ()
-
-    def size_px(self, film_px: tuple[int, int]) -> tuple[int, int]:
-        """Width and height of the picture, given those of the scene's film.
-
-        Raises:
-            ConfigError: the crop does not lie within the picture.
-        """
-        width, height = self.sides_px or (self.width_px or film_px[0], self.height_px or film_px[1])
-        if self.crop is not None:
-            left, top, across, down = self.crop
-            inside = min(left, top) >= 0 and min(across, down) >= 1 and left + across <= width and top + down <= height
-            require(inside, "crop", f"a part of {width} x {height} pixels", self.crop)
-        return width, height
 
     @property
     def times_s(self) -> list[float]:

@@ -88,7 +88,7 @@ def _nothing(shape: tuple[int, ...]) -> NDArray[np.float32]:
     return np.zeros(shape, np.float32)
 
 
-def _dispatch_s(client: Client, chunks: Sequence[range], workers: Sequence[str]) -> float:
+def _dispatch_s(client: Client, chunks: Sequence[Sequence[int]], workers: Sequence[str]) -> float:
     """Seconds per chunk to hand out work that takes no time, and to fetch as many bytes back."""
     from distributed import as_completed
 
@@ -102,7 +102,7 @@ def _dispatch_s(client: Client, chunks: Sequence[range], workers: Sequence[str])
 def study(
     client: Client,
     picture: PictureTask,
-    chunks: Sequence[range],
+    chunks: Sequence[Sequence[int]],
     counts: Sequence[int],
     repetitions: int,
     task: Task,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from distributed import Client
     from torch import Tensor
 
+    from renderer.frames import Crop
     from renderer.trace import Renderer
     from scenes.catalog import Look
 
@@ -39,6 +40,7 @@ class PictureTask:
     scene: str
     look: Look
     size_px: tuple[int, int]
+    crop: Crop | None
     samples: int
     point_set: str
     space_filter: str
@@ -77,8 +79,8 @@ def picture_of(options: TileOptions, threads: int) -> PictureTask:
     """The requested picture.
 
     Raises:
-        ValueError: there is no such scene, the point set cannot have this number of points, or the pixels do not fit
-            into memory.
+        ValueError: there is no such scene, the point set cannot have this number of points, the pixels do not fit into
+            memory, or the crop does not lie within the picture.
     """
     from renderer.sampling.point_sets import point_set
     from renderer.tables.checks import check_frame_size
@@ -86,19 +88,20 @@ def picture_of(options: TileOptions, threads: int) -> PictureTask:
 
     film = catalog.load_seen(options.scene, options.look)[0].film
     point_set(options.point_set, options.samples)
-    size = options.width_px or film.width_px, options.height_px or film.height_px
+    size = options.size_px((film.width_px, film.height_px))
     check_frame_size(*size, 1)
     kinds = options.samples, options.point_set, options.space_filter
     source = source_of(options.scene, options.look, options.point_set)
-    return PictureTask(options.scene, options.look, size, *kinds, options.time_s, options.seed, threads, source)
+    place = options.time_s, options.seed, threads, source
+    return PictureTask(options.scene, options.look, size, options.crop, *kinds, *place)
 
 
-def chunks_of(picture: PictureTask, chunk_tiles: int) -> list[range]:
-    """Runs of consecutive tiles of a picture."""
-    from renderer.frames import tile_count
+def chunks_of(picture: PictureTask, chunk_tiles: int) -> list[list[int]]:
+    """The tiles of a picture, or of its crop, in groups, row by row."""
+    from renderer.frames import tiles_of
 
-    count = tile_count(*picture.size_px)
-    return [range(first, min(first + chunk_tiles, count)) for first in range(0, count, chunk_tiles)]
+    tiles = tiles_of(picture.crop or (0, 0, *picture.size_px), picture.size_px[0])
+    return [tiles[first : first + chunk_tiles] for first in range(0, len(tiles), chunk_tiles)]
 
 
 @lru_cache(maxsize=1)
@@ -131,7 +134,7 @@ def render_chunk(picture: PictureTask, tiles: Sequence[int]) -> tuple[NDArray[np
 def rendered(
     client: Client,
     picture: PictureTask,
-    chunks: Sequence[range],
+    chunks: Sequence[Sequence[int]],
     workers: Sequence[str] | None = None,
     retries: int = _RETRIES,
 ) -> Iterator[tuple[int, tuple[NDArray[np.float32], dict[str, int], float]]]:
@@ -158,17 +161,17 @@ def rendered(
         future.release()
 
 
-def assembled(picture: PictureTask, chunks: Sequence[range], pixels: Sequence[NDArray[np.float32]]) -> Tensor:
-    """The picture, linear radiance ``(h, w, 3)``."""
+def assembled(picture: PictureTask, chunks: Sequence[Sequence[int]], pixels: Sequence[NDArray[np.float32]]) -> Tensor:
+    """The picture or its crop, linear radiance ``(h, w, 3)``."""
     import torch
 
-    from renderer.frames import place_tiles
+    from renderer.frames import cut, place_tiles
 
     width, height = picture.size_px
     image = torch.zeros(height, width, 3)
     for chunk, part in zip(chunks, pixels, strict=True):
         place_tiles(image, chunk, torch.as_tensor(part))
-    return image
+    return cut(image, picture.crop)
 
 
 def render_resumed(

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from renderer.film.files import read_exr
-from tests.scripts.commands import call_script
+from tests.scripts.commands import call_script, one_line
 
 
 def test_a_model_is_rendered_in_tiles(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -26,3 +26,18 @@ def test_a_picture_and_its_summary(tmp_path: Path, monkeypatch, capsys) -> None:
     assert found["chunks"] == found["chunks_rendered_now"] == 1 and found["nonfinite"] == 0
     assert found["rays"]["primary_rays"] == 6 * 256 * 4
     assert "1 chunks (1 now)" in capsys.readouterr().out
+
+
+def test_a_crop_is_that_part_of_the_picture(tmp_path: Path, monkeypatch, capsys) -> None:
+    """Four of six tiles are traced. A crop outside of the picture is refused."""
+    arguments = ("plain", "--size", "40x30", "--samples", "4", "--workers", "1")
+    for name, more in (("whole", ()), ("part", ("--crop", "3", "5", "20", "15"))):
+        assert call_script("tiles.py", monkeypatch, *arguments, *more, "--out", str(tmp_path / name)) == 0
+    whole, part = (read_exr(tmp_path / name / "plain.exr") for name in ("whole", "part"))
+    assert whole.shape == (30, 40, 3) and (part == whole[5:20, 3:23]).all()
+    found = json.loads((tmp_path / "part" / "summary.json").read_text())
+    assert found["rays"]["primary_rays"] == 4 * 256 * 4
+    capsys.readouterr()
+    outside = ("--crop", "30", "0", "20", "15", "--out", str(tmp_path / "no"))
+    assert call_script("tiles.py", monkeypatch, *arguments, *outside) == 2
+    assert one_line(capsys.readouterr().err) and not (tmp_path / "no").exists()

@@ -35,7 +35,7 @@ from scenes.catalog import Look
 from tsar.memory import core_count
 
 SOURCE = source_of("quad-light", Look(), "hammersley")
-PICTURE = PictureTask("quad-light", Look(), (70, 50), 8, "hammersley", "gaussian", 0.0, 3, 1, SOURCE)
+PICTURE = PictureTask("quad-light", Look(), (70, 50), None, 8, "hammersley", "gaussian", 0.0, 3, 1, SOURCE)
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_a_worker_killed_in_the_middle_changes_no_bit(client, expected) -> None:
 
 
 def test_an_interrupted_picture_goes_on_where_it_stopped(client, expected, tmp_path: Path, capsys) -> None:
-    options = TileOptions("quad-light", 70, 50, 8, seed=3, chunk_tiles=4, out=tmp_path)
+    options = TileOptions("quad-light", 8, size="70x50", seed=3, chunk_tiles=4, out=tmp_path)
     picture = picture_of(options, threads=1)
     assert picture == PICTURE
     shown = list[int]()
