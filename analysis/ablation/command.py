@@ -19,7 +19,7 @@ def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(AblationOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
-    require_extra("study", "perception")
+    require_extra("study")
     from analysis.ablation.run import study
     from analysis.ablation.shown import shown_tables
     from analysis.command.console import markdown, show

@@ -12,7 +12,6 @@ DISTRIBUTION = "tsar-render"
 EXTRAS: dict[str, dict[str, str]] = {
     "study": {"dask": "dask", "distributed": "distributed"},
     "search": {"optuna": "optuna"},
-    "perception": {"pycvvdp": "cvvdp", "torchvision": "torchvision", "flip_evaluator": "flip-evaluator"},
     "formats": {"astral": "astral", "defusedxml": "defusedxml"},
     "usd": {"pxr": "usd-core"},
     "peers": {"embreex": "embreex", "mitsuba": "mitsuba", "pyluxcore": "pyluxcore", "pywt": "PyWavelets"},

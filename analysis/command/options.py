@@ -32,6 +32,7 @@ RENAMED = {
     "--scale": ("--image-scale",),
     "--span-s": ("--jod-span-s",),
     "--start-s": ("--ideal-start-s",),
+    "--stride": ("--metric-stride",),
 }
 """Earlier names of options that had two meanings, with what a command may call each now."""
 

@@ -41,7 +41,7 @@ SUBJECTS = {
     "slopes": "frames_per_input",
     "ideal": "ideal_start_s span_s ideal_samples ideal_frames tile_level tile_at tile_index tau",
     "agreement": "tiles_per_input agreement_level agreement_samples agreement_frames",
-    "metric": "metrics metric_stride stride reference_rate_hz reference_samples_per_axis jod_s jod_repetitions"
+    "metric": "metrics metric_stride reference_rate_hz reference_samples_per_axis jod_s jod_repetitions"
     " jod_span_s before_s tolerance draws",
     "repetition": "seed repetitions bootstraps experiments study",
     "observer": "jnds sigmas lapses spreads observers answers guess_rate threshold disturbed",

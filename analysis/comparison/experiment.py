@@ -17,7 +17,7 @@ from analysis.command.ownership import writable_folder
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
 from analysis.comparison.stored import FILES, Recording, added_by, complete_run, content_of, names_of
-from analysis.metrics import METRICS, require_extras
+from analysis.metrics import METRICS
 from analysis.storage.results import SUMMARY, own_results
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from analysis.metrics.quality import DisplayedImages
     from analysis.storage.records import RecordLimits
     from analysis.storage.reference import Reference
-    from analysis.study.displays import DisplayRecord
     from analysis.study.runs import PolicyRun
     from renderer.trace import Renderer
     from scenes.canonical import Scene
 
 _BYTES_PER_PIXEL = 260  # bytes a pixel: images, age fields and samples of a run
+_BYTES_PER_PIXEL_SCORED = 6  # bytes a pixel and image: codes of a display and of the reference, kept for jod
 _BYTES_PER_CACHED_SAMPLE = 20  # bytes a sample of the cache: colours and wavelet coefficients
 
 
@@ -54,13 +54,13 @@ def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
         InputError: the machine or the input cannot provide what the options ask for.
     """
     with bad_input():
-        require_memory(options.pixels_held * _BYTES_PER_PIXEL, options.size)
+        kept = _BYTES_PER_PIXEL_SCORED * options.images_scored if "jod" in options.further_metrics else 0
+        require_memory(options.pixels_held * (_BYTES_PER_PIXEL + kept), options.size)
         slots = options.tsar.cache_slots
         require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
     with first_imports():
         from scenes import catalog
 
-        require_extras(options.metrics)
     with bad_input():
         scene, losses = catalog.load_seen(scene or options.input, options.look, options.phase, options.camera_path)
         renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
@@ -207,6 +207,7 @@ def _compare(
     further: Sequence[Callable[[DisplayedImages], None]],
 ) -> Measured:
     from analysis.comparison.rivalry import Panels
+    from analysis.comparison.scores import scores
     from analysis.comparison.summary import Measured
     from analysis.comparison.viewers import EXACT, Filming, Steps
     from analysis.page.video import Scales
@@ -226,8 +227,10 @@ def _compare(
 
     viewers = [on_view, steps, *further, *filming]
     images = {name: run.images for name, run in runs.items()}
-    of_images = tuple(name for name in options.metrics if METRICS[name].image)
-    kept = (0, len(times_s)) if len(of_images) < len(options.metrics) else (0, 0)
+    of_images = tuple(name for name in options.further_metrics if METRICS[name].image)
+    of_sequences = tuple(name for name in options.further_metrics if METRICS[name].sequence)
+    first = (len(times_s) - options.images_scored) // 2
+    kept = first, first + (options.images_scored if of_sequences else 0)
     measuring = Measuring(metrics=of_images, stride=options.metric_stride, kept=kept)
     seen = watch(images, _truths(options, reference), times_s, measuring, viewers)
     panels = Panels.of({name: one.column("mse") for name, one in seen.items()}, options.policy)
@@ -236,20 +239,10 @@ def _compare(
         fps = options.reference_rate_hz / stride
         with Mp4Writer(options.out / "comparison.mp4", fps, made.width_px, made.height_px) as sink:
             one.write(panels, made, sink, drawn.advance)
-    sequences = {name: _scored(options, name, seen) for name in options.metrics if METRICS[name].sequence}
+    task = bars.task("scores", len(of_sequences) * len(seen))
+    sequences = {name: scores(name, seen, options, task.advance) for name in of_sequences}
     shown = steps.made, steps.panels(list(seen))
     return Measured(options.policy, times_s, seen, runs, *shown, reference.nonfinite, options.cost, sequences)
-
-
-def _scored(options: RunOptions, metric: str, seen: dict[str, DisplayRecord]) -> dict[str, float]:
-    """A metric of sequences for every run."""
-    import numpy as np
-
-    measured, found = METRICS[metric], {}
-    for name, one in seen.items():
-        shown, reference = (np.stack(frames) for frames in one.frames)
-        found[name] = measured.of_sequence(shown, reference, options.reference_rate_hz, options.display)
-    return found
 
 
 def _truths(options: RunOptions, reference: Reference) -> Truths:

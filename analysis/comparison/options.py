@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -70,12 +71,16 @@ class RunOptions(ViewOptions):
     """Policy that decides what is sampled, by name."""
     rivals: tuple[str, ...] = DEFAULT_RIVALS
     """Rivals at equal cost; ratios are to the first. The default leaves out the policy itself."""
-    metrics: tuple[str, ...] = ()
-    """Further metrics beside the squared errors, such as flip, ssim or jod."""
+    metrics: tuple[str, ...] | None = None
+    """Further metrics beside the squared errors, such as flip, ssim or jod. None takes flip, and jod where the
+    reference's rate is a whole fraction of the display's; without names, no further one is taken."""
+    jod_s: float = 0.25
+    """Length of the part in the middle of a run that metrics of sequences score, seconds; such as jod, for which an
+    image of 512² takes half a second of one core."""
     display: DisplayModel = field(default_factory=DisplayModel)
     """The display that perceptual metrics of sequences assume."""
-    metric_stride: int = 6
-    """Interval, in reference images, at which these metrics are taken."""
+    metric_stride: int = 12
+    """Interval, in reference images, at which metrics of images are taken."""
     reference_rate_hz: float = 60.0
     """Reference images per simulated second."""
     reference_samples_per_axis: int = 3
@@ -120,6 +125,7 @@ class RunOptions(ViewOptions):
             reference_rate_hz=limits.RATES_HZ,
             reference_samples_per_axis=(1, 16),
             metric_stride=(1, 10**6),
+            jod_s=(1e-3, 1e9),
             threads=limits.THREADS,
             layered_stills=(0, 1000),
         )
@@ -129,8 +135,10 @@ class RunOptions(ViewOptions):
         for name in runs:
             POLICIES.require(name, "policy" if name == self.policy else "rivals")
         require(len(runs) == len(set(runs)), "rivals", "names that differ, and from the policy's", runs)
-        for name in self.metrics:
+        for name in self.metrics or ():
             METRICS.require(name, "metrics")
+        if "jod" in (self.metrics or ()):
+            self.display.repeats(self.reference_rate_hz)
         self._check_choice()
         warmup = self.tsar.warmup_cycles
         require(warmup >= 4, "warmup_cycles", "at least 4 (the latency and one)", warmup)
@@ -160,6 +168,19 @@ class RunOptions(ViewOptions):
         limits.within(self, budget_flops=(1.0, 1e18), budget_seconds=(1e-6, 1e9), mse_target=(1e-12, 1.0))
         require(not (self.camera_path and self.camera_keys), "camera_path", "none beside camera_keys", self.camera_path)
         require(not self.parts or self.policy == DEFAULT_POLICY, "parts", f"none but of {DEFAULT_POLICY}", self.parts)
+
+    @property
+    def further_metrics(self) -> tuple[str, ...]:
+        """Names of the metrics that are taken beside the squared errors."""
+        if self.metrics is not None:
+            return self.metrics
+        return ("flip", "jod") if self.display.shows(self.reference_rate_hz) else ("flip",)
+
+    @property
+    def images_scored(self) -> int:
+        """Number of reference images, in the middle of the run, that metrics of sequences score."""
+        images = math.ceil(round(self.seconds * self.reference_rate_hz, 6))
+        return min(images, max(1, round(self.jod_s * self.reference_rate_hz)))
 
     @property
     def machine_flops(self) -> float:

@@ -106,5 +106,5 @@ def added_by(options: RunOptions) -> list[Brought]:
     from analysis.storage.source import brought
 
     policies = ((POLICIES, name) for name in (options.policy, *options.rivals))
-    metrics = ((METRICS, name) for name in options.metrics)
+    metrics = ((METRICS, name) for name in options.further_metrics)
     return brought(*policies, *metrics, *chosen(options.tsar), *tables_of(options.input))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,7 +19,9 @@ from analysis.comparison.summary import (
     overdraw,
     segments,
 )
+from analysis.metrics import METRICS
 from analysis.metrics.cost_model import per_segment
+from analysis.metrics.quality import RatioStatistics
 
 
 def key_table(measured: Measured) -> Table:
@@ -75,6 +78,34 @@ def said_of(invariants: Mapping[str, Any] | None, hold: str) -> str:
     if invariants is None:
         return "not recorded by these policies"
     return hold if invariants["ok"] else f"BROKEN: {dict(invariants)}"
+
+
+def run_table(summary: Mapping[str, Any], title: str) -> Table:
+    """A line for each run: its errors, and those of the policy beside them. For the terminal.
+
+    Args:
+        summary: as in ``summary.json``, with statistics as records.
+        title: above the table.
+    """
+    own, beside = summary["policy"], dict(summary.get("ratio_statistics", {}))
+    metrics, rows = summary["metrics"], []
+    for name, errors in summary["mse"].items():
+        values = (f"{values[name]:.3f}" for values in metrics.values())
+        rows.append((name, f"{statistics.median(errors):.2g}", *values, *_beside(beside.get(name))))
+    if "best_rival" in summary:
+        best = summary["best_rival"]["ratio_statistics"]
+        rows.append(("best rival", "", *("" for _ in metrics), *_beside(best)))
+    named = (f"{metric.upper()}, {METRICS[metric].better} is better" for metric in metrics)
+    ours = (f"MSE of {own} / this, median", "quartiles", "at most this", "suitable percentile")
+    return Table(title, ("run", "MSE, median", *named, *ours), rows)
+
+
+def _beside(found: RatioStatistics | None) -> tuple[str, ...]:
+    if found is None:
+        return ("",) * 4
+    share = f"{100 * found.share_suitable:.0f} % of times"
+    quartiles = f"{found.quartile_low:.3f} – {found.quartile_high:.3f}"
+    return f"{found.median:.3f}", quartiles, share, f"{found.suitable_percentile:.0f}"
 
 
 def metric_table(measured: Measured) -> Table | None:

@@ -15,7 +15,7 @@ from analysis.conversion.options import CheckOptions
 def main() -> None:
     """Parses, converts, renders, prints the tables."""
     options = parse(CheckOptions, __doc__ or "")
-    require_extra("formats", "peers", "perception")
+    require_extra("formats", "peers")
     from analysis.command.console import show
     from analysis.conversion.run import check
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.command.cli import InputError
 from analysis.live.overlays import codes
-from analysis.metrics import METRICS, require_extras
+from analysis.metrics import METRICS
 from analysis.metrics.quality import encode, pixel_errors
 from analysis.page.pictures import PagePixels, palette
 from tsar.types import LUMINANCE
@@ -64,7 +63,8 @@ def held(engine: Engine) -> Frozen:
     look = engine.look()
     shown = {side: seen.shown[1].image for side, seen in look.sides.items() if seen is not None}
     truth = engine.truth()
-    names, missing = _metrics()
+    names = [name for name in METRICS if METRICS[name].image]
+    missing = tuple(f"{name} (of sequences: replay a session)" for name in METRICS if name not in names)
     errors = {side: measured(image, truth, names) for side, image in shown.items() if image.shape == truth.shape}
     policies = {side: run.name for side, run in look.runs.items() if run is not None}
     return Frozen(look.time_s, {**shown, TRUTH: truth}, errors, policies, missing)
@@ -75,18 +75,3 @@ def measured(shown: Tensor, truth: Tensor, names: list[str]) -> dict[str, float]
     found, encoded = pixel_errors(shown, truth)
     of_metrics: dict[str, Any] = {name: METRICS[name].of_image(encoded, encode(truth)) for name in names}
     return {"mse": found.mse, "log_mse": found.log_mse, **of_metrics}
-
-
-def _metrics() -> tuple[list[str], tuple[str, ...]]:
-    """Names of metrics of images whose packages are installed, and of those that are not taken."""
-    taken, missing = [], []
-    for name in METRICS:
-        if METRICS[name].image is None:
-            missing.append(f"{name} (of sequences: replay a session)")
-            continue
-        try:
-            require_extras([name])
-            taken.append(name)
-        except InputError:
-            missing.append(f"{name} (the extra {METRICS[name].extra} installs it)")
-    return taken, tuple(missing)

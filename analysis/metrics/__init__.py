@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from analysis.command.extras import require_extra
 from tsar.config import closed_choices
 from tsar.named import Named
 
@@ -35,14 +34,12 @@ class Metric:
         sequence: function of two sequences of display-encoded images ``(count, h, w, 3)`` uint8, their rate in Hz and
             the display; None for a metric of images.
         unit: unit of its values; empty for plain numbers.
-        extra: extra whose packages it needs, a key of :data:`analysis.command.extras.EXTRAS`; empty for the base.
     """
 
     better: Literal["lower", "higher"]
     image: OfImage | None = None
     sequence: OfSequence | None = None
     unit: str = ""
-    extra: str = ""
 
     def __post_init__(self) -> None:
         if (self.image is None) == (self.sequence is None):
@@ -80,15 +77,3 @@ METRICS: Named[Metric] = Named(
         "jod": "analysis.metrics.perceptual:JOD",
     },
 )
-
-
-def require_extras(names: Iterable[str]) -> None:
-    """Checks that the packages of metrics are installed.
-
-    Args:
-        names: keys of :data:`METRICS`.
-
-    Raises:
-        InputError: a package is missing; the message names it and the extra.
-    """
-    require_extra(*(extra for name in names if (extra := METRICS[name].extra)))

@@ -19,13 +19,17 @@ class DisplayModel:
     def __post_init__(self) -> None:
         require(self.rate_hz in (60.0, 120.0), "display.rate_hz", "60 or 120", self.rate_hz)
 
+    def shows(self, image_rate_hz: float) -> bool:
+        """Whether each image of such a rate, Hz, stays on the display for a whole number of refreshes."""
+        count = round(self.rate_hz / image_rate_hz)
+        return count >= 1 and abs(count * image_rate_hz - self.rate_hz) < 1e-6
+
     def repeats(self, image_rate_hz: float) -> int:
         """Number of refreshes for which each image stays on the display.
 
         Raises:
             ConfigError: the number is not an integer.
         """
-        count = round(self.rate_hz / image_rate_hz)
-        fits = count >= 1 and abs(count * image_rate_hz - self.rate_hz) < 1e-6
+        fits = self.shows(image_rate_hz)
         require(fits, "reference_rate_hz", f"a whole fraction of the display's {self.rate_hz:g} Hz", image_rate_hz)
-        return count
+        return round(self.rate_hz / image_rate_hz)

@@ -6,7 +6,6 @@ All run on one thread, because the libraries do not guarantee the same bits for 
 from __future__ import annotations
 
 import contextlib
-import io
 import logging
 from collections.abc import Iterator
 
@@ -54,8 +53,7 @@ def jod(test: Frames, reference: Frames, image_rate_hz: float, display: DisplayM
     logging.getLogger("pycvvdp").setLevel(logging.ERROR)
     import pycvvdp
 
-    # the metric prints a progress bar on standard error
-    with one_thread(), torch.no_grad(), contextlib.redirect_stderr(io.StringIO()):
+    with one_thread(), torch.no_grad():
         metric = pycvvdp.cvvdp(display_name=display.name, device=torch.device("cpu"), quiet=True)
         shown = [np.repeat(frames, repeats, axis=0) for frames in (test, reference)]
         score, _ = metric.predict(*shown, dim_order="FHWC", frames_per_second=round(display.rate_hz))
@@ -85,6 +83,6 @@ def ssim(test: Float[Tensor, "h w 3"], reference: Float[Tensor, "h w 3"]) -> flo
         return float(measure(*planes, window_size=11).mean(dtype=torch.float64))
 
 
-FLIP = Metric("lower", image=flip, extra="perception")
+FLIP = Metric("lower", image=flip)
 SSIM = Metric("higher", image=ssim)
-JOD = Metric("higher", sequence=jod, unit="JOD", extra="perception")
+JOD = Metric("higher", sequence=jod, unit="JOD")

@@ -9,22 +9,25 @@ from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
+import threading
 
 _SCHEMA = "(Tensor dets, Tensor scores, float iou_threshold) -> Tensor"
 _declared = None
+_declaring = threading.Lock()
 
 
 def declare_missing() -> None:
-    """Declares ``nms`` and ``qnms`` unless the extension can be loaded; a second call does nothing."""
+    """Declares ``nms`` and ``qnms`` unless the extension can be loaded; a second call does nothing, in any thread."""
     global _declared
     import torch
 
-    if _declared is not None or hasattr(torch.ops.torchvision, "nms") or _extension_loads():
-        return
-    library = torch.library.Library("torchvision", "DEF")
-    for name in ("nms", "qnms"):
-        library.define(name + _SCHEMA)
-    _declared = library  # the schemas live as long as this object
+    with _declaring:
+        if _declared is not None or hasattr(torch.ops.torchvision, "nms") or _extension_loads():
+            return
+        library = torch.library.Library("torchvision", "DEF")
+        for name in ("nms", "qnms"):
+            library.define(name + _SCHEMA)
+        _declared = library  # the schemas live as long as this object
 
 
 def _extension_loads() -> bool:

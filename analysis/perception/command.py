@@ -12,15 +12,14 @@ from __future__ import annotations
 
 from analysis.command.cli import parse
 from analysis.command.extras import require_extra
-from analysis.perception.options import AdaptiveOptions, SimulateOptions, StepOptions
-
-NEEDS = {SimulateOptions: ("perception",), AdaptiveOptions: ("study", "perception")}
+from analysis.perception.options import AdaptiveOptions, StepOptions
 
 
 def main() -> None:
     """Parses, runs one step of the study, prints the outcome."""
     options = parse(StepOptions, __doc__ or "")  # type: ignore[arg-type]
-    require_extra(*NEEDS.get(type(options), ()))
+    if isinstance(options, AdaptiveOptions):
+        require_extra("study")
     from analysis.command.console import show
     from analysis.perception.run import run
 

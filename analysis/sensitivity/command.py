@@ -16,7 +16,7 @@ def main() -> None:
     """Makes missing runs; prints the best settings, and the flatness of the optimum."""
     options = parse(SensitivityOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
-    require_extra("study", "perception")
+    require_extra("study")
     from analysis.command.console import show
     from analysis.sensitivity.run import study
     from analysis.sensitivity.tables import shown_tables

@@ -16,7 +16,7 @@ def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(SuitabilityOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
-    require_extra("study", "perception")
+    require_extra("study")
     from analysis.command.console import show
     from analysis.study.written import end_study
     from analysis.suitability.page import shown_tables

@@ -53,9 +53,9 @@ class SuitabilityOptions:
     """Ray segments per sample; of the cost model."""
     start_s: float = 0.0
     """Animation time at which the measurement starts, seconds."""
-    stride: int = 6
-    """Interval, in reference images, at which FLIP, SSIM and the causes of the error are taken. At thesis scale they
-    cost more than the runs themselves."""
+    metric_stride: int = 6
+    """Interval, in reference images, at which metrics of images are taken: FLIP, SSIM and the causes of the error. At
+    thesis scale they cost more than the runs themselves."""
     jod_repetitions: int = 1
     """Repetitions that ColorVideoVDP scores."""
     jod_span_s: tuple[float, float] = (0.4, 0.9)
@@ -83,7 +83,7 @@ class SuitabilityOptions:
             self,
             repetitions=limits.REPETITIONS,
             jod_repetitions=(0, limits.REPETITIONS[1]),
-            stride=(1, 1000),
+            metric_stride=(1, 1000),
             framed_rate_hz=(0.01, 1000.0),
             trace_segments=limits.SEGMENTS,
             start_s=limits.TIMES_S,

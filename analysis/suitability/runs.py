@@ -47,7 +47,7 @@ def runs(options: SuitabilityOptions) -> list[Run]:
 
 
 def _runs_of(options: SuitabilityOptions, name: str, repetition: int) -> Iterator[Run]:
-    scale = dataclasses.replace(SCALES[options.scale], stride=options.stride)
+    scale = dataclasses.replace(SCALES[options.scale], stride=options.metric_stride)
     rows = [(row, scale.config(row, dataclasses.replace(options.tsar, seed=repetition))) for row in options.rows]
     at_row = scale.config(options.policy_row, dataclasses.replace(options.tsar, seed=repetition))
     everywhere = dict.fromkeys(("framed", *options.policies, *options.rivals))

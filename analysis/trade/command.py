@@ -20,7 +20,7 @@ def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(TradeOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
-    require_extra("study", "perception", *(["search"] if options.trials else []))
+    require_extra("study", *(["search"] if options.trials else []))
     from analysis.command.console import markdown, show
     from analysis.study.written import end_study
     from analysis.trade.run import trade

@@ -49,7 +49,7 @@ class TradeOptions:
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample; for ledgers that do not count them."""
     jod_s: float = 0.5
-    """Length of the part in the middle of a run that ColorVideoVDP scores, seconds; 0 for no score."""
+    """Length of the part in the middle of a run that metrics of sequences score, seconds; 0 for no score."""
     display: DisplayModel = field(default_factory=DisplayModel)
     """The display that the score assumes."""
     draws: int = 1000

@@ -21,7 +21,7 @@ def main() -> None:
     """Makes missing runs; prints the tables."""
     options = parse(WorkloadOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
-    require_extra("study", "perception")
+    require_extra("study")
     from analysis.study.written import end_study
 
     summary = study(options)

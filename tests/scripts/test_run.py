@@ -270,4 +270,4 @@ def test_other_built_in_scenes_run_too(name: str, tmp_path: Path, monkeypatch, c
     where = (*THESIS, "--no-film", "--out", str(tmp_path / "out"), "--references", str(tmp_path / "cache"))
     assert call_script("run.py", monkeypatch, name, *SIZE, *SPAN, *where) == 0, capsys.readouterr().err
     shown = capsys.readouterr().out
-    assert "hold in every cycle" in shown and "MSE, median" in shown and "add --metrics flip jod" in shown
+    assert "hold in every cycle" in shown and "MSE, median" in shown and "JOD, higher" in shown

@@ -28,14 +28,10 @@ LACKING = [
     ("workloads.py", (), "distributed", "study"),
     ("trade.py", (), "optuna", "search"),
     ("trade.py", ("--trials", "0"), "distributed", "study"),
-    ("suitability.py", (), "pycvvdp", "perception"),
-    ("sensitivity.py", (), "flip_evaluator", "perception"),
-    ("run.py", ("fly-by", "--metrics", "flip"), "flip_evaluator", "perception"),
-    ("run.py", ("fly-by", "--metrics", "ssim", "jod"), "pycvvdp", "perception"),
+    ("sensitivity.py", (), "distributed", "study"),
     ("render.py", ("glass", "--denoise"), "pyoidn", "denoise"),
     ("tiles.py", ("glass",), "dask", "study"),
     ("perception.py", ("adaptive", "fly-by"), "distributed", "study"),
-    ("perception.py", ("simulate", "stimuli"), "torchvision", "perception"),
     ("conversion_check.py", ("--markers",), "pyluxcore", "peers"),
 ]
 

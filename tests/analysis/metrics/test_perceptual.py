@@ -128,6 +128,26 @@ def test_scores_do_not_depend_on_the_number_of_threads(threads: None, monkeypatc
     assert seen == [1, 1, 1, 1], "both measure on one"
 
 
+SEVERAL = """
+import numpy as np
+import torch
+from concurrent.futures import ThreadPoolExecutor
+from analysis.metrics.display_model import DisplayModel
+from analysis.metrics.perceptual import jod
+
+frames = np.random.default_rng(0).integers(0, 256, (6, 64, 64, 3)).astype(np.uint8)
+with ThreadPoolExecutor(4, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+    found = set(pool.map(lambda _: jod(frames, frames // 2, 60.0, DisplayModel()), range(8)))
+assert found == {jod(frames, frames // 2, 60.0, DisplayModel())}, found
+"""
+
+
+def test_several_threads_score_alike() -> None:
+    """In a process of its own, in which all of them load the metric first."""
+    done = subprocess.run([sys.executable, "-c", SEVERAL], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+
+
 def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
     """The progress of a script is not written over."""
     jod(noisy(3.0)[:2], still()[:2], 60.0, AT_60)

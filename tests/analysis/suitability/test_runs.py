@@ -24,7 +24,7 @@ def test_the_whole_study() -> None:
     assert {run.case.phase for run in planned if run.repetition == 1} == {0.5}
     assert {run.repetition for run in planned if run.case.jod_span_s} == {0}
     assert len({run.case for run in planned}) == len(planned)
-    assert {run.case.scale.stride for run in runs(SuitabilityOptions(repetitions=1, stride=30))} == {30}
+    assert {run.case.scale.stride for run in runs(SuitabilityOptions(repetitions=1, metric_stride=30))} == {30}
 
 
 def test_policies_and_rivals_run_at_every_row() -> None:
@@ -59,7 +59,7 @@ def test_some_stand_beside_at_one_row() -> None:
     [
         ({"inputs": ("nowhere",)}, "inputs.*nowhere"),
         ({"inputs": ()}, "inputs"),
-        ({"stride": 0}, "stride"),
+        ({"metric_stride": 0}, "metric_stride"),
         ({"rows": (16,)}, "rows.*0 to 15"),
         ({"rows": (1, 1)}, "rows.*none twice"),
         ({"policies": ("magic",)}, "policies"),
