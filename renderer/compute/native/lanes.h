@@ -72,13 +72,13 @@ template <class F, class T> inline void put_first(T* to, const F& value, int use
 }
 
 // Reductions over all lanes, by halves.
-inline float least(f16 a) {
-    f8 b = vmin((f8)a.lo, (f8)a.hi);
+inline float least(f8 a) {
+    auto b = vmin(a.lo, a.hi);
     auto c = vmin(b.lo, b.hi);
-    auto d = vmin(c.lo, c.hi);
-    return d.x < d.y ? d.x : d.y;
+    return c.x < c.y ? c.x : c.y;
 }
-inline float greatest(f16 a) { return -least(-a); }
+inline float least(f16 a) { return least(vmin((f8)a.lo, (f8)a.hi)); }
+template <class F> inline float greatest(F a) { return -least(-a); }
 // The least lane of each of eight vectors, in half the steps of eight separate reductions.
 inline f8 least_of_each(const f16* a) {
     f8 halves[8], quarters[4], eighths[2];

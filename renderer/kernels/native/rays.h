@@ -23,14 +23,14 @@ inline RayHit hit_of(const PacketHit& hit, int lane) { return {hit.t[lane], 0.0f
 // Tests a few lanes of a packet against a leaf, each with four triangles at once. Returns those with a new hit; with
 // `any` they become idle.
 template <bool any>
-inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const Packet& rays, unsigned lanes, PacketHit& hit) {
+inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const PacketRays& rays, unsigned lanes,
+                                PacketHit& hit) {
     unsigned changed = 0;
-    const Vec16 from = {rays.origin[rays.kx], rays.origin[rays.ky], rays.origin[rays.kz]};
     for (; lanes; lanes &= lanes - 1) {
         const int lane = first_bit(lanes);
         RayHit one = hit_of(hit, lane);
-        const Vec<f4> origin = {(f4)from.x[lane], (f4)from.y[lane], (f4)from.z[lane]};
-        const Vec<f4> shear = {(f4)rays.shear.x[lane], (f4)rays.shear.y[lane], (f4)rays.shear.z[lane]};
+        const Vec<f4> origin = {(f4)rays.origin.x[lane], (f4)rays.origin.y[lane], (f4)rays.origin.z[lane]};
+        const Vec<f4> shear = {(f4)rays.shear_x[lane], (f4)rays.shear_y[lane], (f4)rays.inverse.z[lane]};
         if (!meet_leaf(leaf, triangles, origin, shear, rays.kx, rays.ky, rays.kz, one)) continue;
         changed |= 1u << lane;
         take<any>(hit, lane, one);

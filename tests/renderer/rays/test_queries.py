@@ -89,6 +89,50 @@ def test_a_ray_does_not_depend_on_its_company(subdivisions: int) -> None:
     assert np.array_equal(blocked[order], queries.blocked(origin[order], direction[order], reach[order]))
 
 
+def framelets(rng: np.random.Generator, distance: float, width: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rays of squares of 16 x 16 in Morton order, each square from one point at a distance towards some axis."""
+    index = np.arange(256)
+    x, y = (sum((index >> 2 * bit + axis & 1) << bit for bit in range(4)) / 16.0 - 0.5 for axis in (0, 1))
+    origin, direction = [], []
+    for number in range(count):
+        towards = np.roll(rng.normal(size=3) * (0.2, 0.2, 0.0) + (0.0, 0.0, (-1.0) ** number), number // 2 % 3)
+        across = np.cross(towards, rng.normal(size=3))
+        up = np.cross(towards, across)
+        aim = rng.uniform(-0.8, 0.8, 3) + width * (x[:, None] * across + y[:, None] * up) / np.linalg.norm(up)
+        start = rng.uniform(-0.8, 0.8, 3) - distance * towards
+        origin.append(np.broadcast_to(start, aim.shape)), direction.append(aim - start)
+    return np.concatenate(origin).astype(np.float32), np.concatenate(direction).astype(np.float32)
+
+
+@pytest.mark.parametrize("subdivisions", [4, 6])  # the second is large enough for leaves to wait
+@pytest.mark.parametrize("distance", [0.3, 3.0, 1e2, 1e4])
+@pytest.mark.parametrize("width", [0.0, 1e-6, 0.1, 1.0])
+def test_rays_of_a_framelet_meet_what_each_meets_alone(subdivisions: int, distance: float, width: float) -> None:
+    vertices, faces = bumpy(subdivisions)
+    queries, rng = RayQueries(vertices, faces), np.random.default_rng(7)
+    origin, direction = framelets(rng, distance, width, 24)
+    reach = np.where(rng.random(len(origin)) < 0.9, 1e30, rng.uniform(-0.5, 2.0, len(origin))).astype(np.float32)
+    for kept in (slice(None), rng.random(len(origin)) < 0.8):  # without some, packets are no squares any more
+        start, towards, end = origin[kept], direction[kept], reach[kept]
+        order = rng.permutation(len(start))
+        together, alone = (
+            queries.closest(start, towards, end),
+            queries.closest(start[order], towards[order], end[order]),
+        )
+        for name in ("face", "t", "u", "v"):
+            assert np.array_equal(getattr(together, name)[order], getattr(alone, name)), name
+        blocked = queries.blocked(start, towards, end)
+        assert np.array_equal(blocked[order], queries.blocked(start[order], towards[order], end[order]))
+        # shadow rays: from the points that are met back to the common origin
+        met = together.face >= 0
+        assert met.any()
+        back = -towards[met] * together.t[met, None] * np.float32(0.999)
+        point = start[met] - back
+        again = rng.permutation(len(point))
+        shadow = queries.blocked(point, back, 1.0)
+        assert np.array_equal(shadow[again], queries.blocked(point[again], back[again], 1.0))
+
+
 @pytest.mark.parametrize("distance", [0.3, 3.0, 1e2, 1e4])
 @pytest.mark.parametrize("width", [0.0, 1e-6, 1e-2])
 def test_neighbours_at_an_edge_meet_what_each_meets_alone(distance: float, width: float) -> None:
