@@ -40,7 +40,7 @@ LIBRARIES = (
 ).split()
 """Loaded once; every mutant's process has them from the beginning."""
 TESTS_S = 180.0
-"""Most seconds of tests for one mutant, the shortest files first after the module's own."""
+"""Most seconds of tests for one mutant; a file that would exceed it is left out."""
 MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
 _NO_TESTS = 5
 
@@ -136,7 +136,7 @@ def copied(tree: Path) -> None:
             shutil.copyfile(source, target)
 
 
-def become_tests(tree: Path, files: list[str], cpu_s: float, log: Path) -> int:
+def become_tests(tree: Path, test: str, cpu_s: float, log: Path) -> int:
     """Turns a forked process into one of pytest in the copy; the exit status."""
     os.setsid()
     handle = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
@@ -153,18 +153,18 @@ def become_tests(tree: Path, files: list[str], cpu_s: float, log: Path) -> int:
     import pytest
 
     options = ("-x", "-q", "--tb=line", "-rfE", "-p", "no:cacheprovider", "-p", "no:xdist", f"--basetemp={tree}.tests")
-    return int(pytest.main([*options, *files]))
+    return int(pytest.main([*options, test]))
 
 
-def passed(tree: Path, files: list[str], cpu_s: float, keep_bytecode: bool = False) -> tuple[int, float, str]:
-    """Exit status of the tests, seconds of CPU time, and the first failure."""
+def passed(tree: Path, test: str, cpu_s: float, keep_bytecode: bool = False) -> tuple[int, float, str]:
+    """Exit status of a file of tests, seconds of CPU time, and the first failure."""
     log, limit_s = tree.with_suffix(".log"), time.monotonic() + 60 + 12 * cpu_s
     pid = os.fork()
     if not pid:
         status = 99
         try:
             sys.dont_write_bytecode = not keep_bytecode
-            status = become_tests(tree, files, cpu_s, log)
+            status = become_tests(tree, test, cpu_s, log)
         finally:
             os._exit(status)
     while not (ended := os.wait4(pid, os.WNOHANG))[0]:
@@ -211,22 +211,21 @@ class Trial:
         """Seconds of CPU time that a file of tests takes with the code as it is; infinite if it fails."""
         key = digest(test, (ROOT / test).read_text(encoding="utf-8"))
         if key not in self.record.found:
-            status, seconds, failure = passed(self.tree, [test], 3 * TESTS_S, keep_bytecode=True)
+            status, seconds, failure = passed(self.tree, test, 3 * TESTS_S, keep_bytecode=True)
             self.record.put(key, test=test, seconds=seconds if status in (0, _NO_TESTS) else np.inf, failure=failure)
         return self.record.found[key]["seconds"]
 
-    def tests_of(self, file: str) -> tuple[list[str], float]:
-        """The tests to run for a file, in their order, and their seconds."""
+    def tests_of(self, file: str) -> Iterator[tuple[str, float]]:
+        """The files of tests to run for a file, its own first, and the seconds of each."""
         named, folder = mirrored(ROOT, file)
         found = chosen_for(ROOT, file, self.users)
         if not named and folder:  # those that import it may be few and far
             found |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
-        chosen, total = list[str](), 0.0
-        for test in sorted(found, key=lambda test: (test != named, self.baseline(test))):
-            if total + self.baseline(test) <= TESTS_S:
-                chosen.append(test)
-                total += self.baseline(test)
-        return chosen, total
+        total_s = 0.0
+        for test in sorted(found, key=lambda test: (test != named, not test.startswith(f"{folder}/"), test)):
+            if total_s + (seconds := self.baseline(test)) <= TESTS_S:
+                total_s += seconds
+                yield test, seconds
 
     def tried(self, mutant: Mutant, again: bool) -> dict:
         """Whether tests notice a mutant; as it was found before, unless a survivor is to be tried again."""
@@ -236,16 +235,20 @@ class Trial:
         if known and (known["killed"] or not again):
             return known
         changed, target = mutant.applied(source), self.tree / mutant.file
-        tests, seconds = self.tests_of(mutant.file)
-        target.write_text(changed, encoding="utf-8")
-        try:
-            status, took_s, failure = passed(self.tree, tests, 20 + 3 * seconds)
-        finally:
-            target.write_text(source, encoding="utf-8")
+        status, failure, passing = 0, "", list[str]()
+        for test, seconds in self.tests_of(mutant.file):
+            target.write_text(changed, encoding="utf-8")
+            try:
+                status, _, failure = passed(self.tree, test, 20 + 3 * seconds)
+            finally:
+                target.write_text(source, encoding="utf-8")
+            if status not in (0, _NO_TESTS):
+                break
+            passing.append(test)
         lines = zip(source.splitlines(), changed.splitlines(), strict=False)
         before, after = next(((a, b) for a, b in lines if a != b), ("", "a line is gone"))
-        killed, where = status != 0, {"before": before.strip(), "after": after.strip()}
-        return self.record.put(key, **asdict(mutant), **where, killed=killed, by=failure, seconds=took_s, tests=tests)
+        where = {"before": before.strip(), "after": after.strip(), "passing": passing}
+        return self.record.put(key, **asdict(mutant), **where, killed=status not in (0, _NO_TESTS), by=failure)
 
 
 # --- what came of it -------------------------------------------------------------------------------------------------
