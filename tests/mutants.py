@@ -9,29 +9,19 @@ of the checkout, each in a process of its own that is forked after the libraries
 from __future__ import annotations
 
 import ast
-import contextlib
 import csv
-import filecmp
-import hashlib
 import importlib
-import json
 import os
-import resource
-import shutil
-import signal
-import subprocess
-import sys
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import psutil
 
-from tests.changed import chosen_for, mirrored, used_by
-from tests.test_architecture import PACKAGES, ROOT
+from tests.test_architecture import ROOT
+from tests.trials import Trial, digest
 
 MUTATED = ("tsar", "analysis/metrics", "analysis/storage")
 LIBRARIES = (
@@ -39,10 +29,6 @@ LIBRARIES = (
     "beartype jaxtyping"
 ).split()
 """Loaded once; every mutant's process has them from the beginning."""
-TESTS_S = 180.0
-"""Most seconds of tests for one mutant; a file that would exceed it is left out."""
-MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
-_NO_TESTS = 5
 
 
 @dataclass(frozen=True)
@@ -118,137 +104,19 @@ def drawn(count: int, seed: int) -> tuple[list[Mutant], int]:
     return [every[int(place)] for place in rng.permutation(places)], len(every)
 
 
-# --- running tests in a copy -----------------------------------------------------------------------------------------
-
-
-def copied(tree: Path) -> None:
-    """Makes the copy what the checkout is, uncommitted changes included."""
-    if not (tree / ".git").exists():
-        subprocess.run(["git", "clone", "-q", "--no-hardlinks", str(ROOT), str(tree)], check=True)
-    listed = ("git", "ls-files", "-co", "--exclude-standard")
-    here, there = (set(subprocess.check_output(listed, cwd=one, text=True).splitlines()) for one in (ROOT, tree))
-    for name in there - here:
-        (tree / name).unlink(missing_ok=True)
-    for name in here:
-        source, target = ROOT / name, tree / name
-        if source.is_file() and not (target.is_file() and filecmp.cmp(source, target, shallow=False)):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, target)
-
-
-def become_tests(tree: Path, test: str, cpu_s: float, log: Path) -> int:
-    """Turns a forked process into one of pytest in the copy; the exit status."""
-    os.setsid()
-    handle = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-    os.dup2(handle, 1)
-    os.dup2(handle, 2)
-    resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s) + 1, int(cpu_s) + 3))
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
-    for name in [name for name in sys.modules if name.split(".")[0] in (*PACKAGES, "tests")]:
-        del sys.modules[name]
-    os.chdir(tree)
-    sys.path[:] = [str(tree), *(one for one in sys.path if one and Path(one).resolve() != ROOT)]
-    importlib.invalidate_caches()
-    import pytest
-
-    options = ("-x", "-q", "--tb=line", "-rfE", "-p", "no:cacheprovider", "-p", "no:xdist", f"--basetemp={tree}.tests")
-    return int(pytest.main([*options, test]))
-
-
-def passed(tree: Path, test: str, cpu_s: float, keep_bytecode: bool = False) -> tuple[int, float, str]:
-    """Exit status of a file of tests, seconds of CPU time, and the first failure."""
-    log, limit_s = tree.with_suffix(".log"), time.monotonic() + 60 + 12 * cpu_s
-    pid = os.fork()
-    if not pid:
-        status = 99
-        try:
-            sys.dont_write_bytecode = not keep_bytecode
-            status = become_tests(tree, test, cpu_s, log)
-        finally:
-            os._exit(status)
-    while not (ended := os.wait4(pid, os.WNOHANG))[0]:
-        if time.monotonic() > limit_s:
-            for one in psutil.Process(pid).children(recursive=True):
-                with contextlib.suppress(psutil.NoSuchProcess):
-                    one.kill()
-            os.kill(pid, signal.SIGKILL)
-        time.sleep(0.05)
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(pid, signal.SIGKILL)
-    failures = [line for line in log.read_text(errors="replace").splitlines() if line.startswith(("FAILED", "ERROR"))]
-    status = os.waitstatus_to_exitcode(ended[1])
-    return status, ended[2].ru_utime + ended[2].ru_stime, failures[0] if failures else f"status {status}"
-
-
-class Record:
-    """What was found so far, a line each; appended to as it is found."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        lines = path.read_text().splitlines() if path.exists() else []
-        self.found = {entry["key"]: entry for entry in map(json.loads, lines)}
-
-    def put(self, key: str, **entry: object) -> dict:
-        self.found[key] = {"key": key, **entry}
-        with self.path.open("a") as lines:
-            lines.write(json.dumps(self.found[key]) + "\n")
-        return self.found[key]
-
-
-def digest(*texts: str) -> str:
-    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
-
-
-class Trial:
-    """Runs mutants in a copy."""
-
-    def __init__(self, out: Path) -> None:
-        self.tree, self.record, self.users = out / "tree", Record(out / "found.jsonl"), used_by(ROOT)
-        copied(self.tree)
-
-    def baseline(self, test: str) -> float:
-        """Seconds of CPU time that a file of tests takes with the code as it is; infinite if it fails."""
-        key = digest(test, (ROOT / test).read_text(encoding="utf-8"))
-        if key not in self.record.found:
-            status, seconds, failure = passed(self.tree, test, 3 * TESTS_S, keep_bytecode=True)
-            self.record.put(key, test=test, seconds=seconds if status in (0, _NO_TESTS) else np.inf, failure=failure)
-        return self.record.found[key]["seconds"]
-
-    def tests_of(self, file: str) -> Iterator[tuple[str, float]]:
-        """The files of tests to run for a file, its own first, and the seconds of each."""
-        named, folder = mirrored(ROOT, file)
-        found = chosen_for(ROOT, file, self.users)
-        if not named and folder:  # those that import it may be few and far
-            found |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
-        total_s = 0.0
-        for test in sorted(found, key=lambda test: (test != named, not test.startswith(f"{folder}/"), test)):
-            if total_s + (seconds := self.baseline(test)) <= TESTS_S:
-                total_s += seconds
-                yield test, seconds
-
-    def tried(self, mutant: Mutant, again: bool) -> dict:
-        """Whether tests notice a mutant; as it was found before, unless a survivor is to be tried again."""
-        source = (ROOT / mutant.file).read_text(encoding="utf-8")
-        key = digest(source, *map(str, asdict(mutant).values()))
-        known = self.record.found.get(key)
-        if known and (known["killed"] or not again):
-            return known
-        changed, target = mutant.applied(source), self.tree / mutant.file
-        status, failure, passing = 0, "", list[str]()
-        for test, seconds in self.tests_of(mutant.file):
-            target.write_text(changed, encoding="utf-8")
-            try:
-                status, _, failure = passed(self.tree, test, 20 + 3 * seconds)
-            finally:
-                target.write_text(source, encoding="utf-8")
-            if status not in (0, _NO_TESTS):
-                break
-            passing.append(test)
-        lines = zip(source.splitlines(), changed.splitlines(), strict=False)
-        before, after = next(((a, b) for a, b in lines if a != b), ("", "a line is gone"))
-        where = {"before": before.strip(), "after": after.strip(), "passing": passing}
-        return self.record.put(key, **asdict(mutant), **where, killed=status not in (0, _NO_TESTS), by=failure)
+def tried(trial: Trial, mutant: Mutant, again: bool) -> dict[str, Any]:
+    """Whether tests notice a mutant; as it was found before, unless a survivor is to be tried again."""
+    source = (ROOT / mutant.file).read_text(encoding="utf-8")
+    key = digest(source, *map(str, asdict(mutant).values()))
+    known = trial.record.found.get(key)
+    if known and (known["killed"] or not again):
+        return known
+    changed = mutant.applied(source)
+    killed, by, passing = trial.noticed(mutant.file, mutant.line, changed)
+    lines = zip(source.splitlines(), changed.splitlines(), strict=False)
+    before, after = next(((a, b) for a, b in lines if a != b), ("", "a line is gone"))
+    where = {"before": before.strip(), "after": after.strip(), "passing": passing}
+    return trial.record.put(key, **asdict(mutant), **where, killed=killed, by=by)
 
 
 # --- what came of it -------------------------------------------------------------------------------------------------
@@ -294,7 +162,7 @@ def main(options: Options) -> None:
     trial, found = Trial(out), list[dict]()
     try:
         for number, mutant in enumerate(sample, 1):
-            entry = trial.tried(mutant, options.again)
+            entry = tried(trial, mutant, options.again)
             found.append(entry)
             kind = "killed" if entry["killed"] else "SURVIVED"
             print(

@@ -1,0 +1,185 @@
+"""Runs tests of a changed checkout, in a copy of it; a part of :mod:`tests.mutants`."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import filecmp
+import hashlib
+import importlib
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from tests.changed import chosen_for, mirrored, used_by
+from tests.reach import EVERYTHING
+from tests.test_architecture import PACKAGES, ROOT
+
+TESTS_S, FILE_S = 120.0, 240.0
+"""Most seconds of tests for one mutant, and of one file of tests; what would exceed it is left out."""
+MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
+NONE_FAILED = (0, 5)
+"""Exit statuses of pytest: all passed, and none was there."""
+
+
+def copied(tree: Path) -> None:
+    """Makes the copy what the checkout is, uncommitted changes included."""
+    if not (tree / ".git").exists():
+        subprocess.run(["git", "clone", "-q", "--no-hardlinks", str(ROOT), str(tree)], check=True)
+    listed = ("git", "ls-files", "-co", "--exclude-standard")
+    here, there = (set(subprocess.check_output(listed, cwd=one, text=True).splitlines()) for one in (ROOT, tree))
+    for name in there - here:
+        (tree / name).unlink(missing_ok=True)
+    for name in here:
+        source, target = ROOT / name, tree / name
+        if source.is_file() and not (target.is_file() and filecmp.cmp(source, target, shallow=False)):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
+
+
+def become_tests(tree: Path, file: str, only: set[str] | None, cpu_s: float) -> int:
+    """Turns a forked process into one of pytest in the copy; the exit status."""
+    os.setsid()
+    handle = os.open(tree.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(handle, 1)
+    os.dup2(handle, 2)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s) + 1, int(cpu_s) + 3))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+    for name in [name for name in sys.modules if name.split(".")[0] in (*PACKAGES, "tests")]:
+        del sys.modules[name]
+    os.chdir(tree)
+    sys.path[:] = [str(tree), *(one for one in sys.path if one and Path(one).resolve() != ROOT)]
+    importlib.invalidate_caches()
+    import pytest
+
+    from tests.reach import Chosen, Noted
+
+    options = ("-x", "-q", "--tb=line", "-rfE", "-p", "no:cacheprovider", "-p", "no:xdist", f"--basetemp={tree}.tests")
+    plugin = Chosen(only) if only is not None else Noted(tree, tree.with_suffix(".json"))
+    return int(pytest.main([*options, file], [plugin]))
+
+
+def run(tree: Path, file: str, only: set[str] | None, cpu_s: float) -> tuple[int, float, str]:
+    """Runs tests of a file: only some, or all, and notes what each reaches in ``TREE.json``.
+
+    Returns:
+        Exit status, seconds of CPU time, and the first failure.
+    """
+    log, limit_s = tree.with_suffix(".log"), time.monotonic() + 60 + 12 * cpu_s
+    pid = os.fork()
+    if not pid:
+        status = 99
+        try:
+            sys.dont_write_bytecode = only is not None  # that of a mutant is never kept
+            status = become_tests(tree, file, only, cpu_s)
+        finally:
+            os._exit(status)
+    while not (ended := os.wait4(pid, os.WNOHANG))[0]:
+        if time.monotonic() > limit_s:
+            for one in psutil.Process(pid).children(recursive=True):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    one.kill()
+            os.kill(pid, signal.SIGKILL)
+        time.sleep(0.05)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(pid, signal.SIGKILL)
+    failures = [line for line in log.read_text(errors="replace").splitlines() if line.startswith(("FAILED", "ERROR"))]
+    status = os.waitstatus_to_exitcode(ended[1])
+    if status == 99:
+        raise RuntimeError(f"pytest did not run: {log.read_text(errors='replace')[-2000:]}")
+    return status, ended[2].ru_utime + ended[2].ru_stime, failures[0] if failures else f"status {status}"
+
+
+class Record:
+    """What was found so far, a line each; appended to as it is found."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        lines = path.read_text().splitlines() if path.exists() else []
+        self.found = {entry["key"]: entry for entry in map(json.loads, lines)}
+
+    def put(self, key: str, **entry: object) -> dict:
+        self.found[key] = {"key": key, **entry}
+        with self.path.open("a") as lines:
+            lines.write(json.dumps(self.found[key]) + "\n")
+        return self.found[key]
+
+
+def digest(*texts: str) -> str:
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
+
+
+def function_at(tree: ast.AST, line: int, names: tuple[str, ...] = ()) -> str | None:
+    """Qualified name of the innermost function whose body has a line, or None if it runs at import."""
+    for node in ast.iter_child_nodes(tree):
+        inside = node.lineno <= line <= (node.end_lineno or 0) if isinstance(node, ast.stmt) else True
+        if not inside:
+            continue
+        if isinstance(node, ast.ClassDef):
+            return function_at(node, line, (*names, node.name))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            if line < node.body[0].lineno:
+                return None
+            own = (*names, node.name)
+            return function_at(node, line, (*own, "<locals>")) or ".".join(own)
+        if isinstance(node, ast.stmt) and (found := function_at(node, line, names)):
+            return found
+    return None
+
+
+class Trial:
+    """Runs mutants in a copy."""
+
+    def __init__(self, out: Path) -> None:
+        self.tree, self.record, self.users = out / "tree", Record(out / "found.jsonl"), used_by(ROOT)
+        copied(self.tree)
+
+    def unchanged(self, file: str) -> dict[str, Any]:
+        """What the tests of a file reach, and their seconds, with the code as it is; no tests if one of them fails."""
+        key = digest(file, (ROOT / file).read_text(encoding="utf-8"))
+        if key not in self.record.found:
+            status, seconds, failure = run(self.tree, file, None, FILE_S)
+            reached = json.loads(self.tree.with_suffix(".json").read_text()) if status == 0 else {"tests": {}}
+            self.record.put(key, file=file, seconds=seconds, failure=failure, **reached)
+        return self.record.found[key]
+
+    def tests_of(self, file: str, function: str | None) -> Iterator[tuple[str, set[str], float]]:
+        """Files of tests to run for a function, its module's first; the tests that reach it, and their seconds."""
+        named, folder = mirrored(ROOT, file)
+        found, total_s = chosen_for(ROOT, file, self.users), 0.0
+        if not named and folder:  # those that import it may be few and far
+            found |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
+        for name in sorted(found, key=lambda name: (name != named, not name.startswith(f"{folder}/"), name)):
+            known, place = self.unchanged(name), f"{file}:{function}"
+            tests, shared = known["tests"], set(known.get("shared", ()))
+            every = function is None or place in shared or EVERYTHING in shared
+            only = {one for one, (_, places) in tests.items() if every or place in places or EVERYTHING in places}
+            seconds = known["seconds"] - sum(took for one, (took, _) in tests.items() if one not in only)
+            if only and total_s + seconds <= TESTS_S:
+                total_s += seconds
+                yield name, only, seconds
+
+    def noticed(self, file: str, line: int, changed: str) -> tuple[bool, str, list[str]]:
+        """Whether tests fail with another content of a file, the first failure, and the files that passed."""
+        source, target, passing = (ROOT / file).read_text(encoding="utf-8"), self.tree / file, list[str]()
+        for name, only, seconds in self.tests_of(file, function_at(ast.parse(source), line)):
+            target.write_text(changed, encoding="utf-8")
+            try:
+                status, _, failure = run(self.tree, name, only, 20 + 3 * seconds)
+            finally:
+                target.write_text(source, encoding="utf-8")
+            if status not in NONE_FAILED:
+                return True, failure, passing
+            passing.append(name)
+        return False, "", passing
