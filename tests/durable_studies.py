@@ -29,7 +29,7 @@ def _study(name: str, *arguments: str) -> Callable[[Path], int]:
     def make(folder: Path) -> int:
         from analysis.study.cases import SCALES, Scale
 
-        tiny = Scale(4, seconds=0.2, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=4)
+        tiny = Scale(4, seconds=0.1, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=4)
         with ExitStack() as stack:
             stack.enter_context(patch.dict(SCALES, quick=tiny))
             stack.enter_context(patch("analysis.study.farm.run_cases", run_here))
@@ -60,7 +60,10 @@ _ALONE = ("--inputs", "fly-by", "--repetitions", "1")
 
 STUDIES = {
     "suitability": Kind(
-        _study("suitability", *_ALONE, "--rows", "0", "6", "--jod-repetitions", "0", "--rivals", "framed", "--beside"),
+        _study(
+            *("suitability", *_ALONE, "--rows", "0", "6", "--rivals", "framed", "--beside"),
+            *("--jod-repetitions", "0", "--jod-span-s", "0.0", "0.05"),
+        ),
         _tables("out/tables/*.csv"),
         _RUNS,
     ),
@@ -80,7 +83,7 @@ STUDIES = {
     "sensitivity": Kind(
         _study(
             *("sensitivity", "--inputs", "fast-crossing", "--temporal-slopes", "-1", "--offsets", "--biases", "2"),
-            *("--still-s", "0.1"),
+            *("--still-s", "0.05"),
         ),
         _tables("out/tables/*.csv"),
         _RUNS,

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.durable import KINDS
 from tests.scripts.commands import ROOT
 
 KILLS = {
     "reference": 8, "evaluate": 8, "inputs": 4, "run": 4, "render": 8, "job": 6, "stimuli": 6, "tiles": 6, "session": 6,
+    "suitability": 2, "ablation": 2, "trade": 2, "sensitivity": 2, "workloads": 2, "spectrum": 2,
 }  # fmt: skip
-"""More than 50 in all; a study is killed in ``test_suitability.py``, its workers with it."""
+"""``python -m tests.killed --kills 50`` kills more. ``test_suitability.py`` kills a study with its workers."""
 FEW = {"reference": 4, "render": 2}
 
 
@@ -26,19 +26,12 @@ FEW = {"reference": 4, "render": 2}
 def test_what_was_killed_ends_as_the_unbroken(
     name: str, count: int, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    command = [sys.executable, "-m", "tests.killed", name, str(tmp_path), str(count), "0"]
+    options = ("--kinds", name, "--kills", str(count), "--out", str(tmp_path))
+    command = [sys.executable, "-m", "tests.killed", *options]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
-    logs = "".join(file.read_text() for file in tmp_path.glob("*.log"))
-    assert set(found["statuses"]) == {0} and "Traceback" not in logs, logs
+    assert found["operations"] > 0 and not found["lost"] and not found["wrong"], found
     assert found["kills"] == count, "every kill came before the end"
-    kind = KINDS[name]
-    expected = kind.result(tmp_path / "whole")
-    assert expected
-    for folder in sorted(path for path in tmp_path.iterdir() if path.is_dir() and path.name != "whole"):
-        result = kind.result(folder)
-        differing = [one for one in expected if result.get(one) != expected[one]]
-        assert result.keys() == expected.keys() and not differing, f"{folder}: differing: {differing}"
     with capsys.disabled():
-        print(f"\n{name}: {found['kills']} kills at one of {found['operations']} operations on files, 0 lost")
+        print(f"\n{name}: {found['kills']} kills, 0 lost")
