@@ -6,8 +6,9 @@ INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check --constraint
 BASE := $(VENV)/.base
 STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
+MUTANTS := $(VENV)/.mutants
 
-.PHONY: demo live test test-fast test-slow lint bench study-quick solvers docs constraints clean
+.PHONY: demo live test test-fast test-slow mutants kills lint bench study-quick solvers docs constraints clean
 
 # the base alone, which is enough for the demo
 $(BASE): pyproject.toml constraints.txt
@@ -22,6 +23,10 @@ $(STAMP): $(BASE)
 
 $(DOCS): $(BASE)
 	$(INSTALL) '.[docs]'
+	touch $@
+
+$(MUTANTS): $(STAMP)
+	$(INSTALL) '.[mutants]'
 	touch $@
 
 demo: $(BASE)
@@ -46,6 +51,14 @@ test-fast: $(STAMP)
 test-slow: $(STAMP)
 	$(PY) -m pytest -m slow
 
+# changes of single operators and numbers, and how many of them the nearest tests notice; continues where it ended
+mutants: $(MUTANTS)
+	$(PY) -m tests.mutants
+
+# 50 kills of every long command, which then continues
+kills: $(STAMP)
+	$(PY) -m tests.killed
+
 study-quick: $(STAMP)
 	$(PY) scripts/suitability.py --scale quick --out out/study-quick
 
@@ -62,7 +75,7 @@ docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
 
 # records the installed versions
-constraints: $(STAMP) $(DOCS)
+constraints: $(STAMP) $(DOCS) $(MUTANTS)
 	$(PY) -m pip freeze --all --exclude-editable | grep -v ^pip== | sed 's/+cpu$$//' > constraints.txt
 
 clean:
