@@ -58,11 +58,17 @@ class Mutant:
     operator: str
     occurrence: int
 
-    def applied(self, source: str) -> str:
+    def applied(self, source: str) -> str | None:
+        """The changed source, or None if the change is not Python, or the operator cannot make it."""
         from cosmic_ray.mutating import mutate_code
         from cosmic_ray.plugins import get_operator
 
-        return mutate_code(source, get_operator(self.operator)(), self.occurrence) or source
+        try:
+            changed = mutate_code(source, get_operator(self.operator)(), self.occurrence)
+            ast.parse(changed or "")
+        except (AttributeError, SyntaxError):
+            return None
+        return changed
 
 
 def never_run(tree: ast.AST) -> list[tuple[tuple[int, int], tuple[int, int]]]:
@@ -104,14 +110,17 @@ def drawn(count: int, seed: int) -> tuple[list[Mutant], int]:
     return [every[int(place)] for place in rng.permutation(places)], len(every)
 
 
-def tried(trial: Trial, mutant: Mutant, again: bool) -> dict[str, Any]:
-    """Whether tests notice a mutant; as it was found before, unless a survivor is to be tried again."""
+def tried(trial: Trial, mutant: Mutant, again: bool) -> dict[str, Any] | None:
+    """Whether tests notice a mutant; as it was found before, unless a survivor is to be tried again. None if there is
+    no such mutant."""
     source = (ROOT / mutant.file).read_text(encoding="utf-8")
     key = digest(source, *map(str, asdict(mutant).values()))
     known = trial.record.found.get(key)
     if known and (known["killed"] or not again):
         return known
     changed = mutant.applied(source)
+    if changed is None:
+        return None
     killed, by, passing = trial.noticed(mutant.file, mutant.line, changed)
     lines = zip(source.splitlines(), changed.splitlines(), strict=False)
     before, after = next(((a, b) for a, b in lines if a != b), ("", "a line is gone"))
@@ -163,6 +172,8 @@ def main(options: Options) -> None:
     try:
         for number, mutant in enumerate(sample, 1):
             entry = tried(trial, mutant, options.again)
+            if entry is None:
+                continue
             found.append(entry)
             kind = "killed" if entry["killed"] else "SURVIVED"
             print(
