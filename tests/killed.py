@@ -1,8 +1,8 @@
 """Kills small commands at random moments and lets them continue: ``python -m tests.killed --kills 50``.
 
 Each kind of :mod:`tests.durable` runs in a process of its own, because it forks. It makes everything unbroken in
-``OUT/KIND/whole``, and in ``OUT/KIND/again``. In ``OUT/KIND/0`` and so on it is killed twice and then ends: in turn just before an operation on
-files, and after a random time. The results must be those of the unbroken one.
+``OUT/KIND/whole`` and in ``OUT/KIND/again``. In ``OUT/KIND/0`` and so on it is killed twice and then ends: in turn just
+before an operation on files, and after a random time. The results must be those of the unbroken one.
 """
 
 from __future__ import annotations
