@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
 import threading
@@ -37,8 +38,9 @@ class Noted:
         self.noted()
 
     def traced(self, frame: FrameType, event: str, argument: object) -> None:
-        """Called at each call of a function; asks for no events inside it."""
-        self.seen.add((frame.f_code.co_filename, frame.f_code.co_qualname))
+        """Called at each call of a function; asks for no events inside it. Modules and classes are no functions."""
+        if frame.f_code.co_flags & inspect.CO_OPTIMIZED:
+            self.seen.add((frame.f_code.co_filename, frame.f_code.co_qualname))
 
     def noted(self) -> set[str]:
         """The functions since the last time."""

@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -145,27 +145,40 @@ class Trial:
         self.tree, self.record, self.users = out / "tree", Record(out / "found.jsonl"), used_by(ROOT)
         copied(self.tree)
 
+    def known(self, file: str) -> bool:
+        """Whether it is known what the tests of a file reach."""
+        return digest(file, (ROOT / file).read_text(encoding="utf-8")) in self.record.found
+
     def unchanged(self, file: str) -> dict[str, Any]:
         """What the tests of a file reach, and their seconds, with the code as it is; no tests if one of them fails."""
         key = digest(file, (ROOT / file).read_text(encoding="utf-8"))
-        if key not in self.record.found:
+        if not self.known(file):
             status, seconds, failure = run(self.tree, file, None, FILE_S)
             reached = json.loads(self.tree.with_suffix(".json").read_text()) if status == 0 else {"tests": {}}
             self.record.put(key, file=file, seconds=seconds, failure=failure, **reached)
         return self.record.found[key]
 
     def tests_of(self, file: str, function: str | None) -> Iterator[tuple[str, set[str], float]]:
-        """Files of tests to run for a function, its module's first; the tests that reach it, and their seconds."""
-        named, folder = mirrored(ROOT, file)
-        found, total_s = chosen_for(ROOT, file, self.users), 0.0
-        if not named and folder:  # those that import it may be few and far
-            found |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
-        for name in sorted(found, key=lambda name: (name != named, not name.startswith(f"{folder}/"), name)):
-            known, place = self.unchanged(name), f"{file}:{function}"
-            tests, shared = known["tests"], set(known.get("shared", ()))
-            every = function is None or place in shared or EVERYTHING in shared
-            only = {one for one, (_, places) in tests.items() if every or place in places or EVERYTHING in places}
-            seconds = known["seconds"] - sum(took for one, (took, _) in tests.items() if one not in only)
+        """Files of tests to run for a function, its module's first, then those whose tests are known; the tests that
+        reach it, and their seconds. What runs at import is reached by every test that calls a function of the file."""
+        named, folder = mirrored(ROOT, file)[0], mirrored(ROOT, file)[1] or "tests"
+        left, total_s = chosen_for(ROOT, file, self.users), 0.0
+        if not named:  # those that import it may be few and far
+            left |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
+        while left:
+            name = min(left, key=lambda name: (name != named, not self.known(name), not name.startswith(folder), name))
+            left.remove(name)
+            tests, shared = self.unchanged(name)["tests"], self.unchanged(name).get("shared", ())
+
+            def reached(places: Iterable[str]) -> bool:
+                wanted = f"{file}:{function or ''}"
+                return any(one in (wanted, EVERYTHING) or (not function and one.startswith(wanted)) for one in places)
+
+            only = {one for one, (_, places) in tests.items() if reached(places)}
+            if (function and reached(shared)) or not (function or only):
+                only = set(tests)
+            seconds = self.unchanged(name)["seconds"]
+            seconds -= sum(took for one, (took, _) in tests.items() if one not in only)
             if only and total_s + seconds <= TESTS_S:
                 total_s += seconds
                 yield name, only, seconds
