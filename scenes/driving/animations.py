@@ -8,11 +8,22 @@ Source: Stephens 2011, sec. 7.1.1.1 and figs 7.1–7.2 (inputs 0 to 4); paths, s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenes.animation import LEAD_S, UP, Path, Pose, PoseFunction, Times, camera_to_world, look_at, sample_track
+from scenes.animation import (
+    LEAD_S,
+    UP,
+    Path,
+    Pose,
+    PoseFunction,
+    Times,
+    camera_to_world,
+    continuous_quaternions,
+    look_at,
+    sample_track,
+)
 from scenes.canonical import Integrator, PerspectiveCamera, RigidTrack, Scene
 from scenes.driving import car, sky, world
 from scenes.driving.wheel import RADIUS_M
@@ -70,6 +81,22 @@ def _pivot(eye: tuple[float, float, float], aim: float, fov_deg: float) -> Camer
     return view
 
 
+def _cuts(every_s: float, *views: CameraPath) -> CameraPath:
+    """A camera that jumps from one moving view to the next, with the field of view of the first. A jump takes one
+    interval between keys, 1/240 s."""
+
+    def view(path: Path) -> PerspectiveCamera:
+        cameras = [one(path) for one in views]
+        tracks = [camera.track for camera in cameras if camera.track is not None]
+        time_s = tracks[0].start_s + tracks[0].interval_s * np.arange(len(tracks[0].translation))
+        number = (np.floor(time_s / every_s + 1e-9) % len(tracks)).astype(np.int64), np.arange(len(time_s))
+        translation = np.stack([track.translation for track in tracks])[number]
+        rotation = continuous_quaternions(np.stack([track.rotation for track in tracks])[number])
+        return replace(cameras[0], track=replace(tracks[0], translation=translation, rotation=rotation))
+
+    return view
+
+
 ANIMATIONS: dict[str, Animation] = {
     # enters at the upper left, turns right at the crossing and leaves; paving in the foreground
     "corner-exit": Animation(
@@ -83,16 +110,32 @@ ANIMATIONS: dict[str, Animation] = {
 }
 """Animations by name, in the order of the thesis' inputs 0 to 4."""
 
+CUTS = "cuts"
+_CUT_S = 0.25
+_FURTHER = {
+    # nothing on the picture stays at a cut; between cuts it moves as in chase and fly-by
+    CUTS: Animation(
+        Path((-13.0, _LANE_M), 0.0, 13.0),
+        _cuts(
+            _CUT_S,
+            _chase(5.4, 2.9, 1.75, 0.75, 50.0),
+            _pivot((0.0, 3.4, 1.35), 0.65, 50.0),
+            _chase(-6.0, -2.4, 1.2, 0.6, 50.0),
+        ),
+    ),
+}
+"""Animations that are no input of the thesis."""
+
 
 def load(name: str, phase: float = 0.0) -> Scene:
     """The scene of an animation.
 
     Args:
-        name: a key of :data:`ANIMATIONS`.
+        name: a key of :data:`ANIMATIONS`, or :data:`CUTS`.
         phase: fraction of a wheel's turn by which the car is ahead at time zero: a repetition that differs only in the
             positions of edges on pixels and tiles.
     """
-    animation = ANIMATIONS[name]
+    animation = {**ANIMATIONS, **_FURTHER}[name]
     old = animation.path
     advance = old.advance + phase * 2.0 * np.pi * RADIUS_M
     path = Path(old.start, old.heading_rad, old.speed, old.bends, advance)

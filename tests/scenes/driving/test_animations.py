@@ -57,6 +57,22 @@ def test_inputs_are_in_order_and_go_by_number(scenes: dict[str, Scene]) -> None:
         assert scenes[name].duration_s == DURATION_S >= 2.0
 
 
+def test_cuts_show_another_view_every_quarter_of_a_second() -> None:
+    """The car is in view in each; beside the cuts the camera moves as smoothly as in the inputs."""
+    scene = catalog.load("cuts")
+    track = camera(scene).track
+    assert track is not None and "cuts" not in catalog.NAMES
+    steps = np.abs(np.diff(track.translation, axis=0)).max(axis=1)
+    after_s = track.start_s + track.interval_s * (1 + np.arange(len(steps)))
+    within = (after_s > -0.01) & (after_s < 2.01)
+    assert after_s[within & (steps > 1.0)] == pytest.approx(0.25 * np.arange(9), abs=1e-9)
+    assert steps[steps <= 1.0].max() == pytest.approx(13.0 / 240.0, rel=1e-3)
+    assert (np.linalg.norm(track.rotation, axis=1) == pytest.approx(1.0)) and scene.name == "cuts"
+    for time_s in np.arange(0.05, 2.0, 0.25):
+        low, high = shown(scene, float(time_s))
+        assert (high > 0.1).all() and (low < 0.9).all(), time_s
+
+
 @pytest.mark.parametrize("name", ["", "nonsense", "5", "-1", "Chase", "1.0", "²", "../chase"])
 def test_unknown_names_are_refused(name: str) -> None:
     with pytest.raises(ConfigError, match=r"^scene: expected one of corner-exit, chase, .*, got ") as caught:
