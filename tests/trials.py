@@ -159,14 +159,15 @@ class Trial:
         return self.record.found[key]
 
     def tests_of(self, file: str, function: str | None) -> Iterator[tuple[str, set[str], float]]:
-        """Files of tests to run for a function, its module's first, then those whose tests are known; the tests that
-        reach it, and their seconds. What runs at import is reached by every test that calls a function of the file."""
+        """Files of tests to run for a function, its module's first, then the nearest; the tests that reach it, and
+        their seconds. What runs at import is reached by every test that calls a function of the file."""
         named, folder = mirrored(ROOT, file)[0], mirrored(ROOT, file)[1] or "tests"
-        left, total_s = chosen_for(ROOT, file, self.users), 0.0
+        nearest, total_s = chosen_for(ROOT, file, self.users), 0.0
+        left = set(nearest)
         if not named:  # those that import it may be few and far
             left |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
         while left:
-            name = min(left, key=lambda name: (name != named, not self.known(name), not name.startswith(folder), name))
+            name = min(left, key=lambda name: (name != named, name not in nearest, not self.known(name), name))
             left.remove(name)
             tests, shared = self.unchanged(name)["tests"], self.unchanged(name).get("shared", ())
 
