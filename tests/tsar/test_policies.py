@@ -61,6 +61,16 @@ def test_pull_push_keeps_known_pixels_and_fills_the_rest():
     assert torch.allclose(filled, torch.full_like(filled, 0.7), atol=1e-5)
 
 
+@pytest.mark.parametrize(("height", "width"), [(20, 32), (32, 20), (5, 7), (1, 3)])
+def test_pull_push_of_other_shapes_is_the_corner_of_the_least_square_around_them(height: int, width: int):
+    random, side = torch.Generator().manual_seed(1), 8 if height == 5 else 4 if height == 1 else 32
+    color, weight = torch.rand(3, height, width, generator=random), torch.rand(1, height, width, generator=random)
+    weight = weight * (weight > 0.8)
+    square, known = torch.zeros(3, side, side), torch.zeros(1, side, side)
+    square[:, :height, :width], known[:, :height, :width] = color, weight
+    assert torch.equal(pull_push(color, weight), pull_push(square, known)[:, :height, :width])
+
+
 @pytest.mark.parametrize("shape", [(3, 8, 8), (1, 5, 7), (2, 1, 1), (3, 4, 256)])
 def test_double_width_is_bilinear_interpolation(shape):
     plane = torch.randn(shape, generator=torch.Generator().manual_seed(0))
