@@ -12,6 +12,7 @@ import ast
 import csv
 import importlib
 import os
+import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from tests.test_architecture import ROOT
-from tests.trials import Trial, digest
+from tests.trials import Record, Trial, digest
 
 MUTATED = ("tsar", "analysis/metrics", "analysis/storage")
 LIBRARIES = (
@@ -40,12 +41,18 @@ class Options:
         count: mutants that are drawn.
         seed: decides which.
         again: whether those that survived are tried again, with the tests as they are now.
+        reach: whether to find out first what every test reaches, which pays from some hundred mutants on.
+        backwards: whether to begin at the end of the sample, for a second process beside the first.
+        hours: time after which no other mutant is begun; 0 only says what is known.
     """
 
     out: Path = Path("out/mutants")
     count: int = 300
     seed: int = 0
     again: bool = False
+    reach: bool = True
+    backwards: bool = False
+    hours: float = 24.0
 
 
 @dataclass(frozen=True, order=True)
@@ -110,15 +117,15 @@ def drawn(count: int, seed: int) -> tuple[list[Mutant], int]:
     return [every[int(place)] for place in rng.permutation(places)], len(every)
 
 
-def tried(trial: Trial, mutant: Mutant, again: bool) -> dict[str, Any] | None:
+def tried(trial: Trial, mutant: Mutant, again: bool, late: bool) -> dict[str, Any] | None:
     """Whether tests notice a mutant; as it was found before, unless a survivor is to be tried again. None if there is
-    no such mutant."""
+    no such mutant, or it is too late to try it."""
     source = (ROOT / mutant.file).read_text(encoding="utf-8")
     key = digest(source, *map(str, asdict(mutant).values()))
     known = trial.record.found.get(key)
-    if known and (known["killed"] or not again):
+    if known and (known["killed"] or not again or late):
         return known
-    changed = mutant.applied(source)
+    changed = None if late else mutant.applied(source)
     if changed is None:
         return None
     killed, by, passing = trial.noticed(mutant.file, mutant.line, changed)
@@ -162,16 +169,18 @@ def main(options: Options) -> None:
     """Draws, runs, says what came of it."""
     out = options.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
-    kept = {"OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(out / "tree")}
-    os.environ.update(kept, TMPDIR=str(out / "tmp"), WARP_CACHE_PATH=str(out / "warp"))
-    (out / "tmp").mkdir(exist_ok=True)
+    tree = out / ("tree2" if options.backwards else "tree")
+    kept = {"OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(tree)}
+    os.environ.update(kept, TMPDIR=f"{tree}.tmp", WARP_CACHE_PATH=f"{out}/warp")
+    Path(f"{tree}.tmp").mkdir(exist_ok=True)
     sample, existing = drawn(options.count, options.seed)
     for name in LIBRARIES:
         importlib.import_module(name)
-    trial, found = Trial(out), list[dict]()
+    end_s, trial = time.monotonic() + 3600.0 * options.hours, Trial(tree, Record(out / "found.jsonl"), options.reach)
+    found = list[dict]()
     try:
-        for number, mutant in enumerate(sample, 1):
-            entry = tried(trial, mutant, options.again)
+        for number, mutant in enumerate(reversed(sample) if options.backwards else sample, 1):
+            entry = tried(trial, mutant, options.again, time.monotonic() >= end_s)
             if entry is None:
                 continue
             found.append(entry)

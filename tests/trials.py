@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ from tests.changed import chosen_for, mirrored, used_by
 from tests.reach import EVERYTHING
 from tests.test_architecture import PACKAGES, ROOT
 
-TESTS_S, FILE_S = 120.0, 240.0
-"""Most seconds of tests for one mutant, and of one file of tests; what would exceed it is left out."""
+TESTS_S, FILE_S = 60, 240
+"""Seconds of CPU time of tests for one mutant, after which no further file is begun, and most of one file of tests."""
 MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
 NONE_FAILED = (0, 5)
 """Exit statuses of pytest: all passed, and none was there."""
@@ -47,13 +47,13 @@ def copied(tree: Path) -> None:
             shutil.copyfile(source, target)
 
 
-def become_tests(tree: Path, file: str, only: set[str] | None, cpu_s: float) -> int:
+def become_tests(tree: Path, file: str, only: set[str] | None, note: bool) -> int:
     """Turns a forked process into one of pytest in the copy; the exit status."""
     os.setsid()
     handle = os.open(tree.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(handle, 1)
     os.dup2(handle, 2)
-    resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s) + 1, int(cpu_s) + 3))
+    resource.setrlimit(resource.RLIMIT_CPU, (FILE_S, FILE_S + 2))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
     for name in [name for name in sys.modules if name.split(".")[0] in (*PACKAGES, "tests")]:
@@ -66,23 +66,26 @@ def become_tests(tree: Path, file: str, only: set[str] | None, cpu_s: float) -> 
     from tests.reach import Chosen, Noted
 
     options = ("-x", "-q", "--tb=line", "-rfE", "-p", "no:cacheprovider", "-p", "no:xdist", f"--basetemp={tree}.tests")
-    plugin = Chosen(only) if only is not None else Noted(tree, tree.with_suffix(".json"))
-    return int(pytest.main([*options, file], [plugin]))
+    plugins = [Noted(tree, tree.with_suffix(".json"))] if note else [Chosen(only)] if only is not None else []
+    return int(pytest.main([*options, file], plugins))
 
 
-def run(tree: Path, file: str, only: set[str] | None, cpu_s: float) -> tuple[int, float, str]:
-    """Runs tests of a file: only some, or all, and notes what each reaches in ``TREE.json``.
+def run(
+    tree: Path, file: str, only: set[str] | None = None, note: bool = False, unchanged: bool = False
+) -> tuple[int, float, str]:
+    """Runs tests of a file, all or only some; may note what each reaches in ``TREE.json``. Bytecode of unchanged code
+    is kept.
 
     Returns:
         Exit status, seconds of CPU time, and the first failure.
     """
-    log, limit_s = tree.with_suffix(".log"), time.monotonic() + 60 + 12 * cpu_s
+    log, limit_s = tree.with_suffix(".log"), time.monotonic() + 12 * FILE_S
     pid = os.fork()
     if not pid:
         status = 99
         try:
-            sys.dont_write_bytecode = only is not None  # that of a mutant is never kept
-            status = become_tests(tree, file, only, cpu_s)
+            sys.dont_write_bytecode = not unchanged
+            status = become_tests(tree, file, only, note)
         finally:
             os._exit(status)
     while not (ended := os.wait4(pid, os.WNOHANG))[0]:
@@ -139,61 +142,78 @@ def function_at(tree: ast.AST, line: int, names: tuple[str, ...] = ()) -> str | 
 
 
 class Trial:
-    """Runs mutants in a copy."""
+    """Runs mutants in a copy.
 
-    def __init__(self, out: Path) -> None:
-        self.tree, self.record, self.users = out / "tree", Record(out / "found.jsonl"), used_by(ROOT)
+    Args:
+        tree: folder of the copy.
+        record: what was found so far.
+        reach: whether what tests reach is found out before files of tests are used; otherwise those of which it is not
+            known run whole.
+    """
+
+    def __init__(self, tree: Path, record: Record, reach: bool) -> None:
+        self.tree, self.record, self.reach, self.users = tree, record, reach, used_by(ROOT)
         copied(self.tree)
 
-    def known(self, file: str) -> bool:
-        """Whether it is known what the tests of a file reach."""
-        return digest(file, (ROOT / file).read_text(encoding="utf-8")) in self.record.found
-
-    def unchanged(self, file: str) -> dict[str, Any]:
-        """What the tests of a file reach, and their seconds, with the code as it is; no tests if one of them fails."""
+    def unchanged(self, file: str) -> dict[str, Any] | None:
+        """What the tests of a file reach, and their seconds, with the code as it is; no tests if one of them fails.
+        None if it is not known and not to be found out."""
         key = digest(file, (ROOT / file).read_text(encoding="utf-8"))
-        if not self.known(file):
-            status, seconds, failure = run(self.tree, file, None, FILE_S)
+        if key not in self.record.found and self.reach:
+            status, seconds, failure = run(self.tree, file, note=True, unchanged=True)
             reached = json.loads(self.tree.with_suffix(".json").read_text()) if status == 0 else {"tests": {}}
             self.record.put(key, file=file, seconds=seconds, failure=failure, **reached)
-        return self.record.found[key]
+        return self.record.found.get(key)
 
-    def tests_of(self, file: str, function: str | None) -> Iterator[tuple[str, set[str], float]]:
-        """Files of tests to run for a function, its module's first, then the nearest; the tests that reach it, and
-        their seconds. What runs at import is reached by every test that calls a function of the file."""
-        named, folder = mirrored(ROOT, file)[0], mirrored(ROOT, file)[1] or "tests"
-        nearest, total_s = chosen_for(ROOT, file, self.users), 0.0
-        left = set(nearest)
-        if not named:  # those that import it may be few and far
-            left |= {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).glob("test_*.py")}
-        while left:
-            name = min(left, key=lambda name: (name != named, name not in nearest, not self.known(name), name))
-            left.remove(name)
-            tests, shared = self.unchanged(name)["tests"], self.unchanged(name).get("shared", ())
+    def files_of(self, file: str) -> list[str]:
+        """Files of tests for a module: its own first, then the nearest."""
+        named, folder = mirrored(ROOT, file)
+        nearest = chosen_for(ROOT, file, self.users)
+        further = (ROOT / folder).glob("test_*.py") if folder and not named else ()  # those that import it may be few
+        found = nearest | {path.relative_to(ROOT).as_posix() for path in further}
+        return sorted(found, key=lambda name: (name != named, name not in nearest, name))
 
-            def reached(places: Iterable[str]) -> bool:
-                wanted = f"{file}:{function or ''}"
-                return any(one in (wanted, EVERYTHING) or (not function and one.startswith(wanted)) for one in places)
+    def reaching(self, name: str, file: str, function: str | None) -> set[str] | None:
+        """The tests of a file that reach a function, or None for all. What runs at import is reached by every test
+        that calls a function of its file."""
+        known = self.unchanged(name)
+        if known is None:
+            return None
+        tests, wanted = known["tests"], f"{file}:{function or ''}"
 
-            only = {one for one, (_, places) in tests.items() if reached(places)}
-            if (function and reached(shared)) or not (function or only):
-                only = set(tests)
-            seconds = self.unchanged(name)["seconds"]
-            seconds -= sum(took for one, (took, _) in tests.items() if one not in only)
-            if only and total_s + seconds <= TESTS_S:
-                total_s += seconds
-                yield name, only, seconds
+        def reached(places: Iterable[str]) -> bool:
+            return any(one in (wanted, EVERYTHING) or (not function and one.startswith(wanted)) for one in places)
+
+        only = {one for one, (_, places) in tests.items() if reached(places)}
+        every = reached(known.get("shared", ())) if function else not only
+        return set(tests) if every else only
+
+    def fails_unchanged(self, failure: str) -> bool:
+        """Whether a test fails also with the code as it is."""
+        test = failure.split(" - ")[0].partition(" ")[2]
+        file, _, name = test.partition("::")
+        if not name:
+            return False
+        key = digest(test, (ROOT / file).read_text(encoding="utf-8"))
+        if key not in self.record.found:
+            self.record.put(key, test=test, status=run(self.tree, file, {test}, unchanged=True)[0])
+        return self.record.found[key]["status"] not in NONE_FAILED
 
     def noticed(self, file: str, line: int, changed: str) -> tuple[bool, str, list[str]]:
         """Whether tests fail with another content of a file, the first failure, and the files that passed."""
         source, target, passing = (ROOT / file).read_text(encoding="utf-8"), self.tree / file, list[str]()
-        for name, only, seconds in self.tests_of(file, function_at(ast.parse(source), line)):
+        function, left_s = function_at(ast.parse(source), line), TESTS_S
+        for name in self.files_of(file):
+            only = self.reaching(name, file, function)
+            if only == set() or left_s < 0.0:
+                continue
             target.write_text(changed, encoding="utf-8")
             try:
-                status, _, failure = run(self.tree, name, only, 20 + 3 * seconds)
+                status, seconds, failure = run(self.tree, name, only)
             finally:
                 target.write_text(source, encoding="utf-8")
-            if status not in NONE_FAILED:
+            left_s -= seconds
+            if status not in NONE_FAILED and not self.fails_unchanged(failure):
                 return True, failure, passing
             passing.append(name)
         return False, "", passing
