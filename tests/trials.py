@@ -25,8 +25,9 @@ from tests.changed import chosen_for, mirrored, used_by
 from tests.reach import EVERYTHING
 from tests.test_architecture import PACKAGES, ROOT
 
-TESTS_S, FILE_S = 60, 240
-"""Seconds of CPU time of tests for one mutant, after which no further file is begun, and most of one file of tests."""
+TESTS_S, FILE_S = 60, 100
+"""Seconds of CPU time of tests for one mutant, after which no further file is begun, and most of one file of tests, three times as
+much with the code as it is."""
 MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
 NONE_FAILED = (0, 5)
 """Exit statuses of pytest: all passed, and none was there."""
@@ -47,13 +48,13 @@ def copied(tree: Path) -> None:
             shutil.copyfile(source, target)
 
 
-def become_tests(tree: Path, file: str, only: set[str] | None, note: bool) -> int:
+def become_tests(tree: Path, file: str, only: set[str] | None, note: bool, cpu_s: int) -> int:
     """Turns a forked process into one of pytest in the copy; the exit status."""
     os.setsid()
     handle = os.open(tree.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(handle, 1)
     os.dup2(handle, 2)
-    resource.setrlimit(resource.RLIMIT_CPU, (FILE_S, FILE_S + 2))
+    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 2))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
     for name in [name for name in sys.modules if name.split(".")[0] in (*PACKAGES, "tests")]:
@@ -79,13 +80,14 @@ def run(
     Returns:
         Exit status, seconds of CPU time, and the first failure.
     """
-    log, limit_s = tree.with_suffix(".log"), time.monotonic() + 12 * FILE_S
+    cpu_s, log = 3 * FILE_S if unchanged else FILE_S, tree.with_suffix(".log")
+    limit_s = time.monotonic() + 12 * cpu_s
     pid = os.fork()
     if not pid:
         status = 99
         try:
             sys.dont_write_bytecode = not unchanged
-            status = become_tests(tree, file, only, note)
+            status = become_tests(tree, file, only, note, cpu_s)
         finally:
             os._exit(status)
     while not (ended := os.wait4(pid, os.WNOHANG))[0]:
