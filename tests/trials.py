@@ -26,8 +26,8 @@ from tests.reach import EVERYTHING
 from tests.test_architecture import PACKAGES, ROOT
 
 TESTS_S, FILE_S = 60, 100
-"""Seconds of CPU time of tests for one mutant, after which no further file is begun, and most of one file of tests, three times as
-much with the code as it is."""
+"""Seconds of CPU time of tests for one mutant, after which no further file is begun, and most of one file of tests. It
+may take three times as much with the code as it is."""
 MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
 NONE_FAILED = (0, 5)
 """Exit statuses of pytest: all passed, and none was there."""
