@@ -31,6 +31,8 @@ may take three times as much with the code as it is."""
 MEMORY_BYTES, FILE_BYTES = 16 << 30, 1 << 30
 NONE_FAILED = (0, 5)
 """Exit statuses of pytest: all passed, and none was there."""
+STOPPED = (-signal.SIGXCPU, -signal.SIGKILL)
+"""Those of tests that took too long, which does not count as noticed: they may also do so with the code as it is."""
 
 
 def copied(tree: Path) -> None:
@@ -168,12 +170,13 @@ class Trial:
         return self.record.found.get(key)
 
     def files_of(self, file: str) -> list[str]:
-        """Files of tests for a module: its own first, then the nearest."""
+        """Files of tests for a module: its own first, then the nearest, those that are known to be long later."""
         named, folder = mirrored(ROOT, file)
         nearest = chosen_for(ROOT, file, self.users)
         further = (ROOT / folder).glob("test_*.py") if folder and not named else ()  # those that import it may be few
         found = nearest | {path.relative_to(ROOT).as_posix() for path in further}
-        return sorted(found, key=lambda name: (name != named, name not in nearest, name))
+        long_s = {one["file"]: one["seconds"] for one in self.record.found.values() if "tests" in one}
+        return sorted(found, key=lambda name: (name != named, name not in nearest, long_s.get(name, 20.0), name))
 
     def reaching(self, name: str, file: str, function: str | None) -> set[str] | None:
         """The tests of a file that reach a function, or None for all. What runs at import is reached by every test
@@ -215,7 +218,7 @@ class Trial:
             finally:
                 target.write_text(source, encoding="utf-8")
             left_s -= seconds
-            if status not in NONE_FAILED and not self.fails_unchanged(failure):
+            if status not in (*NONE_FAILED, *STOPPED) and not self.fails_unchanged(failure):
                 return True, failure, passing
-            passing.append(name)
+            passing.append(name if status not in STOPPED else f"{name} (did not end)")
         return False, "", passing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
 
@@ -9,8 +10,8 @@ from tests.oracles import pictures
 from tests.oracles.screens import Layer, Screen
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
-from tsar.policies import POLICIES, refinement
-from tsar.policy import Policy, Setting, run
+from tsar.policies import POLICIES, interruptible, refinement
+from tsar.policy import Policy, Price, Setting, run
 
 CONFIG = TsarConfig(batch_size=4, resolution_px=64, warmup_cycles=2, tiling=TilingConfig(level_min=1))
 CYCLE_S = 1.0 / 64.0
@@ -108,3 +109,22 @@ def test_contrast_is_of_known_cells_beside() -> None:
     finest = refinement.levels(color, count)[-1].contrast
     assert finest[1, 1] == 1.0 and finest[1, 2] == 0.0 and float(finest[0, 1]) == pytest.approx(1 / 3)
     assert finest[3, 3] == 0.0
+
+
+def test_the_standard_error_of_probes() -> None:
+    """Their encoded colours change by 0.1, 0.2 and 0.5 in every channel."""
+    change, empty = torch.tensor([0.1, 0.2, 0.5]), torch.zeros(0, dtype=torch.int64)
+    before = torch.full((3, 3), 0.09)
+    frame = interruptible.Frame(
+        0.0, before, torch.ones(3), torch.zeros(3, 2, dtype=torch.float64), torch.zeros(3, dtype=torch.int32),
+        torch.zeros(3, 3), torch.arange(3), before,
+    )  # fmt: skip
+    asked = interruptible.Asked(empty, torch.arange(3))
+    found = interruptible._probed(frame, asked, (0.3 + change[:, None]).square().expand(3, 3))
+    squared = np.array([0.01, 0.04, 0.25])
+    assert found == pytest.approx((squared.mean(), squared.std(ddof=1) / 3**0.5), rel=1e-4)
+
+
+def test_the_price_is_the_sum_of_its_parts() -> None:
+    """Refinement 130, pyramid 75, and displacement 42 for each of two buffers."""
+    assert made(moving(0.0)).price == Price(4 * 256, pixel_flops=289.0, sample_flops=34.0)
