@@ -29,7 +29,7 @@ def _study(name: str, *arguments: str) -> Callable[[Path], int]:
     def make(folder: Path) -> int:
         from analysis.study.cases import SCALES, Scale
 
-        tiny = Scale(4, seconds=0.1, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=4)
+        tiny = Scale(4, seconds=0.2, reference_rate_hz=20.0, reference_samples_per_axis=1, stride=4)
         with ExitStack() as stack:
             stack.enter_context(patch.dict(SCALES, quick=tiny))
             stack.enter_context(patch("analysis.study.farm.run_cases", run_here))

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 import torch
 
-from analysis.storage.records import StepWriter, density_quantiles
+from analysis.storage.records import StepWriter, density_quantiles, stage_seconds
 from tests.analysis.builders import ELEMENTS, LIMITS, good_record
 from tests.oracles.steps import read_limits
 from tsar.types import StepRecord
@@ -74,3 +74,15 @@ def test_density_quantiles(tmp_path: Path) -> None:
     assert np.allclose(found["sim_time_s"], 0.01 * np.arange(40))
     assert np.allclose(found["density_spatial"], np.array([1.0, 1.5, 2.0]) + np.arange(40)[:, None])
     assert np.allclose(found["density_temporal"], np.tile([0.25, 0.375, 0.5], (40, 1)))
+
+
+@pytest.mark.parametrize(("cycles", "groups"), [(7, 7), (120, 120), (121, 61), (240, 120), (241, 81)])
+def test_seconds_of_stages_are_medians_of_groups_of_cycles(cycles: int, groups: int, tmp_path: Path) -> None:
+    """At most 120, of equally many cycles but for the last."""
+    records = [good_record(i, stage_s={"tracing": float(i), "error": 1.0}) for i in range(cycles)]
+    times_s, stages = stage_seconds(write(tmp_path / "a.parquet", records))
+    each = -(-cycles // groups)
+    starts = np.arange(0, cycles, each)
+    assert len(times_s) == groups and times_s == pytest.approx(0.01 * starts)
+    assert stages["tracing"].tolist() == [np.median(range(at, min(at + each, cycles))) for at in starts]
+    assert stages["error"].tolist() == [1.0] * groups
