@@ -38,18 +38,42 @@ inline unsigned meet_leaf_alone(const Block* leaf, int triangles, const PacketRa
     return changed;
 }
 
-// Sixteen rays in memory, for access ray by ray: a lane of a vector is written, and often read, through a copy of the
-// whole vector.
+// Constants of sixteen single rays, computed together and kept in memory for access ray by ray: a lane of a vector is
+// written, and often read, through a copy of the whole vector.
 struct LaneRays {
-    alignas(64) float origin[3][LANES], direction[3][LANES];
+    alignas(64) float origin[3][LANES], inverse[3][LANES], inverse_far[3][LANES];
+    alignas(64) float near_origin[3][LANES], far_origin[3][LANES], shear[3][LANES];
+    alignas(64) int fastest[LANES], near_side[3][LANES], far_side[3][LANES];
 
     LaneRays(const Vec16& from, const Vec16& along) {
-        for (int axis = 0; axis < 3; ++axis) store(origin[axis], from[axis]), store(direction[axis], along[axis]);
+        const f16 x = vabs(along.x), y = vabs(along.y), z = vabs(along.z);
+        const i16 by_x = (x >= y) & (x >= z), by_y = y >= z;
+        store(fastest, by_x ? (i16)0 : by_y ? (i16)1 : (i16)2);
+        const Vec16 turned = pick(by_x, {along.y, along.z, along.x}, pick(by_y, {along.z, along.x, along.y}, along));
+        const f16 fast = 1.0f / turned.z;
+        store(shear[0], turned.x * fast), store(shear[1], turned.y * fast), store(shear[2], fast);
+        const f16 pad = PADDING * vmax(vmax(vmax(vabs(from.x), vabs(from.y)), vabs(from.z)), (f16)1.0f);
+        for (int axis = 0; axis < 3; ++axis) {
+            const f16 slowness = reciprocal(along[axis]);
+            const i16 back = slowness < 0.0f;
+            const f16 below = from[axis] - pad, above = from[axis] + pad;
+            store(origin[axis], from[axis]);
+            store(inverse[axis], slowness), store(inverse_far[axis], slowness * ROUNDING_UP);
+            store(near_origin[axis], back ? below : above), store(far_origin[axis], back ? above : below);
+            const i16 low = axis * WIDTH, high = (3 + axis) * WIDTH;
+            store(near_side[axis], back ? high : low), store(far_side[axis], back ? low : high);
+        }
     }
     Single single(int lane) const {
-        const float from[3] = {origin[0][lane], origin[1][lane], origin[2][lane]};
-        const float along[3] = {direction[0][lane], direction[1][lane], direction[2][lane]};
-        return Single(from, along);
+        Single one;
+        one.kz = fastest[lane], one.kx = one.kz == 2 ? 0 : one.kz + 1, one.ky = one.kx == 2 ? 0 : one.kx + 1;
+        for (int axis = 0; axis < 3; ++axis) {
+            one.origin[axis] = origin[axis][lane], one.shear[axis] = shear[axis][lane];
+            one.inverse[axis] = inverse[axis][lane], one.inverse_far[axis] = inverse_far[axis][lane];
+            one.near_origin[axis] = near_origin[axis][lane], one.far_origin[axis] = far_origin[axis][lane];
+            one.near_side[axis] = near_side[axis][lane], one.far_side[axis] = far_side[axis][lane];
+        }
+        return one;
     }
 };
 
