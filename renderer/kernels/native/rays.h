@@ -9,7 +9,7 @@
 namespace packets {
 
 // Number of rays that are traversed in turns through a large tree.
-constexpr int TURNS = 2;
+constexpr int TURNS = 6;
 // Up to this many rays of a packet are tested against a leaf one by one.
 constexpr int FEW = 3;
 
