@@ -3,6 +3,7 @@
 Examples: python scripts/conversion_check.py scene.xml other.lxs --out out/conversion-check
           python scripts/conversion_check.py --markers
           python scripts/conversion_check.py --matrix --samples 64
+          python scripts/conversion_check.py --mutations 20000 scene.xml --root .
 """
 
 from __future__ import annotations

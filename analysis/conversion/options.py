@@ -54,6 +54,11 @@ class CheckOptions:
     """Check the places of known lamps in the pictures, from every format to every other."""
     matrix: bool = False
     """Compare every light and every material in every pair of formats."""
+    mutations: int = 0
+    """Change the scene files (by default the Cornell boxes) at random so many times, read each and count failures,
+    instead of rendering. A run in the same folder goes on where an earlier one was."""
+    seed: int = 0
+    """Seed of these changes."""
     plain: bool = False
     """Also compare both renderers on each scene with every surface matte: a difference is then not due to materials."""
     width_px: int = 160
@@ -65,12 +70,13 @@ class CheckOptions:
     limit_s: float = 240.0
     """Most seconds for each picture."""
     out: Path = Path("out/conversion-check")
-    """Folder for the results; the scenes, pictures, table.csv, markers.csv, matrix.csv, worst.csv, pictures.jpg and
-    summary.json."""
+    """Folder for the results; the scenes, pictures, table.csv, markers.csv, matrix.csv, worst.csv, mutations.csv,
+    pictures.jpg and summary.json."""
 
     def __post_init__(self) -> None:
-        limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0))
-        given = bool(self.scenes) or self.markers or self.matrix
-        require(given, "scenes", "scene files, --markers or --matrix", "none of them")
+        limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0), mutations=(0, 1 << 24),
+                      seed=(0, 1 << 31))  # fmt: skip
+        given = bool(self.scenes) or self.markers or self.matrix or self.mutations > 0
+        require(given, "scenes", "scene files, --markers, --matrix or --mutations", "none of them")
         for scene in self.scenes:
             require(scene.is_file(), "scenes", "scene files", scene)

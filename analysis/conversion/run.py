@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
 
 from analysis.command.cli import bad_input
 from analysis.command.console import Table, frame_table
-from analysis.command.progress import bars
+from analysis.command.progress import Task, bars
 from analysis.conversion.options import CheckOptions, ConvertOptions
 from analysis.storage.files import write_json, write_table
 from analysis.storage.results import own_results
@@ -46,23 +48,42 @@ def check(options: CheckOptions) -> list[Table]:
     from analysis.conversion.check import checked
     from analysis.conversion.markers import marker_offsets
     from analysis.conversion.matrix import GROUPS, matrix_rows, worst
+    from analysis.conversion.mutations import summed
 
     with bad_input():
         written = ("table.csv", "markers.csv", "pictures.jpg", "worst.csv", "matrix.csv", "markers/*",
-                    "matrix/*", "[0-9][0-9]-*/*")  # fmt: skip
+                    "matrix/*", "[0-9][0-9]-*/*", "mutations.csv", "mutations.journal")  # fmt: skip
         own_results(options.out, written)
     with bad_input(), bars() as shown:
-        rows = checked(options, shown.task("scenes", len(options.scenes)))
+        mutations = mutation_rows(options, shown.task("mutations", options.mutations)) if options.mutations else []
+        rows = [] if options.mutations else checked(options, shown.task("scenes", len(options.scenes)))
         markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []
         matrix = (
             matrix_rows(options.out / "matrix", options.samples, options.limit_s, shown.task("matrix", len(GROUPS)))
             if options.matrix
             else []
         )
-        tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix) if matrix else []}
+        tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix) if matrix else [],
+                  "mutations": mutations}  # fmt: skip
         found = {name: part for name, part in tables.items() if part}
         for name, part in found.items():
             write_table(options.out / f"{name}.csv", pd.DataFrame(part))
-        write_summary(options.out, {"rows": rows, "markers": markers, "matrix": matrix}, options, seed=0)
+        write_summary(options.out, {"rows": rows, "markers": markers, "matrix": matrix, "mutations": mutations},
+                      options, seed=options.seed)  # fmt: skip
     brief = [{**row, "losses": len(row["losses"])} for row in rows]
-    return [frame_table(pd.DataFrame(part)) for part in (brief, markers, tables["worst"]) if part]
+    counts = [summed(mutations)] if mutations else []
+    faults = [{"fault": fault} for row in mutations for fault in row["faults"]]
+    return [frame_table(pd.DataFrame(part)) for part in (brief, markers, tables["worst"], counts, faults) if part]
+
+
+def mutation_rows(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
+    """A row for each batch of changed scene files."""
+    from analysis.conversion.mutations import Mutations, sources_in
+    from scenes.loading import asset
+
+    scenes = options.scenes or tuple(asset(f"cornell-box/cornell-box{ending}") for ending in (".pbrt", ".lxs", ".xml"))
+    with TemporaryDirectory() as work:
+        sources = sources_in(Path(work), scenes, options.root)
+        return Mutations(sources, Path(work), options.out / "mutations.journal", options.seed).rows(
+            options.mutations, task
+        )

@@ -2,100 +2,63 @@
 
 from __future__ import annotations
 
-import json
-import resource
-import shutil
-import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenes.canonical import (
-    SceneError,
-)
+from analysis.command.progress import Task
+from analysis.conversion import mutations
+from analysis.conversion.mutations import Mutations, outcome_of, sources_in, summed
+from scenes.canonical import SceneError
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from tests.scenes.formats.files import DATA, DELIVERED, HEAD, MITSUBA, REAL, SENSOR
 
 
-def mutated(content: bytes, rng: np.random.Generator) -> bytes:
-    """A real file with some of it changed, cut, doubled or swapped."""
-    found = bytearray(content)
-    for _ in range(rng.integers(1, 4)):
-        at, size = int(rng.integers(0, len(found) + 1)), int(rng.integers(1, 40))
-        what = rng.integers(0, 5)
-        if what == 0:
-            found[at : at + size] = b""
-        elif what == 1:
-            found[at:at] = found[at : at + size]
-        elif what == 2:
-            found[at : at + 1] = bytes([int(rng.integers(0, 256))])
-        elif what == 3:
-            words = [b" nan ", b" 1e308 ", b" -1 ", b' "', b" [ ", b" ] ", b" 0 ", b"AttributeBegin ", b"AttributeEnd "]
-            found[at:at] = words[rng.integers(0, len(words))]
-        else:
-            found[at:] = found[at:][: int(rng.integers(0, max(1, len(found) - at)))]
-    return bytes(found)
-
-
-def newer(files: list[Path]) -> list[Path]:
-    """The same scenes in the newest formats, beside the files."""
-    made = []
-    for file in files:
-        scene = load_scene_file(file, file.parents[1])
-        for to, ending in (("pbrt4", "-4.pbrt"), ("mitsuba3", "-3.xml")):
-            made.append(file.with_name(f"newer-{file.stem}{ending}"))
-            save_scene_file(scene, made[-1], to)
-    tree = {"type": "scene", "sensor": {"type": "perspective"}, "ball": {"type": "sphere", "radius": 2.0}}
-    tree["floor"] = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}}}
-    made.append(files[0].with_name("newer.json"))
-    made[-1].write_text(json.dumps(tree))
-    return made
-
-
-def fuzz(count: int, folder: Path) -> dict[str, int]:
-    """How many changed files made a scene, and how many a clear error; anything else is raised.
-
-    It prints the longest that a file took, and the most memory that the process had.
-    """
-    shutil.copytree(DATA if REAL else DELIVERED, folder, dirs_exist_ok=True, copy_function=shutil.copyfile)
-    for path in [folder, *folder.rglob("*/")]:
-        path.chmod(0o755)
-    files = [folder / name for name in (*REAL, *MITSUBA)] or sorted(folder.glob("cornell-box.*[blts]"))
-    sources = [(file, file.read_bytes()) for file in (*files, *newer(files))]
-    longest_s, slowest = 0.0, ""
-    outcome = {"scene": 0, "error": 0}
-    for number in range(count):
-        rng = np.random.default_rng([7, number])
-        file, content = sources[rng.integers(0, len(sources))]
-        changed = file.with_name(f"changed{file.suffix}")
-        changed.write_bytes(mutated(content, rng))
-        begun_s = time.perf_counter()
-        try:
-            load_scene_file(changed, folder)
-            outcome["scene"] += 1
-        except SceneError as error:
-            assert "\n" not in str(error) and len(str(error)) < 1000
-            outcome["error"] += 1
-        if time.perf_counter() - begun_s > longest_s:
-            longest_s, slowest = time.perf_counter() - begun_s, f"{file.name}, change {number}"
-    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"{count} files: {outcome}; longest {longest_s:.2f} s ({slowest}), at most {peak_mb:.0f} MB")
-    return outcome
+def changed(count: int, folder: Path) -> dict[str, float]:
+    """What changed files came to; those beside this project are changed where they are, else the delivered ones."""
+    names = [f"{DATA}/{name}" for name in (*REAL, *MITSUBA)]
+    delivered = [DELIVERED / f"cornell-box{ending}" for ending in (".pbrt", ".lxs", ".xml")]
+    sources = sources_in(folder, tuple(map(Path, names)) or tuple(delivered), DATA if names else DELIVERED)
+    return summed(Mutations(sources, folder, folder / "mutations.journal", 7).rows(count, Task()))
 
 
 def test_changed_files_make_a_scene_or_a_clear_error(tmp_path: Path) -> None:
-    outcome = fuzz(300, tmp_path / "files")
-    assert outcome["scene"] > 10 and outcome["error"] > 50
+    found = changed(300, tmp_path)
+    assert found["traceback"] == 0 and found["scene"] > 10 and found["line"] > 50
+    assert found["scene"] + found["line"] == found["files"] == 300
 
 
 @pytest.mark.slow
 def test_many_changed_files(tmp_path: Path) -> None:
-    outcome = fuzz(20_000, tmp_path / "files")
-    assert outcome["scene"] + outcome["error"] == 20_000
+    found = changed(20_000, tmp_path)
+    assert found["scene"] + found["line"] == found["files"] == 20_000
+
+
+def test_tracebacks_hangs_and_memory_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter([("line", "a", "f", 0.1, 9.0), ("traceback", "b", "f", 0.2, 9.0), ("scene", "", "f", 9.0, 9.0),
+                    None, ("scene", "", "f", 0.1, 5000.0)])  # fmt: skip
+    monkeypatch.setattr(mutations, "_Reader", lambda *given: SimpleNamespace(answer=lambda n: next(answers),
+                                                                             end=lambda: None))  # fmt: skip
+    rows = Mutations([], tmp_path, tmp_path / "a.journal").rows(5, Task())
+    found = summed(rows)
+    assert (found["line"], found["traceback"], found["scene"], found["slow"], found["large"]) == (1, 1, 2, 2, 1)
+    assert [fault.split(":")[0] for fault in rows[0]["faults"]] == ["1, f", "2, f", "3", "4, f"]
+    again = Mutations([], tmp_path, tmp_path / "a.journal").rows(5, Task())
+    assert again == rows  # from the journal: there are no more answers
+
+
+def test_other_errors_than_lines_are_tracebacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*given: object) -> None:
+        raise KeyError("x")
+
+    (tmp_path / "a.pbrt").write_text("Nonsense")
+    assert outcome_of(tmp_path / "a.pbrt", tmp_path) == ("line", "a.pbrt:1:1: expected a directive, got 'Nonsense'")
+    monkeypatch.setattr("scenes.formats.conversion.load_scene_file", broken)
+    assert outcome_of(tmp_path / "a.pbrt", tmp_path) == ("traceback", "KeyError: 'x'")
 
 
 WORDS = (
