@@ -15,9 +15,9 @@ RECORDS = tuple(f"tsar.{name}" for name in "checks choices config lazy memory mo
 CANONICAL = ("scenes.canonical", "scenes.arithmetic")
 POSED = (*CANONICAL, "scenes.animation")
 SHARED = tuple(f"scenes.formats.{room}" for room in ("text", "geometry", "appearance", "losses"))
-BESIDE = tuple(f"scenes.{name}" for name in "animation arithmetic daylight loading models pictures".split())
+BESIDE = tuple(f"scenes.{name}" for name in "animation arithmetic daylight loading models pictures viewing".split())
 MEASURED = tuple(f"analysis.{room}" for room in ("command", "storage", "metrics", "page"))
-DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks")
+DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks", "gltf")
 OTHERS = ("renderer", "scenes", "tsar")
 QUESTIONS = (
     "comparison suitability ablation trade precision sensitivity spectrum cost_report conversion bench tracer "

@@ -43,8 +43,8 @@ class SpotLight:
     Attributes:
         intensity: intensity on the axis.
         profile: profile of the fall-off, with ``x`` from 0 at the edge to 1: ``3x² - 2x³`` or ``x⁴`` in the cosine,
-            ``x`` in the angle, or (``secant``) ``x⁴`` in the cosine with the whole light divided by the cosine. The
-            renderer supports the first.
+            ``x`` in the angle, (``secant``) ``x⁴`` in the cosine with the whole light divided by the cosine, or
+            (``quadratic``) ``x²`` in the cosine. The renderer supports the first.
     """
 
     position: Rgb
@@ -52,7 +52,7 @@ class SpotLight:
     intensity: Rgb
     inner_deg: float
     outer_deg: float
-    profile: Literal["hermite", "quartic", "linear", "secant"] = "hermite"
+    profile: Literal["hermite", "quartic", "linear", "secant", "quadratic"] = "hermite"
 
 
 @dataclass(frozen=True, eq=False)

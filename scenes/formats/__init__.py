@@ -23,6 +23,7 @@ FORMATS: Named[Format] = Named(
         "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
         "mitsuba-dictionary": "scenes.formats.mitsuba.declared:MITSUBA_DICTIONARY",
+        "gltf": "scenes.formats.gltf.declared:GLTF",
         "model": "scenes.models.scenes_of_models:MODEL",
     },
 )

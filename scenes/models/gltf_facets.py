@@ -4,7 +4,7 @@ All textures of a material must have the coordinates of its first one; others ar
 maps are not needed, because path tracing computes the light between surfaces.
 
 Source: Khronos Group, "glTF 2.0 specification", section 3.9 and appendix B; extensions KHR_materials_clearcoat,
-KHR_materials_emissive_strength, KHR_materials_ior, KHR_materials_unlit.
+KHR_materials_emissive_strength, KHR_materials_ior, KHR_materials_specular, KHR_materials_unlit.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from scenes.canonical import ConstantTexture, Masked, Material, MetallicRough, NormalMapped, Texture
+from scenes.canonical import ConstantTexture, Emissive, Masked, Material, MetallicRough, NormalMapped, Texture
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import Lookup, Textures, lookup_of
 
-ALONG_PATHS = {"KHR_materials_clearcoat"}
+ALONG_PATHS = {"KHR_materials_clearcoat", "KHR_materials_specular"}
 """Extensions that only this module reads."""
 
 _BLACK = ConstantTexture((0.0, 0.0, 0.0))
@@ -71,17 +71,31 @@ class FacetMaterials:
                 metallic,
                 rough,
                 None if beside is None else self._picture(beside, where, numbers=True),
-                max(float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5)), 1.0),
+                self._index(extensions, where),
                 float(np.clip(coat.get("clearcoatFactor", 0.0), 0.0, 1.0)),
                 float(np.clip(coat.get("clearcoatRoughnessFactor", 0.0), 0.0, 1.0)),
                 rgb(np.maximum(emission, 0.0)),
                 None if glow is None or not (emission > 0.0).any() else self._picture(glow, where),
             )
+            if given.get("doubleSided", False) and found == MetallicRough(
+                _BLACK, 0.0, rough, ior=1.0, emission=found.emission
+            ):
+                found = Emissive(found.emission)
         normal = pictures.get("normalTexture")
         if normal is not None:
             scale = float(given["normalTexture"].get("scale", 1.0))
             found = NormalMapped(found, self._picture(normal, where, numbers=True), scale)
         return self._with_holes(given, found, shared, where)
+
+    def _index(self, extensions: dict[str, Any], where: str) -> float:
+        """The refractive index; 1 for a dielectric without reflection (a specular factor of 0)."""
+        specular = extensions.get("KHR_materials_specular", {})
+        factor = float(specular.get("specularFactor", 1.0))
+        if factor == 0.0:
+            return 1.0
+        if factor != 1.0 or specular.keys() - {"specularFactor"}:
+            self.report.add(where, "KHR_materials_specular", "a reflection by the index alone")
+        return max(float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5)), 1.0)
 
     def _alike(self, name: str, lookup: Lookup, shared: Lookup | None, where: str) -> Lookup | None:
         if shared is not None and lookup.place == shared.place:

@@ -1,6 +1,7 @@
 """The fall-off of spot lights in each renderer, and conversion between the profiles.
 
-Source: PBRT v3 (Pharr, Jakob and Humphreys 2016, sec. 12.3.1); Mitsuba 0.5 documentation, section on spot lights;
+Source: PBRT v3 (Pharr, Jakob and Humphreys 2016, sec. 12.3.1); Mitsuba 0.5 documentation, section on spot lights; the
+fall-off that the glTF extension KHR_lights_punctual recommends;
 ``renderer/kernels/lights.py`` for this project's renderer. The fall-off of LuxCore 2.10 is that of PBRT divided by the
 cosine (measured in ``tests/scenes/formats/test_light.py``).
 """
@@ -22,7 +23,11 @@ _NAMES = {
     "quartic": "by the fourth power in the cosine",
     "linear": "linearly in the angle",
     "secant": "by the fourth power in the cosine, over the cosine",
+    "quadratic": "by the square in the cosine",
 }
+
+_SHARES = {"hermite": 0.5, "quartic": 0.2, "quadratic": 1.0 / 3.0}
+"""Mean of the profile from the edge to the full intensity, over the cosine."""
 
 
 def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
@@ -36,8 +41,7 @@ def flux(profile: str, inner_deg: float, outer_deg: float) -> float:
     if profile == "secant":
         # integral of x⁴ / c over the cosine c, with x = (c - low) / (high - low)
         return _quartic_over(low / (high - low)) - log(high)
-    share = 0.5 if profile == "hermite" else 0.2
-    return 1.0 - high + share * (high - low)
+    return 1.0 - high + _SHARES[profile] * (high - low)
 
 
 def _quartic_over(ratio: float) -> float:

@@ -37,9 +37,13 @@ class Output:
         self._meshes: dict[int, tuple[Mesh, str]] = {}
         self._pictures: dict[int, tuple[NDArray[np.float32], str]] = {}
 
-    def _named(self, folder: str, stem: str, ending: str, parts: Iterable[bytes | memoryview]) -> str:
+    def named(self, folder: str, stem: str, ending: str, parts: Iterable[bytes | memoryview]) -> str:
         """Writes a file whose name contains a hash of its content, so that the files of several scenes in one folder do
-        not collide."""
+        not collide.
+
+        Returns:
+            Its name, relative to the folder of the scene.
+        """
         (self._work / folder).mkdir(exist_ok=True)
         partial, digest = self._work / folder / "partial", hashlib.blake2b(digest_size=4)
         with partial.open("wb") as file:
@@ -58,7 +62,7 @@ class Output:
         """
         if id(mesh) not in self._meshes:
             stem = Path(mesh.source).stem if mesh.source.endswith((".ply", ".obj", ".gz")) else "mesh"
-            self._meshes[id(mesh)] = mesh, self._named("models", stem, ".ply", ply_parts(mesh))
+            self._meshes[id(mesh)] = mesh, self.named("models", stem, ".ply", ply_parts(mesh))
         return self._meshes[id(mesh)][1]
 
     def picture(
@@ -76,7 +80,7 @@ class Output:
             wanted = path.is_file() and path.suffix.lower() in endings
             same = wanted and np.array_equal(loading.read_image(path), image)
             content = path.read_bytes() if same else self._exr_bytes(image)
-            name = self._named("textures", path.stem or "picture", path.suffix.lower() if same else ".exr", [content])
+            name = self.named("textures", path.stem or "picture", path.suffix.lower() if same else ".exr", [content])
             self._pictures[id(image)] = image, name
         return self._pictures[id(image)][1]
 
@@ -93,6 +97,11 @@ class Output:
     def text(self, name: str, content: str) -> None:
         """Writes a text file; the scene's own has the name of :attr:`path`."""
         (self._work / name).write_text(content, encoding="utf-8")
+
+    def content(self, name: str, parts: Iterable[bytes]) -> None:
+        """Writes a binary file from its parts; the scene's own has the name of :attr:`path`."""
+        with (self._work / name).open("wb") as file:
+            file.writelines(parts)
 
     def place(self) -> None:
         """Moves everything into place, the scene's own file last.

@@ -1,0 +1,276 @@
+"""Writer of glTF 2.0 scenes: nodes, meshes, cameras, lights and motion.
+
+The world of glTF has y upwards and no mirrored cameras: scenes with z upwards, or with a mirrored picture, lie below
+one node that turns or mirrors all of them, so that the picture is the same. Radiant units stand for the photometric
+ones of the format, one for one.
+
+Source: Khronos Group, "glTF 2.0 specification"; extension KHR_lights_punctual.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from scenes.animation import look_at, pose_at
+from scenes.arithmetic import arctan, determinant, product, tan
+from scenes.canonical import (
+    Camera,
+    Disk,
+    Emissive,
+    EnvironmentLight,
+    Film,
+    Instance,
+    Light,
+    Mesh,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    Rectangle,
+    Scene,
+    Sphere,
+    SpotLight,
+    SunSky,
+)
+from scenes.canonical.values import Matrix, Rgb, RigidTrack
+from scenes.daylight import sun_light
+from scenes.formats.appearance.spot_profiles import reshaped
+from scenes.formats.geometry.conventions import FAR
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.geometry.orientation import is_closed
+from scenes.formats.geometry.placing import shines
+from scenes.formats.geometry.transform_stack import track_times
+from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
+from scenes.formats.gltf.write_materials import GltfMaterialWriter
+from scenes.formats.losses import LossReport
+from scenes.formats.text.output import Output
+from scenes.viewing import turned_up, up_of
+
+_NEAR, _SHARP_RAD = 1e-3, 1e-6
+_SPARSE = np.iinfo(np.uint16).max
+
+
+@dataclass
+class GltfWriter:
+    """Collects the nodes of a scene."""
+
+    document: Document
+    report: LossReport
+    _roots: list[int] = field(default_factory=list)
+    _channels: list[Json] = field(default_factory=list)
+    _samplers: list[Json] = field(default_factory=list)
+    _lights: list[Json] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._materials = GltfMaterialWriter(self.document, self.report)
+
+    def write(self, scene: Scene) -> None:
+        """Writes a scene."""
+        self._camera(scene.camera, scene.film)
+        for number, instance in enumerate(scene.instances):
+            self._instance(instance, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}")
+        for light in scene.lights:
+            self._light(light)
+        where = scene.name or "scene"
+        if scene.background is not None:
+            self.report.add(where, "a background that lights nothing")
+        if scene.ambient != (0.0, 0.0, 0.0):
+            self.report.add(where, "constant ambient light")
+        self.report.hint("integrator", scene.integrator.kind, "that of the renderer")
+        self.report.hint("sampler", f"{scene.sampler.kind}, {scene.sampler.samples_per_pixel} samples a pixel")
+        self.report.hint("film", f"{scene.film.width_px} x {scene.film.height_px} pixels", "their ratio")
+        if scene.film.filter != "box":
+            self.report.hint("film", f"a filter ({scene.film.filter})", "that of the renderer")
+        roots, turn = self._roots, _turned(scene)
+        if not np.array_equal(turn, np.eye(4)):
+            roots = [self._node({"name": "world", "children": roots}, turn)]
+        self.document.add("scenes", {"name": where, "nodes": roots})
+        if self._lights:
+            self.document.extensions |= self.document.extension("KHR_lights_punctual", {"lights": self._lights})
+        if self._channels:
+            self.document.add("animations", {"channels": self._channels, "samplers": self._samplers})
+
+    def _node(self, values: Json, matrix: Matrix) -> int:
+        if not np.array_equal(matrix, np.eye(4)):
+            values["matrix"] = [float(value) for value in matrix.T.ravel()]
+        return self.document.add("nodes", values)
+
+    def _place(self, values: Json, matrix: Matrix, track: RigidTrack | None = None) -> None:
+        """Adds a node at a place, below a node that moves where it does."""
+        node = self._node(values, matrix)
+        if track is None or len(track.translation) == 1:
+            if track is not None:
+                node = self._node({"children": [node]}, pose_at(track, track.start_s))
+            self._roots.append(node)
+            return
+        children = self.document.once(("motion", id(track)), track, lambda: self._moving(track))
+        children.append(node)
+
+    def _moving(self, track: RigidTrack) -> list[int]:
+        """The children of a new node with the motion of a track; times of glTF begin at zero."""
+        times_s = track_times(track)
+        if times_s[0] < 0.0:
+            self.report.add("motion", "motion before the time zero")
+            times_s = [0.0, *(time_s for time_s in times_s if time_s > 0.0)]
+        from scipy.spatial.transform import Rotation
+
+        poses = np.stack([pose_at(track, time_s) for time_s in times_s])
+        turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+        children: list[int] = []
+        node = self.document.add("nodes", {"name": "motion", "children": children})
+        times = self.document.accessor(np.array(times_s, np.float32), bounds=True)
+        for path, values in (("translation", poses[:, :3, 3]), ("rotation", turns)):
+            accessor = self.document.accessor(values.astype(np.float32))
+            self._samplers.append({"input": times, "output": accessor, "interpolation": "LINEAR"})
+            self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
+        self._roots.append(node)
+        return children
+
+    # --- cameras -----------------------------------------------------------------------------------------------------
+
+    def _camera(self, camera: Camera, film: Film) -> None:
+        wide, high = (side / min(film.width_px, film.height_px) for side in (film.width_px, film.height_px))
+        if isinstance(camera, OrthographicCamera):
+            lens: Json = {"xmag": camera.half_width * wide, "ymag": camera.half_width * high}
+            made = {"type": "orthographic", "orthographic": {**lens, "znear": 0.0, "zfar": FAR}}
+        else:
+            if not isinstance(camera, PerspectiveCamera):
+                self.report.add("camera", type(camera).__name__, "a pinhole of 45 degrees")
+                camera = PerspectiveCamera(camera.to_world)
+            self._losses_of(camera)
+            fov_rad = 2.0 * float(arctan(high * tan(math.radians(camera.fov_deg) / 2.0)))
+            made = {"type": "perspective",
+                    "perspective": {"yfov": fov_rad, "aspectRatio": wide / high, "znear": _NEAR}}  # fmt: skip
+        number = self.document.add("cameras", made)
+        self._place({"name": "camera", "camera": number}, camera.to_world, getattr(camera, "track", None))
+
+    def _losses_of(self, camera: PerspectiveCamera) -> None:
+        if camera.lens_radius > 0.0:
+            self.report.add("camera", f"a lens of radius {camera.lens_radius:g}", "a pinhole")
+        if camera.shift != (0.0, 0.0):
+            self.report.add("camera", "a picture off the viewing direction", "one about it")
+        if camera.shutter_s[0] != camera.shutter_s[1]:
+            self.report.add("camera", "a shutter that is open for some time", "a moment")
+
+    # --- shapes ------------------------------------------------------------------------------------------------------
+
+    def _instance(self, instance: Instance, name: str) -> None:
+        shape, lamp = instance.shape, instance.emission is not None
+        both_sides = not (lamp or instance.one_sided)
+        if not both_sides and not is_closed(shape):
+            what = "the back of a lamp" if lamp else "a surface with a black back"
+            self.report.add(name, what, "not drawn from behind")
+        if isinstance(shape, Disk | Sphere):
+            became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
+            self.report.add(name, f"a {type(shape).__name__.lower()}", became)
+        mesh = _square() if isinstance(shape, Rectangle) else as_mesh(shape)
+        emission = instance.emission if shines(instance) and not isinstance(instance.material, Emissive) else None
+        key = "mesh", id(mesh), id(instance.material), emission, both_sides
+        number, middle = self.document.once(
+            key, (mesh, instance.material), lambda: self._mesh(instance, mesh, emission, both_sides, name)
+        )
+        matrix = instance.to_world
+        if middle is not None:
+            matrix = product(matrix, middle)
+        self._place({"name": name, "mesh": number}, matrix, instance.track)
+
+    def _mesh(
+        self, instance: Instance, mesh: Mesh, emission: Rgb | None, both_sides: bool, name: str
+    ) -> tuple[int, Matrix | None]:
+        """The index of a mesh with its material, and the place of its origin if that was moved."""
+        textured = mesh.uvs is not None and depends_on_uv(instance.material)
+        key = "geometry", id(mesh), textured
+        geometry, middle = self.document.once(key, mesh, lambda: self._geometry(mesh, textured))
+        material = self._materials.material(instance.material, emission, both_sides, name)
+        return self.document.add("meshes", {"name": name, "primitives": [{**geometry, "material": material}]}), middle
+
+    def _geometry(self, mesh: Mesh, textured: bool) -> tuple[Json, Matrix | None]:
+        """Vertices and faces; the format has floats of 32 bits, so that far vertices are given from their middle."""
+        points, middle = mesh.vertices, None
+        if points.dtype.itemsize > 4:
+            middle = np.eye(4)
+            middle[:3, 3] = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            points = points - middle[:3, 3]
+        found = {"POSITION": self.document.accessor(points.astype(np.float32), VERTICES, bounds=True)}
+        if mesh.normals is not None:
+            found["NORMAL"] = self.document.accessor(mesh.normals.astype(np.float32), VERTICES)
+        if textured and mesh.uvs is not None:
+            down = np.stack([mesh.uvs[:, 0], 1.0 - mesh.uvs[:, 1]], axis=1)
+            found["TEXCOORD_0"] = self.document.accessor(down.astype(np.float32), VERTICES)
+        kind = np.uint16 if len(points) <= _SPARSE else np.uint32
+        return {
+            "attributes": found,
+            "indices": self.document.accessor(mesh.faces.ravel().astype(kind), INDICES),
+        }, middle
+
+    # --- lights ------------------------------------------------------------------------------------------------------
+
+    def _light(self, light: Light) -> None:
+        if isinstance(light, EnvironmentLight):
+            self.report.add("light", "light all around")
+            return
+        if isinstance(light, SunSky):
+            if light.part != "sun":
+                self.report.add("light", "the sky")
+            if light.part == "sky":
+                return
+            light = sun_light(light)
+        if isinstance(light, PointLight):
+            place = np.eye(4)
+            place[:3, 3] = light.position
+            self._punctual("point", light.intensity, place)
+        elif isinstance(light, SpotLight):
+            light = reshaped(light, "quadratic", self.report)
+            if light.outer_deg > 90.0:
+                self.report.add("light", f"a spot of {light.outer_deg:g} degrees", "90 degrees")
+            outer = math.radians(min(light.outer_deg, 90.0))
+            inner = min(math.radians(light.inner_deg), outer - _SHARP_RAD)
+            place = _facing(np.array(light.position), np.subtract(light.target, light.position))
+            cone = {"innerConeAngle": max(inner, 0.0), "outerConeAngle": outer}
+            self._punctual("spot", light.intensity, place, spot=cone)
+        else:
+            if light.angle_deg > 0.0:
+                self.report.add("light", f"a sun of {light.angle_deg:g} degrees", "a parallel light")
+            self._punctual("directional", light.irradiance, _facing(np.zeros(3), np.array(light.direction)))
+
+    def _punctual(self, kind: str, strength: Rgb, place: Matrix, **more: Json) -> None:
+        """Adds a light with its node; colours are at most 1."""
+        most = max(strength)
+        color = [part / most for part in strength] if most > 0.0 else [1.0, 1.0, 1.0]
+        self._lights.append({"type": kind, "color": color, "intensity": most, **more})
+        node: Json = {"name": kind}
+        node["extensions"] = self.document.extension("KHR_lights_punctual", {"light": len(self._lights) - 1})
+        self._place(node, place)
+
+
+@cache
+def _square() -> Mesh:
+    """The rectangle, cut so that :mod:`scenes.formats.geometry.recognition` begins at its first corner."""
+    mesh = as_mesh(Rectangle())
+    return Mesh(mesh.vertices, np.array([[0, 1, 3], [1, 2, 3]], np.int32), mesh.normals, mesh.uvs, mesh.source)
+
+
+def _facing(position: np.ndarray, direction: np.ndarray) -> Matrix:
+    """The transform that has -z in a direction."""
+    place = np.eye(4)
+    place[:3, :3] = look_at(np.zeros(3), direction).as_matrix()
+    place[:3, 3] = position
+    return place
+
+
+def _turned(scene: Scene) -> Matrix:
+    """The transform of the world to one with y upwards in which the picture is not mirrored."""
+    turn = np.eye(4) if up_of(scene) == "y" else turned_up("y")
+    if determinant(scene.camera.to_world) < 0.0:
+        turn = product(np.diag([-1.0, 1.0, 1.0, 1.0]), turn)
+    return turn
+
+
+def save_gltf(scene: Scene, output: Output, report: LossReport) -> None:
+    """Writes a scene and its files; they are not in place before the output is placed."""
+    document = Document(output)
+    GltfWriter(document, report).write(scene)
+    document.write()

@@ -1,0 +1,223 @@
+"""Writer of materials and textures of a glTF file.
+
+Source: Khronos Group, "glTF 2.0 specification", sections 3.8 and 3.9; extension KHR_texture_transform, and those of
+:mod:`scenes.formats.gltf.surfaces`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture, Material, ScaleTexture, Texture
+from scenes.canonical.values import Rgb
+from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.spectra import rgb
+from scenes.formats.gltf.document import Document, Json, number_codes, srgb_codes
+from scenes.formats.gltf.surfaces import Surface, surface_of
+from scenes.formats.losses import LossReport
+from scenes.loading import decode_srgb, read_image
+
+_NEAREST, _LINEAR, _LINEAR_LEVELS = 9728, 9729, 9987
+_WRAPS = {"repeat": 10497, "clamp": 33071, "black": 33071}
+_COPIED = (".png", ".jpg", ".jpeg")
+_WHOLE = (1.0, 1.0, 1.0)
+
+
+@dataclass
+class GltfMaterialWriter:
+    """Writes materials, each once."""
+
+    document: Document
+    report: LossReport
+    _surfaces: dict[int, tuple[Material, Surface]] = field(default_factory=dict)
+
+    def material(self, material: Material, emission: Rgb | None, both_sides: bool, where: str) -> int:
+        """The index of a material.
+
+        Args:
+            material: material.
+            emission: radiance of a lamp with this material; None for that of the material.
+            both_sides: whether it is the same on both sides; otherwise its back is not drawn.
+            where: place for messages.
+        """
+        key = "material", id(material), emission, both_sides
+        return self.document.once(key, material, lambda: self._material(material, emission, both_sides, where))
+
+    def _material(self, material: Material, emission: Rgb | None, both_sides: bool, where: str) -> int:
+        surface = surface_of(material, where, self.report)
+        rough: Json = {"metallicFactor": surface.metallic, "roughnessFactor": surface.roughness}
+        made: Json = {"pbrMetallicRoughness": rough, "doubleSided": both_sides}
+        self._base(surface, rough, made, where)
+        if surface.parts is not None:
+            factor, image = self._factored(surface.parts, where, "numbers")
+            rough["roughnessFactor"] = min(surface.roughness * factor[1], 1.0)
+            rough["metallicFactor"] = min(surface.metallic * factor[2], 1.0)
+            if image is not None:
+                rough["metallicRoughnessTexture"] = self._lookup(image, "numbers")
+        if surface.normals is not None:
+            _, image = self._factored(surface.normals, where, "as it is")
+            if image is not None:
+                made["normalTexture"] = {**self._lookup(image, "numbers"), "scale": surface.normal_scale}
+        self._emission(surface, emission, made, where)
+        self._extensions(surface, made)
+        return self.document.add("materials", made)
+
+    def _base(self, surface: Surface, rough: Json, made: Json, where: str) -> None:
+        """Writes the colour and the opacity, which share a picture."""
+        factor, image = self._factored(surface.base, where)
+        if max(factor) > 1.0:
+            self.report.add(where, f"a colour of {max(factor):.3g}", "1")
+        alpha, holes = 1.0, None
+        if surface.opacity is not None:
+            (alpha, _, _), holes = self._factored(surface.opacity, where, "numbers")
+            made["alphaMode"] = "BLEND" if surface.cutoff is None else "MASK"
+            if surface.cutoff is not None:
+                made["alphaCutoff"] = surface.cutoff
+        if image is not None and holes is not None and not _alike(image, holes):
+            self.report.add(where, "holes that lie otherwise than the colours", "their mean")
+            alpha, holes = alpha * mean_of(holes)[0], None
+        rough["baseColorFactor"] = [min(max(float(part), 0.0), 1.0) for part in (*factor, alpha)]
+        if holes is not None:
+            rough["baseColorTexture"] = self._lookup(image or holes, "colour", holes, image is None)
+        elif image is not None:
+            rough["baseColorTexture"] = self._lookup(image, "colour")
+
+    def _emission(self, surface: Surface, emission: Rgb | None, made: Json, where: str) -> None:
+        radiance, glow = surface.emission, surface.glow
+        if emission is not None:
+            if max(radiance) > 0.0:
+                self.report.add(where, "a lamp of a material that shines", "the lamp")
+            radiance, glow = emission, None
+        if max(radiance) <= 0.0:
+            return
+        if glow is not None:
+            factor, image = self._factored(glow, where)
+            radiance = rgb(np.multiply(radiance, factor))
+            if image is not None:
+                made["emissiveTexture"] = self._lookup(image, "colour")
+        strength = max(1.0, *radiance)
+        made["emissiveFactor"] = [part / strength for part in radiance]
+        if strength > 1.0:
+            self._add(made, "emissive_strength", {"emissiveStrength": strength})
+
+    def _extensions(self, surface: Surface, made: Json) -> None:
+        if surface.transmitted:
+            self._add(made, "transmission", {"transmissionFactor": 1.0})
+            if surface.thick:
+                self._add(made, "volume", {"thicknessFactor": 1.0})
+        if surface.ior != 1.5:
+            self._add(made, "ior", {"ior": surface.ior})
+        if surface.specular != 1.0:
+            self._add(made, "specular", {"specularFactor": surface.specular})
+        if surface.coat > 0.0:
+            coat = {"clearcoatFactor": surface.coat, "clearcoatRoughnessFactor": surface.coat_roughness}
+            self._add(made, "clearcoat", coat)
+
+    def _add(self, made: Json, name: str, values: Json) -> None:
+        made.setdefault("extensions", {}).update(self.document.extension(f"KHR_materials_{name}", values))
+
+    def _factored(self, texture: Texture, where: str, mode: str = "colour") -> tuple[Rgb, ImageTexture | None]:
+        """A texture as a colour times an image of values up to 1, or the colour alone; others become their mean.
+
+        Images that 8 bits do not hold are divided by their greatest values, so that what 8 bits come to is the same
+        again. The mode is ``colour``, ``numbers`` (which are not encoded), or ``as it is``.
+        """
+        if isinstance(texture, ConstantTexture):
+            return texture.value, None
+        if isinstance(texture, ScaleTexture):
+            for one, other in ((texture.first, texture.second), (texture.second, texture.first)):
+                if isinstance(one, ConstantTexture):
+                    factor, image = self._factored(other, where, mode)
+                    return rgb(np.multiply(factor, one.value)), image
+        if isinstance(texture, CheckerboardTexture):
+            texture = _checks(texture) or texture
+        if not isinstance(texture, ImageTexture):
+            plain = folded(texture)
+            if type(plain) is not type(texture):
+                return self._factored(plain, where, mode)
+            self.report.add(where, f"texture {type(texture).__name__}", "its mean")
+            return mean_of(texture), None
+        if texture.wrap == "black":
+            self.report.add(where, "a picture that is black beyond its border", "the colours of its border")
+        if mode == "as it is" or _in_bytes(texture.image, mode):
+            return _WHOLE, texture
+        self.report.hint(where, "a picture of more than 8 bits", "8 bits")
+        most = np.maximum(texture.image.reshape(-1, 3).max(axis=0), 0.0)
+        _, image = self.document.once(("scaled", id(texture)), texture, lambda: (texture, _divided(texture, most)))
+        return rgb(most), image
+
+    def _lookup(self, texture: ImageTexture, mode: str, holes: ImageTexture | None = None, white: bool = False) -> Json:
+        """The reference of a material to a texture, with its transform; ``v`` points downwards in glTF."""
+        filters = (_NEAREST, _NEAREST) if texture.filter == "nearest" else (_LINEAR, _LINEAR_LEVELS)
+        wrap = _WRAPS[texture.wrap]
+        sampler = self.document.once(
+            ("sampler", filters, wrap),
+            None,
+            lambda: self.document.add(
+                "samplers", {"magFilter": filters[0], "minFilter": filters[1], "wrapS": wrap, "wrapT": wrap}
+            ),
+        )
+        kept = texture.image, None if holes is None else holes.image
+        source = self.document.once(
+            ("image", id(kept[0]), id(kept[1]), mode, white), kept, lambda: self._image(texture, mode, holes, white)
+        )
+        index = self.document.once(
+            ("texture", source, sampler),
+            None,
+            lambda: self.document.add("textures", {"source": source, "sampler": sampler}),
+        )
+        found: Json = {"index": index}
+        (across, up), (right, above) = texture.uv_scale, texture.uv_offset
+        if (texture.uv_scale, texture.uv_offset) != ((1.0, 1.0), (0.0, 0.0)):
+            change = {"scale": [across, up], "offset": [right, 1.0 - up - above]}
+            found["extensions"] = self.document.extension("KHR_texture_transform", change)
+        return found
+
+    def _image(self, texture: ImageTexture, mode: str, holes: ImageTexture | None, white: bool) -> int:
+        path = Path(texture.source)
+        stem = path.stem or "picture"
+        if mode == "colour" and holes is None and path.suffix.lower() in _COPIED and path.is_file():
+            if np.array_equal(read_image(path), texture.image):
+                return self.document.image(path.read_bytes(), stem, path.suffix.lower().replace(".jpeg", ".jpg"))
+        codes = number_codes(texture.image) if mode == "numbers" else srgb_codes(texture.image)
+        if holes is not None:
+            opacity = number_codes(_as_large(holes.image[..., :1], texture.image.shape))
+            codes = np.full_like(codes, 255) if white else codes
+            codes = np.concatenate([codes, opacity], axis=2)
+        return self.document.picture(codes, stem)
+
+
+def _alike(first: ImageTexture, second: ImageTexture) -> bool:
+    """Whether two pictures lie in the same way."""
+    return (first.uv_scale, first.uv_offset, first.wrap) == (second.uv_scale, second.uv_offset, second.wrap)
+
+
+def _as_large(image: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """An image with another number of rows and columns, by its nearest values."""
+    rows, columns = (np.arange(shape[axis]) * image.shape[axis] // shape[axis] for axis in (0, 1))
+    return image[rows[:, None], columns[None]]
+
+
+def _in_bytes(image: np.ndarray, mode: str) -> bool:
+    """Whether 8-bit sRGB values, or 8-bit numbers, hold an image."""
+    if mode == "colour":
+        return np.array_equal(decode_srgb(srgb_codes(image)), image)
+    return np.array_equal(number_codes(image).astype(np.float32) / np.float32(255.0), image)
+
+
+def _divided(texture: ImageTexture, most: np.ndarray) -> ImageTexture:
+    image = (np.maximum(texture.image, 0.0) / np.where(most > 0.0, most, 1.0)).astype(np.float32)
+    return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, texture.filter, texture.source)
+
+
+def _checks(texture: CheckerboardTexture) -> ImageTexture | None:
+    """Four texels that repeat, in place of squares of two colours."""
+    if not (isinstance(texture.even, ConstantTexture) and isinstance(texture.odd, ConstantTexture)):
+        return None
+    even, odd = texture.even.value, texture.odd.value
+    image = np.array([[odd, even], [even, odd]], np.float32)
+    scale = 0.5 * texture.uv_scale[0], 0.5 * texture.uv_scale[1]
+    return ImageTexture(image, scale, (0.0, 0.0), "repeat", "nearest")
