@@ -1,4 +1,8 @@
-"""Microfacet materials and coats of the canonical scene; conventions as in :mod:`scenes.canonical`."""
+"""Microfacet materials and coats of the canonical scene; conventions as in :mod:`scenes.canonical`.
+
+A material with an ``alpha`` has the alpha of its microfacets, along both tangent axes, from that texture; its
+``roughness`` is the mean. The renderer uses the mean.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +22,7 @@ class Metal:
     roughness: tuple[float, float] = (0.0, 0.0)
     reflectance_scale: Texture = WHITE
     distribution: Literal["beckmann", "ggx"] = "ggx"
+    alpha: Texture | None = None
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,7 @@ class Glossy:
     diffuse: Texture
     specular: Texture
     roughness: tuple[float, float] = (0.1, 0.1)
+    alpha: Texture | None = None
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,7 @@ class Plastic:
         roughness: microfacet alpha of the coat.
         layered: whether the coat attenuates light to and from the base (Mitsuba); otherwise the reflection of the coat
             is added to the base (PBRT).
+        alpha: texture of the microfacet alpha, of which ``roughness`` is the mean.
     """
 
     diffuse: Texture
@@ -46,6 +53,7 @@ class Plastic:
     ior: float = 1.5
     roughness: float = 0.0
     layered: bool = True
+    alpha: Texture | None = None
 
 
 @dataclass(frozen=True)

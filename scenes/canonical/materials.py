@@ -88,6 +88,7 @@ class Glass:
         thin: whether it is a pane without thickness: light passes undeflected, and reflections between its faces are
             summed.
         spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill uniformly.
+        alpha: texture of the microfacet alpha, of which ``roughness`` is the mean; the renderer uses the mean.
     """
 
     reflectance: Texture = WHITE
@@ -96,6 +97,7 @@ class Glass:
     roughness: tuple[float, float] = (0.0, 0.0)
     thin: bool = False
     spread_deg: float = 0.0
+    alpha: Texture | None = None
 
     def __post_init__(self) -> None:
         _check_spread("Glass.spread_deg", self.spread_deg)

@@ -50,8 +50,10 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.daylight import sky_map, sun_light
+from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.indices import reflectance_of_index
+from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
@@ -165,6 +167,10 @@ class Approximation:
         return self._materials[id(material)][1]
 
     def _material(self, material: Material, where: str) -> Material:
+        if isinstance(material, Metal | Glass | Glossy | Plastic):
+            material = with_even_facets(material, where, self.report)
+        if isinstance(material, MetallicRough) and not self.paths:
+            return self.material(simpler(material, where, self.report), where)
         if self.paths and (
             isinstance(material, PATH_MATERIALS) or (isinstance(material, Plastic) and material.layered)
         ):

@@ -157,7 +157,8 @@ def added_metal(material: Plastic, where: str, report: LossReport) -> Material:
     if greatest_of(material.specular) > share + 1e-6:
         report.add(where, "a coat and a base that reflect more than the incident light", "a darker coat")
     coat = _capped(material.specular, 1.0 / share)
-    metal = Metal(grey(material.ior), grey(0.0), (material.roughness, material.roughness), coat)
+    alphas = material.roughness, material.roughness
+    metal = Metal(grey(material.ior), grey(0.0), alphas, coat, alpha=material.alpha)
     return MixMaterial(Matte(_scaled(material.diffuse, 1.0 / (1.0 - share))), metal, ConstantTexture(grey(share)))
 
 
@@ -175,7 +176,7 @@ def plastic_of(material: MixMaterial) -> Material:
         product_of(base.reflectance, ConstantTexture(grey(1.0 - share))),
         product_of(coat.reflectance_scale, ConstantTexture(grey(share))),
     )
-    return Plastic(*parts, coat.eta[0], coat.roughness[0], layered=False)
+    return Plastic(*parts, coat.eta[0], coat.roughness[0], layered=False, alpha=coat.alpha)
 
 
 def added_coat(material: Plastic) -> Material:
@@ -185,5 +186,5 @@ def added_coat(material: Plastic) -> Material:
         return Matte(material.diffuse)
     share, straight = coat_share(material), ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
     alpha = max(material.roughness, 1e-3)
-    coat = Glossy(BLACK.reflectance, _capped(material.specular, straight / share), (alpha, alpha))
+    coat = Glossy(BLACK.reflectance, _capped(material.specular, straight / share), (alpha, alpha), material.alpha)
     return MixMaterial(Matte(_scaled(material.diffuse, 1.0 / (1.0 - share))), coat, ConstantTexture(grey(share)))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from scenes.canonical import (
     ConstantTexture,
     HeightField,
+    ImageTexture,
     Material,
     Metal,
     MetallicRough,
@@ -13,9 +16,10 @@ from scenes.canonical import (
     Plastic,
     Texture,
 )
-from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.facets import Facets, facets_of
+from scenes.formats.appearance.folding import changed, folded, greatest_of, mean_of
 from scenes.formats.appearance.indices import index_of_reflectance
-from scenes.formats.appearance.spectra import grey
+from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 
 ALPHA_MIN = 1e-3
@@ -31,24 +35,50 @@ def simpler(material: HeightField | NormalMapped | MetallicRough, where: str, re
         report.add(where, "a normal map", "the normals of the shape")
         return material.base
     report.add(where, "a metallic-roughness surface", "plastic and metal of its parameters")
-    _, roughness, metallic = (1.0, 1.0, 1.0) if material.parts is None else mean_of(material.parts)
-    if material.parts is not None:
-        report.add(where, "textures of metallic and roughness", "their means")
     if material.coat > 0.0:
         report.add(where, "a clear coat")
     if max(material.emission) > 0.0:
         report.add(where, "the light of a surface that also reflects")
-    alpha = max((material.roughness * roughness) ** 2, ALPHA_MIN)
-    plastic = Plastic(material.base, ior=material.ior, roughness=alpha, layered=False)
-    share = min(material.metallic * metallic, 1.0)
-    return plastic if share == 0.0 else mixed(plastic, metal_of(material.base, alpha), ConstantTexture(grey(share)))
+    least = max(material.roughness**2, ALPHA_MIN)
+    rough = Facets((least, least))
+    share: Texture = ConstantTexture(grey(material.metallic))
+    if material.parts is not None:
+        rough, share = _of_parts(material, material.parts, where, report)
+    plastic = Plastic(material.base, ior=material.ior, roughness=rough.roughness[0], layered=False, alpha=rough.alpha)
+    return plastic if greatest_of(share) == 0.0 else mixed(plastic, metal_of(material.base, rough), share)
 
 
-def metal_of(base: Texture, alpha: float) -> Metal:
+def _of_parts(material: MetallicRough, parts: Texture, where: str, report: LossReport) -> tuple[Facets, Texture]:
+    """The roughness and the metallic share of a surface with a texture of both."""
+
+    def alpha(values: np.ndarray) -> np.ndarray:
+        return np.repeat(np.maximum((material.roughness * values[..., 1:2]) ** 2, ALPHA_MIN), 3, axis=-1)
+
+    def metal(values: np.ndarray) -> np.ndarray:
+        return np.repeat(np.clip(material.metallic * values[..., 2:3], 0.0, 1.0), 3, axis=-1)
+
+    made = [changed(folded(parts), change) for change in (alpha, metal)]
+    if made[0] is None or made[1] is None:
+        report.add(where, "textures of metallic and roughness", "their means")
+        made = [ConstantTexture(rgb(change(np.array(mean_of(parts))))) for change in (alpha, metal)]
+    facets = facets_of(_plain(made[0]))
+    assert facets is not None
+    return facets, _plain(made[1])
+
+
+def _plain(texture: Texture | None) -> Texture:
+    """A texture, or its colour if it is the same everywhere."""
+    assert texture is not None
+    if isinstance(texture, ImageTexture) and np.ptp(texture.image) == 0.0:
+        return ConstantTexture(rgb(texture.image[0, 0]))
+    return texture
+
+
+def metal_of(base: Texture, facets: Facets) -> Metal:
     """A metal with a colour at normal incidence; with a texture, the colour is the same at all angles."""
     if isinstance(base, ConstantTexture):
-        return Metal(*index_of_reflectance(base.value), (alpha, alpha))
-    return Metal(grey(0.0), grey(1.0), (alpha, alpha), base)
+        return Metal(*index_of_reflectance(base.value), facets.roughness, alpha=facets.alpha)
+    return Metal(grey(0.0), grey(1.0), facets.roughness, base, alpha=facets.alpha)
 
 
 def mixed(first: Material, second: Material, amount: Texture) -> Material:

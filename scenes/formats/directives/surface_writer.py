@@ -13,10 +13,13 @@ from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
     Emissive,
+    Glass,
+    Glossy,
     HeightField,
     ImageTexture,
     Material,
     Matte,
+    Metal,
     MetallicRough,
     Mirror,
     MixTexture,
@@ -25,6 +28,7 @@ from scenes.canonical import (
     ScaleTexture,
     Texture,
 )
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import folded, height_of
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.directives.textures import Pair
@@ -144,6 +148,12 @@ class SurfaceWriter:
         line, height = self.material_line(material.base, name), folded(height_of(material))
         return line if isinstance(height, ConstantTexture) else f"{line} {self.texture(height, parameter, 'float')}"
 
+    def facets(self, facets: Facets | Metal | Glass | Glossy) -> str:
+        """Parameters of the roughness along both directions of a surface, or of its texture."""
+        if facets.alpha is None:
+            return roughness_pair(facets.roughness)
+        return " ".join(self.texture(facets.alpha, name, "float") for name in ("uroughness", "vroughness"))
+
     def plain_material(self, material: Material, where: str) -> tuple[str, list[str]]:
         """Kind and parameters of a material that contains no other material."""
         if isinstance(material, Matte):
@@ -170,5 +180,5 @@ def mixture_line(first: str, second: str, amount: str) -> str:
 
 
 def roughness_pair(alphas: Pair) -> str:
-    """Parameters of the roughness along both directions of a surface."""
+    """Parameters of the constant roughness along both directions of a surface."""
     return f'"float uroughness" [ {number(alphas[0])} ] "float vroughness" [ {number(alphas[1])} ]'

@@ -18,7 +18,8 @@ from scenes.canonical import (
     SceneError,
     Texture,
 )
-from scenes.formats.appearance.folding import mean_of, product_of
+from scenes.formats.appearance.facets import Facets, facets_of
+from scenes.formats.appearance.folding import ValueChange, mean_of, product_of
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb, sampled_rgb, xyz_to_rgb
 from scenes.formats.directives.names import Names, Of
 from scenes.formats.directives.syntax import Parameters
@@ -29,6 +30,7 @@ _WRAPS = ("repeat", "clamp", "black")
 _NO_TEXTURES = ("windy", "fbm", "wrinkled", "marble", "dots", "uv", "bilerp")
 
 Pair = tuple[float, float]
+Names3 = tuple[str, str, str]
 
 
 @dataclass
@@ -113,6 +115,36 @@ class TextureReader:
         if not isinstance(found, ConstantTexture):
             self.report.add(str(parameters.place), f"{name}: a texture", f"its mean, {value:g}")
         return value
+
+    def facets(
+        self, parameters: Parameters, names: Names3, default: float, change: ValueChange | None = None
+    ) -> Facets:
+        """The roughness of a material, which is given for both tangent axes together or for each.
+
+        Textures that differ along the axes, or that are not plain, become their means, which is reported.
+
+        Args:
+            parameters: parameters of the material.
+            names: names for both axes (or empty), for u and for v.
+            default: roughness if it is not given.
+            change: alpha of given values.
+
+        Raises:
+            SceneError: a roughness is negative.
+        """
+        even = names[0] if names[0] in parameters else ""
+        given = [name if name in parameters else even for name in names[1:]]
+        if all(given) and all(parameters.types.get(name) == "texture" for name in given):
+            first, second = (self.texture(parameters, name, grey(default), "float") for name in given)
+            found = facets_of(first, change) if first is second else None
+            if found is not None:
+                return found
+        both = self.scalar(parameters, names[0], default) if names[0] else default
+        pair = np.array([self.scalar(parameters, name, both) for name in names[1:]])
+        if pair.min() < 0.0:
+            raise SceneError(f"{parameters.place}: roughness: expected no negative number, got {pair.min():g}")
+        u, v = (pair if change is None else change(pair)).tolist()
+        return Facets((u, v))
 
     def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
         """The texture that a ``Texture`` directive defines, of colours or floats."""

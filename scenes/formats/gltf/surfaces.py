@@ -38,13 +38,15 @@ from scenes.canonical import (
 )
 from scenes.canonical.textures import WHITE
 from scenes.canonical.values import Rgb
-from scenes.formats.appearance.folding import greatest_of, mean_of, product_of
+from scenes.formats.appearance.facets import with_even_facets
+from scenes.formats.appearance.folding import changed, folded, greatest_of, mean_of, product_of
 from scenes.formats.appearance.indices import index_of_reflectance, reflectance_of_index
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.losses import LossReport
 
 BLACK: Rgb = (0.0, 0.0, 0.0)
+Rough = Glass | Metal | Glossy | Plastic
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,10 +97,14 @@ def surface_of(material: Material, where: str, report: LossReport) -> Surface:
     if isinstance(material, Emissive):
         return Surface(ConstantTexture(BLACK), specular=0.0, emission=material.radiance)
     if isinstance(material, Glass):
-        return _glass(material, where, report)
-    if isinstance(material, Mirror | Metal):
+        return _textured(_glass(material, where, report), material, where, report)
+    if isinstance(material, Mirror):
         return _metal(material, where, report)
-    if isinstance(material, Glossy | Plastic | Uber | Phong):
+    if isinstance(material, Metal):
+        return _textured(_metal(material, where, report), material, where, report)
+    if isinstance(material, Glossy | Plastic):
+        return _textured(_coated(material, where, report), material, where, report)
+    if isinstance(material, Uber | Phong):
         return _coated(material, where, report)
     if isinstance(material, MixMaterial):
         return _mixed(material, where, report)
@@ -126,6 +132,19 @@ def roughness_of(alphas: tuple[float, float], where: str, report: LossReport) ->
     if alphas[0] != alphas[1]:
         report.add(where, f"facets of two alphas ({alphas[0]:g}, {alphas[1]:g})", "of one, their geometric mean")
     return min(math.sqrt(math.sqrt(alphas[0] * alphas[1])), 1.0)
+
+
+def _textured(made: Surface, material: Rough, where: str, report: LossReport) -> Surface:
+    """A surface with the texture of the roughness, if its material has one."""
+    if material.alpha is None or (made.transmitted and not made.thick):
+        return made
+    root = changed(
+        folded(material.alpha), lambda alphas: np.sqrt(np.clip(alphas, 0.0, 1.0)) * (0.0, 1.0, 0.0) + (0.0, 0.0, 1.0)
+    )
+    if root is None:
+        with_even_facets(material, where, report)
+        return made
+    return dataclasses.replace(made, roughness=1.0, parts=root)
 
 
 def _glass(material: Glass, where: str, report: LossReport) -> Surface:

@@ -25,6 +25,7 @@ from scenes.canonical import (
     Texture,
     Translucent,
 )
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.indices import index_of_reflectance
 from scenes.formats.appearance.mixtures import NOTHING, is_nothing, mixture_of
@@ -97,17 +98,17 @@ class LuxSurfaces(SurfaceFactory):
     def _mirror(self, parameters: Parameters) -> Material:
         return Mirror(self.texture(parameters, "Kr", grey(1.0)))
 
-    def _alphas(self, parameters: Parameters, default: float) -> tuple[float, float]:
-        return self.scalar(parameters, "uroughness", default), self.scalar(parameters, "vroughness", default)
+    def _facets(self, parameters: Parameters, default: float) -> Facets:
+        return self.facets(parameters, ("", "uroughness", "vroughness"), default)
 
     def _glass(self, parameters: Parameters) -> Material:
         parts = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
         rough = parameters.text("type", "glass") == "roughglass"
-        alphas = self._alphas(parameters, 0.001) if rough else (0.0, 0.0)
+        facets = self._facets(parameters, 0.001) if rough else Facets((0.0, 0.0))
         if "cauchyb" in parameters and self.scalar(parameters, "cauchyb", 0.0):
             self.report.add(str(parameters.place), "dispersion (cauchyb)", "one index for all colours")
         thin = parameters.truth("architectural", False)
-        return Glass(*parts, self.scalar(parameters, "index", 1.5), alphas, thin)
+        return Glass(*parts, self.scalar(parameters, "index", 1.5), facets.roughness, thin, alpha=facets.alpha)
 
     def _named_metal(self, parameters: Parameters) -> Material:
         name = parameters.text("name", "aluminium")
@@ -116,7 +117,8 @@ class LuxSurfaces(SurfaceFactory):
             self.report.add(str(parameters.place), f"the metal {name!r}, which is not known", "aluminium")
             index = metal("Al")
         assert index is not None
-        return Metal(*index, self._alphas(parameters, 0.001))
+        facets = self._facets(parameters, 0.001)
+        return Metal(*index, facets.roughness, alpha=facets.alpha)
 
     def _metal(self, parameters: Parameters) -> Material:
         name = parameters.text("fresnel", "")
@@ -125,7 +127,8 @@ class LuxSurfaces(SurfaceFactory):
             self.report.add(str(parameters.place), f"fresnel texture {name!r}, which is not defined", "aluminium")
             index = metal("Al")
         assert index is not None
-        return Metal(*index, self._alphas(parameters, 0.001))
+        facets = self._facets(parameters, 0.001)
+        return Metal(*index, facets.roughness, alpha=facets.alpha)
 
     def _glossy(self, parameters: Parameters) -> Material:
         parts = self.texture(parameters, "Kd", grey(0.5)), self.texture(parameters, "Ks", grey(0.5))
@@ -134,7 +137,8 @@ class LuxSurfaces(SurfaceFactory):
             parameters.asked.add("d")
         if parameters.truth("multibounce", False):
             self.report.add(str(parameters.place), "bounces between the facets of the coat (multibounce)", "one")
-        return Glossy(*parts, self._alphas(parameters, 0.1))
+        facets = self._facets(parameters, 0.1)
+        return Glossy(*parts, facets.roughness, facets.alpha)
 
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)

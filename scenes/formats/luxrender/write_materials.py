@@ -26,11 +26,12 @@ from scenes.canonical import (
     Translucent,
     Uber,
 )
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.mixtures import added_coat, dimmed, lobes_of
 from scenes.formats.appearance.spectra import METALS, rgb
-from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line, roughness_pair
+from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line
 from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.text.numbers import listed, number
 
@@ -102,21 +103,21 @@ class LuxSurfaceWriter(SurfaceWriter):
     def _coated(self, material: Glossy | Plastic | Phong, where: str) -> tuple[str, list[str]]:
         """A material that is, or is replaced by, a coat over a diffuse base."""
         if isinstance(material, Glossy):
-            parts = material.diffuse, material.specular, material.roughness
+            parts = material.diffuse, material.specular, Facets(material.roughness, material.alpha)
         elif isinstance(material, Plastic):
             fresnel = ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
             coat = ConstantTexture(rgb(fresnel * np.array(mean_of(material.specular))))
             alpha = max(material.roughness, 1e-3)
-            parts = material.diffuse, coat, (alpha, alpha)
+            parts = material.diffuse, coat, Facets((alpha, alpha), material.alpha)
             self.report.add(
                 where, "plastic", f"glossy that reflects {fresnel:.3g} of its highlight at normal incidence"
             )
         else:
             alpha = math.sqrt(2.0 / (material.exponent + 2.0))
             mirror = np.array(material.specular) + material.fresnel_min * np.array(material.mirror_tint)
-            parts = material.diffuse, ConstantTexture(rgb(mirror)), (alpha, alpha)
+            parts = material.diffuse, ConstantTexture(rgb(mirror)), Facets((alpha, alpha))
             self.report.add(where, "Phong reflection with a Fresnel-weighted mirror", f"glossy of alpha {alpha:.3g}")
-        textures = [self.texture(parts[0], "Kd"), self.texture(parts[1], "Ks"), roughness_pair(parts[2])]
+        textures = [self.texture(parts[0], "Kd"), self.texture(parts[1], "Ks"), self.facets(parts[2])]
         return "glossy", [*textures, '"bool multibounce" [ "false" ]']
 
     def _glass(self, material: Glass, where: str) -> tuple[str, list[str]]:
@@ -125,7 +126,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
         parts.append(f'"float index" [ {number(material.ior)} ]')
         if material.roughness != (0.0, 0.0):
-            return "roughglass", [*parts, roughness_pair(material.roughness)]
+            return "roughglass", [*parts, self.facets(material)]
         return "glass", [*parts, f'"bool architectural" [ "{str(material.thin).lower()}" ]']
 
     def _metal(self, material: Metal, where: str) -> tuple[str, list[str]]:
@@ -142,7 +143,7 @@ class LuxSurfaceWriter(SurfaceWriter):
             self.lines.append(f'\tTexture "{label}" "fresnel" "fresnelcolor" "color Kr" {listed(color)}')
             if material.k != (0.0, 0.0, 0.0) or not plain:
                 self.report.add(where, "the complex index of a metal", "its colour at normal incidence")
-        return "metal2", [f'"texture fresnel" [ "{label}" ]', roughness_pair(material.roughness)]
+        return "metal2", [f'"texture fresnel" [ "{label}" ]', self.facets(material)]
 
 
 def _even(scale: Texture) -> bool:

@@ -21,12 +21,14 @@ from scenes.canonical import (
     Matte,
     Metal,
     MixMaterial,
+    NormalMapped,
     Phong,
     Plastic,
     SceneError,
     Translucent,
 )
 from scenes.formats.appearance.coats import without_bounces
+from scenes.formats.appearance.facets import Facets, facets_of
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.mixtures import NOTHING, plastic_of
 from scenes.formats.appearance.spectra import grey, metal
@@ -59,7 +61,7 @@ class MitsubaSurfaces(MitsubaTextures):
             "phong": self._phong, "ward": self._ward, "difftrans": self._difftrans, "twosided": self._twosided,
             "mask": self._mask, "blendbsdf": self._blend, "mixturebsdf": self._mixture, "bump": self._bump,
             "bumpmap": self._bump, "coating": self._coating, "roughcoating": self._coating,
-            "normalmap": self._coating, "principled": lambda found: principled(found, self),
+            "normalmap": self._normal_map, "principled": lambda found: principled(found, self),
         }  # fmt: skip
         kind, properties = node.get("type"), Properties(node, self.report)
         self._deep += 1
@@ -117,13 +119,22 @@ class MitsubaSurfaces(MitsubaTextures):
 
     def _scalar(self, properties: Properties, name: str, default: float) -> float:
         """A number; a texture that is not constant becomes its mean, which is reported."""
-        if not any(child.tag in ("texture", "ref") and child.get("name") == name for child in properties.rest):
+        if not _is_texture(properties, name):
             return properties.number(name, default)
         found = self.texture(properties, name, grey(default))
         value = sum(mean_of(found)) / 3.0
         if not isinstance(found, ConstantTexture):
             self.report.add(properties.where, f"{name}: a texture", f"its mean, {value:g}")
         return value
+
+    def _facets(self, properties: Properties) -> Facets:
+        """The roughness: a texture if ``alpha`` is one and the two axes have no own."""
+        if not any(child.get("name") in ("alphaU", "alphaV") for child in properties.node.children):
+            given = self.texture(properties, "alpha", grey(0.1)) if _is_texture(properties, "alpha") else None
+            found = None if given is None else facets_of(given)
+            if found is not None:
+                return found
+        return Facets(self._alphas(properties))
 
     def _alphas(self, properties: Properties) -> tuple[float, float]:
         even = self._scalar(properties, "alpha", 0.1)
@@ -154,12 +165,12 @@ class MitsubaSurfaces(MitsubaTextures):
             self.texture(properties, "specularReflectance", grey(1.0)),
             self.texture(properties, "specularTransmittance", grey(1.0)),
         )
-        alphas = (0.0, 0.0)
+        facets = Facets((0.0, 0.0))
         if kind == "roughdielectric":
-            alphas = self._alphas(properties)
+            facets = self._facets(properties)
             if self._distribution(properties) != "ggx":
                 self.report.add(properties.where, "the distribution beckmann of glass", "ggx")
-        return Glass(*parts, index, alphas, kind == "thindielectric")
+        return Glass(*parts, index, facets.roughness, kind == "thindielectric", alpha=facets.alpha)
 
     def _conductor(self, properties: Properties) -> Material:
         name = properties.text("material", "Cu")
@@ -178,8 +189,8 @@ class MitsubaSurfaces(MitsubaTextures):
         scale = self.texture(properties, "specularReflectance", grey(1.0))
         if properties.node.get("type") == "conductor":
             return Metal(index[0], index[1], (0.0, 0.0), scale)
-        kind = self._distribution(properties)
-        return Metal(index[0], index[1], self._alphas(properties), scale, kind)  # type: ignore[arg-type]
+        kind, facets = self._distribution(properties), self._facets(properties)
+        return Metal(index[0], index[1], facets.roughness, scale, kind, facets.alpha)  # type: ignore[arg-type]
 
     def _plastic(self, properties: Properties) -> Material:
         index = ior(properties, "intIOR", "polypropylene") / ior(properties, "extIOR", "air")
@@ -189,14 +200,15 @@ class MitsubaSurfaces(MitsubaTextures):
         )
         if properties.truth("nonlinear", False):
             parts = without_bounces(parts[0], index, properties.where, self.report), parts[1]
-        alpha = 0.0
+        alpha, facets = 0.0, Facets((0.0, 0.0))
         if properties.node.get("type") == "roughplastic":
-            alphas = self._alphas(properties)
+            facets = self._facets(properties)
+            alphas = facets.roughness
             alpha = math.sqrt(alphas[0] * alphas[1])
             if alphas[0] != alphas[1]:
                 self.report.add(properties.where, "a coat of two roughnesses", f"one of alpha {alpha:.3g}")
             self._distribution(properties)
-        return Plastic(*parts, index, alpha)
+        return Plastic(*parts, index, alpha, alpha=facets.alpha)
 
     def _phong(self, properties: Properties) -> Material:
         specular = mean_of(self.texture(properties, "specularReflectance", grey(0.2)))
@@ -213,7 +225,8 @@ class MitsubaSurfaces(MitsubaTextures):
             self.texture(properties, "diffuseReflectance", grey(0.5)),
             self.texture(properties, "specularReflectance", grey(0.2)),
         )
-        return Glossy(*parts, self._alphas(properties))
+        facets = self._facets(properties)
+        return Glossy(*parts, facets.roughness, facets.alpha)
 
     def _difftrans(self, properties: Properties) -> Material:
         return Translucent(ConstantTexture(grey(0.0)), self.texture(properties, "transmittance", grey(0.5)))
@@ -258,8 +271,16 @@ class MitsubaSurfaces(MitsubaTextures):
             raise SceneError(f"{properties.where}: bump: expected a texture inside")
         return Bumped(self.one_inner(properties), self.made_texture(heights[0]), properties.number("scale", 1.0))
 
+    def _normal_map(self, properties: Properties) -> Material:
+        normals = self.texture(properties, "normalmap", (0.5, 0.5, 1.0))
+        return NormalMapped(self.one_inner(properties), normals)
+
     def _coating(self, properties: Properties) -> Material:
         properties.asked.update(properties.given)
         properties.asked.update(child.get("name") for child in properties.rest)
         self.report.add(properties.where, f"{properties.node.get('type')} over a material", "the material alone")
         return self.one_inner(properties)
+
+
+def _is_texture(properties: Properties, name: str) -> bool:
+    return any(child.tag in ("texture", "ref") and child.get("name") == name for child in properties.rest)

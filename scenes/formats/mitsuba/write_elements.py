@@ -96,6 +96,14 @@ class ElementWriter:
             self.report.add(name, f"texture {type(texture).__name__}", "its mean")
             self.color(parent, name, mean_of(texture))
 
+    def numbers(self, parent: Element, texture: Texture, name: str) -> None:
+        """Writes a texture of numbers, which are not encoded, as a property."""
+        self.texture(parent, texture, name)
+        made = parent[-1]
+        files = [part.get("value", "") for part in made if part.get("name") == "filename"]
+        if self.modern and files and files[0].endswith(".exr"):
+            self.put(made, "boolean", "raw", "true")
+
     def _part(self, made: Element, texture: Texture, name: str) -> None:
         """Writes a texture nested in a texture, by name, so that a shared one is written once."""
         if id(texture) not in self._parts:

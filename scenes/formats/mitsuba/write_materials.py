@@ -21,6 +21,7 @@ from scenes.canonical import (
     Glass,
     Glossy,
     HeightField,
+    ImageTexture,
     Masked,
     Material,
     Matte,
@@ -35,10 +36,12 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
-from scenes.formats.appearance.folding import height_of, mean_of
+from scenes.formats.appearance.facets import with_even_facets
+from scenes.formats.appearance.folding import folded, height_of, mean_of
 from scenes.formats.appearance.mixtures import added_metal, lobes_of
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
+from scenes.formats.mitsuba.principled import scaled_normals, write_principled
 from scenes.formats.mitsuba.write_elements import Element, ElementWriter
 from scenes.formats.text.numbers import number
 
@@ -99,7 +102,11 @@ class MitsubaSurfaceWriter(ElementWriter):
                 return self.bsdf(material.base, where)
             made.append(self.bsdf(material.base, where))
             return made
-        if isinstance(material, HeightField | NormalMapped | MetallicRough):
+        if isinstance(material, NormalMapped) and self.modern:
+            return self._normal_mapped(material, where)
+        if isinstance(material, HeightField | NormalMapped) or (
+            isinstance(material, MetallicRough) and not self.modern
+        ):
             return self.bsdf(simpler(material, where, self.report), where)
         if isinstance(material, Glass):
             return self._glass(material, where)
@@ -110,6 +117,19 @@ class MitsubaSurfaceWriter(ElementWriter):
         both = self.plugin("bsdf", "twosided")
         both.append(self._opaque(material, where))
         return both
+
+    def _normal_mapped(self, material: NormalMapped, where: str) -> Element:
+        normals = folded(scaled_normals(material.normals, material.scale, where, self.report))
+        if not isinstance(normals, ImageTexture):
+            return self.bsdf(material.base, where)
+        made, base = self.plugin("bsdf", "normalmap"), self.bsdf(material.base, where)
+        self.numbers(made, normals, "normalmap")
+        if base.get("type") != "twosided":
+            made.append(base)
+            return made
+        made.append(base[0])
+        base[:] = [made]
+        return base
 
     def _blunt(self, material: Material, where: str) -> Material:
         """A perfect mirror or glass, replaced by facets of a small alpha, because Mitsuba 3.9's blend with a perfect
@@ -124,6 +144,8 @@ class MitsubaSurfaceWriter(ElementWriter):
         return made
 
     def _opaque(self, material: Material, where: str) -> Element:
+        if isinstance(material, MetallicRough):
+            return write_principled(material, where, self)
         if isinstance(material, Matte):
             rough = material.sigma_deg > 0.0 and not self.modern
             made = self.plugin("bsdf", "roughdiffuse" if rough else "diffuse")
@@ -151,7 +173,7 @@ class MitsubaSurfaceWriter(ElementWriter):
                 self.texture(made, material.reflectance_scale, "specularReflectance")
             if not smooth:
                 self.put(made, "string", "distribution", material.distribution)
-                self._alphas(made, material.roughness)
+                self._facets(made, material)
             return made
         if isinstance(material, Emissive):
             made = self.plugin("bsdf", "diffuse")
@@ -168,7 +190,11 @@ class MitsubaSurfaceWriter(ElementWriter):
         return self._plastic(material, where)
 
     def _plastic(self, material: Material, where: str) -> Element:
-        """A dielectric coat over a diffuse base, or its closest approximation."""
+        """A dielectric coat over a diffuse base, or its closest approximation; it has one alpha in Mitsuba 3."""
+        rough = None
+        if isinstance(material, Plastic | Glossy):
+            material = with_even_facets(material, where, self.report) if self.modern else material
+            rough = material.alpha
         if isinstance(material, Plastic):
             parts = material.diffuse, material.specular, material.ior, material.roughness
         elif isinstance(material, Glossy):
@@ -191,12 +217,17 @@ class MitsubaSurfaceWriter(ElementWriter):
         self.texture(made, parts[1], "specularReflectance")
         self.put(made, "float", "intIOR", number(parts[2]))
         self.put(made, "float", "extIOR", "1")
-        if parts[3] > 0.0:
+        if rough is not None:
+            self.numbers(made, rough, "alpha")
+        elif parts[3] > 0.0:
             self.put(made, "float", "alpha", number(parts[3]))
         return made
 
-    def _alphas(self, made: Element, alphas: tuple[float, float]) -> None:
-        if alphas[0] == alphas[1]:
+    def _facets(self, made: Element, material: Metal | Glass) -> None:
+        alphas = material.roughness
+        if material.alpha is not None:
+            self.numbers(made, material.alpha, "alpha")
+        elif alphas[0] == alphas[1]:
             self.put(made, "float", "alpha", number(alphas[0]))
         else:
             self.put(made, "float", "alphaU", number(alphas[0]))
@@ -220,7 +251,7 @@ class MitsubaSurfaceWriter(ElementWriter):
                 self.texture(made, texture, name)
         if kind == "roughdielectric":
             self.put(made, "string", "distribution", "ggx")
-            self._alphas(made, material.roughness)
+            self._facets(made, material)
         return made
 
     def _translucent(self, material: Translucent, where: str) -> Element:

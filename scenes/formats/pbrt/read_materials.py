@@ -7,6 +7,7 @@ Humphreys 2016, ch. 8 to 10.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes import loading
 from scenes.arithmetic import log
@@ -19,11 +20,11 @@ from scenes.canonical import (
     Metal,
     Mirror,
     Plastic,
-    SceneError,
     Texture,
     Translucent,
     Uber,
 )
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.mixtures import NOTHING, mixture_of
 from scenes.formats.appearance.spectra import METALS, grey
@@ -31,13 +32,15 @@ from scenes.formats.directives.surfaces import Maker, SurfaceFactory
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 
+_ROUGHNESS = ("roughness", "uroughness", "vroughness")
 
-def alpha_of_roughness(roughness: float) -> float:
-    """Microfacet alpha of PBRT's perceptual roughness ``r``, a polynomial of fourth degree in ``ln r``.
+
+def alpha_of_roughness(roughness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Microfacet alphas of PBRT's perceptual roughness ``r``, a polynomial of fourth degree in ``ln r``.
 
     Source: ``RoughnessToAlpha``, Pharr et al. 2016, sec. 8.4.2.
     """
-    x = log(max(roughness, 1e-3))
+    x = log(np.maximum(roughness, 1e-3))
     return 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)))
 
 
@@ -69,14 +72,9 @@ class PbrtSurfaces(SurfaceFactory):
     def base_colors(self) -> dict[str, str]:
         return {"disney": "color", **dict.fromkeys(("fourier", "hair", "kdsubsurface", "subsurface"), "Kd")}
 
-    def _alphas(self, parameters: Parameters, default: float) -> tuple[float, float]:
-        even = self.scalar(parameters, "roughness", default)
-        pair = self.scalar(parameters, "uroughness", even), self.scalar(parameters, "vroughness", even)
-        if min(pair) < 0.0:
-            raise SceneError(f"{parameters.place}: roughness: expected no negative number, got {min(pair):g}")
-        if not parameters.truth("remaproughness", True):
-            return pair
-        return alpha_of_roughness(pair[0]), alpha_of_roughness(pair[1])
+    def _facets(self, parameters: Parameters, default: float) -> Facets:
+        remapped = parameters.truth("remaproughness", True)
+        return self.facets(parameters, _ROUGHNESS, default, alpha_of_roughness if remapped else None)
 
     def _mirror(self, parameters: Parameters) -> Material:
         return Mirror(self.texture(parameters, "Kr", grey(0.9)))
@@ -84,10 +82,10 @@ class PbrtSurfaces(SurfaceFactory):
     def _glass(self, parameters: Parameters) -> Material:
         ior = self._ior(parameters)
         parts = self.texture(parameters, "Kr", grey(1.0)), self.texture(parameters, "Kt", grey(1.0))
-        rough = any(name in parameters for name in ("uroughness", "vroughness", "roughness"))
-        remapped = self._alphas(parameters, 0.0)
-        smooth = all(self.scalar(parameters, name, 0.0) == 0.0 for name in ("uroughness", "vroughness", "roughness"))
-        return Glass(*parts, ior, remapped if rough and not smooth else (0.0, 0.0))
+        facets = self._facets(parameters, 0.0)
+        given = [name for name in _ROUGHNESS if name in parameters]
+        smooth = facets.alpha is None and all(self.scalar(parameters, name, 0.0) == 0.0 for name in given)
+        return Glass(*parts, ior, (0.0, 0.0) if smooth else facets.roughness, alpha=facets.alpha)
 
     def _ior(self, parameters: Parameters) -> float:
         """The refractive index: ``eta``, or ``index`` in older files."""
@@ -96,21 +94,24 @@ class PbrtSurfaces(SurfaceFactory):
     def _metal(self, parameters: Parameters) -> Material:
         eta, k = METALS["Cu"]
         index = self.color(parameters, "eta", eta), self.color(parameters, "k", k)
-        return Metal(*index, self._alphas(parameters, 0.01))
+        facets = self._facets(parameters, 0.01)
+        return Metal(*index, facets.roughness, alpha=facets.alpha)
 
     def _substrate(self, parameters: Parameters) -> Material:
         parts = self.texture(parameters, "Kd", grey(0.5)), self.texture(parameters, "Ks", grey(0.5))
-        return Glossy(*parts, self._alphas(parameters, 0.1))
+        facets = self._facets(parameters, 0.1)
+        return Glossy(*parts, facets.roughness, facets.alpha)
 
     def _plastic(self, parameters: Parameters) -> Material:
         parts = self.texture(parameters, "Kd", grey(0.25)), self.texture(parameters, "Ks", grey(0.25))
-        return Plastic(*parts, 1.5, self._alphas(parameters, 0.1)[0], layered=False)
+        facets = self._facets(parameters, 0.1)
+        return Plastic(*parts, 1.5, facets.roughness[0], layered=False, alpha=facets.alpha)
 
     def _translucent(self, parameters: Parameters) -> Material:
         base = self.texture(parameters, "Kd", grey(0.25))
         sides = [self.texture(parameters, name, grey(0.5)) for name in ("reflect", "transmit")]
         glossy = self.texture(parameters, "Ks", grey(0.25))
-        self._alphas(parameters, 0.1)
+        self._facets(parameters, 0.1)
         if mean_of(glossy) != (0.0, 0.0, 0.0):
             self.report.add(str(parameters.place), "the glossy part of translucent", "left out")
         return Translucent(*(product_of(base, side) for side in sides))
@@ -119,7 +120,10 @@ class PbrtSurfaces(SurfaceFactory):
         ior = self._ior(parameters)
         names = (("Kd", 0.25), ("Ks", 0.25), ("Kr", 0.0), ("Kt", 0.0), ("opacity", 1.0))
         parts = [self.texture(parameters, name, grey(value)) for name, value in names]
-        return Uber(*parts, ior=ior, roughness=self._alphas(parameters, 0.1))
+        facets = self._facets(parameters, 0.1)
+        if facets.alpha is not None:
+            self.report.add(str(parameters.place), "a texture of the roughness", f"its mean, {facets.roughness[0]:.3g}")
+        return Uber(*parts, ior=ior, roughness=facets.roughness)
 
     def _mix(self, parameters: Parameters) -> Material:
         first, second = self.mixed(parameters)

@@ -28,6 +28,7 @@ from scenes.canonical import (
     Translucent,
 )
 from scenes.formats.appearance.coats import without_bounces
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import product_of
 from scenes.formats.appearance.mixtures import NOTHING, mixture_of, plastic_of
 from scenes.formats.appearance.spectra import METALS, blackbody_rgb, grey, rgb
@@ -112,15 +113,11 @@ class PbrtV4Surfaces(PbrtSurfaces):
 
     # --- materials -----------------------------------------------------------------------------------------------
 
-    def alphas(self, parameters: Parameters, prefix: str = "", default: float = 0.0) -> Pair:
-        """Alphas of the facets: square roots of the roughness, unless it is not remapped."""
-        even = self.scalar(parameters, f"{prefix}roughness", default)
-        pair = [self.scalar(parameters, f"{prefix}{axis}roughness", even) for axis in "uv"]
-        if min(pair) < 0.0:
-            raise SceneError(f"{parameters.place}: roughness: expected no negative number, got {min(pair):g}")
-        if parameters.truth("remaproughness", True):
-            pair = [math.sqrt(part) for part in pair]
-        return pair[0], pair[1]
+    def facets_v4(self, parameters: Parameters, prefix: str = "") -> Facets:
+        """Facets whose alphas are the square roots of the roughness, unless it is not remapped."""
+        names = f"{prefix}roughness", f"{prefix}uroughness", f"{prefix}vroughness"
+        remapped = parameters.truth("remaproughness", True)
+        return self.facets(parameters, names, 0.0, np.sqrt if remapped else None)
 
     def _diffuse(self, parameters: Parameters) -> Material:
         return Matte(self.texture(parameters, "reflectance", grey(0.5)))
@@ -138,13 +135,14 @@ class PbrtV4Surfaces(PbrtSurfaces):
 
     def _coated(self, parameters: Parameters) -> Material:
         where, ior = str(parameters.place), self._index(parameters)
-        alphas = self.alphas(parameters)
+        facets = self.facets_v4(parameters)
+        alphas = facets.roughness
         alpha = math.sqrt(alphas[0] * alphas[1])
         if alphas[0] != alphas[1]:
             self.report.add(where, "a coat of two roughnesses", f"one of alpha {alpha:.3g}")
         self._layers(parameters, "", 0.01)
         base = without_bounces(self.texture(parameters, "reflectance", grey(0.5)), ior, where, self.report)
-        return Plastic(base, ior=ior, roughness=alpha)
+        return Plastic(base, ior=ior, roughness=alpha, alpha=facets.alpha)
 
     def _metal_index(self, parameters: Parameters, prefix: str) -> tuple[Rgb, Rgb, Texture]:
         """Complex index, and the factor of its reflection: a texture of the reflectance at normal incidence."""
@@ -165,21 +163,24 @@ class PbrtV4Surfaces(PbrtSurfaces):
 
     def _conductor(self, parameters: Parameters) -> Material:
         eta, k, scale = self._metal_index(parameters, "")
-        return Metal(eta, k, self.alphas(parameters), scale)
+        facets = self.facets_v4(parameters)
+        return Metal(eta, k, facets.roughness, scale, alpha=facets.alpha)
 
     def _coated_metal(self, parameters: Parameters) -> Material:
-        self.report.add(str(parameters.place), "a coat over metal", "the metal alone")
-        self.alphas(parameters, "interface.")
+        alpha = self.facets_v4(parameters, "interface.").roughness[0]
+        self.report.add(str(parameters.place), f"a coat of alpha {alpha:.3g} over metal", "the metal alone")
         if "interface.eta" in parameters:
             parameters.asked.add("interface.eta")
         self._layers(parameters, "", 0.01)
         parameters.asked.add("interface.thickness")
         prefix = "" if "reflectance" in parameters else "conductor."
         eta, k, scale = self._metal_index(parameters, prefix)
-        return Metal(eta, k, self.alphas(parameters, "conductor."), scale)
+        facets = self.facets_v4(parameters, "conductor.")
+        return Metal(eta, k, facets.roughness, scale, alpha=facets.alpha)
 
     def _dielectric(self, parameters: Parameters) -> Material:
-        return Glass(ior=self._index(parameters), roughness=self.alphas(parameters))
+        facets = self.facets_v4(parameters)
+        return Glass(ior=self._index(parameters), roughness=facets.roughness, alpha=facets.alpha)
 
     def _pane(self, parameters: Parameters) -> Material:
         return Glass(ior=self._index(parameters), thin=True)

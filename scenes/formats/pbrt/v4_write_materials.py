@@ -31,11 +31,12 @@ from scenes.canonical import (
 )
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.coats import with_bounces
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.mixtures import added_metal, dimmed, lobes_of
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.surface_writer import Kind, plain_line
-from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter, unmapped_roughness
+from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter
 from scenes.formats.text.numbers import number
 
 V4_PICTURES = (*PICTURES, ".hdr", ".qoi")
@@ -92,14 +93,14 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         if isinstance(material, Mirror):
             if material.spread_deg:
                 self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
-            return self._mirror(material.reflectance, (0.0, 0.0), where)
+            return self._mirror(material.reflectance, Facets((0.0, 0.0)), where)
         if isinstance(material, Metal):
             if material.distribution != "ggx":
                 self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
             if (material.eta, material.k) == _MIRROR:
-                return self._mirror(material.reflectance_scale, material.roughness, where)
+                return self._mirror(material.reflectance_scale, material, where)
             index = [self.constant("eta", material.eta), self.constant("k", material.k)]
-            return "conductor", [*index, unmapped_roughness(material.roughness)]
+            return "conductor", [*index, self.unmapped(material)]
         if isinstance(material, Glass):
             return self._glass(material, where)
         if isinstance(material, Translucent):
@@ -108,11 +109,11 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         assert not isinstance(material, Masked | Bumped | MixMaterial | Uber)
         return self._coated(material, where)
 
-    def _mirror(self, reflectance: Texture, alphas: tuple[float, float], where: str) -> tuple[str, list[str]]:
+    def _mirror(self, reflectance: Texture, facets: Facets | Metal, where: str) -> tuple[str, list[str]]:
         """A metal given by its reflectance at normal incidence, which becomes white at grazing angles."""
         if mean_of(reflectance) != (1.0, 1.0, 1.0):
             self.report.add(where, "a mirror of one colour", "a metal of that colour, white at the edge")
-        return "conductor", [self.texture(reflectance, "reflectance"), unmapped_roughness(alphas)]
+        return "conductor", [self.texture(reflectance, "reflectance"), self.unmapped(facets)]
 
     def _glass(self, material: Glass, where: str) -> tuple[str, list[str]]:
         if material.spread_deg:
@@ -124,7 +125,7 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
             if material.roughness != (0.0, 0.0):
                 self.report.add(where, "a rough pane", "a clear one")
             return "thindielectric", [index]
-        return "dielectric", [index, unmapped_roughness(material.roughness)]
+        return "dielectric", [index, self.unmapped(material)]
 
     def _coated(self, material: Material, where: str) -> tuple[str, list[str]]:
         """A base under a coat, or the closest approximation of a material that PBRT v4 lacks."""
@@ -144,4 +145,5 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         ior = max(ior, 1.0001)
         color = with_bounces(base, ior, where, self.report)
         parts = [self.texture(color, "reflectance"), f'"float eta" [ {number(ior)} ]']
-        return "coateddiffuse", [*parts, unmapped_roughness((alpha, alpha))]
+        rough = material.alpha if isinstance(material, Plastic | Glossy) else None
+        return "coateddiffuse", [*parts, self.unmapped(Facets((alpha, alpha), rough))]

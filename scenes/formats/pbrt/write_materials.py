@@ -25,12 +25,15 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
+from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import folded, product_of
 from scenes.formats.appearance.indices import mean_reflectance
 from scenes.formats.appearance.mixtures import dimmed
 from scenes.formats.appearance.spectra import grey, rgb
-from scenes.formats.directives.surface_writer import Pair, SurfaceWriter, mixture_line, roughness_pair
+from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line
 from scenes.formats.text.numbers import number
+
+_UNMAPPED = '"bool remaproughness" [ "false" ]'
 
 PICTURES = (".exr", ".png", ".tga", ".pfm")
 """Endings of image files that PBRT v3 reads."""
@@ -69,10 +72,10 @@ class PbrtSurfaceWriter(SurfaceWriter):
             if material.distribution != "ggx":
                 self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
             index = [self.constant("eta", material.eta), self.constant("k", material.k)]
-            return "metal", [*index, unmapped_roughness(material.roughness)]
+            return "metal", [*index, self.unmapped(material)]
         if isinstance(material, Glossy):
             parts = [self.texture(material.diffuse, "Kd"), self.texture(material.specular, "Ks")]
-            return "substrate", [*parts, unmapped_roughness(material.roughness)]
+            return "substrate", [*parts, self.unmapped(material)]
         if isinstance(material, Plastic):
             return self._plastic(material, where)
         if isinstance(material, Translucent):
@@ -83,7 +86,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
             names = ("diffuse", "Kd"), ("specular", "Ks"), ("reflectance", "Kr"), ("transmittance", "Kt")
             parts = [self.texture(getattr(material, ours), theirs) for ours, theirs in names]
             parts += [self.texture(material.opacity, "opacity"), f'"float eta" [ {number(material.ior)} ]']
-            return "uber", [*parts, unmapped_roughness(material.roughness)]
+            return "uber", [*parts, self.unmapped(Facets(material.roughness))]
         if isinstance(material, Phong):
             return self._phong(material, where)
         return super().plain_material(material, where)
@@ -95,7 +98,9 @@ class PbrtSurfaceWriter(SurfaceWriter):
             kept = 1.0 - mean_reflectance(material.ior)
             diffuse = folded(product_of(diffuse, ConstantTexture(grey(kept))))
             self.report.add(where, "a base under a coat", f"{kept:.3g} of it beside the coat")
-        rough = f'"float roughness" [ {number(material.roughness)} ] "bool remaproughness" [ "false" ]'
+        rough = f'"float roughness" [ {number(material.roughness)} ] {_UNMAPPED}'
+        if material.alpha is not None:
+            rough = f"{self.texture(material.alpha, 'roughness', 'float')} {_UNMAPPED}"
         if material.ior == 1.5 and material.roughness > 0.0:
             return "plastic", [self.texture(diffuse, "Kd"), self.texture(material.specular, "Ks"), rough]
         smooth = material.roughness == 0.0
@@ -110,7 +115,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
             self.report.add(where, "rays spread about the perfect ones", "clear glass")
         parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
         parts.append(f'"float eta" [ {number(material.ior)} ]')
-        return "glass", parts + ([unmapped_roughness(material.roughness)] if material.roughness != (0.0, 0.0) else [])
+        return "glass", parts + ([self.unmapped(material)] if material.roughness != (0.0, 0.0) else [])
 
     def _phong(self, material: Phong, where: str) -> tuple[str, list[str]]:
         """Phong as ``uber`` with a highlight of equal width: ``alpha² = 2 / (exponent + 2)`` (Walter et al. 2007, sec.
@@ -121,9 +126,8 @@ class PbrtSurfaceWriter(SurfaceWriter):
         mirrored = rgb(material.fresnel_min * np.array(material.mirror_tint))
         parts = [self.texture(material.diffuse, "Kd"), self.constant("Ks", material.specular)]
         parts += [self.constant("Kr", mirrored), self.constant("Kt", grey(0.0))]
-        return "uber", [*parts, unmapped_roughness((alpha, alpha))]
+        return "uber", [*parts, self.unmapped(Facets((alpha, alpha)))]
 
-
-def unmapped_roughness(alphas: Pair) -> str:
-    """Parameters of the alphas along both directions of a surface, without remapping."""
-    return f'{roughness_pair(alphas)} "bool remaproughness" [ "false" ]'
+    def unmapped(self, facets: Facets | Metal | Glass | Glossy) -> str:
+        """Parameters of the alphas along both directions of a surface, without remapping."""
+        return f"{self.facets(facets)} {_UNMAPPED}"

@@ -130,8 +130,8 @@ def test_plugins_of_mitsuba_3(tmp_path: Path) -> None:
     body += '<float name="metallic" value="0.3"/><float name="sheen" value="0.5"/></bsdf></shape>'
     scene, losses = of(tmp_path, body)
     made = scene.instances[0].material
-    assert isinstance(made, MixMaterial) and isinstance(made.first, Plastic) and isinstance(made.second, Metal)
-    assert made.first.roughness == 0.25 and made.first.ior == pytest.approx(1.5) and made.amount.value[0] == 0.3  # type: ignore[union-attr]
+    assert isinstance(made, MetallicRough) and (made.metallic, made.roughness) == (0.3, 0.5)
+    assert made.ior == pytest.approx(1.5) and made.base == ConstantTexture((0.6, 0.4, 0.2))
     assert len(losses) == 2 and "sheen" in losses[0]
     body = '<shape type="sphere"><bsdf type="bumpmap"><texture type="checkerboard"/><float name="scale" value="2"/>'
     scene, losses = of(tmp_path, body + '<bsdf type="diffuse"/></bsdf></shape><shape type="bsplinecurve"/>')
