@@ -16,7 +16,7 @@ from scenes.canonical import (
     Glass,
     Matte,
     Metal,
-    MixMaterial,
+    MetallicRough,
     OrthographicCamera,
     PerspectiveCamera,
     Plastic,

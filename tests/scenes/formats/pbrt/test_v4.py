@@ -133,7 +133,7 @@ def test_materials(tmp_path: Path) -> None:
     assert isinstance(made, Metal) and losses == []
     assert reflectance_of_index(made.eta, made.k) == pytest.approx((0.9, 0.5, 0.2))
     made, losses = of(tmp_path, '"coatedconductor"')
-    assert isinstance(made, Metal) and made.eta == METALS["Cu"][0] and "a coat over metal" in losses[0]
+    assert isinstance(made, Metal) and made.eta == METALS["Cu"][0] and "a coat of alpha 0 over metal" in losses[0]
     made, losses = of(tmp_path, '"dielectric" "spectrum eta" "glass-BK7"')
     assert made == Glass(ior=1.5168) and "dispersion" in losses[0]
     made, losses = of(tmp_path, '"hair"')
