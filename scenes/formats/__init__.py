@@ -24,6 +24,6 @@ FORMATS: Named[Format] = Named(
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
         "mitsuba-dictionary": "scenes.formats.mitsuba.declared:MITSUBA_DICTIONARY",
         "gltf": "scenes.formats.gltf.declared:GLTF",
-        "model": "scenes.models.scenes_of_models:MODEL",
+        "model": "scenes.models.for_conversion:MODEL",
     },
 )

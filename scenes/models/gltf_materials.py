@@ -160,9 +160,12 @@ class GltfMaterials:
 
     def _glass(self, given: dict[str, Any], base: Texture, extensions: dict[str, Any], where: str) -> Material:
         """Glass of the mean base colour, thin unless it has a volume; for path tracing with its roughness."""
-        thickness = extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0)
-        if "KHR_materials_volume" in extensions:
+        volume = extensions.get("KHR_materials_volume", {})
+        thickness = volume.get("thicknessFactor", 0.0)
+        if any(part != 1.0 for part in volume.get("attenuationColor", ())):
             self.report.add(where, "absorption in glass")
+        if "metallicRoughnessTexture" in _rough(given):
+            self.report.add(where, "a texture of the roughness of glass", "its factor")
         ior = float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5))
         if not isinstance(base, ConstantTexture):
             self.report.add(where, "a texture of glass", "its mean")

@@ -52,7 +52,7 @@ def camera_at_node(data: GltfData, number: Any, matrix: Matrix, track: RigidTrac
 def light_at_node(data: GltfData, number: Any, matrix: Matrix, where: str, report: LossReport) -> Light | None:
     """A light of the extension KHR_lights_punctual at a node with this transform.
 
-    Deviation: spots fall off as ``3x² - 2x³`` in the cosine, where the extension recommends ``x²``.
+    Spots fall off as ``x²`` in the cosine, as the extension recommends.
 
     Raises:
         SceneError: there is no such light.
@@ -80,4 +80,5 @@ def light_at_node(data: GltfData, number: Any, matrix: Matrix, where: str, repor
     inner_deg = math.degrees(float(spot.get("innerConeAngle", 0.0)))
     if not 0.0 <= inner_deg < outer_deg <= 90.0 + 1e-6:
         raise SceneError(f"cannot be read: light {number}: expected cone angles 0 <= inner < outer <= π/2")
-    return SpotLight((x, y, z), (x + along[0], y + along[1], z + along[2]), strength, inner_deg, min(outer_deg, 90.0))
+    target = x + along[0], y + along[1], z + along[2]
+    return SpotLight((x, y, z), target, strength, inner_deg, min(outer_deg, 90.0), "quadratic")

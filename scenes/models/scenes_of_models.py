@@ -8,8 +8,7 @@ from typing import Any
 
 from scenes.canonical import Instance, Scene, SceneError
 from scenes.formats.losses import LossReport
-from scenes.formats.text.format import Format
-from scenes.models import MODEL_ENDINGS, read_whole
+from scenes.models import read_whole
 from scenes.viewing import Up, framed
 
 _Y_UP = (".obj", ".gltf", ".glb")
@@ -55,10 +54,3 @@ def duration_of(instances: tuple[Instance, ...]) -> float:
     """The time of the last key of all motions, seconds."""
     tracks = [instance.track for instance in instances if instance.track is not None]
     return max((track.start_s + track.interval_s * (len(track.translation) - 1) for track in tracks), default=0.0)
-
-
-def _read(path: Path, root: Path | None, report: LossReport) -> Scene:
-    return model_scene(path, report)
-
-
-MODEL = Format("a model", MODEL_ENDINGS, _read)

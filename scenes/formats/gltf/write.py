@@ -47,9 +47,10 @@ from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter
 from scenes.formats.losses import LossReport
 from scenes.formats.text.output import Output
-from scenes.viewing import turned_up, up_of
+from scenes.viewing import turned_up
 
 _NEAR, _SHARP_RAD = 1e-3, 1e-6
+_LEVEL = 1e-3  # that a camera must be nearer to z upwards, so that a turned scene is not turned again
 _SPARSE = np.iinfo(np.uint16).max
 
 
@@ -263,7 +264,8 @@ def _facing(position: np.ndarray, direction: np.ndarray) -> Matrix:
 
 def _turned(scene: Scene) -> Matrix:
     """The transform of the world to one with y upwards in which the picture is not mirrored."""
-    turn = np.eye(4) if up_of(scene) == "y" else turned_up("y")
+    up = np.abs(scene.camera.to_world[:3, 1])
+    turn = turned_up("y") if up[2] > up[1] + _LEVEL else np.eye(4)
     if determinant(scene.camera.to_world) < 0.0:
         turn = product(np.diag([-1.0, 1.0, 1.0, 1.0]), turn)
     return turn

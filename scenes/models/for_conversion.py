@@ -1,7 +1,7 @@
-"""Reader of glTF 2.0 files as scenes for conversion.
+"""Models as scenes for conversion.
 
-:mod:`scenes.models` reads the file. Here shapes and materials become what scene files have: meshes that are canonical
-shapes, lamps that emit on their front, and matte surfaces.
+Shapes and materials become what scene files have: meshes that are canonical shapes, lamps that emit on their front, and
+matte surfaces.
 """
 
 from __future__ import annotations
@@ -9,13 +9,18 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import numpy as np
+
 from scenes.arithmetic import product
 from scenes.canonical import Instance, Integrator, Masked, Material, Matte, Mesh, MetallicRough, NormalMapped, Scene
 from scenes.canonical.values import Matrix, Rgb
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
+from scenes.formats.geometry.placing import shines
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.losses import LossReport
+from scenes.formats.text.format import Format
+from scenes.models import MODEL_ENDINGS, read_whole
 from scenes.models.scenes_of_models import model_scene
 
 _DEPTH = 16
@@ -34,8 +39,9 @@ class _Parts:
         if key not in self._shapes:
             material, emission = self._material(instance.material, instance.name)
             made = dataclasses.replace(instance, material=material, emission=instance.emission or emission)
-            assert isinstance(made.shape, Mesh)
-            shape, own = shape_of(made.shape, material, instance.name, self.report)
+            shape, own = made.shape, np.eye(4)
+            if isinstance(shape, Mesh):
+                shape, own = shape_of(shape, material, instance.name, self.report)
             self._shapes[key] = instance, dataclasses.replace(made, shape=shape), own
         _, made, own = self._shapes[key]
         place = product(instance.to_world, own)
@@ -65,12 +71,21 @@ class _Parts:
         return bare, emission
 
 
-def load_gltf(path: Path, root: Path | None, report: LossReport) -> Scene:
-    """Reads a file; without a camera or lights it has those of :func:`scenes.viewing.framed`.
+def load_model(path: Path, root: Path | None, report: LossReport) -> Scene:
+    """Reads a model as a scene; without a camera or lights it has those of :func:`scenes.viewing.framed`.
+
+    Surfaces that shine are the lights of a file that has a camera.
 
     Raises:
         SceneError: the file cannot be read.
     """
     scene, parts = model_scene(path, report, facets=True), _Parts(report)
     instances = tuple(map(parts.instance, scene.instances))
-    return dataclasses.replace(scene, instances=instances, integrator=Integrator("path", _DEPTH))
+    scene = dataclasses.replace(scene, instances=instances, integrator=Integrator("path", _DEPTH))
+    added = scene.background is not None
+    if added and any(map(shines, instances)) and read_whole(path, facets=True).cameras:
+        scene = dataclasses.replace(scene, lights=(), ambient=(0.0, 0.0, 0.0), background=None)
+    return scene
+
+
+MODEL = Format("a model", MODEL_ENDINGS, load_model)
