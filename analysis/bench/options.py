@@ -22,15 +22,16 @@ GROUPS = (
     "overhead",
     "tsar",
     "growth",
+    "large",
     "conversion",
     "start",
 )
 """Groups of rows, in the order of the table."""
 
-ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "conversion", "start")
+ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "large", "conversion", "start")
 """Groups that do not run on a GPU."""
 
-ON_ANY_ISA = ("coherent", "incoherent", "cores", "order", "hits", "overhead", "tsar", "growth")
+ON_ANY_ISA = ("coherent", "incoherent", "cores", "order", "hits", "overhead", "tsar", "growth", "large")
 """Groups in which our side, and Embree, can be limited to an instruction set."""
 
 FRAMELET_SIDE = 16
@@ -47,7 +48,7 @@ class BenchOptions:
     summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """What to do, instead of everything; a group, or several with commas between; may be repeated. Without it all run:
-    coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, growth, conversion, start."""
+    coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, growth, large, conversion, start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of our side are compared; nothing is run."""
     device: Literal["cpu", "cuda:0"] = "cpu"

@@ -112,7 +112,7 @@ def compare(
         task: progress that advances by one step a round.
     """
     answers: dict[str, Callable[[Rays], object]] = {"ours": lambda rays: _ask(ours, rays)}
-    note = NOT_INSTALLED
+    note = NOT_INSTALLED if embree is None else ""
     if peer is not None:
         answers["embreex"] = lambda rays: _ask(peer, rays)
         wrong = sum(disagreements(ours, peer, rays) for rays in question.calls)

@@ -8,6 +8,7 @@ from typing import Any
 from analysis.bench.conversion import conversion
 from analysis.bench.features import features
 from analysis.bench.growth import growth
+from analysis.bench.large import large
 from analysis.bench.machine import machine, versions
 from analysis.bench.options import ON_CPU_ONLY, BenchOptions
 from analysis.bench.overhead import overhead
@@ -38,6 +39,7 @@ MEASURED_BY: Mapping[str, Group] = {
     "overhead": overhead,
     "tsar": policy,
     "growth": growth,
+    "large": large,
     "conversion": conversion,
     "start": start_rows,
 }

@@ -54,11 +54,35 @@ def bumpy_sphere(subdivisions: int) -> Mesh:
     import trimesh
 
     sphere = trimesh.creation.icosphere(subdivisions=subdivisions)
-    x, y, z = np.asarray(sphere.vertices).T
-    radius = 1.0 + 0.035 * (np.sin(9.0 * x + 2.0 * y) + np.sin(8.0 * y - 3.0 * z) + np.sin(10.0 * z + 2.5 * x))
-    sphere.vertices = np.asarray(sphere.vertices) * radius[:, None]
+    sphere.vertices = np.asarray(sphere.vertices) * _bumps(np.asarray(sphere.vertices))[:, None]
     normals = np.asarray(sphere.vertex_normals, np.float32)
     return Mesh(np.asarray(sphere.vertices, np.float32), np.asarray(sphere.faces, np.int32), normals, source="bumpy")
+
+
+def bumpy_globe(triangles: int) -> Mesh:
+    """The same surface as rows of quads from pole to pole, two triangles each, for meshes of any size.
+
+    Args:
+        triangles: about how many; there are twice as many columns as rows.
+    """
+    rows = max(2, round((triangles / 4) ** 0.5))
+    columns = 2 * rows
+    polar, azimuth = np.meshgrid(
+        np.linspace(1e-3, np.pi - 1e-3, rows + 1), np.arange(columns) * (2.0 * np.pi / columns), indexing="ij"
+    )
+    ring = np.sin(polar)
+    points = np.stack([ring * np.cos(azimuth), np.cos(polar), ring * np.sin(azimuth)], axis=-1).reshape(-1, 3)
+    points *= _bumps(points)[:, None]
+    corner = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    right, below = np.roll(corner, -1, axis=1), corner + columns
+    upper, lower = np.stack([corner, right, below], axis=-1), np.stack([right, right + columns, below], axis=-1)
+    return Mesh(points.astype(np.float32), np.stack([upper, lower], axis=2).reshape(-1, 3), source="globe")
+
+
+def _bumps(points: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Distances from the middle of the surface, for points ``(n, 3)`` of the unit sphere."""
+    x, y, z = points.T
+    return 1.0 + 0.035 * (np.sin(9.0 * x + 2.0 * y) + np.sin(8.0 * y - 3.0 * z) + np.sin(10.0 * z + 2.5 * x))
 
 
 def bumpy_scene(subdivisions: int = SHADED_SUBDIVISIONS) -> Scene:
