@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("tsar", "renderer", "scenes", "analysis", "scripts")
 
-RECORDS = tuple(f"tsar.{name}" for name in "checks choices config lazy memory morton named types".split())
+RECORDS = tuple(f"tsar.{name}" for name in "checks choices config lazy memory morton named threads types".split())
 CANONICAL = ("scenes.canonical", "scenes.arithmetic")
 POSED = (*CANONICAL, "scenes.animation")
 SHARED = tuple(f"scenes.formats.{room}" for room in ("text", "geometry", "appearance", "losses"))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Generic, TypeVar
 
@@ -18,6 +19,7 @@ from torch import Tensor
 from tsar.clock import CycleSeconds, StageTimer, checked, end_of_cycle
 from tsar.config import TsarConfig, require
 from tsar.stages import Stages, reference
+from tsar.threads import one_thread
 from tsar.types import FrameletBatch, MapShown, SampleBatch, SampleMap, ShownImage, Spent, StepRecord, Trace, Viewpoint
 from tsar.window import Window
 
@@ -178,6 +180,11 @@ class Policy(ABC, Generic[State]):
         return self.config.warmup_cycles
 
     @property
+    def own_threads(self) -> bool:
+        """Whether its stages have threads of their own (:class:`tsar.stages.Stages`)."""
+        return False
+
+    @property
     def price(self) -> Price:
         """Price of a cycle; by default that of the adaptive pipeline."""
         return Price(self.config.batch_size * self.config.samples, adaptive_stages=True)
@@ -274,11 +281,12 @@ def cropped(shown: Picture, window: Window) -> Picture:
 def step(policy: Policy[State], state: State, trace: Trace, moment: Moment) -> Cycle[State]:
     """One cycle of a policy."""
     timer = StageTimer()
-    with timer("selection"):
-        asked, batch = policy.request(state, moment)
-    with timer("tracing"):
-        samples = trace(batch)
-    after = policy.observe(asked, batch, samples, moment, timer)
-    with timer("reconstruction"):
-        shown = policy.image(after, moment)
+    with one_thread() if policy.own_threads else nullcontext():
+        with timer("selection"):
+            asked, batch = policy.request(state, moment)
+        with timer("tracing"):
+            samples = trace(batch)
+        after = policy.observe(asked, batch, samples, moment, timer)
+        with timer("reconstruction"):
+            shown = policy.image(after, moment)
     return Cycle(state, after, samples, shown, timer)

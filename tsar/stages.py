@@ -37,6 +37,8 @@ class Stages:
         reconstruct: returns the image and flags dead framelets in the cache, in place.
         account: returns the sums for the record of the cycle.
         filtering: stages of the policies ``filter`` and ``tsar``.
+        own_threads: whether the stages divide their work among threads of their own. Torch then uses one in a cycle:
+            its operations between them are small, and its threads would wait on the cores that the stages use.
     """
 
     observe: Callable[[FrameletBatch, Tensor, FrameletCache, TsarConfig, StageTimer], Observation] = observe
@@ -44,6 +46,7 @@ class Stages:
     reconstruct: Callable[[FrameletCache, TsarConfig, float], Reconstruction] = reconstruct
     account: Callable[[Densities, Errors, Tensor, TsarConfig], Account] = account
     filtering: FilterStages = FILTERING
+    own_threads: bool = False
 
 
 REFERENCE = Stages()

@@ -11,8 +11,8 @@ import torch
 
 from analysis.comparison.options import RunOptions
 from analysis.metrics import METRICS
-from analysis.metrics.perceptual import one_thread
 from tsar.memory import core_count
+from tsar.threads import one_thread
 
 if TYPE_CHECKING:
     from analysis.study.displays import DisplayRecord

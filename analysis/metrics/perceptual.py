@@ -5,9 +5,7 @@ All run on one thread, because the libraries do not guarantee the same bits for 
 
 from __future__ import annotations
 
-import contextlib
 import logging
-from collections.abc import Iterator
 
 import numpy as np
 import torch
@@ -17,20 +15,10 @@ from torch import Tensor
 
 from analysis.metrics import Metric
 from analysis.metrics.display_model import DisplayModel
+from tsar.threads import one_thread
 
 Frames = NDArray[np.uint8]
 """``(count, height, width, 3)`` display-encoded images."""
-
-
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Runs the torch operations of the block on one thread."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def jod(test: Frames, reference: Frames, image_rate_hz: float, display: DisplayModel) -> float:

@@ -21,7 +21,7 @@ import torch
 from PIL import Image
 
 from analysis.metrics.causes import Truths
-from analysis.metrics.perceptual import jod, one_thread
+from analysis.metrics.perceptual import jod
 from analysis.metrics.quality import DisplayedImages, reference_times
 from analysis.page.pictures import PagePixels, tiling_map
 from analysis.page.video import to_pixels
@@ -36,6 +36,7 @@ from analysis.study.memory import PeakMemory
 from analysis.study.runs import Machine, PolicyRun, Totals, begin
 from analysis.study.scenery import render_reference, renderer
 from analysis.study.spending import spent
+from tsar.threads import one_thread
 
 if TYPE_CHECKING:
     from renderer.trace import Renderer

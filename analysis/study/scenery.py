@@ -6,11 +6,11 @@ import dataclasses
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from analysis.metrics.perceptual import one_thread
 from analysis.metrics.quality import reference_times
 from analysis.storage.reference import Reference, ReferenceSpec, content_hash, obtain, renderer_hash
 from analysis.study.cases import MovingScene, Scale, Tracing
 from tsar.formats import rounded
+from tsar.threads import one_thread
 
 if TYPE_CHECKING:
     from pathlib import Path

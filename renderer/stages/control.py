@@ -71,6 +71,7 @@ def compiled_stages(config: TsarConfig, threads: int = 1) -> Stages:
         reconstruct=reconstructor.reconstruct,
         account=control.account,
         filtering=covered(filter_stages(config.resolution_px, threads, config.shape), reference_filter(config.window)),
+        own_threads=True,
     )
 
 

@@ -101,7 +101,8 @@ class Filter(Policy[State]):
         super().__init__(setting)
         self._window, self._side = self.config.window, self.config.resolution_px
         self._options = replace(options, reach=options.reach * self._window.reach)
-        self._stages = setting.stages_of(self.config).filtering
+        stages = setting.stages_of(self.config)
+        self._stages, self._own_threads = stages.filtering, stages.own_threads
         self._view = setting.view if options.reprojection else None
         most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
@@ -121,6 +122,10 @@ class Filter(Policy[State]):
     @property
     def footprint(self) -> int:
         return self._options.footprint
+
+    @property
+    def own_threads(self) -> bool:
+        return self._own_threads
 
     @property
     def warmup_cycles(self) -> int:

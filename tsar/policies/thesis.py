@@ -54,6 +54,10 @@ class Thesis(Policy[State]):
         super().__init__(setting)
         self._stages = setting.stages_of(setting.config)
 
+    @property
+    def own_threads(self) -> bool:
+        return self._stages.own_threads
+
     def start(self) -> State:
         """A uniform field, its tiling, the first tiles that are due, and an empty cache."""
         densities = initial_densities(self.config)

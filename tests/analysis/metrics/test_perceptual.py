@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from analysis.metrics.display_model import DisplayModel
-from analysis.metrics.perceptual import Frames, flip, jod, one_thread, ssim
+from analysis.metrics.perceptual import Frames, flip, jod, ssim
 from tsar.config import ConfigError
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -85,17 +85,6 @@ def threads():
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)
-
-
-def test_one_thread_gives_the_others_back(threads: None) -> None:
-    for before in (1, 2, 3):
-        torch.set_num_threads(before)
-        with one_thread():
-            assert torch.get_num_threads() == 1
-        assert torch.get_num_threads() == before
-        with pytest.raises(KeyError), one_thread():
-            raise KeyError
-        assert torch.get_num_threads() == before
 
 
 def test_scores_do_not_depend_on_the_number_of_threads(threads: None, monkeypatch: pytest.MonkeyPatch) -> None:
