@@ -52,6 +52,12 @@ def test_the_knee_is_on_the_front_and_knows_no_units(points: list[tuple[int, int
     assert below(scaled) == pytest.approx(below(found), abs=1e-9)  # another one only where they tie
 
 
+def test_the_only_point_is_the_knee() -> None:
+    with np.errstate(all="raise"):
+        assert knee(np.array([3.0]), np.array([2.0])) == 0
+        assert knee(np.array([3.0, 3.0]), np.array([2.0, 2.0])) == 0
+
+
 def test_a_corner_is_the_knee() -> None:
     costs, errors = np.array([1.0, 2.0, 4.0, 16.0, 3.0]), np.array([100.0, 10.0, 2.0, 1.0, 50.0])
     assert knee(costs, errors) == 2

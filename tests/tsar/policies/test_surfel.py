@@ -64,3 +64,17 @@ def test_a_pixel_that_is_not_known_has_the_variance_of_one_sample() -> None:
         replace(state, estimates=replace(estimates, time_s=nothing, inverse=0.0 * estimates.inverse)), NOW
     )
     assert found.spatial.unique().item() == pytest.approx(relative(0.01, 0.02), rel=1e-5)
+
+
+@pytest.mark.parametrize("wide", [4, 16, 32])
+def test_a_plane_is_resampled_to_the_field(wide: int) -> None:
+    """Elements in Morton order have the mean of the cells within them, or the value of the cell around them."""
+    policy = Surfel(Setting(CONFIG))
+    side, plane = CONFIG.sdf_side, torch.rand(1, wide, wide, generator=torch.Generator().manual_seed(0))
+    found = policy._field(plane)
+    for number in range(side * side):
+        x = sum((number >> 2 * bit & 1) << bit for bit in range(8))
+        y = sum((number >> 2 * bit + 1 & 1) << bit for bit in range(8))
+        first = plane[0, y * wide // side : max((y + 1) * wide // side, y * wide // side + 1)]
+        cells = first[:, x * wide // side : max((x + 1) * wide // side, x * wide // side + 1)]
+        assert float(found[number]) == pytest.approx(float(cells.mean()), rel=1e-5)
