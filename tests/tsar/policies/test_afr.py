@@ -70,6 +70,29 @@ def test_extents_follow_the_gradients() -> None:
     assert found[1] == pytest.approx(2.0 * found[0], rel=0.01) and found[2] == pytest.approx(2.0 * found[0], rel=0.01)
 
 
+def test_values_of_crosshairs() -> None:
+    """The greater difference along each axis, and the change since the newest earlier sample of the pixel."""
+    # compressed luminance l of grey l² / (1 - l²): centres, right, left, below, above of two crosshairs
+    luminance = torch.tensor([0.5, 0.2, 0.6, 0.2, 0.2, 0.1, 0.5, 0.4, 0.7, 0.3])
+    color = (luminance.square() / (1.0 - luminance.square()))[:, None].expand(10, 3)
+    place = torch.tensor([[0.5, 0.5], [0.1, 0.1]] + [[0.9, 0.9]] * 8)
+    buffer = DeepBuffer.empty(4)
+    for held, time_s, at in ((0.3, 1.0, 0.5), (0.45, 1.5, 0.5), (0.9, 2.0, 0.5)):
+        grey = torch.full((1, 3), held**2 / (1.0 - held**2))
+        buffer.add(grey, time_s, torch.full((1, 2), at), None)
+    found = afr._values(
+        buffer, buffer.seen(None, (8, 8)), afr.Crosshairs(torch.tensor([64, 65]), place), color, 2.0, (8, 8)
+    )
+    assert found[0].tolist() == [1.0] * 10
+    assert found[1].tolist() == pytest.approx(luminance.tolist(), abs=1e-6)
+    assert found[2].tolist() == pytest.approx(luminance.square().tolist(), abs=1e-6)
+    first, second = 0.5 * (0.3**2 + 0.2**2), 0.5 * (0.1**2 + 0.2**2)
+    assert found[3].tolist() == pytest.approx([first, second] * 5, abs=1e-6)
+    # the sample of now does not count, and of the others the newest does; elsewhere nothing is held
+    assert found[4].tolist() == pytest.approx([(0.5 - 0.45) ** 2] + [0.0] * 9, abs=1e-6)
+    assert found[5].tolist() == pytest.approx([0.25] + [0.0] * 9)
+
+
 def test_reprojection_takes_what_moves_along() -> None:
     """A picture that moves by a pixel a cycle is shown as well as one that stands, and far better than without it."""
     moved, stale, still = error(moving(1.0), True), error(moving(1.0), False), error(moving(0.0), True)
