@@ -112,17 +112,17 @@ def test_contrast_is_of_known_cells_beside() -> None:
 
 
 def test_the_standard_error_of_probes() -> None:
-    """Their encoded colours change by 0.1, 0.2 and 0.5 in every channel."""
-    change, empty = torch.tensor([0.1, 0.2, 0.5]), torch.zeros(0, dtype=torch.int64)
-    before = torch.full((3, 3), 0.09)
+    """Their encoded colours change by 0.1, 0.2, 0.5 and 0.2 in every channel."""
+    change, empty = torch.tensor([0.1, 0.2, 0.5, 0.2]), torch.zeros(0, dtype=torch.int64)
+    before = torch.full((4, 3), 0.09)
     frame = interruptible.Frame(
-        0.0, before, torch.ones(3), torch.zeros(3, 2, dtype=torch.float64), torch.zeros(3, dtype=torch.int32),
-        torch.zeros(3, 3), torch.arange(3), before,
+        0.0, before, torch.ones(4), torch.zeros(4, 2, dtype=torch.float64), torch.zeros(4, dtype=torch.int32),
+        torch.zeros(4, 3), torch.arange(4), before,
     )  # fmt: skip
-    asked = interruptible.Asked(empty, torch.arange(3))
-    found = interruptible._probed(frame, asked, (0.3 + change[:, None]).square().expand(3, 3))
-    squared = np.array([0.01, 0.04, 0.25])
-    assert found == pytest.approx((squared.mean(), squared.std(ddof=1) / 3**0.5), rel=1e-4)
+    asked = interruptible.Asked(empty, torch.arange(4))
+    found = interruptible._probed(frame, asked, (0.3 + change[:, None]).square().expand(4, 3))
+    squared = np.array([0.01, 0.04, 0.25, 0.04])
+    assert found == pytest.approx((squared.mean(), squared.std(ddof=1) / 2.0), rel=1e-4)
 
 
 def test_the_price_is_the_sum_of_its_parts() -> None:
