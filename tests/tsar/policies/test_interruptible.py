@@ -11,7 +11,7 @@ from tests.oracles.screens import Layer, Screen
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
 from tsar.policies import POLICIES, interruptible, refinement
-from tsar.policy import Policy, Price, Setting, run
+from tsar.policy import Moment, Policy, Price, Setting, run
 
 CONFIG = TsarConfig(batch_size=4, resolution_px=64, warmup_cycles=2, tiling=TilingConfig(level_min=1))
 CYCLE_S = 1.0 / 64.0
@@ -68,7 +68,7 @@ def test_the_static_error_is_near_the_true_one() -> None:
     screen = moving(0.0)
     policy, state, ratios = made(screen), None, []
     truth = refinement.encoded(screen.picture(0.0, 64, axis=1))
-    from tsar.policy import Moment, step
+    from tsar.policy import step
 
     state = policy.start()
     for cycle in range(3):
@@ -123,6 +123,17 @@ def test_the_standard_error_of_probes() -> None:
     found = interruptible._probed(frame, asked, (0.3 + change[:, None]).square().expand(4, 3))
     squared = np.array([0.01, 0.04, 0.25, 0.04])
     assert found == pytest.approx((squared.mean(), squared.std(ddof=1) / 2.0), rel=1e-4)
+
+
+def test_the_change_that_probes_show_goes_on() -> None:
+    """Without poses nothing is known to move: 0.02 after three quarters of a second is 0.02 x 1 / 0.75 after one."""
+    policy = POLICIES["interruptible"](Setting(CONFIG))
+    assert isinstance(policy, interruptible.Interruptible)
+    frame = interruptible.Frame.empty(CONFIG, 1.0, torch.arange(4))
+    view = interruptible.View(frame, torch.zeros(64, 64, 3), torch.zeros(64, 64), 0.0, [], 0)
+    for probes, expected in (((0.02, 1e-4), 0.02 / 0.75), (None, 0.0)):
+        assert policy._dynamic(view, Moment(1.75, 0, 0.25), probes) == pytest.approx(expected)
+    assert policy._dynamic(view, Moment(1.0, 0, 0.25), (0.02, 1e-4)) == 0.0
 
 
 def test_the_price_is_the_sum_of_its_parts() -> None:
