@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 MUTANTS := $(VENV)/.mutants
 
-.PHONY: demo live test test-fast test-slow mutants kills lint bench study-quick solvers docs constraints clean
+.PHONY: demo live test test-fast test-slow mutants kills lint bench bench-history study-quick solvers docs constraints clean
 
 # the base alone, which is enough for the demo
 $(BASE): pyproject.toml constraints.txt
@@ -69,6 +69,12 @@ solvers: $(STAMP)
 
 bench: $(STAMP)
 	$(PY) scripts/bench.py --out out/bench
+
+# adds the figures of this commit to .asv/results and shows them; `asv compare COMMIT COMMIT` and `asv publish` show several
+bench-history: $(STAMP)
+	$(INSTALL) '.[history]'
+	$(VENV)/bin/asv machine --yes
+	$(VENV)/bin/asv run --python=same --set-commit-hash $$(git rev-parse HEAD)
 
 # needs no network once its packages are installed
 docs: $(DOCS)
