@@ -163,7 +163,7 @@ def _in_cache(folder: Path) -> Callable[[Any], list[Any]]:
     from analysis.comparison.repetitions import InputsOptions
 
     listed = InputsOptions.runs
-    small = {"cache": folder / "cache", "reference_samples_per_axis": 1}
+    small = {"references": folder / "cache", "reference_samples_per_axis": 1}
     return lambda options: [dataclasses.replace(run, **small) for run in listed(options)]
 
 
