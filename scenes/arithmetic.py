@@ -77,8 +77,8 @@ def product(first: ArrayLike, second: ArrayLike) -> Any:
     """
     a, b = np.asarray(first), np.asarray(second)
     if a.shape == b.shape == (4, 4):  # the same sums, with one multiplication for all terms
-        terms = a[:, :, None] * b
-        return terms[:, 0] + terms[:, 1] + terms[:, 2] + terms[:, 3]
+        # over an axis that is not the last, terms are added one by one; the sum of zeros keeps its sign
+        return (a[:, :, None] * b).sum(axis=1, initial=-0.0)
     rows, columns = a[None] if a.ndim == 1 else a, b[:, None] if b.ndim == 1 else b
     total = rows[..., :1] * columns[..., :1, :]
     for k in range(1, rows.shape[-1]):

@@ -23,17 +23,21 @@ from scenes.formats.text.places import TextPosition
 
 _TOKEN = re.compile(
     r"""
-    (?P<BLANK> (?: \s+ | \#[^\n]* )+ )
-    | (?P<TRUTH> (?: true | false )\b )
+    (?: \s+ | \#[^\n]* )*+
+    (?: (?P<TRUTH> (?: true | false )\b )
     | (?P<NAME> [A-Za-z_]\w* )
     | (?P<STRING> "[^"\\\n]*(?:\\.[^"\\\n]*)*" )
     | (?P<NUMBER> [-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.]) )
     | (?P<STRINGS> \[\s*(?:(?:\#[^\n]*\n|true\b|false\b|"[^"\\\n]*(?:\\.[^"\\\n]*)*")\s*)*\] )
     | (?P<NUMBERS> \[[-+.\deE\s,]*(?:\#[^\n]*(?:\n|$)[-+.\deE\s,]*)*\] )
+    | (?P<END> \Z ) )
     """,
     re.VERBOSE,
 )
-"""The tokens. No grammar is needed: a directive is a name and all values up to the next name."""
+"""The tokens, after blanks and comments. No grammar is needed: a directive is a name and all values up to the next
+name."""
+
+_BLANKS = re.compile(r"(?:\s+|#[^\n]*)*")
 
 _LONG = 256  # characters from which numbers are converted by NumPy
 _PIECE = 1 << 20  # characters of a list of numbers that are converted at a time
@@ -191,18 +195,30 @@ def _spliced(text: str, inside: tuple[Path, ...], opener: Opener) -> Iterator[tu
 
 def _tokens(text: str, file: Path) -> Iterator[Token]:
     """Tokens one by one, so that at most one list of numbers is held both as text and as numbers."""
-    at, line, begun = 0, 1, 0
-    while at < len(text):
-        found = _TOKEN.match(text, at)
+    at, line, begun, match = 0, 1, 0, _TOKEN.match
+    while True:
+        found = match(text, at)
         if found is None:
+            at = _after_blanks(text, at)
+            line, begun = line + text.count("\n", begun, at), text.rfind("\n", 0, at) + 1
             place, got = TextPosition(file.name, line, at - begun + 1), text[at : at + 20].split("\n")[0]
             raise SceneError(f"{place}: expected a directive, string or number, got {got!r}")
-        kind, end = str(found.lastgroup), found.end()
-        if kind != "BLANK":
-            yield Token(kind, found.group(), line, at - begun + 1)
-        if kind in ("BLANK", "STRINGS", "NUMBERS") and (ends := text.count("\n", at, end)):
-            line, begun = line + ends, text.rindex("\n", at, end) + 1
+        kind = found.lastgroup
+        if kind == "END" or kind is None:
+            return
+        start, end = found.span(kind)
+        if start > at and (ends := text.count("\n", at, start)):
+            line, begun = line + ends, text.rindex("\n", at, start) + 1
+        yield Token(kind, found[kind], line, start - begun + 1)
+        if kind in ("STRINGS", "NUMBERS") and (ends := text.count("\n", start, end)):
+            line, begun = line + ends, text.rindex("\n", start, end) + 1
         at = end
+
+
+def _after_blanks(text: str, at: int) -> int:
+    """Where blanks and comments end that begin at a place."""
+    found = _BLANKS.match(text, at)
+    return at if found is None else found.end()
 
 
 def _values(token: Token, file: Path) -> Values:
@@ -212,8 +228,8 @@ def _values(token: Token, file: Path) -> Values:
     if kind == "TRUTH":
         return (body,)
     if kind == "STRINGS":
-        parts = [part for part in _TOKEN.finditer(body[1:-1]) if part.lastgroup != "BLANK"]
-        return tuple(part[0] if part.lastgroup == "TRUTH" else _unquoted(part[0]) for part in parts)
+        parts = [(str(part.lastgroup), part[str(part.lastgroup)]) for part in _TOKEN.finditer(body[1:-1])]
+        return tuple(word if kind == "TRUTH" else _unquoted(word) for kind, word in parts if kind != "END")
     if kind == "NUMBER" and abs(value := float(body)) <= NUMBER_MAX:
         return np.array([value])
     place = TextPosition(file.name, token.line, token.column)

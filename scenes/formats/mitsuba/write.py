@@ -40,6 +40,7 @@ from scenes.formats.text.output import Output
 from scenes.formats.text.xml_tree import xml_text
 
 _FILTERS = first_of(FILTERS)
+_UNMOVED = np.eye(4)
 _DEVIATIONS = 4.0  # that the radius of a Gaussian filter of Mitsuba 3 is wide
 _SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "halton": "halton",
              "hammersley": "hammersley"}  # fmt: skip
@@ -163,7 +164,7 @@ class MitsubaWriter(MitsubaLightWriter):
         if shines(instance) or not (shared or (len(keys) > 1 and not self.modern)):
             made, local = self._shape(instance)
             self.root.append(made)
-            self._placing(made, [product(key, local) for key in keys], times_s, where)
+            self._placing(made, keys if local is _UNMOVED else [product(key, local) for key in keys], times_s, where)
             return
         key = part_key(instance)
         if key not in self._groups:
@@ -190,7 +191,7 @@ class MitsubaWriter(MitsubaLightWriter):
         if len(keys) > 1:
             what = "the motion of the camera" if where == "camera" else "the motion of a shape"
             self.report.add(where, what, "its place at the start")
-        if not np.array_equal(keys[0], np.eye(4)):
+        if not (keys[0] == _UNMOVED).all():
             self.matrix(made, "toWorld", keys[0])
 
     def _depends_on_uv(self, material: Material) -> bool:
@@ -220,7 +221,7 @@ class MitsubaWriter(MitsubaLightWriter):
                 became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
                 self.report.add(instance.name or "shape", what, became)
             shape = as_mesh(shape)
-        label, local = self.material(material, "", instance.one_sided), np.eye(4)
+        label, local = self.material(material, "", instance.one_sided), _UNMOVED
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
         made = self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):
