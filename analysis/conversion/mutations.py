@@ -23,7 +23,7 @@ from analysis.command.progress import Task
 from analysis.storage.journal import Journal
 
 LIMIT_S, LIMIT_MB = 5.0, 1024.0
-"""Most seconds for a file, and most memory of the process that reads it."""
+"""Most seconds of processor time for a file, and most memory of the process that reads it."""
 
 _STUCK_S = 60.0
 _BATCH = 50
@@ -96,7 +96,7 @@ def outcome_of(file: Path, folder: Path) -> tuple[str, str]:
 
 
 def _read(pipe: Connection, sources: list[Path], folder: Path, seed: int) -> None:
-    """Answers each number with what reading the changed file came to, its seconds, and the most memory, MB."""
+    """Answers each number with what reading the changed file came to, its seconds of processor time, and the most memory."""
     contents = [file.read_bytes() for file in sources]
     while True:
         number = pipe.recv()
@@ -107,9 +107,9 @@ def _read(pipe: Connection, sources: list[Path], folder: Path, seed: int) -> Non
         changed.write_bytes(mutated(contents[chosen], rng))
         if _FORGET_PEAK.exists():
             _FORGET_PEAK.write_text("5")
-        begun_s = time.perf_counter()
+        begun_s = time.process_time()
         outcome, error = outcome_of(changed, folder)
-        spent_s = time.perf_counter() - begun_s
+        spent_s = time.process_time() - begun_s
         changed.unlink()
         pipe.send((outcome, error, file.name, spent_s, _peak_mb()))
 
