@@ -96,7 +96,7 @@ def outcome_of(file: Path, folder: Path) -> tuple[str, str]:
 
 
 def _read(pipe: Connection, sources: list[Path], folder: Path, seed: int) -> None:
-    """Answers each number with what reading the changed file came to, its seconds of processor time, and the most memory."""
+    """Answers each number with what reading the changed file came to, seconds of processor time, and memory in MB."""
     contents = [file.read_bytes() for file in sources]
     while True:
         number = pipe.recv()
