@@ -199,7 +199,7 @@ def _tokens(text: str, file: Path) -> Iterator[Token]:
     while True:
         found = match(text, at)
         if found is None:
-            at = _after_blanks(text, at)
+            at = next(_BLANKS.finditer(text, at)).end()
             line, begun = line + text.count("\n", begun, at), text.rfind("\n", 0, at) + 1
             place, got = TextPosition(file.name, line, at - begun + 1), text[at : at + 20].split("\n")[0]
             raise SceneError(f"{place}: expected a directive, string or number, got {got!r}")
@@ -213,12 +213,6 @@ def _tokens(text: str, file: Path) -> Iterator[Token]:
         if kind in ("STRINGS", "NUMBERS") and (ends := text.count("\n", start, end)):
             line, begun = line + ends, text.rindex("\n", start, end) + 1
         at = end
-
-
-def _after_blanks(text: str, at: int) -> int:
-    """Where blanks and comments end that begin at a place."""
-    found = _BLANKS.match(text, at)
-    return at if found is None else found.end()
 
 
 def _values(token: Token, file: Path) -> Values:
