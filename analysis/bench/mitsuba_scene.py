@@ -203,13 +203,15 @@ def _glass(mitsuba: Any, material: Glass) -> dict[str, Any]:
     for name, texture in (("reflectance", material.reflectance), ("transmittance", material.transmittance)):
         if texture is not WHITE:
             found[f"specular_{name}"] = _texture(mitsuba, texture)
-    return found | ({"distribution": "ggx", "alpha": material.roughness[0]} if kind == "roughdielectric" else {})
+    rough = {"distribution": material.distribution, "alpha": material.roughness[0]}
+    return found | (rough if kind == "roughdielectric" else {})
 
 
 def _coated(mitsuba: Any, material: Plastic) -> dict[str, Any]:
     found = {"type": "roughplastic" if material.roughness > 0.0 else "plastic", "int_ior": material.ior, "ext_ior": 1.0}
     found["diffuse_reflectance"] = _texture(mitsuba, material.diffuse)
-    return found | ({"distribution": "ggx", "alpha": material.roughness} if material.roughness > 0.0 else {})
+    rough = {"distribution": material.distribution, "alpha": material.roughness}
+    return found | (rough if material.roughness > 0.0 else {})
 
 
 def _metal(mitsuba: Any, material: Metal) -> dict[str, Any]:

@@ -27,7 +27,7 @@ class ScatterRecord:
     thin: wp.int32
     eta: wp.vec3
     k: wp.vec3
-    beckmann: wp.int32  # 1 if the facets of a metal have the distribution of Beckmann
+    beckmann: wp.int32  # 1 if the facets have the distribution of Beckmann
     inner: wp.float32  # internal diffuse reflectance of a coat
     passed_low: wp.vec4  # coefficients of the transmittance of a rough coat minus that of a smooth one, lowest power
     passed_high: wp.vec4  # first

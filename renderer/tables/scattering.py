@@ -92,6 +92,7 @@ def _glass(material: Glass, textures: Textures, where: str) -> Row:
         "ior": material.ior,
         "thin": int(material.thin),
         "alpha": mean_alpha(material.roughness),
+        "beckmann": int(material.distribution == "beckmann"),
     }
 
 
@@ -112,7 +113,7 @@ def _plastic(material: Plastic, textures: Textures, where: str) -> Row:
         raise SceneError(f"{where}: Plastic.layered: expected True (all that paths support), got False")
     rough = {"inner": thrown_back(material.ior)}
     if material.roughness > 0.0:
-        passed, inner = rough_coat(material.ior, material.roughness)
+        passed, inner = rough_coat(material.ior, material.roughness, material.distribution)
         rough = {"inner": inner, "passed_low": tuple(passed[:4]), "passed_high": tuple(passed[4:])}
     return {
         **rough,
@@ -121,6 +122,7 @@ def _plastic(material: Plastic, textures: Textures, where: str) -> Row:
         "specular": textures.add_texture(material.specular, where),
         "ior": material.ior,
         "alpha": material.roughness,
+        "beckmann": int(material.distribution == "beckmann"),
     }
 
 

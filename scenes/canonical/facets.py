@@ -12,6 +12,9 @@ from typing import Literal
 from scenes.canonical.textures import WHITE, Texture
 from scenes.canonical.values import Rgb, SceneError
 
+Distribution = Literal["beckmann", "ggx"]
+"""Distribution of the normals of microfacets."""
+
 
 @dataclass(frozen=True)
 class Metal:
@@ -21,7 +24,7 @@ class Metal:
     k: Rgb
     roughness: tuple[float, float] = (0.0, 0.0)
     reflectance_scale: Texture = WHITE
-    distribution: Literal["beckmann", "ggx"] = "ggx"
+    distribution: Distribution = "ggx"
     alpha: Texture | None = None
 
 
@@ -46,6 +49,7 @@ class Plastic:
         layered: whether the coat attenuates light to and from the base (Mitsuba); otherwise the reflection of the coat
             is added to the base (PBRT).
         alpha: texture of the microfacet alpha, of which ``roughness`` is the mean.
+        distribution: distribution of the facets of a rough coat.
     """
 
     diffuse: Texture
@@ -54,6 +58,7 @@ class Plastic:
     roughness: float = 0.0
     layered: bool = True
     alpha: Texture | None = None
+    distribution: Distribution = "ggx"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.canonical.facets import Glossy, Metal, MetallicRough, Plastic
+from scenes.canonical.facets import Distribution, Glossy, Metal, MetallicRough, Plastic
 from scenes.canonical.textures import WHITE, Texture
 from scenes.canonical.values import Rgb, SceneError
 
@@ -89,6 +89,7 @@ class Glass:
             summed.
         spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill uniformly.
         alpha: texture of the microfacet alpha, of which ``roughness`` is the mean; the renderer uses the mean.
+        distribution: distribution of the facets of rough glass.
     """
 
     reflectance: Texture = WHITE
@@ -98,6 +99,7 @@ class Glass:
     thin: bool = False
     spread_deg: float = 0.0
     alpha: Texture | None = None
+    distribution: Distribution = "ggx"
 
     def __post_init__(self) -> None:
         _check_spread("Glass.spread_deg", self.spread_deg)

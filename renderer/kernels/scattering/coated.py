@@ -9,7 +9,7 @@ from __future__ import annotations
 import warp as wp
 
 from renderer.kernels.glass import dielectric_reflectance
-from renderer.kernels.scattering.facets import facet_density, seen_share, visible_density, visible_normal
+from renderer.kernels.scattering.distributions import density_of, masked, normal_density, normal_of
 from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, brightness, cosine_direction, mirrored
 
 
@@ -49,10 +49,10 @@ def coated_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respo
     if lobes.alpha > 0.0:
         half = wp.normalize(outgoing + arriving)
         toward = wp.dot(outgoing, half)
-        shape = facet_density(lobes.alpha, half[2]) * seen_share(lobes.alpha, outgoing[2])
-        shape = shape * seen_share(lobes.alpha, arriving[2]) / (4.0 * outgoing[2])
+        shape = density_of(lobes, half[2]) * masked(lobes, outgoing[2])
+        shape = shape * masked(lobes, arriving[2]) / (4.0 * outgoing[2])
         response.value = response.value + lobes.specular * (dielectric_reflectance(toward, lobes.ratio) * shape)
-        choice = visible_density(lobes.alpha, outgoing, half) / wp.max(4.0 * toward, 1.0e-9)
+        choice = normal_density(lobes, outgoing, half) / wp.max(4.0 * toward, 1.0e-9)
         response.density = response.density + chance * choice
     return response
 
@@ -69,7 +69,7 @@ def coated_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp
         chosen.direction = cosine_direction(point)
     elif lobes.alpha > 0.0:
         chosen.density = 1.0
-        chosen.direction = mirrored(outgoing, visible_normal(lobes.alpha, outgoing, point))
+        chosen.direction = mirrored(outgoing, normal_of(lobes, outgoing, point))
     else:
         chosen.direction = mirrored(outgoing, wp.vec3(0.0, 0.0, 1.0))
         chosen.weight = lobes.specular * (reflectance / chance)

@@ -6,7 +6,7 @@ import warp as wp
 
 from renderer.kernels.glass import dielectric_reflectance
 from renderer.kernels.randomness import cone_direction
-from renderer.kernels.scattering.facets import facet_density, seen_share, visible_density, visible_normal
+from renderer.kernels.scattering.distributions import density_of, masked, normal_density, normal_of
 from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, mirrored
 
 
@@ -45,9 +45,9 @@ def glass_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respon
     if toward <= 0.0 or (up and beside <= 0.0) or (not up and beside >= 0.0):
         return response
     reflectance = dielectric_reflectance(toward, ratio)
-    shape = facet_density(lobes.alpha, half[2]) * seen_share(lobes.alpha, outgoing[2])
-    shape = shape * seen_share(lobes.alpha, wp.abs(arriving[2])) / outgoing[2]
-    choice = visible_density(lobes.alpha, outgoing, half)
+    shape = density_of(lobes, half[2]) * masked(lobes, outgoing[2])
+    shape = shape * masked(lobes, wp.abs(arriving[2])) / outgoing[2]
+    choice = normal_density(lobes, outgoing, half)
     if up:
         response.value = lobes.specular * (reflectance * shape * 0.25)
         response.density = reflectance * choice / (4.0 * beside)
@@ -68,7 +68,7 @@ def glass_chosen(lobes: Lobes, outgoing: wp.vec3, choice: wp.float32, point: wp.
     normal = wp.vec3(0.0, 0.0, 1.0)
     rough = lobes.alpha > 0.0 and lobes.thin == 0
     if rough:
-        normal = visible_normal(lobes.alpha, outgoing, point)
+        normal = normal_of(lobes, outgoing, point)
         chosen.density = 1.0
     cosine = wp.dot(outgoing, normal)
     reflectance = dielectric_reflectance(cosine, lobes.ratio)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.kernels.scattering.beckmann import beckmann_normal
 from renderer.kernels.scattering.coated import coated_chosen, coated_response
 from renderer.kernels.scattering.diffuse import diffuse_response
-from renderer.kernels.scattering.facets import visible_normal
+from renderer.kernels.scattering.distributions import normal_of
 from renderer.kernels.scattering.glass import glass_chosen, glass_response
 from renderer.kernels.scattering.lobes import Chosen, Lobes, Response, cosine_direction, mirrored
 from renderer.kernels.scattering.metal import metal_reflectance, metal_response
@@ -48,6 +47,7 @@ def lobes_at(
     lobes.specular = looked_up(features, scene, record.specular, surface, footprint)
     lobes.rough = record.rough
     lobes.alpha = record.alpha
+    lobes.beckmann = record.beckmann
     lobes.cos_spread = material.cos_spread
     lobes.thin = record.thin
     lobes.ratio = 1.0 / record.ior
@@ -65,7 +65,6 @@ def lobes_at(
     elif (features & Feature.FACETS) != 0:
         lobes.eta = record.eta
         lobes.k = record.k
-        lobes.beckmann = record.beckmann
         lobes.inner = record.inner
         lobes.passed_low = record.passed_low
         lobes.passed_high = record.passed_high
@@ -114,10 +113,7 @@ def chosen_of(features: wp.int32, lobes: Lobes, outgoing: wp.vec3, choice: wp.fl
         chosen = glass_chosen(lobes, outgoing, choice, point)
     elif (features & Feature.FACETS) != 0:
         if lobes.kind == ScatterKind.METAL and lobes.alpha > 0.0:
-            if lobes.beckmann != 0:
-                chosen.direction = mirrored(outgoing, beckmann_normal(lobes.alpha, point))
-            else:
-                chosen.direction = mirrored(outgoing, visible_normal(lobes.alpha, outgoing, point))
+            chosen.direction = mirrored(outgoing, normal_of(lobes, outgoing, point))
             chosen.density = 1.0
         elif lobes.kind == ScatterKind.METAL:
             chosen.direction = mirrored(outgoing, wp.vec3(0.0, 0.0, 1.0))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from renderer.kernels.scattering.beckmann import beckmann_density, beckmann_seen
-from renderer.kernels.scattering.facets import facet_density, seen_share, visible_density
+from renderer.kernels.scattering.distributions import density_of, masked, normal_density
 from renderer.kernels.scattering.lobes import Lobes, Response
 
 
@@ -43,14 +42,8 @@ def metal_response(lobes: Lobes, outgoing: wp.vec3, arriving: wp.vec3) -> Respon
     half = wp.normalize(outgoing + arriving)
     toward = wp.dot(outgoing, half)
     choice = wp.max(4.0 * toward, 1.0e-9)
-    if lobes.beckmann != 0:
-        shape = beckmann_density(lobes.alpha, half[2]) / (4.0 * outgoing[2])
-        response.density = beckmann_density(lobes.alpha, half[2]) * half[2] / choice
-        shape = shape * beckmann_seen(lobes.alpha, outgoing[2]) * beckmann_seen(lobes.alpha, arriving[2])
-        response.value = metal_reflectance(lobes, toward) * shape
-        return response
-    shape = facet_density(lobes.alpha, half[2]) * seen_share(lobes.alpha, outgoing[2])
-    shape = shape * seen_share(lobes.alpha, arriving[2]) / (4.0 * outgoing[2])
+    shape = density_of(lobes, half[2]) * masked(lobes, outgoing[2])
+    shape = shape * masked(lobes, arriving[2]) / (4.0 * outgoing[2])
     response.value = metal_reflectance(lobes, toward) * shape
-    response.density = visible_density(lobes.alpha, outgoing, half) / choice
+    response.density = normal_density(lobes, outgoing, half) / choice
     return response

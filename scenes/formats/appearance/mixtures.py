@@ -158,7 +158,7 @@ def added_metal(material: Plastic, where: str, report: LossReport) -> Material:
         report.add(where, "a coat and a base that reflect more than the incident light", "a darker coat")
     coat = _capped(material.specular, 1.0 / share)
     alphas = material.roughness, material.roughness
-    metal = Metal(grey(material.ior), grey(0.0), alphas, coat, alpha=material.alpha)
+    metal = Metal(grey(material.ior), grey(0.0), alphas, coat, material.distribution, material.alpha)
     return MixMaterial(Matte(_scaled(material.diffuse, 1.0 / (1.0 - share))), metal, ConstantTexture(grey(share)))
 
 
@@ -170,13 +170,12 @@ def plastic_of(material: MixMaterial) -> Material:
     share, even = amount.value[0], len(set(amount.value)) == len(set(coat.eta)) == len(set(coat.roughness)) == 1
     if not (even and base.sigma_deg == 0.0 and coat.k == grey(0.0) and coat.eta[0] > 1.0 and 0.0 < share < 1.0):
         return material
-    if coat.distribution != "ggx":
-        return material
     parts = (
         product_of(base.reflectance, ConstantTexture(grey(1.0 - share))),
         product_of(coat.reflectance_scale, ConstantTexture(grey(share))),
     )
-    return Plastic(*parts, coat.eta[0], coat.roughness[0], layered=False, alpha=coat.alpha)
+    alphas = {"distribution": coat.distribution, "alpha": coat.alpha}
+    return Plastic(*parts, coat.eta[0], coat.roughness[0], layered=False, **alphas)  # type: ignore[arg-type]
 
 
 def added_coat(material: Plastic) -> Material:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from scenes.canonical import (
     Bumped,
     CheckerboardTexture,
@@ -24,6 +26,7 @@ from scenes.canonical import (
     Mirror,
     MixTexture,
     NormalMapped,
+    Plastic,
     Rgb,
     ScaleTexture,
     Texture,
@@ -47,11 +50,13 @@ class SurfaceWriter:
         color_texture: type of colour textures.
         color: type of colour parameters.
         checkerboard_end: additional parameters of every checkerboard.
+        facets: the distribution of facets, for messages.
     """
 
     color_texture: ClassVar[str]
     color: ClassVar[str]
     checkerboard_end: ClassVar[str] = ""
+    facets: ClassVar[str] = "Trowbridge–Reitz (ggx)"
 
     output: Output
     report: LossReport
@@ -141,6 +146,9 @@ class SurfaceWriter:
         where = f"material {name!r}"
         if isinstance(material, HeightField | NormalMapped | MetallicRough):
             return self.material_line(simpler(material, where, self.report), name)
+        if isinstance(material, Metal | Glass | Plastic) and np.max(material.roughness) > 0.0:
+            if material.distribution != "ggx":
+                self.report.add(where, f"the distribution {material.distribution} of facets", self.facets)
         return plain_line(*self.plain_material(material, where))
 
     def bumped_line(self, material: Bumped, name: str, parameter: str) -> str:

@@ -42,6 +42,7 @@ class LuxSurfaceWriter(SurfaceWriter):
     """Collects the lines of textures and materials."""
 
     color_texture = "color"
+    facets = "LuxRender's own"
     color = "color"
     checkerboard_end = ' "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
     _null: Matte | None = None
@@ -134,8 +135,6 @@ class LuxSurfaceWriter(SurfaceWriter):
         label = self.label("t")
         known = (_METAL_NAMES.get(name) for name, index in METALS.items() if index == (material.eta, material.k))
         preset, plain = next(known, ""), mean_of(material.reflectance_scale) == (1.0, 1.0, 1.0)
-        if material.distribution != "ggx":
-            self.report.add(where, f"the distribution {material.distribution} of facets", "LuxRender's own")
         if preset and plain:
             self.lines.append(f'\tTexture "{label}" "fresnel" "preset" "string name" [ "{preset}" ]')
         else:

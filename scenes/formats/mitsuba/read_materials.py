@@ -27,6 +27,7 @@ from scenes.canonical import (
     SceneError,
     Translucent,
 )
+from scenes.canonical.facets import Distribution
 from scenes.formats.appearance.coats import without_bounces
 from scenes.formats.appearance.facets import Facets, facets_of
 from scenes.formats.appearance.folding import mean_of
@@ -143,7 +144,7 @@ class MitsubaSurfaces(MitsubaTextures):
             raise SceneError(f"{properties.where}: alpha: expected no negative number, got {min(pair):g}")
         return pair
 
-    def _distribution(self, properties: Properties) -> str:
+    def _distribution(self, properties: Properties) -> Distribution:
         found = properties.text("distribution", "beckmann")
         if found not in ("beckmann", "ggx"):
             self.report.add(properties.where, f"the distribution {found!r} of facets", "beckmann")
@@ -165,12 +166,10 @@ class MitsubaSurfaces(MitsubaTextures):
             self.texture(properties, "specularReflectance", grey(1.0)),
             self.texture(properties, "specularTransmittance", grey(1.0)),
         )
-        facets = Facets((0.0, 0.0))
         if kind == "roughdielectric":
-            facets = self._facets(properties)
-            if self._distribution(properties) != "ggx":
-                self.report.add(properties.where, "the distribution beckmann of glass", "ggx")
-        return Glass(*parts, index, facets.roughness, kind == "thindielectric", alpha=facets.alpha)
+            facets, distribution = self._facets(properties), self._distribution(properties)
+            return Glass(*parts, index, facets.roughness, alpha=facets.alpha, distribution=distribution)
+        return Glass(*parts, index, thin=kind == "thindielectric")
 
     def _conductor(self, properties: Properties) -> Material:
         name = properties.text("material", "Cu")
@@ -190,7 +189,7 @@ class MitsubaSurfaces(MitsubaTextures):
         if properties.node.get("type") == "conductor":
             return Metal(index[0], index[1], (0.0, 0.0), scale)
         kind, facets = self._distribution(properties), self._facets(properties)
-        return Metal(index[0], index[1], facets.roughness, scale, kind, facets.alpha)  # type: ignore[arg-type]
+        return Metal(index[0], index[1], facets.roughness, scale, kind, facets.alpha)
 
     def _plastic(self, properties: Properties) -> Material:
         index = ior(properties, "intIOR", "polypropylene") / ior(properties, "extIOR", "air")
@@ -201,14 +200,15 @@ class MitsubaSurfaces(MitsubaTextures):
         if properties.truth("nonlinear", False):
             parts = without_bounces(parts[0], index, properties.where, self.report), parts[1]
         alpha, facets = 0.0, Facets((0.0, 0.0))
+        kind: Distribution = "ggx"
         if properties.node.get("type") == "roughplastic":
             facets = self._facets(properties)
             alphas = facets.roughness
             alpha = math.sqrt(alphas[0] * alphas[1])
             if alphas[0] != alphas[1]:
                 self.report.add(properties.where, "a coat of two roughnesses", f"one of alpha {alpha:.3g}")
-            self._distribution(properties)
-        return Plastic(*parts, index, alpha, alpha=facets.alpha)
+            kind = self._distribution(properties)
+        return Plastic(*parts, index, alpha, alpha=facets.alpha, distribution=kind)
 
     def _phong(self, properties: Properties) -> Material:
         specular = mean_of(self.texture(properties, "specularReflectance", grey(0.2)))

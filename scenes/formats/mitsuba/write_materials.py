@@ -217,6 +217,8 @@ class MitsubaSurfaceWriter(ElementWriter):
         self.texture(made, parts[1], "specularReflectance")
         self.put(made, "float", "intIOR", number(parts[2]))
         self.put(made, "float", "extIOR", "1")
+        if isinstance(material, Plastic) and (rough is not None or parts[3] > 0.0):
+            self.put(made, "string", "distribution", material.distribution)
         if rough is not None:
             self.numbers(made, rough, "alpha")
         elif parts[3] > 0.0:
@@ -250,7 +252,7 @@ class MitsubaSurfaceWriter(ElementWriter):
             if texture != WHITE:
                 self.texture(made, texture, name)
         if kind == "roughdielectric":
-            self.put(made, "string", "distribution", "ggx")
+            self.put(made, "string", "distribution", material.distribution)
             self._facets(made, material)
         return made
 

@@ -95,8 +95,6 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
                 self.report.add(where, "rays spread about the mirrored one", "a sharp mirror")
             return self._mirror(material.reflectance, Facets((0.0, 0.0)), where)
         if isinstance(material, Metal):
-            if material.distribution != "ggx":
-                self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
             if (material.eta, material.k) == _MIRROR:
                 return self._mirror(material.reflectance_scale, material, where)
             index = [self.constant("eta", material.eta), self.constant("k", material.k)]

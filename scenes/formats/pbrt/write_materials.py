@@ -69,8 +69,6 @@ class PbrtSurfaceWriter(SurfaceWriter):
         if isinstance(material, Glass):
             return self._glass(material, where)
         if isinstance(material, Metal):
-            if material.distribution != "ggx":
-                self.report.add(where, f"the distribution {material.distribution} of facets", "Trowbridge–Reitz (ggx)")
             index = [self.constant("eta", material.eta), self.constant("k", material.k)]
             return "metal", [*index, self.unmapped(material)]
         if isinstance(material, Glossy):

@@ -53,9 +53,11 @@ MATERIALS = {
     "Beckmann metal": Metal(*GOLD, (0.3, 0.3), distribution="beckmann"),
     "glass": Glass(),
     "rough glass": Glass(roughness=(0.3, 0.3)),
+    "Beckmann glass": Glass(roughness=(0.3, 0.3), distribution="beckmann"),
     "pane": Glass(transmittance=color(0.5, 0.8, 0.9), thin=True),
     "plastic": Plastic(color(0.6, 0.2, 0.2)),
     "rough plastic": Plastic(color(0.6, 0.2, 0.2), roughness=0.3),
+    "Beckmann plastic": Plastic(color(0.6, 0.2, 0.2), roughness=0.3, distribution="beckmann"),
     "holes": Masked(Matte(color(0.7, 0.3, 0.2)), color(0.4)),
 }
 
