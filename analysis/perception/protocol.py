@@ -29,6 +29,7 @@ _OLD_SESSION, _OLD_ANSWERS = "session.json", "answers.jsonl"
 
 _MOST = {
     "response_s": 1e8, "display_rate_hz": 1e6, "dropped_frames": 10**9, "refreshes": 10**9, "device_pixel_ratio": 1e3,
+    "videos": 4,
 }  # fmt: skip
 
 
@@ -193,9 +194,10 @@ class TrialSession:
                     "display_rate_hz": answer.get("display_rate_hz", np.nan),
                     "dropped_frames": answer.get("dropped_frames", -1),
                     "fits_window": answer.get("fits_window", False),
+                    "videos": answer.get("videos", 4),
                 }
             )
-        extra = ["display_rate_hz", "dropped_frames", "fits_window"]
+        extra = ["display_rate_hz", "dropped_frames", "fits_window", "videos"]
         return pd.DataFrame(rows, columns=[*COLUMNS, *extra])
 
     def export(self) -> Path:

@@ -1,10 +1,20 @@
-// Shows the trials one by one: two synchronised pairs of the same sequence, one of which differs.
+// Shows the trials one by one: two synchronised pairs of the same sequence, one of which differs. The pairs stand side
+// by side where four pictures fit into the window, else they are seen in turn, two pictures side by side.
 "use strict";
 
 const message = document.getElementById("message"), pairs = document.getElementById("pairs");
 const progress = document.getElementById("progress"), canvases = [...document.querySelectorAll("canvas")];
 const headers = { "X-Token": document.querySelector("meta[name=token]").content };
-let state = null, phase = "loading", shown = null;
+const columns = [...document.querySelectorAll(".pair")];
+let state = null, phase = "loading", shown = null, told = 0;
+
+const RULES = {
+  4: "Two pairs of moving pictures are shown, left and right.\nIn one pair the upper and the lower picture differ.\n" +
+    "Press the arrow key of the side where they differ. Guess if you cannot tell.",
+  2: "Two pairs of moving pictures are shown in turn; the space key changes to the other pair.\n" +
+    "In one pair the left and the right picture differ.\nPress the left arrow key if they differ in the first pair, " +
+    "the right one for the second. Guess if you cannot tell.",
+};
 
 function say(text) {
   message.textContent = text;
@@ -35,10 +45,26 @@ function fit([width, height]) {
   }
 }
 
+// The number of pictures that fit into the window at once: 4, 2 or 0.
+function fitting([width, height]) {
+  const ratio = window.devicePixelRatio || 1, wide = 2 * width / ratio, high = height / ratio;
+  if (wide + 48 <= window.innerWidth && 2 * high + 24 <= window.innerHeight) return 4;
+  return wide + 8 <= window.innerWidth && high + 16 <= window.innerHeight ? 2 : 0;
+}
+
+// Shows both pairs, or one of them.
+function reveal(videos, pair) {
+  pairs.className = videos === 2 ? "turns" : "";
+  columns.forEach((column, at) => { column.style.display = videos === 2 && at !== pair ? "none" : "grid"; });
+  if (videos === 2) progress.textContent = `${state.done} of ${state.total}, ${pair ? "second" : "first"} pair`;
+  shown.pair = pair;
+  shown.seen.add(pair);
+}
+
 // All four canvases are drawn in the same refresh. Counts refreshes, and late ones.
 function play(sequences, rate) {
   const contexts = canvases.map((canvas) => canvas.getContext("2d"));
-  const run = { begun: performance.now(), intervals: [], last: null, over: false };
+  const run = { begun: performance.now(), intervals: [], last: null, over: false, videos: 4, pair: 0, seen: new Set() };
   function draw(now) {
     if (run.over) return;
     if (run.last !== null) run.intervals.push(now - run.last);
@@ -61,6 +87,7 @@ function measured(run) {
     refreshes: run.intervals.length,
     fits_window: pairs.scrollWidth <= window.innerWidth && box.bottom <= window.innerHeight,
     device_pixel_ratio: window.devicePixelRatio || 1,
+    videos: run.videos,
   };
 }
 
@@ -69,6 +96,19 @@ async function next() {
   if (state.trial === null) {
     phase = "end";
     say("That was the last one. Thank you.");
+    return;
+  }
+  const videos = fitting(state.size_px), [width, height] = state.size_px;
+  if (videos === 0) {
+    phase = "small";
+    const ratio = window.devicePixelRatio || 1, wide = Math.ceil(2 * width / ratio + 8);
+    say(`The window is too small for two pictures side by side.\nIt has ${window.innerWidth} x ${window.innerHeight} ` +
+      `and needs ${wide} x ${Math.ceil(height / ratio + 16)}. Make it larger, or the zoom smaller.`);
+    return;
+  }
+  if (videos !== told) {
+    told = videos;
+    pause(RULES[videos]);
     return;
   }
   phase = "loading";
@@ -84,6 +124,8 @@ async function next() {
   message.style.display = "none";
   pairs.style.display = "flex";
   shown = play(sequences, state.frame_rate_hz);
+  shown.videos = videos;
+  reveal(videos, 0);
   phase = "trial";
 }
 
@@ -117,10 +159,15 @@ async function answer(side) {
   else await next();
 }
 
+// The window became large enough.
+window.addEventListener("resize", () => { if (phase === "small") next(); });
+
 document.addEventListener("keydown", (event) => {
+  const ready = phase === "trial" && (shown.videos === 4 || shown.seen.size === 2);
   if (phase === "pause" && event.code === "Space") next();
-  else if (phase === "trial" && event.code === "ArrowLeft") answer("left");
-  else if (phase === "trial" && event.code === "ArrowRight") answer("right");
+  else if (phase === "trial" && shown.videos === 2 && event.code === "Space") reveal(2, 1 - shown.pair);
+  else if (ready && event.code === "ArrowLeft") answer("left");
+  else if (ready && event.code === "ArrowRight") answer("right");
   else return;
   event.preventDefault();
 });
@@ -128,6 +175,5 @@ document.addEventListener("keydown", (event) => {
 (async () => {
   state = await (await fetch("state", { headers })).json();
   progress.textContent = `${state.done} of ${state.total}`;
-  pause("Two pairs of moving pictures are shown, left and right.\nIn one pair the upper and the lower picture differ.\n" +
-    "Press the arrow key of the side where they differ. Guess if you cannot tell.");
+  await next();
 })();

@@ -88,6 +88,7 @@ def test_a_session_from_the_first_trial_to_the_last(browser: Browser, tmp_path: 
 
 PAIRS = """all => all.map(one => ({
   left: one.getBoundingClientRect().left,
+  width: one.getBoundingClientRect().width,
   pixels: one.getContext("2d").getImageData(0, 0, one.width, one.height).data.join(),
 }))"""
 
@@ -128,14 +129,41 @@ def test_a_stimulus_that_was_damaged_is_said(browser: Browser, tmp_path: Path) -
     page.close()
 
 
-def test_a_window_that_is_too_small_is_noted(browser: Browser, tmp_path: Path) -> None:
-    stimuli = write_stimuli(tmp_path / "stimuli", side=160)
+def test_pairs_are_seen_in_turn_where_four_pictures_do_not_fit(browser: Browser, tmp_path: Path) -> None:
+    """A window that is too small for two refuses to start; one that is wide enough shows one pair at a time."""
+    stimuli = write_stimuli(tmp_path / "stimuli", side=160, frames=1)
     page = browser.new_page(viewport={"width": 300, "height": 300})
-    with TrialSession(tmp_path / "session", stimuli, "bert", 1, 0) as session, serving(session) as address:
+    with TrialSession(tmp_path / "session", stimuli, "bert", 2, 0) as session, serving(session) as address:
         page.goto(address)
-        page.wait_for_function("phase === 'pause'")
+        expect(page.locator("#message")).to_contain_text("It has 300 x 300 and needs 328 x 176", timeout=10_000)
+        page.keyboard.press("Space")
+        expect(page.locator("#pairs")).to_be_hidden()
+        page.set_viewport_size({"width": 340, "height": 200})
+        expect(page.locator("#message")).to_contain_text("in turn", timeout=10_000)
+        page.keyboard.press("Space")
+        for trial in session.trials[:2]:
+            page.wait_for_function(f"phase === 'trial' && state.trial.number === {trial.number}")
+            page.wait_for_function("shown.intervals.length > 1")
+            page.keyboard.press("ArrowLeft")  # before both pairs were seen: no answer
+            seen = []
+            for _ in range(2):
+                canvases = page.eval_on_selector_all("canvas", PAIRS)
+                seen.append({one["pixels"] for one in canvases if one["width"] > 0})
+                assert sum(one["width"] > 0 for one in canvases) == 2
+                assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+                page.keyboard.press("Space")
+            differing = ["left" if len(seen[0]) == 2 else "right"] if trial.test != trial.reference else [trial.side]
+            assert differing == [trial.side]
+            page.keyboard.press({"left": "ArrowLeft", "right": "ArrowRight"}[trial.side])
+            page.wait_for_function(f"state.done === {trial.number + 1}")
+        page.set_viewport_size({"width": 600, "height": 500})
+        press_when_shown(page, "ArrowLeft")  # the trial that is shown goes on in turn
+        page.keyboard.press("Space")
+        page.keyboard.press("ArrowLeft")
+        expect(page.locator("#message")).to_contain_text("left and right", timeout=10_000)
         page.keyboard.press("Space")
         press_when_shown(page, "ArrowLeft")
-        page.wait_for_function("state.done === 1")
-        assert not session.table()["fits_window"].iloc[0]
+        page.wait_for_function("state.done === 4")
+        table = session.table()
+        assert table["videos"].tolist() == [2, 2, 2, 4] and table["fits_window"].all() and table["correct"][:2].all()
     page.close()
