@@ -6,6 +6,8 @@ Examples: python scripts/perception.py stimuli --width-px 128 --frames 20 --out 
           python scripts/perception.py adaptive fly-by chase --out out/perception-adaptive
           python scripts/perception.py analyse out/perception-simulated/trials-simulated.parquet
           python scripts/perception.py recover
+          python scripts/perception.py figures
+          python scripts/perception.py anomaly
 """
 
 from __future__ import annotations

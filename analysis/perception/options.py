@@ -234,6 +234,53 @@ class AdaptiveOptions:
         )
 
 
+@dataclass(frozen=True)
+class FiguresOptions:
+    """Draws figures 3, 6, 8, 10, 15, 17 and 18 of the thesis: sampling in time and space, and both scenes."""
+
+    width_px: int = 192
+    """Width, pixels; of a frame, also its height."""
+    samples: int = 64
+    """Samples per pixel."""
+    seed: int = 0
+    """Seed of all random numbers; of shifts."""
+    threads: Threads = 0
+    out: Path = Path("out/perception-figures")
+    """Folder for the results; figures and summary.json."""
+
+    def __post_init__(self) -> None:
+        limits.within(self, width_px=(16, 2048), samples=(8, 4096), seed=limits.SEEDS, threads=limits.THREADS)
+
+
+@dataclass(frozen=True)
+class AnomalyOptions:
+    """Measures how much random stratified sets differ, and whether that explains the anomaly at 216 samples."""
+
+    levels: tuple[int, ...] = (125, 216, 343)
+    """Numbers of samples, which must be cubes."""
+    sets: int = 16
+    """Point sets of each number of samples."""
+    shifts: int = 3
+    """Shifts of each set."""
+    studies: int = 20_000
+    """Studies of observers that are simulated."""
+    width_px: int = 48
+    """Width, pixels; of a frame, also its height."""
+    seed: int = 0
+    """Seed of all random numbers; of sets, shifts and observers."""
+    threads: Threads = 0
+    out: Path = Path("out/perception-anomaly")
+    """Folder for the results; anomaly.csv and summary.json."""
+
+    def __post_init__(self) -> None:
+        require_distinct(self, "levels")
+        for level in self.levels:
+            require(round(level ** (1 / 3)) ** 3 == level and 1 <= level <= 4096, "levels", "cubes to 4096", level)
+        require(len(self.levels) >= 2, "levels", "at least two", self.levels)
+        limits.within(self, sets=(2, 256), shifts=(2, 64), studies=(100, 10**6), width_px=(16, 512))
+        limits.within(self, seed=(0, limits.SEEDS[1] - 256), threads=limits.THREADS)
+
+
 StepOptions = (
     Annotated[StimuliOptions, tyro.conf.subcommand("stimuli")]
     | Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
@@ -241,5 +288,7 @@ StepOptions = (
     | Annotated[AdaptiveOptions, tyro.conf.subcommand("adaptive")]
     | Annotated[AnalyseOptions, tyro.conf.subcommand("analyse")]
     | Annotated[RecoverOptions, tyro.conf.subcommand("recover")]
+    | Annotated[FiguresOptions, tyro.conf.subcommand("figures")]
+    | Annotated[AnomalyOptions, tyro.conf.subcommand("anomaly")]
 )
 """One step of the study, chosen by its name on the command line."""

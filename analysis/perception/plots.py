@@ -1,4 +1,5 @@
-"""Figures 19 to 25 of the thesis: share of right answers against samples per pixel; computes only the curves."""
+"""Figures of the thesis: share of right answers against samples per pixel (19 to 25), of which only the curves are
+computed here; and rows of pictures and densities of filters (3, 6, 8, 10, 15, 17, 18)."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from analysis.page.figures import line_style
 from analysis.perception.psychometrics import TWO_ALTERNATIVES, Rule, correct_share
@@ -80,4 +82,24 @@ def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:
     axis.set(xlabel="noise of a stimulus, JOD", ylabel="just noticeable, samples per pixel")
     axis.grid(True, alpha=0.3)
     axis.legend(fontsize=8)
+    return figure
+
+
+def row_figure(pictures: Mapping[str, NDArray[np.uint8]]) -> Figure:
+    """Encoded pictures side by side under their titles, a pixel of each at least as large as one of the figure."""
+    figure = Figure(figsize=(2.6 * len(pictures), 2.9), layout="constrained")
+    for axis, (title, picture) in zip(np.atleast_1d(figure.subplots(1, len(pictures))), pictures.items(), strict=True):
+        axis.imshow(picture, interpolation="nearest")
+        axis.set(xticks=(), yticks=(), title=title)
+    return figure
+
+
+def densities_figure(filters: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Figure:
+    """Densities of time filters over the time for which the shutter is open."""
+    figure = Figure(figsize=(3.4 * len(filters), 2.4), layout="constrained")
+    axes = figure.subplots(1, len(filters), sharey=True)
+    for axis, (title, (times, density)) in zip(axes, filters.items(), strict=True):
+        axis.plot(times, density, color=_INK[0])
+        axis.set(title=title, xlabel="time, share of the shutter's", xlim=(0, 1), ylim=(0, 2.2))
+    axes[0].set_ylabel("density")
     return figure

@@ -19,6 +19,8 @@ from analysis.perception.observers import TASK, drawn_observers, simulated_trial
 from analysis.perception.options import (
     AdaptiveOptions,
     AnalyseOptions,
+    AnomalyOptions,
+    FiguresOptions,
     RecoverOptions,
     ServeOptions,
     SimulateOptions,
@@ -35,7 +37,10 @@ from analysis.storage.summary import write_summary
 from analysis.tracer.options import LEVELS
 
 Found = tuple[dict[str, Any], str]
-Options = StimuliOptions | SimulateOptions | ServeOptions | AdaptiveOptions | AnalyseOptions | RecoverOptions
+Options = (
+    StimuliOptions | SimulateOptions | ServeOptions | AdaptiveOptions | AnalyseOptions | RecoverOptions
+    | FiguresOptions | AnomalyOptions
+)  # fmt: skip
 
 SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.048, 2.0)
 """Noise of a stimulus in the sweep of the observer, JOD."""
@@ -65,6 +70,8 @@ def run(options: Options) -> str:
         AdaptiveOptions: adaptive,
         AnalyseOptions: analyse,
         RecoverOptions: recover,
+        FiguresOptions: figures,
+        AnomalyOptions: anomaly,
     }
     with bad_input():
         own_results(options.out, _FILES.get(type(options), _TABLES))
@@ -175,6 +182,31 @@ def recover(options: RecoverOptions, bars: Bars) -> Found:
         for row in rows
     ]
     return {"rows": rows}, "\n".join(lines)
+
+
+def figures(options: FiguresOptions, bars: Bars) -> Found:
+    """Draws the figures of the thesis about sampling and scenes."""
+    from analysis.page.figures import save
+    from analysis.perception.thesis_figures import FRAMES, densities, pictures
+
+    drawn = pictures(options, bars.task("frames", FRAMES))
+    for name, row in drawn.items():
+        save(plots.row_figure(row), options.out / f"{name}.png")
+    save(plots.densities_figure(densities()), options.out / "time_filters.png")
+    names = [*drawn, "time_filters"]
+    return {"figures": names}, f"figures: {', '.join(names)}"
+
+
+def anomaly(options: AnomalyOptions, bars: Bars) -> Found:
+    """Measures whether the point set explains the anomaly at 216 samples."""
+    from analysis.perception.anomaly import SCENES, chance_rises, described, errors, table
+
+    task = bars.task("sets", len(SCENES) * (1 + len(options.levels) * options.sets))
+    rows = pd.concat([table(errors(scene, options, task), scene) for scene in SCENES], ignore_index=True)
+    write_table(options.out / "anomaly.csv", rows)
+    rises = chance_rises(options)
+    found = {"rows": rows.to_dict("records"), "rises": {str(least): share for least, share in rises.items()}}
+    return found, described(rows, rises)
 
 
 def analyse(options: AnalyseOptions, bars: Bars) -> Found:

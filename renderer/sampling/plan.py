@@ -60,7 +60,14 @@ def blue_shift(
     return np.stack(axes, axis=1)
 
 
-_SHIFTS = {"white": pixel_shift, "blue": blue_shift}
+def no_shift(
+    seed: int, column: Int[NDArray[np.int64], " n"], row: Int[NDArray[np.int64], " n"], frame: int = 0
+) -> Points:
+    """No shift: all pixels have the same points."""
+    return np.zeros((len(column), 3))
+
+
+_SHIFTS = {"white": pixel_shift, "blue": blue_shift, "none": no_shift}
 
 # --- warps -----------------------------------------------------------------------------------------------------------
 
@@ -117,8 +124,8 @@ class SamplePlan:
     """Reconstruction filter over the time the shutter is open."""
     box_share: float = 1.0
     """Share of that time, in its middle, that a box spans; 0.5 in the thesis."""
-    shift: Literal["white", "blue"] = "white"
-    """Shift of the points in each pixel: independent of its neighbours, or by spatiotemporal blue noise."""
+    shift: Literal["white", "blue", "none"] = "white"
+    """Shift of the points in each pixel: independent of its neighbours, by spatiotemporal blue noise, or none."""
     new_set_each_frame: bool = False
     """Whether every frame has its own point set, instead of one for all."""
 

@@ -223,7 +223,7 @@ def test_materials_keep_their_brightness(program: str, via: str, tmp_path: Path)
 
 def test_what_a_blunt_coat_takes_from_its_base(tmp_path: Path) -> None:
     """Mitsuba 3 draws both; PBRT dims the base by the mean of a smooth coat."""
-    scene = furnace([Plastic(even(0.4), even(0.0), 1.5, 0.46)])
+    scene = furnace([Plastic(even(0.4), even(0.0), 1.5, 0.46, distribution="beckmann")])
     save_scene_file(scene, tmp_path / "via.pbrt")
     kept = [drawn(one, "mitsuba", tmp_path).mean() / 0.4 for one in (scene, load_scene_file(tmp_path / "via.pbrt"))]
     assert kept == pytest.approx([0.73, 0.91], abs=0.005)
