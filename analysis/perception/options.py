@@ -257,7 +257,7 @@ class AnomalyOptions:
     """Measures how much random stratified sets differ, and whether that explains the anomaly at 216 samples."""
 
     levels: tuple[int, ...] = (125, 216, 343)
-    """Numbers of samples, which must be cubes."""
+    """Numbers of points, which must be cubes."""
     sets: int = 16
     """Point sets of each number of samples."""
     shifts: int = 3
