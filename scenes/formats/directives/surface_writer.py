@@ -50,13 +50,13 @@ class SurfaceWriter:
         color_texture: type of colour textures.
         color: type of colour parameters.
         checkerboard_end: additional parameters of every checkerboard.
-        facets: the distribution of facets, for messages.
+        distribution: the distribution of facets, for messages.
     """
 
     color_texture: ClassVar[str]
     color: ClassVar[str]
     checkerboard_end: ClassVar[str] = ""
-    facets: ClassVar[str] = "Trowbridge–Reitz (ggx)"
+    distribution: ClassVar[str] = "Trowbridge–Reitz (ggx)"
 
     output: Output
     report: LossReport
@@ -148,7 +148,7 @@ class SurfaceWriter:
             return self.material_line(simpler(material, where, self.report), name)
         if isinstance(material, Metal | Glass | Plastic) and np.max(material.roughness) > 0.0:
             if material.distribution != "ggx":
-                self.report.add(where, f"the distribution {material.distribution} of facets", self.facets)
+                self.report.add(where, f"the distribution {material.distribution} of facets", self.distribution)
         return plain_line(*self.plain_material(material, where))
 
     def bumped_line(self, material: Bumped, name: str, parameter: str) -> str:

@@ -42,7 +42,7 @@ class LuxSurfaceWriter(SurfaceWriter):
     """Collects the lines of textures and materials."""
 
     color_texture = "color"
-    facets = "LuxRender's own"
+    distribution = "LuxRender's own"
     color = "color"
     checkerboard_end = ' "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
     _null: Matte | None = None
