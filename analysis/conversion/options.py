@@ -58,7 +58,7 @@ class CheckOptions:
     """Change the scene files (by default the Cornell boxes) at random so many times, read each and count failures,
     instead of rendering. A run in the same folder goes on where an earlier one was."""
     seed: int = 0
-    """Seed of these changes."""
+    """Seed of all random numbers; those of the changes."""
     plain: bool = False
     """Also compare both renderers on each scene with every surface matte: a difference is then not due to materials."""
     width_px: int = 160

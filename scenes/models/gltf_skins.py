@@ -69,11 +69,11 @@ def bent(
     bend: Bends, points: NDArray[np.float64], normals: NDArray[np.float64] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Points and normals in the world."""
-    moved = np.einsum("vij,vj->vi", bend[:, :3, :3], points) + bend[:, :3, 3]
+    moved = product(bend[:, :3, :3], points[..., None])[..., 0] + bend[:, :3, 3]
     if normals is None:
         return moved, None
     rows = np.swapaxes(bend[:, :3, :3], 1, 2)
     # the cofactors are the inverse transpose times the determinant, and exist for singular transforms too
     cofactors = np.stack([np.cross(rows[:, (axis + 1) % 3], rows[:, (axis + 2) % 3]) for axis in range(3)], axis=-1)
     sign = np.where(np.linalg.det(bend[:, :3, :3]) < 0.0, -1.0, 1.0)
-    return moved, sign[:, None] * np.einsum("vij,vj->vi", cofactors, normals)
+    return moved, sign[:, None] * product(cofactors, normals[..., None])[..., 0]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.arithmetic import cos, sin
+from scenes.arithmetic import cos, product, sin
 from scenes.canonical import Cube, Matrix, Mesh, Rectangle, SceneError, Shape, Sphere
 from scenes.formats.geometry.orientation import turned
 from scenes.formats.geometry.revolution import cone, cylinder, revolved, ring
@@ -40,7 +40,7 @@ def shapes_of(prim: Any, code: Any) -> list[tuple[Shape, Matrix]]:
     if kind == "Plane":  # the width lies along x and the length along y, or along the axis that the normal replaces
         sides = {"X": (size["length"], size["width"]), "Y": (size["length"], size["width"])}
         first, second = sides.get(str(axis), (size["width"], size["length"]))
-        return [(Rectangle(), turn @ np.diag([first / 2.0, second / 2.0, 1.0, 1.0]))]
+        return [(Rectangle(), product(turn, np.diag([first / 2.0, second / 2.0, 1.0, 1.0])))]
     radius, half = size["radius"], size["height"] / 2.0
     below = turned(ring(radius, 0.0, -half))
     if kind == "Cylinder":
@@ -49,7 +49,7 @@ def shapes_of(prim: Any, code: Any) -> list[tuple[Shape, Matrix]]:
         side = cone(radius, 2.0 * half)
         down = np.eye(4)
         down[2, 3] = -half
-        return [(side, turn @ down), (below, turn)]
+        return [(side, product(turn, down)), (below, turn)]
     return [(_capsule(radius, half), turn)]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.arithmetic import product, sin
+from scenes.arithmetic import arctan, norm, power, product, sin
 from scenes.canonical import (
     ConstantTexture,
     DirectionalLight,
@@ -62,7 +62,7 @@ def camera_of(prim: Any, code: Any, matrix: Matrix, track: RigidTrack | None, re
         if shift != (0.0, 0.0):
             report.add(prim.GetName(), "a picture off the viewing direction", "one about it")
         return ModelCamera(OrthographicCamera(placed, tenth * min(wide, high) / 2.0, track), wide / high)
-    fov_deg = shorter_fov_deg(2.0 * math.atan(high / (2.0 * lens.focalLength)), wide / high)
+    fov_deg = shorter_fov_deg(2.0 * float(arctan(high / (2.0 * lens.focalLength))), wide / high)
     focus = lens.focusDistance if lens.focusDistance > 0.0 else 1.0
     sharp = lens.fStop <= 0.0 or lens.focusDistance <= 0.0
     radius = 0.0 if sharp else tenth * lens.focalLength / (2.0 * lens.fStop)
@@ -133,11 +133,11 @@ def _radiance(prim: Any, code: Any, report: LossReport) -> NDArray[np.float64]:
 
 def _lamp(prim: Any, kind: str, code: Any, matrix: Matrix) -> tuple[Shape, Matrix, float]:
     """Shape, local transform and area in the world of a lamp; flat ones emit along -z."""
-    axes = [float(np.linalg.norm(matrix[:3, axis])) for axis in range(3)]
+    axes = [norm(matrix[:3, axis]) for axis in range(3)]
     flat = np.diag([-1.0, 1.0, -1.0, 1.0])
     if kind == "SphereLight":
         radius = max(float(_value(prim, "radius", code, 0.5)), 1e-6)
-        size = radius * float(np.prod(axes)) ** (1.0 / 3.0)
+        size = radius * float(power(np.prod(axes), 1.0 / 3.0))
         return Sphere(radius), np.eye(4), 4.0 * math.pi * size * size
     if kind == "DiskLight":
         radius = max(float(_value(prim, "radius", code, 0.5)), 1e-6)
