@@ -83,3 +83,17 @@ def test_a_command_that_ends_well_ends_at_once() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "main\nthread\nexit\n", "")
+
+
+def test_flip_and_jod_are_taken_unless_something_else_is_asked() -> None:
+    assert RunOptions("fly-by").further_metrics == ("flip", "jod")
+    assert RunOptions("fly-by", metrics=()).further_metrics == ()
+    assert RunOptions("fly-by", metrics=("ssim",)).further_metrics == ("ssim",)
+    assert RunOptions("fly-by", reference_rate_hz=50.0).further_metrics == ("flip",), "60 Hz shows no 50 Hz"
+    with pytest.raises(ConfigError, match="reference_rate_hz: expected a whole fraction of the display's 60 Hz"):
+        RunOptions("fly-by", metrics=("jod",), reference_rate_hz=50.0)
+
+
+@pytest.mark.parametrize(("seconds", "jod_s", "expected"), [(2.0, 0.25, 15), (0.1, 0.25, 6), (2.0, 5.0, 120)])
+def test_metrics_of_sequences_score_the_middle_of_a_run(seconds: float, jod_s: float, expected: int) -> None:
+    assert RunOptions("fly-by", seconds=seconds, jod_s=jod_s).images_scored == expected
