@@ -21,6 +21,7 @@ import numpy as np
 
 from analysis.command.progress import Task
 from analysis.storage.journal import Journal
+from analysis.storage.source import code_hash
 
 LIMIT_S, LIMIT_MB = 5.0, 1024.0
 """Most seconds of processor time for a file, and most memory of the process that reads it."""
@@ -148,7 +149,7 @@ class _Reader:
 
 @dataclass
 class Mutations:
-    """Reads changed files in batches and counts what they came to.
+    """Reads changed files in batches and counts what they came to. Batches that other code has read do not count.
 
     Attributes:
         sources: the files that are changed.
@@ -164,7 +165,9 @@ class Mutations:
 
     def rows(self, count: int, task: Task) -> list[dict[str, Any]]:
         """A row for each batch of the first ``count`` changed files; those of an earlier run are not repeated."""
-        digest = hashlib.blake2b(str(self.seed).encode(), digest_size=8)
+        from scenes.formats.conversion import load_scene_file
+
+        digest = hashlib.blake2b(f"{self.seed} {code_hash(load_scene_file)}".encode(), digest_size=8)
         for file in self.sources:
             digest.update(file.name.encode() + file.read_bytes())
         key, journal = digest.hexdigest(), Journal(self.journal)

@@ -49,6 +49,9 @@ def test_tracebacks_hangs_and_memory_are_counted(tmp_path: Path, monkeypatch: py
     assert [fault.split(":")[0] for fault in rows[0]["faults"]] == ["1, f", "2, f", "3", "4, f"]
     again = Mutations([], tmp_path, tmp_path / "a.journal").rows(5, Task())
     assert again == rows  # from the journal: there are no more answers
+    monkeypatch.setattr(mutations, "code_hash", lambda *makers: "of other code")
+    with pytest.raises(StopIteration):
+        Mutations([], tmp_path, tmp_path / "a.journal").rows(5, Task())
 
 
 def test_other_errors_than_lines_are_tracebacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
