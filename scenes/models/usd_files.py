@@ -7,7 +7,8 @@ Source: OpenUSD documentation, UsdGeom (Imageable, Xformable, PointInstancer), U
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Hashable, Iterator
 from typing import Any
 
 import numpy as np
@@ -37,9 +38,13 @@ from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
 from scenes.models.usd_views import LAMP, camera_of, light_of
 
 _INSTANCES_MOST = 1 << 20
+_HOLDERS = UsdGeom.Gprim, UsdGeom.PointInstancer, UsdGeom.Camera
 _DEPTH_MAX = 32
 _GREY = 0.18
+_ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
+_PROTOTYPES = Usd.PrimIsActive & Usd.PrimIsLoaded  # those may lie below a class, or an override alone
 _Part = tuple[Any, Material, Matrix]
+_Placed = tuple[Any, Matrix]
 
 
 def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Model:
@@ -57,8 +62,8 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Mode
             if layer.realPath:
                 path = sources.path.parent / layer.realPath
                 sources.files.setdefault(path, state_of(path))
-        for error in stage.GetCompositionErrors():
-            report.add(sources.path.stem, " ".join(str(error).split())[:200])
+        for error in sorted(_ADDRESS.sub("", str(error)) for error in stage.GetCompositionErrors()):
+            report.add(sources.path.stem, " ".join(error.split())[:200])
         return _Reader(stage, sources, report, facets).model()
     except Tf.ErrorException as error:
         said = " ".join(str(error.args[0].commentary).split())
@@ -80,14 +85,16 @@ class _Reader:
         self.described = UsdMaterials(document, self.pictures, self.code, report)
         self.materials = GltfMaterials(document, UsdTextures(document, report), report, facets)
         self.up_is_z = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
-        self._made: dict[str, list[_Part]] = {}
+        self._made: dict[Hashable, list[_Part]] = {}
+        self._placed: dict[str, list[tuple[Matrix, list[_Placed]]]] = {}
+        self._count = 0
         self._parts: list[Instance] = []
         self._lights: list[Light] = []
         self._cameras: dict[str, ModelCamera] = {}
 
     def model(self) -> Model:
         self._bend()
-        shown = list(self._prims(self.stage.GetPseudoRoot()))
+        shown = list(self._prims(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate))
         tracks = self.motion.tracks(shown, self.report)
         for prim in shown:
             self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)), 0)
@@ -106,9 +113,10 @@ class _Reader:
                 self.report.add(root.GetName(), "a skeleton that moves", "the pose at its start")
             UsdSkel.BakeSkinning(UsdSkel.Root(root), Gf.Interval(at, at))
 
-    def _prims(self, root: Any) -> Iterator[Any]:
-        """Visible prims below a root, within instances too; those below a point instancer are its prototypes."""
-        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    def _prims(self, root: Any, among: Any) -> Iterator[Any]:
+        """Visible prims at and below a root that hold something, within instances too; those below a point instancer
+        are its prototypes."""
+        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(among)))
         for prim in walk:
             if prim.IsPseudoRoot():
                 continue
@@ -125,10 +133,14 @@ class _Reader:
                 continue
             if prim.IsA(UsdGeom.PointInstancer):
                 walk.PruneChildren()
-            yield prim
+            if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(kind) for kind in _HOLDERS):
+                yield prim
 
     def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None, depth: int) -> None:
         """Adds what a prim itself holds."""
+        self._count += 1
+        if self._count > _INSTANCES_MOST:
+            raise SceneError(f"cannot be read: expected at most {_INSTANCES_MOST:,} instances")
         name = f"{self.sources.path.stem}/{prim.GetName()}"
         if prim.IsA(UsdGeom.PointInstancer):
             self._instances(prim, matrix, track, depth)
@@ -141,8 +153,6 @@ class _Reader:
             if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
                 self.report.add(prim.GetName(), "a node without extent")
                 return
-            if len(self._parts) > _INSTANCES_MOST:
-                raise SceneError(f"cannot be read: expected at most {_INSTANCES_MOST:,} instances")
             for shape, material, local in self._shapes(prim):
                 self._parts.append(Instance(shape, material, product(matrix, local), track, name))
 
@@ -158,9 +168,19 @@ class _Reader:
 
     def _instances(self, prim: Any, matrix: Matrix, track: RigidTrack | None, depth: int) -> None:
         """Adds the instances of a point instancer."""
-        given = UsdGeom.PointInstancer(prim)
         if depth > _DEPTH_MAX:
             raise SceneError(f"cannot be read: expected point instancers at most {_DEPTH_MAX} deep")
+        key = str(prim.GetPath())
+        if key not in self._placed:
+            self._placed[key] = self._poses(prim)
+        for pose, inner in self._placed[key]:
+            place = product(matrix, pose)
+            for one, local in inner:
+                self._add(one, product(place, local), track, depth + 1)
+
+    def _poses(self, prim: Any) -> list[tuple[Matrix, list[_Placed]]]:
+        """The pose of each instance of a point instancer, and the prims of its prototype with their poses in it."""
+        given, made = UsdGeom.PointInstancer(prim), []
         if given.GetPositionsAttr().ValueMightBeTimeVarying() or given.GetOrientationsAttr().ValueMightBeTimeVarying():
             self.report.add(prim.GetName(), "instances that move", "their poses at the start")
         paths = given.GetPrototypesRel().GetForwardedTargets()
@@ -179,17 +199,20 @@ class _Reader:
             if not root:
                 self.report.add(prim.GetName(), f"a prototype {path}, which is not there")
                 continue
-            inner = [(one, self.motion.matrix_below(one, root)) for one in self._prims(root)]
+            inner = [(one, self.motion.matrix_below(one, root)) for one in self._prims(root, _PROTOTYPES)]
             at = np.flatnonzero(chosen == number)
-            for instance in at[np.array(mask, bool)[at]] if len(mask) else at:
-                place = product(matrix, poses[instance].T)
-                for one, local in inner:
-                    self._add(one, product(place, local), track, depth + 1)
+            made += [(poses[one].T, inner) for one in (at[np.array(mask, bool)[at]] if len(mask) else at)]
+        return made
 
     def _shapes(self, prim: Any) -> list[_Part]:
-        """Shapes of a prim with their materials, in its space; instances of one prototype share them."""
-        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        key = str(source.GetPath())
+        """Shapes of a prim with their materials, in its space; instances of one prototype share them if they inherit
+        the same materials and primvars."""
+        key: tuple[Hashable, ...] = (str(prim.GetPath()),)
+        if prim.IsInstanceProxy():
+            bound = [self._bound(one) for one in (prim, *prim.GetChildren())]
+            primvars = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
+            key = _shared(prim), *(_shared(material.GetPrim()) if material else "" for material in bound)
+            key += tuple(sorted((one.GetName(), _shared(one.GetAttr().GetPrim())) for one in primvars))
         if key not in self._made:
             self._made[key] = self._read(prim)
         return self._made[key]
@@ -257,3 +280,8 @@ class _Reader:
         """The material that is bound to a prim; None without one."""
         material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
         return material if material else None
+
+
+def _shared(prim: Any) -> str:
+    """The path of a prim, in its prototype if it is one of an instance."""
+    return str((prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath())

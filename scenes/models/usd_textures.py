@@ -9,9 +9,10 @@ import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
+from PIL import Image
 
 from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
@@ -79,7 +80,7 @@ class Pictures:
                 given = np.rint(np.clip(given, 0.0, 1.0) * 65535.0).astype(np.uint16)
             if given.dtype == np.float32:
                 found = given
-            elif space == "raw":
+            elif space == "raw" or (space != "sRGB" and not self._is_encoded(path, given)):
                 found = given.astype(np.float32) / np.float32(np.iinfo(given.dtype).max)
             else:
                 found = decode_srgb(given)
@@ -87,6 +88,10 @@ class Pictures:
                 raise SceneError(f"texture {path}: holds non-finite values")
             self._colors[path, space] = found.astype(np.float32)
         return self._colors[path, space]
+
+    def _is_encoded(self, path: str, given: np.ndarray) -> bool:
+        """True if a picture of no given space is sRGB: one of 8 bits with 3 or 4 channels, or one that says so."""
+        return given.dtype == np.uint8 and self._read(path, _is_color, _is_color)
 
     def _opacity(self, path: str) -> Pixels:
         if path not in self._opacities:
@@ -102,6 +107,11 @@ class Pictures:
             return of_content(io.BytesIO(bytes(asset.GetBuffer())))
         except Exception as error:  # decoders raise arbitrary exceptions on broken files
             raise SceneError(f"texture {path}: cannot be read: {' '.join(str(error).split())}") from None
+
+
+def _is_color(path: Path | BinaryIO) -> bool:
+    with Image.open(path) as image:
+        return "srgb" in image.info or image.mode not in ("1", "L", "LA", "La")
 
 
 class UsdDocument:

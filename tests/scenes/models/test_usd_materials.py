@@ -244,3 +244,20 @@ def test_a_missing_package_is_one_line(tmp_path: Path, monkeypatch, capsys) -> N
 def test_a_name_of_a_camera_that_no_file_has() -> None:
     with pytest.raises(SceneError, match="expected six numbers"):
         load_seen("glass", Look(camera="main"))
+
+
+@pytest.mark.parametrize(
+    ("mode", "space", "expected"),
+    [("L", "auto", 128 / 255), ("RGB", "auto", 0.2158605), ("RGBA", "auto", 0.2158605), ("I;16", "auto", 128 / 255),
+     ("L", "sRGB", 0.2158605), ("RGB", "raw", 128 / 255)],
+)  # fmt: skip
+def test_spaces_of_pictures(mode: str, space: str, expected: float, tmp_path: Path) -> None:
+    """Without a space, 8 bits with three or four channels are sRGB, all others raw."""
+    if mode == "I;16":
+        picture = Image.fromarray(np.full((2, 2), 128 * 257, np.uint16))
+    else:
+        picture = Image.new(mode, (2, 2), 128 if mode == "L" else (128,) * len(mode))
+    picture.save(tmp_path / "t.png")
+    nodes = texture("T", "t.png", f'token inputs:sourceColorSpace = "{space}"')
+    base = base_of(tmp_path, "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>", nodes)
+    assert isinstance(base, ImageTexture) and base.image == pytest.approx(expected, abs=1e-4)
