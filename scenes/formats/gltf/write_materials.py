@@ -56,11 +56,11 @@ class GltfMaterialWriter:
             rough["roughnessFactor"] = min(surface.roughness * factor[1], 1.0)
             rough["metallicFactor"] = min(surface.metallic * factor[2], 1.0)
             if image is not None:
-                rough["metallicRoughnessTexture"] = self._lookup(image, "numbers")
+                rough["metallicRoughnessTexture"] = self._lookup(surface, image, "numbers")
         if surface.normals is not None:
             _, image = self._factored(surface.normals, where, "as it is")
             if image is not None:
-                made["normalTexture"] = {**self._lookup(image, "numbers"), "scale": surface.normal_scale}
+                made["normalTexture"] = {**self._lookup(surface, image, "numbers"), "scale": surface.normal_scale}
         self._emission(surface, emission, made, where)
         self._extensions(surface, made)
         return self.document.add("materials", made)
@@ -81,9 +81,9 @@ class GltfMaterialWriter:
             alpha, holes = alpha * mean_of(holes)[0], None
         rough["baseColorFactor"] = [min(max(float(part), 0.0), 1.0) for part in (*factor, alpha)]
         if holes is not None:
-            rough["baseColorTexture"] = self._lookup(image or holes, "colour", holes, image is None)
+            rough["baseColorTexture"] = self._lookup(surface, image or holes, "colour", holes, image is None)
         elif image is not None:
-            rough["baseColorTexture"] = self._lookup(image, "colour")
+            rough["baseColorTexture"] = self._lookup(surface, image, "colour")
 
     def _emission(self, surface: Surface, emission: Rgb | None, made: Json, where: str) -> None:
         radiance, glow = surface.emission, surface.glow
@@ -97,7 +97,7 @@ class GltfMaterialWriter:
             factor, image = self._factored(glow, where)
             radiance = rgb(np.multiply(radiance, factor))
             if image is not None:
-                made["emissiveTexture"] = self._lookup(image, "colour")
+                made["emissiveTexture"] = self._lookup(surface, image, "colour")
         strength = max(1.0, *radiance)
         made["emissiveFactor"] = [part / strength for part in radiance]
         if strength > 1.0:
@@ -149,8 +149,15 @@ class GltfMaterialWriter:
         _, image = self.document.once(("scaled", id(texture)), texture, lambda: (texture, _divided(texture, most)))
         return rgb(most), image
 
-    def _lookup(self, texture: ImageTexture, mode: str, holes: ImageTexture | None = None, white: bool = False) -> Json:
-        """The reference of a material to a texture, with its transform; ``v`` points downwards in glTF."""
+    def _lookup(
+        self, surface: Surface, texture: ImageTexture, mode: str, holes: ImageTexture | None = None, white: bool = False
+    ) -> Json:
+        """The reference of a surface to a texture, with its transform; ``v`` points downwards in glTF.
+
+        A transform that mirrors would turn the normals of a normal map: beside one, the pictures are mirrored instead.
+        """
+        if surface.normals is not None:
+            texture, holes = self._unmirrored(texture), None if holes is None else self._unmirrored(holes)
         filters = (_NEAREST, _NEAREST) if texture.filter == "nearest" else (_LINEAR, _LINEAR_LEVELS)
         wrap = _WRAPS[texture.wrap]
         sampler = self.document.once(
@@ -175,6 +182,12 @@ class GltfMaterialWriter:
             change = {"scale": [across, up], "offset": [right, 1.0 - up - above]}
             found["extensions"] = self.document.extension("KHR_texture_transform", change)
         return found
+
+    def _unmirrored(self, texture: ImageTexture) -> ImageTexture:
+        """The same texture with positive scales, by a mirrored picture where they are not."""
+        if min(texture.uv_scale) >= 0.0:
+            return texture
+        return self.document.once(("mirrored", id(texture)), texture, lambda: (texture, _mirrored(texture)))[1]
 
     def _image(self, texture: ImageTexture, mode: str, holes: ImageTexture | None, white: bool) -> int:
         path = Path(texture.source)
@@ -211,6 +224,17 @@ def _in_bytes(image: np.ndarray, mode: str) -> bool:
 def _divided(texture: ImageTexture, most: np.ndarray) -> ImageTexture:
     image = (np.maximum(texture.image, 0.0) / np.where(most > 0.0, most, 1.0)).astype(np.float32)
     return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, texture.filter, texture.source)
+
+
+def _mirrored(texture: ImageTexture) -> ImageTexture:
+    """A texture with its picture mirrored along the axes whose scales are negative."""
+    image, scale, offset = texture.image, list(texture.uv_scale), list(texture.uv_offset)
+    for axis in (0, 1):
+        if scale[axis] < 0.0:
+            image = np.flip(image, 1 - axis)
+            scale[axis], offset[axis] = -scale[axis], 1.0 - offset[axis]
+    placed = (scale[0], scale[1]), (offset[0], offset[1])
+    return ImageTexture(np.ascontiguousarray(image), *placed, texture.wrap, texture.filter, texture.source)
 
 
 def _checks(texture: CheckerboardTexture) -> ImageTexture | None:

@@ -24,6 +24,7 @@ from scenes.canonical import (
     Metal,
     MetallicRough,
     MixMaterial,
+    NormalMapped,
     PerspectiveCamera,
     Plastic,
     PointLight,
@@ -156,3 +157,30 @@ def test_a_glowing_surface_keeps_its_own_light_in_other_formats(tmp_path: Path) 
     (part,) = load_scene_file(tmp_path / "a.pbrt").instances
     assert part.emission == (2.0, 1.0, 0.5) and isinstance(part.material, Plastic)
     assert not any("the light of" in str(loss) for loss in report.losses)
+
+
+@pytest.mark.parametrize("scale", [(1.0, -1.0), (-1.0, 1.0), (-2.0, -0.5)])
+def test_normals_of_a_mirrored_picture_look_the_same_way(scale: tuple[float, float], tmp_path: Path) -> None:
+    """A light from above and the right, normals tilted against both axes, and a base with a picture of its own."""
+    codes = np.array([[[200, 220, 215], [90, 220, 215]], [[200, 40, 215], [128, 128, 255]]], np.float32) / 255.0
+    colours = np.array([[[1.0, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32)
+    base, normals = (ImageTexture(image, scale, (0.25, 1.0), filter="nearest") for image in (colours, codes))
+    view = np.eye(4)
+    view[2, 3] = 6.0
+    scene = Scene(
+        PerspectiveCamera(view, 20.0),
+        (Instance(Rectangle(), NormalMapped(Matte(base), normals)),),
+        (DirectionalLight((-0.5, -1.0, -1.0), (2.0, 2.0, 2.0)),),
+        Film(SIDE_PX, SIDE_PX),
+        integrator=Integrator("path", 2),
+    )
+    lost = LossReport()
+    save_scene_file(scene, tmp_path / "a.gltf", None, lost)
+    assert not [loss for loss in lost.losses if loss.picture]
+    read = dataclasses.replace(load_scene_file(tmp_path / "a.gltf", None, lost), film=scene.film)
+    assert not [loss for loss in lost.losses if loss.picture]
+    pictures = [
+        render_image(Renderer(one), SamplePlan(16), SIDE_PX, SIDE_PX, 0.0, (0.0, 0.0)).numpy() for one in (scene, read)
+    ]
+    assert np.ptp(pictures[0]) > 0.2
+    np.testing.assert_allclose(pictures[1], pictures[0], atol=1e-3)
