@@ -103,6 +103,8 @@ class _Reader:
         if depth > _DEPTH_MAX:
             raise SceneError(f"cannot be read: expected nodes at most {_DEPTH_MAX} deep")
         node = self.data.at("nodes", number)
+        if number in self._world:
+            raise SceneError(f"cannot be read: expected a tree of nodes, got node {number} twice")
         name = node.get("name", f"node{number}")
         moved = self.motion.poses(number)
         if moved is not None:
