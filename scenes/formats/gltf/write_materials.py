@@ -6,6 +6,7 @@ Source: Khronos Group, "glTF 2.0 specification", sections 3.8 and 3.9; extension
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -72,7 +73,7 @@ class GltfMaterialWriter:
             self.report.add(where, f"a colour of {max(factor):.3g}", "1")
         alpha, holes = 1.0, None
         if surface.opacity is not None:
-            (alpha, _, _), holes = self._factored(surface.opacity, where, "numbers")
+            alpha, holes = self._opacity(surface.opacity, where)
             made["alphaMode"] = "BLEND" if surface.cutoff is None else "MASK"
             if surface.cutoff is not None:
                 made["alphaCutoff"] = surface.cutoff
@@ -84,6 +85,21 @@ class GltfMaterialWriter:
             rough["baseColorTexture"] = self._lookup(surface, image or holes, "colour", holes, image is None)
         elif image is not None:
             rough["baseColorTexture"] = self._lookup(surface, image, "colour")
+
+    def _opacity(self, opacity: Texture, where: str) -> tuple[float, ImageTexture | None]:
+        """An opacity as a number times an image with equal channels, those of colours being their means."""
+        factor, image = self._factored(opacity, where, "numbers")
+        values = np.array(factor) if image is None else image.image * np.array(factor)
+        if not np.ptp(values, axis=-1).any():
+            return factor[0], image
+        self.report.add(where, "a coloured opacity", "the mean of its channels")
+        means = np.repeat(values.mean(axis=-1, keepdims=True), 3, axis=-1)
+        if image is None:
+            return float(means[0]), None
+        most = np.maximum(means.reshape(-1, 3).max(axis=0), 0.0)
+        even = dataclasses.replace(image, image=means.astype(np.float32))
+        made = self.document.once(("opacity", id(image), factor), image, lambda: _divided(even, most))
+        return float(most[0]), made
 
     def _emission(self, surface: Surface, emission: Rgb | None, made: Json, where: str) -> None:
         radiance, glow = surface.emission, surface.glow
@@ -187,7 +203,7 @@ class GltfMaterialWriter:
         """The same texture with positive scales, by a mirrored picture where they are not."""
         if min(texture.uv_scale) >= 0.0:
             return texture
-        return self.document.once(("mirrored", id(texture)), texture, lambda: (texture, _mirrored(texture)))[1]
+        return self.document.once(("mirrored", id(texture)), texture, lambda: _mirrored(texture))
 
     def _image(self, texture: ImageTexture, mode: str, holes: ImageTexture | None, white: bool) -> int:
         path = Path(texture.source)

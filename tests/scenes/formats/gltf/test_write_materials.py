@@ -26,7 +26,9 @@ from scenes.canonical import (
     PerspectiveCamera,
     ScaleTexture,
     Scene,
+    Uber,
 )
+from scenes.formats.appearance.mixtures import NOTHING
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
@@ -98,6 +100,32 @@ def test_metal_and_dielectric_of_one_base_are_metallic_in_part(tmp_path: Path) -
     assert losses == [] and tree["materials"][0]["pbrMetallicRoughness"]["metallicFactor"] == 0.25
     _, losses = written(tmp_path, shown(MixMaterial(halves[0], Metal((1.0,) * 3, (2.0,) * 3), RED)))
     assert any("a mixture of materials: the one with the greater share" in loss for loss in losses)
+
+
+COLOURED = ConstantTexture((1.0, 0.5, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("material", "alpha"),
+    [
+        (Masked(Matte(RED), COLOURED), 0.5),
+        (Uber(RED, RED, RED, RED, COLOURED), 0.5),
+        (MixMaterial(NOTHING, Matte(RED), ConstantTexture((1.0, 0.75, 0.5))), 0.75),
+    ],
+)
+def test_a_coloured_opacity_becomes_its_mean(material: Material, alpha: float, tmp_path: Path) -> None:
+    tree, losses = written(tmp_path, shown(material))
+    assert tree["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][3] == pytest.approx(alpha)
+    assert any("a coloured opacity: the mean of its channels" in loss for loss in losses)
+
+
+def test_a_picture_of_coloured_opacities_becomes_its_means(tmp_path: Path) -> None:
+    holes = ImageTexture(np.array([[[1.0, 0.5, 0.0], [0.0, 0.0, 0.6]]], np.float32), filter="nearest")
+    _, losses = written(tmp_path, shown(Masked(Matte(RED), holes)))
+    assert any("a coloured opacity: the mean of its channels" in loss for loss in losses)
+    read = load_scene_file(tmp_path / "a.gltf").instances[0].material
+    assert isinstance(read, Masked) and isinstance(read.opacity, ImageTexture)
+    np.testing.assert_allclose(read.opacity.image, np.repeat([[[0.5], [0.2]]], 3, axis=2), atol=1e-3)
 
 
 def test_a_checkerboard_is_four_texels_that_repeat(tmp_path: Path) -> None:
