@@ -106,3 +106,10 @@ def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
 def _require_read(image: ImageBuf) -> None:
     if image.has_error:
         raise ValueError(image.geterror().partition("\n")[0])
+
+
+def resized(image: Pixels, height: int, width: int) -> Pixels:
+    """An image ``(h, w, c)`` with another number of rows and columns, by nearest-neighbour sampling."""
+    rows = np.arange(height) * image.shape[0] // height
+    columns = np.arange(width) * image.shape[1] // width
+    return image[rows[:, None], columns[None]]

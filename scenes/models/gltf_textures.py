@@ -20,7 +20,7 @@ from scenes.formats.losses import LossReport
 from scenes.loading import decode_srgb
 from scenes.models.gltf_data import GltfData
 from scenes.models.sources import Sources
-from scenes.pictures import Pixels, alpha_of, by_pillow, decoded
+from scenes.pictures import Pixels, alpha_of, by_pillow, decoded, resized
 
 Uvs = Float[NDArray[np.float64], "*n 2"]
 _NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
@@ -159,13 +159,6 @@ class GltfTextures(Textures):
     def _source(self, lookup: Lookup) -> Any:
         texture = self.data.at("textures", lookup.texture)
         return texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
-
-
-def resized(image: Pixels, height: int, width: int) -> Pixels:
-    """An image enlarged by nearest-neighbour sampling."""
-    rows = np.arange(height) * image.shape[0] // height
-    columns = np.arange(width) * image.shape[1] // width
-    return image[rows[:, None], columns[None]]
 
 
 def multiplied(first: Pixels, second: Pixels) -> Pixels:

@@ -28,6 +28,8 @@ from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
 from scenes.models.model import ModelCamera, axis_of, shorter_fov_deg, unscaled
 
+_SHARP = 1e-6  # relative width of the edge of a spot that has none
+
 
 def camera_at_node(data: GltfData, number: Any, matrix: Matrix, track: RigidTrack | None) -> ModelCamera:
     """A camera at a node with this transform and motion.
@@ -78,7 +80,10 @@ def light_at_node(data: GltfData, number: Any, matrix: Matrix, where: str, repor
     spot, along = given.get("spot", {}), axis_of(matrix, 2)
     outer_deg = math.degrees(float(spot.get("outerConeAngle", math.pi / 4.0)))
     inner_deg = math.degrees(float(spot.get("innerConeAngle", 0.0)))
-    if not 0.0 <= inner_deg < outer_deg <= 90.0 + 1e-6:
+    if not (0.0 <= inner_deg < math.inf and 0.0 < outer_deg <= 90.0 + 1e-6):
         raise SceneError(f"cannot be read: light {number}: expected cone angles 0 <= inner < outer <= π/2")
+    if inner_deg >= outer_deg:
+        report.add(where, "a spot whose inner cone is as wide as its outer cone", "one that is slightly narrower")
+        inner_deg = outer_deg * (1.0 - _SHARP)
     target = x + along[0], y + along[1], z + along[2]
     return SpotLight((x, y, z), target, strength, inner_deg, min(outer_deg, 90.0), "quadratic")

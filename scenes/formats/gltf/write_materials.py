@@ -20,6 +20,7 @@ from scenes.formats.gltf.document import Document, Json, number_codes, srgb_code
 from scenes.formats.gltf.surfaces import Surface, surface_of
 from scenes.formats.losses import LossReport
 from scenes.loading import decode_srgb, read_image
+from scenes.pictures import resized
 
 _NEAREST, _LINEAR, _LINEAR_LEVELS = 9728, 9729, 9987
 _WRAPS = {"repeat": 10497, "clamp": 33071, "black": 33071}
@@ -213,7 +214,7 @@ class GltfMaterialWriter:
                 return self.document.image(path.read_bytes(), stem, path.suffix.lower().replace(".jpeg", ".jpg"))
         codes = number_codes(texture.image) if mode == "numbers" else srgb_codes(texture.image)
         if holes is not None:
-            opacity = number_codes(_as_large(holes.image[..., :1], texture.image.shape))
+            opacity = number_codes(resized(holes.image[..., :1], *texture.image.shape[:2]))
             codes = np.full_like(codes, 255) if white else codes
             codes = np.concatenate([codes, opacity], axis=2)
         return self.document.picture(codes, stem)
@@ -222,12 +223,6 @@ class GltfMaterialWriter:
 def _alike(first: ImageTexture, second: ImageTexture) -> bool:
     """Whether two pictures lie in the same way."""
     return (first.uv_scale, first.uv_offset, first.wrap) == (second.uv_scale, second.uv_offset, second.wrap)
-
-
-def _as_large(image: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """An image with another number of rows and columns, by its nearest values."""
-    rows, columns = (np.arange(shape[axis]) * image.shape[axis] // shape[axis] for axis in (0, 1))
-    return image[rows[:, None], columns[None]]
 
 
 def _in_bytes(image: np.ndarray, mode: str) -> bool:

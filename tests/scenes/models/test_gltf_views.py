@@ -105,6 +105,18 @@ def test_lights(tmp_path: Path) -> None:
     assert "the range of a light" in report.text() and "a light of type area" in report.text()
 
 
+def test_a_spot_with_equal_cones_is_sharp(tmp_path: Path) -> None:
+    report = LossReport()
+    file = with_light(tmp_path, type="spot", spot={"innerConeAngle": 0.4, "outerConeAngle": 0.4})
+    (spot,) = read_whole(file.written(), report).lights
+    assert isinstance(spot, SpotLight) and 0.0 < spot.outer_deg - spot.inner_deg < 1e-3
+    assert spot.outer_deg == pytest.approx(math.degrees(0.4))
+    assert "a spot whose inner cone is as wide as its outer cone" in report.text()
+    file = with_light(tmp_path, type="spot", spot={"innerConeAngle": -0.1, "outerConeAngle": 0.4})
+    with pytest.raises(SceneError, match="light 0: expected cone angles"):
+        read_whole(file.written())
+
+
 def test_a_point_light_lights_as_it_says(tmp_path: Path) -> None:
     """Below a light of I candela at distance d, a white diffuse surface has the radiance I / (π d²)."""
     file = with_light(tmp_path, type="point", intensity=5)
