@@ -7,6 +7,7 @@ BASE := $(VENV)/.base
 STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 MUTANTS := $(VENV)/.mutants
+HISTORY := $(VENV)/.history
 
 .PHONY: demo live test test-fast test-slow mutants kills lint bench bench-history study-quick solvers docs constraints clean
 
@@ -27,6 +28,10 @@ $(DOCS): $(BASE)
 
 $(MUTANTS): $(STAMP)
 	$(INSTALL) '.[mutants]'
+	touch $@
+
+$(HISTORY): $(STAMP)
+	$(INSTALL) '.[history]'
 	touch $@
 
 demo: $(BASE)
@@ -71,8 +76,7 @@ bench: $(STAMP)
 	$(PY) scripts/bench.py --out out/bench
 
 # adds the figures of this commit to .asv/results and shows them; `asv compare COMMIT COMMIT` and `asv publish` show several
-bench-history: $(STAMP)
-	$(INSTALL) '.[history]'
+bench-history: $(HISTORY)
 	$(VENV)/bin/asv machine --yes
 	$(VENV)/bin/asv run --python=same --set-commit-hash $$(git rev-parse HEAD)
 
@@ -81,7 +85,7 @@ docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
 
 # records the installed versions
-constraints: $(STAMP) $(DOCS) $(MUTANTS)
+constraints: $(STAMP) $(DOCS) $(MUTANTS) $(HISTORY)
 	$(PY) -m pip freeze --all --exclude-editable | grep -v ^pip== | sed 's/+cpu$$//' > constraints.txt
 
 clean:

@@ -156,7 +156,10 @@ def compared(name: str, root: Path, statuses: dict[str, int]) -> tuple[list[str]
 
 
 def main(options: Options) -> None:
-    """One kind in this process, several in one each."""
+    """One kind in this process, several in one each; the status of several is 1 if a result was lost or wrong."""
+    unknown = [kind for kind in options.kinds if kind not in KINDS]
+    if unknown or not options.kinds:
+        raise SystemExit(f"kinds: expected some of {', '.join(KINDS)}, got {', '.join(unknown) or 'none'}")
     if len(options.kinds) == 1:
         folder = options.out.resolve() / options.kinds[0].replace(" ", "-")
         shutil.rmtree(folder, ignore_errors=True)
@@ -179,6 +182,7 @@ def main(options: Options) -> None:
         totals = {name: sum(len(row[name]) for row in rows) for name in ("lost", "wrong")}
         write_summary(options.out, {"kills": sum(row["kills"] for row in rows), **totals, "rows": rows}, options)
     print(f"{sum(row['kills'] for row in rows)} kills, {totals['lost']} lost, {totals['wrong']} silently wrong")
+    raise SystemExit(bool(totals["lost"] or totals["wrong"]))
 
 
 if __name__ == "__main__":

@@ -42,7 +42,6 @@ class Options:
         seed: decides which.
         again: whether those that survived are tried again, with the tests as they are now.
         reach: whether to find out first what every test reaches, which pays from some hundred mutants on.
-        backwards: whether to begin at the end of the sample, for a second process beside the first.
         hours: time after which no other mutant is begun; 0 only says what is known.
     """
 
@@ -51,7 +50,6 @@ class Options:
     seed: int = 0
     again: bool = False
     reach: bool = True
-    backwards: bool = False
     hours: float = 24.0
 
 
@@ -169,7 +167,7 @@ def main(options: Options) -> None:
     """Draws, runs, says what came of it."""
     out = options.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
-    tree = out / ("tree2" if options.backwards else "tree")
+    tree = out / "tree"
     kept = {"OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(tree)}
     os.environ.update(kept, TMPDIR=f"{tree}.tmp", WARP_CACHE_PATH=f"{out}/warp")
     Path(f"{tree}.tmp").mkdir(exist_ok=True)
@@ -179,7 +177,7 @@ def main(options: Options) -> None:
     end_s, trial = time.monotonic() + 3600.0 * options.hours, Trial(tree, Record(out / "found.jsonl"), options.reach)
     found = list[dict]()
     try:
-        for number, mutant in enumerate(reversed(sample) if options.backwards else sample, 1):
+        for number, mutant in enumerate(sample, 1):
             entry = tried(trial, mutant, options.again, time.monotonic() >= end_s)
             if entry is None:
                 continue

@@ -12,7 +12,7 @@ import pytest
 
 from tests.mutants import interval, mutants_of, never_run
 from tests.test_architecture import ROOT
-from tests.trials import function_at
+from tests.trials import Record, function_at
 
 SOURCE = """from __future__ import annotations
 if TYPE_CHECKING:
@@ -84,3 +84,13 @@ def test_what_each_test_calls_is_noted(tmp_path: Path) -> None:
     assert {"counted.py:outer", "counted.py:outer.<locals>.inner"} <= called["test_one"]
     assert "counted.py:Kept.area" in found["shared"] and called["test_two"] == {"test_it.py:test_two"}
     assert "*:" in called["test_three"]
+
+
+def test_a_line_that_a_kill_cut_off_is_found_again(tmp_path: Path) -> None:
+    path = tmp_path / "found.jsonl"
+    Record(path).put("a", killed=True)
+    path.write_text(path.read_text() + '{"key": "b", "kil')
+    record = Record(path)
+    assert set(record.found) == {"a"}
+    record.put("b", killed=False)
+    assert set(Record(path).found) == {"a", "b"}

@@ -113,8 +113,11 @@ class Record:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        lines = path.read_text().splitlines() if path.exists() else []
-        self.found = {entry["key"]: entry for entry in map(json.loads, lines)}
+        # a line that a kill cut off has no end
+        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+        self.found = {entry["key"]: entry for entry in (json.loads(line) for line in lines if line.endswith("\n"))}
+        if lines and not lines[-1].endswith("\n"):
+            path.write_text("".join(lines[:-1]))
 
     def put(self, key: str, **entry: object) -> dict:
         self.found[key] = {"key": key, **entry}

@@ -98,7 +98,7 @@ def compare(
         policies: names, or classes of policies, which go by their own name; ratios are of the first to each of the
             others.
         metrics: names, or functions of two display-encoded images ``(h, w, 3)`` in [0, 1], shown and reference, which
-            go by their own name; lower is better.
+            go by their own name; lower is better. ``jod`` scores the middle of the run (``jod_s``).
         seconds: animation time to measure, seconds.
         image_times_s: times at which images are kept, each at the last reference time that is not later; by default
             five, evenly spaced.

@@ -239,8 +239,7 @@ def _compare(
         fps = options.reference_rate_hz / stride
         with Mp4Writer(options.out / "comparison.mp4", fps, made.width_px, made.height_px) as sink:
             one.write(panels, made, sink, drawn.advance)
-    task = bars.task("scores", len(of_sequences) * len(seen))
-    sequences = {name: scores(name, seen, options, task.advance) for name in of_sequences}
+    sequences = {name: scores(name, seen, options, bars.task(name, len(seen)).advance) for name in of_sequences}
     shown = steps.made, steps.panels(list(seen))
     return Measured(options.policy, times_s, seen, runs, *shown, reference.nonfinite, options.cost, sequences)
 

@@ -23,7 +23,7 @@ def main() -> None:
     summary = run_experiment(options, process_began_s())
 
     from analysis.command.console import Table, show
-    from analysis.comparison.tables import run_table, said_of
+    from analysis.comparison.tables import run_tables, said_of
 
     rows = {}
     if options.metrics is None and "jod" not in summary["metrics"]:
@@ -38,7 +38,7 @@ def main() -> None:
     }
     files = ", ".join(["summary.json", *summary["files"]])
     title = f"{options.input}: {summary['policy']} beside rivals at equal cost, ledger {summary['ledger']}"
-    parts: list[Table | str] = [run_table(summary, title), Table("", ("", ""), list(rows.items()), words=2)]
+    parts: list[Table | str] = [*run_tables(summary, title), Table("", ("", ""), list(rows.items()), words=2)]
     if summary["choice"]:
         from analysis.comparison.choosing import choice_table
 

@@ -80,30 +80,39 @@ def said_of(invariants: Mapping[str, Any] | None, hold: str) -> str:
     return hold if invariants["ok"] else f"BROKEN: {dict(invariants)}"
 
 
-def run_table(summary: Mapping[str, Any], title: str) -> Table:
-    """A line for each run: its errors, and those of the policy beside them. For the terminal.
+def run_tables(summary: Mapping[str, Any], title: str) -> list[Table]:
+    """The errors of every run, and those of the policy beside each rival's. For the terminal.
 
     Args:
         summary: as in ``summary.json``, with statistics as records.
-        title: above the table.
+        title: above the first table.
     """
-    own, beside = summary["policy"], dict(summary.get("ratio_statistics", {}))
-    metrics, rows = summary["metrics"], []
-    for name, errors in summary["mse"].items():
-        values = (f"{values[name]:.3f}" for values in metrics.values())
-        rows.append((name, f"{statistics.median(errors):.2g}", *values, *_beside(beside.get(name))))
-    if "best_rival" in summary:
-        best = summary["best_rival"]["ratio_statistics"]
-        rows.append(("best rival", "", *("" for _ in metrics), *_beside(best)))
+    own, metrics, config = summary["policy"], summary["metrics"], summary["config"]
+    rows = [
+        (name, f"{statistics.median(errors):.2g}", *(f"{values[name]:.3f}" for values in metrics.values()))
+        for name, errors in summary["mse"].items()
+    ]
     named = (f"{metric.upper()}, {METRICS[metric].better} is better" for metric in metrics)
-    ours = (f"MSE of {own} / this, median", "quartiles", "at most this", "suitable percentile")
-    return Table(title, ("run", "MSE, median", *named, *ours), rows)
+    taken = [f"{metric.upper()}: {_span(config) if METRICS[metric].sequence else _mean(config)}" for metric in metrics]
+    beside = dict(summary.get("ratio_statistics", {}))
+    if "best_rival" in summary:
+        beside["the best of them"] = summary["best_rival"]["ratio_statistics"]
+    ratios = [(name, *_beside(found)) for name, found in beside.items()]
+    ours = ("rival", "median", "quartiles", "times at most its", "suitable percentile")
+    tables = [Table(title, ("run", "MSE, median", *named), rows, "; ".join(taken))]
+    return tables + ([Table(f"MSE of {own} over that of each rival", ours, ratios)] if ratios else [])
 
 
-def _beside(found: RatioStatistics | None) -> tuple[str, ...]:
-    if found is None:
-        return ("",) * 4
-    share = f"{100 * found.share_suitable:.0f} % of times"
+def _span(config: Mapping[str, Any]) -> str:
+    return f"{min(config['jod_s'], config['seconds']):g} s in the middle"
+
+
+def _mean(config: Mapping[str, Any]) -> str:
+    return f"mean over one in {config['metric_stride']} images of the reference"
+
+
+def _beside(found: RatioStatistics) -> tuple[str, ...]:
+    share = f"{100 * found.share_suitable:.0f} %"
     quartiles = f"{found.quartile_low:.3f} – {found.quartile_high:.3f}"
     return f"{found.median:.3f}", quartiles, share, f"{found.suitable_percentile:.0f}"
 
@@ -112,7 +121,8 @@ def metric_table(measured: Measured) -> Table | None:
     """Metrics of every run; None if none was asked for."""
     found = metrics_of(measured)
     rows = [(name, *(f"{found[metric][name]:.4f}" for metric in found)) for name in measured.seen]
-    return Table("Metrics, mean over the times", ("run", *found), rows) if found else None
+    note = "Metrics of images are means over the times at which they were taken; jod scores the middle of the run."
+    return Table("Metrics", ("run", *found), rows, note) if found else None
 
 
 def stage_table(measured: Measured) -> Table:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 from tsar.config import require
 
@@ -12,11 +16,14 @@ class DisplayModel:
     """The display that a score assumes; every record names it."""
 
     name: str = "standard_fhd"
-    """A display of ColorVideoVDP: size, distance, luminance."""
+    """A display of ColorVideoVDP that shows sRGB: size, distance, luminance."""
     rate_hz: float = 60.0
     """Refresh rate, Hz. The same pixels score differently at another rate."""
 
     def __post_init__(self) -> None:
+        if self.name != DisplayModel.name:
+            known = srgb_displays()
+            require(self.name in known, "display.name", f"one of {', '.join(known)}", self.name)
         require(self.rate_hz in (60.0, 120.0), "display.rate_hz", "60 or 120", self.rate_hz)
 
     def shows(self, image_rate_hz: float) -> bool:
@@ -33,3 +40,12 @@ class DisplayModel:
         fits = self.shows(image_rate_hz)
         require(fits, "reference_rate_hz", f"a whole fraction of the display's {self.rate_hz:g} Hz", image_rate_hz)
         return round(self.rate_hz / image_rate_hz)
+
+
+@cache
+def srgb_displays() -> tuple[str, ...]:
+    """Names of the displays of ColorVideoVDP that show sRGB; it has others, to which our codes mean another light."""
+    package = importlib.util.find_spec("pycvvdp")
+    folder = Path(((package and package.submodule_search_locations) or [""])[0])
+    found = json.loads((folder / "vvdp_data" / "display_models.json").read_text())
+    return tuple(name for name, display in found.items() if display.get("colorspace", "sRGB") == "sRGB")

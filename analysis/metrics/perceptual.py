@@ -1,6 +1,6 @@
 """Perceptual metrics of display-encoded images: JOD, FLIP, SSIM.
 
-All run on one thread, because the libraries do not guarantee the same bits for another number of threads.
+JOD and SSIM run on one thread, because the libraries do not guarantee the same bits for another number of threads.
 """
 
 from __future__ import annotations

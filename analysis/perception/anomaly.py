@@ -79,7 +79,7 @@ def table(made: dict[int, NDArray[np.float64]], scene: str) -> pd.DataFrame:
     for lower, level in itertools.pairwise(levels):
         mean, of_sets, of_shifts = of_the_set(made[level])
         below = float(made[lower].mean())
-        away = (below - mean) / of_sets if of_sets > 0.0 else np.inf
+        away = (below - mean) / of_sets if of_sets > 0.0 else np.nan
         rows.append(
             {
                 "scene": scene, "samples": level, "mse": mean, "lower": lower, "mse_lower": below,
@@ -111,8 +111,12 @@ def described(rows: pd.DataFrame, rises: dict[float, float]) -> str:
     """A line for each row of :func:`table`, and for each share of studies."""
     lines = [
         f"{row['scene']}, {row['samples']:.0f} samples: sets differ by {100 * row['set_share']:.1f} % of the error, "
-        f"shifts by {100 * row['shift_share']:.1f} %; one as bad as the mean set of {row['lower']:.0f} is "
-        f"{row['deviations']:.1f} deviations away"
+        f"shifts by {100 * row['shift_share']:.1f} %; "
+        + (
+            f"one as bad as the mean set of {row['lower']:.0f} is {row['deviations']:.1f} deviations away"
+            if row["deviations"] == row["deviations"]
+            else "sets differ by no more than the shifts do by chance"
+        )
         for row in rows.to_dict("records")
     ]
     lines += [f"a curve rises by {least:g} or more in {100 * one:.0f} % of studies" for least, one in rises.items()]

@@ -275,7 +275,7 @@ class AnomalyOptions:
     def __post_init__(self) -> None:
         require_distinct(self, "levels")
         for level in self.levels:
-            require(round(level ** (1 / 3)) ** 3 == level and 1 <= level <= 4096, "levels", "cubes to 4096", level)
+            require(1 <= level <= 4096 and round(level ** (1 / 3)) ** 3 == level, "levels", "cubes to 4096", level)
         require(len(self.levels) >= 2, "levels", "at least two", self.levels)
         limits.within(self, sets=(2, 256), shifts=(2, 64), studies=(100, 10**6), width_px=(16, 512))
         limits.within(self, seed=(0, limits.SEEDS[1] - 256), threads=limits.THREADS)

@@ -177,10 +177,13 @@ def _one_process(module: Kernels) -> Iterator[None]:
     from filelock import lock_descriptor  # here, because it takes long to import
 
     lock = kept.with_name(f"{kept.name}.lock")
-    with lock.open("w") as file:
-        lock_descriptor(file.fileno())
+    with contextlib.ExitStack() as held:
+        with contextlib.suppress(OSError):  # such as a folder of another user
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            file = held.enter_context(lock.open("w"))
+            held.callback(lock.unlink, missing_ok=True)
+            lock_descriptor(file.fileno())
         yield
-    lock.unlink(missing_ok=True)
 
 
 def _name(module: Kernels) -> str:

@@ -72,6 +72,10 @@ def test_a_rate_that_the_display_cannot_hold_is_refused(rate_hz: float) -> None:
 def test_other_displays_and_shapes_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"display.rate_hz: expected 60 or 120, got 50.0"):
         DisplayModel(rate_hz=50.0)
+    for name in ("foo", "standard_hdr_pq"):  # the second shows no sRGB
+        with pytest.raises(ConfigError, match=rf"display.name: expected one of standard_4k, .*got '{name}'"):
+            DisplayModel(name)
+    assert DisplayModel("standard_4k").name == "standard_4k"
     with pytest.raises(ValueError, match=r"equal shapes, got \(5, 64, 64, 3\) and \(6, 64, 64, 3\)"):
         jod(still()[:5], still(), 60.0, AT_60)
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from analysis.perception.anomaly import chance_rises, of_the_set, table
+from analysis.perception.anomaly import chance_rises, described, of_the_set, table
 from analysis.perception.options import AnomalyOptions
 from analysis.perception.thesis_figures import densities
 from renderer.sampling.plan import SamplePlan, box_warp, triangle_warp
@@ -68,5 +68,13 @@ def test_the_anomaly_is_measured(tmp_path: Path, monkeypatch, capsys) -> None:
     rows = pd.read_csv(tmp_path / "anomaly.csv")
     assert rows["scene"].tolist() == ["planescene", "spheresscene"] and (rows["mse"] < rows["mse_lower"]).all()
     assert "sets differ by" in capsys.readouterr().out
-    assert call_script("perception.py", monkeypatch, "anomaly", "--levels", "100", "216") == 2
-    assert one_line(capsys.readouterr().err)
+    for wrong in ("100", "-8"):
+        assert call_script("perception.py", monkeypatch, "anomaly", "--levels", wrong, "216") == 2
+        assert one_line(capsys.readouterr().err)
+
+
+def test_sets_that_do_not_differ_are_said_to_be_alike() -> None:
+    shifts = np.array([[1.0, 3.0], [3.0, 1.0], [2.0, 2.0]])
+    rows = table({27: 2.0 * shifts, 64: shifts}, "planescene")
+    assert rows["set_share"].item() == 0.0 and np.isnan(rows["deviations"].item()) and np.isnan(rows["chance"].item())
+    assert "sets differ by no more than the shifts do by chance" in described(rows, {})

@@ -116,6 +116,14 @@ def test_of_two_processes_one_compiles(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.lock"))
 
 
+def test_a_cache_that_was_removed_is_made_again(tmp_path: Path) -> None:
+    (tmp_path / "small.py").write_text(SMALL)
+    environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path / "cache"), "PYTHONPATH": f"{ROOT}:{tmp_path}"}
+    removed = RACE.replace("sys.stdin.readline()", "import shutil, warp; shutil.rmtree(warp.config.kernel_cache_dir)")
+    done = subprocess.run([sys.executable, "-c", removed], env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and "compiled 1" in done.stdout, done.stderr
+
+
 def test_headers_come_once_after_what_they_include() -> None:
     found = list(texts("shading.h", "surface.h", "samples.h"))
     names = [re.findall(r'^#line 1 "renderer/\w+/native/(\w+\.h)"', text)[0] for text in found]
