@@ -142,20 +142,17 @@ def memory_row(triangles: int) -> Row:
 
 
 def _build_watched(sender: Connection, triangles: int) -> None:
-    import resource
     import signal
 
-    import psutil
-
+    from analysis.study.memory import PeakMemory
     from renderer.tables.trees import build_tree
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
     build_tree(*_arrays(bumpy_globe(1000)))  # loads kernels
     mesh = bumpy_globe(triangles)
-    before = psutil.Process().memory_info().rss
-    tree = build_tree(*_arrays(mesh))
-    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    sender.send((len(mesh.faces), before, peak, tree.nodes.nbytes + tree.blocks.nbytes))
+    with PeakMemory() as peak:
+        tree = build_tree(*_arrays(mesh))
+    sender.send((len(mesh.faces), peak.bytes - peak.grown, peak.bytes, tree.nodes.nbytes + tree.blocks.nbytes))
     sender.close()
 
 

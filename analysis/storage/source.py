@@ -28,7 +28,9 @@ _NO_DATA = (".pyc", ".md", ".html", ".js")
 _PLACE = re.compile(r"[a-z_]\w*(\.\w+)+:\w+")
 """An entry in a table of names, as ``module:attribute``, which is imported at its first use."""
 
-_DISTRIBUTIONS = {"warp": "warp-lang", "PIL": "pillow", "pycvvdp": "cvvdp", "flip_evaluator": "flip-evaluator"}
+_DISTRIBUTIONS = {
+    "warp": "warp-lang", "PIL": "pillow", "pycvvdp": "cvvdp", "flip_evaluator": "flip-evaluator", "pxr": "usd-core",
+}  # fmt: skip
 """Distribution names of packages that differ from their import names."""
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-_NAMES = ("Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdLux", "UsdShade", "UsdSkel", "UsdUtils")
+if TYPE_CHECKING:
+    Ar: Any
+    Gf: Any
+    Sdf: Any
+    Tf: Any
+    Usd: Any
+    UsdGeom: Any
+    UsdLux: Any
+    UsdShade: Any
+    UsdSkel: Any
+    UsdUtils: Any
+else:
+    from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils
 
-Ar: Any
-Gf: Any
-Sdf: Any
-Tf: Any
-Usd: Any
-UsdGeom: Any
-UsdLux: Any
-UsdShade: Any
-UsdSkel: Any
-UsdUtils: Any
-Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils = (import_module(f"pxr.{name}") for name in _NAMES)
+__all__ = ["Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdLux", "UsdShade", "UsdSkel", "UsdUtils"]

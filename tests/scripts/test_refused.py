@@ -34,7 +34,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "bench --compare missing-a.json missing-b.json": ("compare", "missing-a.json"),
     "bench --nonsense": ("--nonsense",),
     "conversion_check gone.xml": ("scenes", "scene files"),
-    "conversion_check": ("scenes", "scene files, --markers or --matrix"),
+    "conversion_check": ("scenes", "scene files, --markers, --matrix or --mutations"),
     f"conversion_check --width-px 2 {__file__}": ("width_px", "between 16 and 4096"),
     "cost_report --batch-size -1": ("batch_size", "-1"),
     "cost_report --trace-segments nan": ("trace_segments", "nan"),

@@ -7,6 +7,7 @@ from analysis.bench.large import cycle_row, instance_rows, instances, memory_row
 from analysis.bench.options import BenchOptions
 from analysis.bench.scenes import bumpy_globe
 from analysis.command.progress import Task
+from renderer.tables import merging
 
 OPTIONS = BenchOptions(only=("large",), resolution_px=64, batch_size=16, repetitions=7)
 
@@ -40,9 +41,10 @@ def test_memory_of_a_tree() -> None:
     assert 60.0 < row.ours < 2000.0 and "the tree itself" in row.note
 
 
-def test_instances_share_their_mesh() -> None:
+def test_instances_share_their_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     from renderer.trace import Renderer
 
+    monkeypatch.setattr(merging, "COPIED_FACES_MAX", 0)  # as for meshes of a million triangles
     mesh = bumpy_globe(4000)
     one, many = (Renderer(instances(mesh, count), threads=1).buffers.data for count in (1, 16))
     assert one.tree_nodes.shape == many.tree_nodes.shape and one.tree_blocks.shape == many.tree_blocks.shape

@@ -42,6 +42,8 @@ def test_every_specimen_of_every_format_becomes_every_other(source: str, tmp_pat
                          ("metallic-roughness", "a metallic-roughness surface")])  # fmt: skip
 def test_what_no_format_has_is_a_loss(specimen: str, loss: str, tmp_path: Path) -> None:
     for target in FORMATS_OF:
+        if (specimen, target) == ("normal-mapped", "mitsuba3"):
+            continue  # it has normal maps
         assert any(one.startswith(loss) for one in losses(SINGLE[specimen], "scene", target, tmp_path)[0])
 
 
