@@ -35,6 +35,7 @@ from scenes.models.usd_motion import UsdMotion
 from scenes.models.usd_shapes import KINDS as SHAPES
 from scenes.models.usd_shapes import shapes_of
 from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
+from scenes.models.usd_values import finite
 from scenes.models.usd_views import LAMP, camera_of, light_of
 
 _INSTANCES_MOST = 1 << 20
@@ -157,6 +158,9 @@ class _Reader:
                 self._parts.append(Instance(shape, material, product(matrix, local), track, name))
 
     def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None, name: str) -> None:
+        if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
+            self.report.add(prim.GetName(), "a light without extent")
+            return
         light, lamp = light_of(prim, self.code, matrix, self.pictures, self.up_is_z, self.report)
         if light is not None:
             self._lights.append(light)
@@ -231,7 +235,8 @@ class _Reader:
         if colors:
             shown = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(colors)
             found = shown.ComputeFlattened(self.code) if shown and shown.HasValue() else None
-            color = np.broadcast_to(_GREY if not found else np.array(found[0], np.float64), (1, 3, 3))
+            color = finite(_GREY if not found else np.array(found[0], np.float64), f"{name}: primvar {colors}")
+            color = np.broadcast_to(color, (1, 3, 3))
         material = self.materials.painted(number, {}, color).material
         return [(shape, material, local) for shape, local in shapes_of(prim, self.code)]
 

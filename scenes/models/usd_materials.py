@@ -14,6 +14,7 @@ from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import multiplied
 from scenes.models.usd_library import Sdf, UsdShade
 from scenes.models.usd_textures import WRAPS, Make, Pictures, Reading, UsdDocument
+from scenes.models.usd_values import finite
 from scenes.pictures import Pixels
 
 _NUMBERS = {"metallic": 0.0, "roughness": 0.5, "opacity": 1.0, "opacityThreshold": 0.0, "ior": 1.5, "clearcoat": 0.0,
@@ -175,19 +176,24 @@ class UsdMaterials:
             return rest if found is None else found
         kind, output = source[0].GetShaderId(), source[1]
         if kind == "UsdUVTexture":
-            return self._reading(source[0], output, where)
+            path = self._file(source[0], where)
+            return self._fallback(source[0], output, name) if path is None else self._reading(*source, path, where)
         if kind in ("UsdPrimvarReader_float3", "UsdPrimvarReader_float4") and name == "diffuseColor":
             return str(self._constant(source[0], "varname") or "displayColor")
         self.report.add(where, f"{name} of a node {kind or 'without kind'}", "its default")
         return rest
 
     def _constant(self, shader: Any, name: str) -> Any:
-        """The value of an input, through the interfaces of materials and groups; None if there is none."""
+        """The value of an input, through the interfaces of materials and groups; None if there is none.
+
+        Raises:
+            SceneError: it has numbers that are not finite.
+        """
         given = shader.GetInput(name)
         for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given else ():
             if not UsdShade.Output.IsOutput(attribute):
                 found = attribute.Get(self.code)
-                return None if isinstance(found, Sdf.AssetPath) else found
+                return None if isinstance(found, Sdf.AssetPath) else finite(found, attribute.GetPath())
         return None
 
     def _connected(self, shader: Any, name: str) -> tuple[Any, str] | None:
@@ -198,9 +204,14 @@ class UsdMaterials:
                 return UsdShade.Shader(attribute.GetPrim()), attribute.GetName().partition(":")[2]
         return None
 
-    def _reading(self, shader: Any, channels: str, where: str) -> Reading:
+    def _fallback(self, shader: Any, channels: str, name: str) -> Any:
+        """The value of an input whose picture is missing."""
+        given = [float(part) for part in self._constant(shader, "fallback")]
+        parts = 3 * (given["rgba".index(channels)],) if channels in tuple("rgba") else tuple(given[:3])
+        return parts[0] if name in _NUMBERS else parts
+
+    def _reading(self, shader: Any, channels: str, path: str, where: str) -> Reading:
         """What a UsdUVTexture reads."""
-        path = self._file(shader, where)
         scale, bias = (self._constant(shader, name) for name in ("scale", "bias"))
         wraps = tuple(str(self._constant(shader, name) or "black") for name in ("wrapS", "wrapT"))
         reading = Reading(
@@ -214,8 +225,8 @@ class UsdMaterials:
         self._wraps[reading] = WRAPS.get(wraps[0], WRAPS["black"]), WRAPS.get(wraps[1], WRAPS["black"])
         return reading
 
-    def _file(self, shader: Any, where: str) -> str:
-        """The resolved path of the picture of a UsdUVTexture."""
+    def _file(self, shader: Any, where: str) -> str | None:
+        """The resolved path of the picture of a UsdUVTexture; None if it is missing and the file has a fallback."""
         given = shader.GetInput("file")
         for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given else ():
             found = attribute.Get(self.code)
@@ -225,7 +236,11 @@ class UsdMaterials:
                     self.report.add(where, "tiles of a texture", "the first one")
                     layer = attribute.GetPropertyStack(self.code)[0].layer
                     path = layer.ComputeAbsolutePath(found.path.replace("<UDIM>", "1001"))
-                return path or str(self.document.sources.require(found.path, "a texture at"))
+                sources = self.document.sources
+                if not path and self._constant(shader, "fallback") is not None and sources.find(found.path) is None:
+                    self.report.add(where, f"a missing texture {found.path}", "its fallback")
+                    return None
+                return path or str(sources.require(found.path, "a texture at"))
         return str(self.document.sources.require("", f"{where}: a file of a texture, found none;"))
 
     def _coordinates(self, shader: Any, where: str) -> tuple[int, tuple[Any, ...]]:

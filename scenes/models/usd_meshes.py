@@ -97,7 +97,7 @@ def array_of(values: Any, width: int) -> NDArray[np.float64]:
 def at_corners(
     values: NDArray[np.float64], interpolation: str, triangles: Triangles, what: str, where: str, report: LossReport
 ) -> NDArray[np.float64] | None:
-    """Values ``(f, 3, width)`` at the corners; None, with a loss, if their number does not fit.
+    """Values ``(f, 3, width)`` at the corners; None, with a loss, if their number does not fit. They may be non-finite.
 
     Args:
         values: values ``(n, width)`` without indices.
@@ -114,15 +114,17 @@ def at_corners(
     if len(values) <= index.max(initial=0):
         report.add(where, f"{what} ({interpolation}) with {len(values)} values")
         return None
-    if not np.isfinite(values).all():
-        raise SceneError(f"{where}: {what}: holds non-finite values")
     return values[index]
 
 
 def primvar_at_corners(
     prim: Any, name: str, width: int, triangles: Triangles, code: Any, where: str, report: LossReport
 ) -> NDArray[np.float64] | None:
-    """Values ``(f, 3, width)`` of a primvar, inherited where it is constant; None if there is none that fits."""
+    """Values ``(f, 3, width)`` of a primvar, inherited where it is constant; None if there is none that fits.
+
+    Raises:
+        SceneError: values other than normals are not finite.
+    """
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     if not primvar or not primvar.HasValue():
         return None
@@ -132,20 +134,25 @@ def primvar_at_corners(
         report.add(where, f"primvar {name} of type {primvar.GetTypeName()}")
         return None
     values = found.reshape(len(found), -1)[:, :width]
+    if name != "normals" and not np.isfinite(values).all():
+        raise SceneError(f"{where}: primvar {name}: holds non-finite values")
     return at_corners(values, primvar.GetInterpolation(), triangles, f"primvar {name}", where, report)
 
 
 def normals_at_corners(
     mesh: Any, triangles: Triangles, code: Any, where: str, report: LossReport
 ) -> NDArray[np.float64] | None:
-    """Normals ``(f, 3, 3)`` of a mesh, not normalised; None if it has none."""
+    """Normals ``(f, 3, 3)`` of a mesh, not normalised and not all finite; None if it has none."""
     primvar = UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvar("normals")
     if primvar and primvar.HasValue():
-        return primvar_at_corners(mesh.GetPrim(), "normals", 3, triangles, code, where, report)
-    values = array_of(mesh.GetNormalsAttr().Get(code), 3)
-    if not len(values):
-        return None
-    return at_corners(values, mesh.GetNormalsInterpolation(), triangles, "normals", where, report)
+        found = primvar_at_corners(mesh.GetPrim(), "normals", 3, triangles, code, where, report)
+    else:
+        values = array_of(mesh.GetNormalsAttr().Get(code), 3)
+        interpolation = mesh.GetNormalsInterpolation()
+        found = at_corners(values, interpolation, triangles, "normals", where, report) if len(values) else None
+    if found is not None and not np.isfinite(found).all():
+        report.add(where, "non-finite normals", "those of the faces")
+    return found
 
 
 def subsets_of(mesh: Any, code: Any, polygons: int) -> list[tuple[Any, NDArray[np.bool_]]]:

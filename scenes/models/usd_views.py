@@ -35,6 +35,7 @@ from scenes.formats.losses import LossReport
 from scenes.models.model import ModelCamera, axis_of, shorter_fov_deg, unscaled
 from scenes.models.usd_library import UsdGeom, UsdLux
 from scenes.models.usd_textures import Pictures, Reading
+from scenes.models.usd_values import finite
 from scenes.viewing import turned_up
 
 LAMP = Matte(ConstantTexture((0.0, 0.0, 0.0)))
@@ -48,16 +49,18 @@ def camera_of(prim: Any, code: Any, matrix: Matrix, track: RigidTrack | None, re
     """A camera with this transform and motion.
 
     Raises:
-        SceneError: apertures or focal length are not positive.
+        SceneError: apertures or focal length are not positive, or values are not finite.
     """
     lens = UsdGeom.Camera(prim).GetCamera(code)
     wide, high = lens.horizontalAperture, lens.verticalAperture
-    if not (0.0 < min(wide, high, lens.focalLength) and max(wide, high, lens.focalLength) < math.inf):
+    if not all(0.0 < size < math.inf for size in (wide, high, lens.focalLength)):
         raise SceneError(f"cannot be read: camera {prim.GetName()}: expected positive apertures and focal length")
+    offsets = lens.horizontalApertureOffset, lens.verticalApertureOffset
+    finite((*offsets, lens.fStop, lens.focusDistance), f"camera {prim.GetName()}: lens")
     if tuple(lens.clippingPlanes):
         report.add(prim.GetName(), "clipping planes of a camera")
     placed, tenth = unscaled(matrix), 0.1  # apertures and focal length are in tenths of a scene unit
-    shift = lens.horizontalApertureOffset / wide, lens.verticalApertureOffset / high
+    shift = offsets[0] / wide, offsets[1] / high
     if str(lens.projection).endswith("Orthographic"):
         if shift != (0.0, 0.0):
             report.add(prim.GetName(), "a picture off the viewing direction", "one about it")
@@ -75,7 +78,7 @@ def light_of(
     """A light without an area; or the shape, the transform and the radiance of a lamp. Both None if there is no light.
 
     Raises:
-        SceneError: its strength is not finite, or its picture cannot be read.
+        SceneError: one of its values or its strength is not finite, or its picture cannot be read.
     """
     name, kind = prim.GetName(), prim.GetTypeName()
     if kind not in KINDS:
@@ -88,16 +91,18 @@ def light_of(
         return _dome(prim, code, matrix, radiance, pictures, up_is_z, report), None
     normalized = bool(_value(prim, "normalize", code, False))
     if kind == "DistantLight":
-        half_deg = float(_value(prim, "angle", code, 0.53)) / 2.0
-        solid = math.pi * float(sin(math.radians(min(max(half_deg, 0.0), 90.0)))) ** 2
+        half_deg = min(max(float(_value(prim, "angle", code, 0.53)) / 2.0, 0.0), 90.0)
+        solid = math.pi * float(sin(math.radians(half_deg))) ** 2
         shown = radiance if normalized or solid == 0.0 else radiance * solid
-        return DirectionalLight(axis_of(matrix, 2), rgb(shown), 2.0 * min(half_deg, 90.0)), None
+        return DirectionalLight(axis_of(matrix, 2), rgb(shown), 2.0 * half_deg), None
     shape, local, area = _lamp(prim, kind, code, matrix)
+    if not area > 0.0:
+        report.add(name, "a light without extent")
+        return None, None
     if normalized:
         radiance = radiance / area
     point = kind == "SphereLight" and bool(_value(prim, "treatAsPoint", None, False))
-    cone = prim.GetAttribute("inputs:shaping:cone:angle")
-    if cone and cone.HasAuthoredValue() and float(cone.Get(code)) < 90.0:
+    if float(_value(prim, "shaping:cone:angle", code, 90.0)) < 90.0:
         return _spot(prim, code, matrix, radiance * area / (4.0 if kind == "SphereLight" else 1.0), kind, report), None
     if point:
         x, y, z = (float(part) for part in matrix[:3, 3])
@@ -110,7 +115,7 @@ def light_of(
 def _value(prim: Any, name: str, code: Any, rest: Any) -> Any:
     attribute = prim.GetAttribute(f"inputs:{name}" if name != "treatAsPoint" else name)
     found = attribute.Get() if attribute and code is None else attribute.Get(code) if attribute else None
-    return rest if found is None else found
+    return rest if found is None else finite(found, attribute.GetPath())
 
 
 def _radiance(prim: Any, code: Any, report: LossReport) -> NDArray[np.float64]:
@@ -121,7 +126,7 @@ def _radiance(prim: Any, code: Any, report: LossReport) -> NDArray[np.float64]:
     if _value(prim, "enableColorTemperature", code, False):
         kelvin = float(_value(prim, "colorTemperature", code, 6500.0))
         color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
-    if not np.isfinite(color * strength).all():
+    if not (np.abs(color * strength) <= np.finfo(np.float32).max).all():
         raise SceneError(f"cannot be read: light {prim.GetName()}: expected a finite strength")
     for name, rest in (("diffuse", 1.0), ("specular", 1.0), ("shaping:focus", 0.0), ("shadow:enable", True)):
         if _value(prim, name, code, rest) != rest:

@@ -194,7 +194,7 @@ HOSTILE = {
     "point instancers at most 32 deep": 'def PointInstancer "p" { int[] protoIndices = [0]\n'
                                         "point3f[] positions = [(0, 0, 0)]\nrel prototypes = [</p>]\n }",
     "positive apertures": mesh() + 'def Camera "c" { float focalLength = 0 }',
-    "a finite strength": mesh() + 'def SphereLight "l" { float inputs:intensity = inf }',
+    "finite numbers, got inf": mesh() + 'def SphereLight "l" { float inputs:intensity = inf }',
     "gone.png, found no file": textured("color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
                                         texture("T", "gone.png")),
     "cannot identify image file": textured("color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",

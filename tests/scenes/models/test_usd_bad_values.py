@@ -1,0 +1,73 @@
+"""Values of USD files that are not finite, and pictures that are missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenes.canonical import ConstantTexture, DirectionalLight, MetallicRough, SceneError
+from scenes.formats.losses import LossReport
+from scenes.models import read_model, read_whole
+from tests.scenes.models.usd import BOUND, QUAD, READER, ST, material, mesh, texture, written
+
+
+@pytest.mark.parametrize(
+    ("body", "where"),
+    [
+        (mesh(BOUND) + material("float inputs:roughness = nan"), "/Mat/S.inputs:roughness"),
+        (mesh(BOUND) + material("color3f inputs:diffuseColor = (1, inf, 0)"), "/Mat/S.inputs:diffuseColor"),
+        (mesh() + 'def DistantLight "L" { float inputs:angle = nan }', "/L.inputs:angle"),
+        (mesh() + 'def SphereLight "L" { float inputs:radius = nan }', "/L.inputs:radius"),
+        (mesh() + 'def SphereLight "L" { float inputs:shaping:cone:angle = nan }', "/L.inputs:shaping:cone:angle"),
+        (mesh() + 'def SphereLight "L" { float inputs:exposure = nan }', "/L.inputs:exposure"),
+        (mesh() + 'def SphereLight "L" { float inputs:intensity = 1e38\n float inputs:exposure = 9 }', "light L"),
+        (mesh() + 'def Camera "C" { float fStop = nan }', "camera C"),
+        (mesh() + 'def Camera "C" { float focalLength = nan }', "camera C"),
+        ('def Sphere "b" { color3f[] primvars:displayColor = [(nan, 0, 0)] }', "b: primvar displayColor"),
+    ],
+)
+def test_values_that_are_not_finite_are_refused(body: str, where: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneError) as refused:
+        read_whole(written(tmp_path, body))
+    said = str(refused.value)
+    assert where in said and "in.usda" in said and "expected" in said and "\n" not in said
+
+
+def test_lights_without_an_angle_or_extent(tmp_path: Path) -> None:
+    body = """def DistantLight "sun" { float inputs:angle = -1 }
+    def RectLight "panel" { bool inputs:normalize = 1
+        float3 xformOp:scale = (0, 1, 1)
+        uniform token[] xformOpOrder = ["xformOp:scale"]
+    }
+    """
+    report = LossReport()
+    model = read_whole(written(tmp_path, mesh() + body), report)
+    (sun,) = model.lights
+    assert isinstance(sun, DirectionalLight) and sun.angle_deg == 0.0 and len(model.parts) == 1
+    assert "panel: a light without extent" in report.text()
+
+
+@pytest.mark.parametrize("name", ["normals", "primvars:normals"])
+def test_normals_that_are_not_finite_are_those_of_the_face(name: str, tmp_path: Path) -> None:
+    inside = f'normal3f[] {name} = [(nan, 0, 0), (0, 1, 0), (0, 1, 0), (0, 1, 0)] (interpolation = "vertex")'
+    report = LossReport()
+    (part,) = read_model(written(tmp_path, mesh(inside, QUAD)), report)
+    found = {tuple(normal) for normal in np.round(part.shape.normals, 4)}
+    assert found == {(0.0, 0.0, 1.0), (0.0, 1.0, 0.0)}
+    assert "quad: non-finite normals: those of the faces" in report.text()
+
+
+def test_a_missing_picture_has_its_fallback(tmp_path: Path) -> None:
+    node = texture(
+        "T", "none.png", "float4 inputs:fallback = (0.25, 0.5, 0.75, 1)", "float3 outputs:rgb\nfloat outputs:g"
+    )
+    inputs = """color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>
+            float inputs:roughness.connect = </Mat/T.outputs:g>"""
+    report = LossReport()
+    body = mesh(ST + BOUND) + material(inputs, node + READER)
+    (part,) = read_model(written(tmp_path, body), report, facets=True)
+    assert isinstance(part.material, MetallicRough)
+    assert part.material.base == ConstantTexture((0.25, 0.5, 0.75)) and part.material.roughness == 0.5
+    assert "material Mat: a missing texture none.png: its fallback" in report.text()
