@@ -37,7 +37,7 @@ def test_a_run_prints_its_folder_as_it_is(
     statistics = types.SimpleNamespace(median=1.0, quartile_low=0.9, quartile_high=1.1, share_suitable=0.5)
     statistics.suitable_percentile = 50.0
     summary: dict[str, Any] = {"ratio_statistics": {"framed": statistics}, "policy": "thesis", "metrics": {}}
-    summary |= {"mse": {"thesis": [0.1], "framed": [0.2]}}
+    summary |= {"mse": {"thesis": [0.1], "framed": [0.2]}, "config": {}}
     summary |= {"files": [], "choice": None, "ledger": "thesis", "cycles": 1, "cycle_s": 0.1}
     summary |= {"samples_traced": 1, "invariants": {"ok": True, "runs": ["thesis"]}, "nonfinite": {"samples": 0}}
     monkeypatch.setattr(run_command, "run_experiment", lambda options, began_s: summary)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from renderer.render import render
+from renderer import render
 from scenes.animation import pose_at
 from scenes.canonical import DirectionalLight, OrthographicCamera, PerspectiveCamera, PointLight, SceneError, SpotLight
 from scenes.catalog import Look, load_seen

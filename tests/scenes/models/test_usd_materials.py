@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from renderer.render import render
+from renderer import render
 from scenes.canonical import ImageTexture, Masked, MetallicRough, NormalMapped, SceneError, Texture
 from scenes.catalog import Look, load_seen
 from scenes.formats.losses import LossReport
