@@ -22,6 +22,7 @@ import numpy as np
 from analysis.command.progress import Task
 from analysis.storage.journal import Journal
 from analysis.storage.source import code_hash
+from analysis.study.memory import PeakMemory
 
 LIMIT_S, LIMIT_MB = 5.0, 1024.0
 """Most seconds of processor time for a file, and most memory of the process that reads it."""
@@ -30,7 +31,6 @@ _STUCK_S = 60.0
 _BATCH = 50
 _WORDS = (b" nan ", b" 1e308 ", b" -1 ", b' "', b" [ ", b" ] ", b" 0 ", b"AttributeBegin ", b"AttributeEnd ")
 _NEWER = {"pbrt4": "-4.pbrt", "mitsuba3": "-3.xml", "gltf": ".gltf"}
-_PEAK, _FORGET_PEAK = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 def mutated(content: bytes, rng: np.random.Generator) -> bytes:
@@ -106,19 +106,12 @@ def _read(pipe: Connection, sources: list[Path], folder: Path, seed: int) -> Non
         file = sources[chosen]
         changed = file.with_name(f"changed-{os.getpid()}{file.suffix}")
         changed.write_bytes(mutated(contents[chosen], rng))
-        if _FORGET_PEAK.exists():
-            _FORGET_PEAK.write_text("5")
         begun_s = time.process_time()
-        outcome, error = outcome_of(changed, folder)
+        with PeakMemory() as peak:
+            outcome, error = outcome_of(changed, folder)
         spent_s = time.process_time() - begun_s
         changed.unlink()
-        pipe.send((outcome, error, file.name, spent_s, _peak_mb()))
-
-
-def _peak_mb() -> float:
-    """The most memory of this process since the peak was forgotten, MB; 0 where the system does not tell."""
-    lines = _PEAK.read_text().splitlines() if _PEAK.exists() else []
-    return next((int(line.split()[1]) / 1024.0 for line in lines if line.startswith("VmHWM")), 0.0)
+        pipe.send((outcome, error, file.name, spent_s, peak.bytes / 2**20))
 
 
 class _Reader:

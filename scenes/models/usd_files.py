@@ -8,7 +8,7 @@ Source: OpenUSD documentation, UsdGeom (Imageable, Xformable, PointInstancer), U
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from scenes.models.gltf_materials import GltfMaterials
 from scenes.models.model import Model, ModelCamera
 from scenes.models.smoothing import unit_normals, with_corners
 from scenes.models.sources import Sources
+from scenes.models.usd_instances import PointInstances, prims_of
 from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils
 from scenes.models.usd_materials import UsdMaterials
 from scenes.models.usd_meshes import (
@@ -35,17 +36,12 @@ from scenes.models.usd_motion import UsdMotion
 from scenes.models.usd_shapes import KINDS as SHAPES
 from scenes.models.usd_shapes import shapes_of
 from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
-from scenes.models.usd_values import finite
+from scenes.models.usd_values import finite, report_animated
 from scenes.models.usd_views import LAMP, camera_of, light_of
 
-_INSTANCES_MOST = 1 << 20
-_HOLDERS = UsdGeom.Gprim, UsdGeom.PointInstancer, UsdGeom.Camera
-_DEPTH_MAX = 32
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
-_PROTOTYPES = Usd.PrimIsActive & Usd.PrimIsLoaded  # those may lie below a class, or an override alone
 _Part = tuple[Any, Material, Matrix]
-_Placed = tuple[Any, Matrix]
 
 
 def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Model:
@@ -85,20 +81,20 @@ class _Reader:
         self.pictures = Pictures(sources)
         self.described = UsdMaterials(document, self.pictures, self.code, report)
         self.materials = GltfMaterials(document, UsdTextures(document, report), report, facets)
+        self.instances = PointInstances(stage, self.motion, report)
         self.up_is_z = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
         self._made: dict[Hashable, list[_Part]] = {}
-        self._placed: dict[str, list[tuple[Matrix, list[_Placed]]]] = {}
-        self._count = 0
         self._parts: list[Instance] = []
         self._lights: list[Light] = []
         self._cameras: dict[str, ModelCamera] = {}
 
     def model(self) -> Model:
         self._bend()
-        shown = list(self._prims(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate))
+        shown = list(prims_of(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate, self.code, self.report))
         tracks = self.motion.tracks(shown, self.report)
         for prim in shown:
-            self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)), 0)
+            self.instances.admit(prim)
+            self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)))
         return Model(tuple(self._parts), tuple(self._lights), self._cameras, "z" if self.up_is_z else "y")
 
     def _bend(self) -> None:
@@ -109,44 +105,20 @@ class _Reader:
         self.stage.SetEditTarget(self.stage.GetSessionLayer())
         at = self.code.GetValue()
         for root in roots:
-            animations = [prim for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Animation)]
-            if any(UsdSkel.Animation(prim).GetRotationsAttr().ValueMightBeTimeVarying() for prim in animations):
+            animations = [UsdSkel.Animation(prim) for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Animation)]
+            parts = [f"Get{part}Attr" for part in ("Translations", "Rotations", "Scales")]
+            if any(getattr(one, part)().ValueMightBeTimeVarying() for one in animations for part in parts):
                 self.report.add(root.GetName(), "a skeleton that moves", "the pose at its start")
             UsdSkel.BakeSkinning(UsdSkel.Root(root), Gf.Interval(at, at))
 
-    def _prims(self, root: Any, among: Any) -> Iterator[Any]:
-        """Visible prims at and below a root that hold something, within instances too; those below a point instancer
-        are its prototypes."""
-        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(among)))
-        for prim in walk:
-            if prim.IsPseudoRoot():
-                continue
-            imageable = UsdGeom.Imageable(prim)
-            if not imageable:
-                continue
-            visible = imageable.GetVisibilityAttr()
-            if visible.ValueMightBeTimeVarying():
-                self.report.add(prim.GetName(), "an animation of the visibility", "that at its start")
-            if visible.Get(self.code) == UsdGeom.Tokens.invisible:
-                walk.PruneChildren()
-                continue
-            if imageable.ComputePurpose() in (UsdGeom.Tokens.proxy, UsdGeom.Tokens.guide):
-                continue
-            if prim.IsA(UsdGeom.PointInstancer):
-                walk.PruneChildren()
-            if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(kind) for kind in _HOLDERS):
-                yield prim
-
-    def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None, depth: int) -> None:
+    def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
         """Adds what a prim itself holds."""
-        self._count += 1
-        if self._count > _INSTANCES_MOST:
-            raise SceneError(f"cannot be read: expected at most {_INSTANCES_MOST:,} instances")
         name = f"{self.sources.path.stem}/{prim.GetName()}"
         if prim.IsA(UsdGeom.PointInstancer):
-            self._instances(prim, matrix, track, depth)
+            self._instances(prim, matrix, track)
         elif prim.IsA(UsdGeom.Camera):
             key = prim.GetName() if prim.GetName() not in self._cameras else str(prim.GetPath())
+            report_animated(prim, self.report)
             self._cameras[key] = camera_of(prim, self.code, matrix, track, self.report)
         elif prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdGeom.Gprim):
             self._light(prim, matrix, track, name)
@@ -161,6 +133,7 @@ class _Reader:
         if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
             self.report.add(prim.GetName(), "a light without extent")
             return
+        report_animated(prim, self.report)
         light, lamp = light_of(prim, self.code, matrix, self.pictures, self.up_is_z, self.report)
         if light is not None:
             self._lights.append(light)
@@ -170,43 +143,12 @@ class _Reader:
             shape, place, radiance = lamp
             self._parts.append(Instance(shape, LAMP, place, track, name, radiance))
 
-    def _instances(self, prim: Any, matrix: Matrix, track: RigidTrack | None, depth: int) -> None:
+    def _instances(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
         """Adds the instances of a point instancer."""
-        if depth > _DEPTH_MAX:
-            raise SceneError(f"cannot be read: expected point instancers at most {_DEPTH_MAX} deep")
-        key = str(prim.GetPath())
-        if key not in self._placed:
-            self._placed[key] = self._poses(prim)
-        for pose, inner in self._placed[key]:
+        for pose, inner in self.instances.of(prim):
             place = product(matrix, pose)
             for one, local in inner:
-                self._add(one, product(place, local), track, depth + 1)
-
-    def _poses(self, prim: Any) -> list[tuple[Matrix, list[_Placed]]]:
-        """The pose of each instance of a point instancer, and the prims of its prototype with their poses in it."""
-        given, made = UsdGeom.PointInstancer(prim), []
-        if given.GetPositionsAttr().ValueMightBeTimeVarying() or given.GetOrientationsAttr().ValueMightBeTimeVarying():
-            self.report.add(prim.GetName(), "instances that move", "their poses at the start")
-        paths = given.GetPrototypesRel().GetForwardedTargets()
-        chosen = np.array(given.GetProtoIndicesAttr().Get(self.code) or [], np.int64)
-        kinds = given.ExcludeProtoXform, given.IgnoreMask
-        poses = np.array(given.ComputeInstanceTransformsAtTime(self.code, self.code, *kinds), np.float64)
-        poses = poses.reshape(-1, 4, 4)
-        if len(poses) != len(chosen) or (len(chosen) and not 0 <= chosen.min() <= chosen.max() < len(paths)):
-            what = f"a pose and one of {len(paths)} prototypes for each instance"
-            raise SceneError(f"cannot be read: {prim.GetName()}: expected {what}")
-        if len(poses) > _INSTANCES_MOST or not np.isfinite(poses).all():
-            raise SceneError(f"cannot be read: {prim.GetName()}: expected at most {_INSTANCES_MOST:,} finite poses")
-        mask = given.ComputeMaskAtTime(self.code)
-        for number, path in enumerate(paths):
-            root = self.stage.GetPrimAtPath(path)
-            if not root:
-                self.report.add(prim.GetName(), f"a prototype {path}, which is not there")
-                continue
-            inner = [(one, self.motion.matrix_below(one, root)) for one in self._prims(root, _PROTOTYPES)]
-            at = np.flatnonzero(chosen == number)
-            made += [(poses[one].T, inner) for one in (at[np.array(mask, bool)[at]] if len(mask) else at)]
-        return made
+                self._add(one, product(place, local), track)
 
     def _shapes(self, prim: Any) -> list[_Part]:
         """Shapes of a prim with their materials, in its space; instances of one prototype share them if they inherit
@@ -223,6 +165,11 @@ class _Reader:
 
     def _read(self, prim: Any) -> list[_Part]:
         name, kind = prim.GetName(), prim.GetTypeName()
+        if prim.HasAPI(UsdLux.LightAPI):
+            self.report.add(name, "the light of a mesh", "a surface that does not shine")
+        opacity = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayOpacity")
+        if opacity and opacity.HasValue() and self._bound(prim) is None:
+            self.report.add(name, "an opacity without a material", "opaque")
         if prim.IsA(UsdGeom.Mesh):
             return self._mesh(UsdGeom.Mesh(prim), name)
         if kind not in SHAPES:
@@ -248,7 +195,7 @@ class _Reader:
         if whole is None:
             return []
         rest, found = np.ones(whole.polygons, bool), []
-        for prim, marks in subsets_of(mesh, self.code, whole.polygons):
+        for prim, marks in subsets_of(mesh, self.code, whole.polygons, self.report):
             found.append((prim, marks & rest))
             rest &= ~marks
         found.append((mesh.GetPrim(), rest))

@@ -14,7 +14,7 @@ from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import multiplied
 from scenes.models.usd_library import Sdf, UsdShade
 from scenes.models.usd_textures import WRAPS, Make, Pictures, Reading, UsdDocument
-from scenes.models.usd_values import finite
+from scenes.models.usd_values import finite, report_animated
 from scenes.pictures import Pixels
 
 _NUMBERS = {"metallic": 0.0, "roughness": 0.5, "opacity": 1.0, "opacityThreshold": 0.0, "ior": 1.5, "clearcoat": 0.0,
@@ -70,6 +70,7 @@ class UsdMaterials:
         if kind != "UsdPreviewSurface":
             self.report.add(where, f"a surface of kind {kind or 'none'}", "the displayed colour")
             return None
+        report_animated(shader.GetPrim(), self.report)
         given = {name: self._value(shader, name, rest, where) for name, rest in {**_NUMBERS, **_COLORS}.items()}
         for name, value in given.items():
             if isinstance(value, Reading) and name not in _TEXTURED:

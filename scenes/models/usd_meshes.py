@@ -155,12 +155,15 @@ def normals_at_corners(
     return found
 
 
-def subsets_of(mesh: Any, code: Any, polygons: int) -> list[tuple[Any, NDArray[np.bool_]]]:
-    """Subsets of a mesh to which materials are bound: each prim, and a mark for each polygon."""
+def subsets_of(mesh: Any, code: Any, polygons: int, report: LossReport) -> list[tuple[Any, NDArray[np.bool_]]]:
+    """Subsets of a mesh to which materials are bound: each prim, and a mark for each polygon. Those of other polygons
+    than the mesh has are reported."""
     found = []
     for subset in UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, "materialBind"):
         indices = array_of(subset.GetIndicesAttr().Get(code), 0).astype(np.int64)
-        marks = np.zeros(polygons, bool)
-        marks[indices[(indices >= 0) & (indices < polygons)]] = True
+        marks, there = np.zeros(polygons, bool), (indices >= 0) & (indices < polygons)
+        if not there.all():
+            report.add(subset.GetPrim().GetName(), f"{np.count_nonzero(~there)} polygons that the mesh does not have")
+        marks[indices[there]] = True
         found.append((subset.GetPrim(), marks))
     return found

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from scenes.canonical import SceneError
+from scenes.formats.losses import LossReport
 
 
 def finite(value: Any, where: object) -> Any:
@@ -23,3 +24,11 @@ def finite(value: Any, where: object) -> Any:
     if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
         raise SceneError(f"cannot be read: {where}: expected finite numbers, got {value}")
     return value
+
+
+def report_animated(prim: Any, report: LossReport) -> None:
+    """Reports values of a prim that change over time, beside its transform and visibility, which are read otherwise."""
+    names = (one.GetName() for one in prim.GetAttributes() if one.ValueMightBeTimeVarying())
+    changing = sorted(name for name in names if not name.startswith("xformOp") and name != "visibility")
+    if changing:
+        report.add(prim.GetName(), f"values that change ({', '.join(changing)})", "those at the start")

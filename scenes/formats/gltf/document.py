@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, TypeVar
@@ -125,7 +126,7 @@ class Document:
         """Writes the file, with its buffer beside it unless it is embedded.
 
         Raises:
-            SceneError: a GLB file would have 4 GiB or more.
+            SceneError: a GLB file would have 4 GiB or more, or a number is not finite.
         """
         whole: Json = {"asset": {"version": "2.0", "generator": "tsar"}, **self.json}
         if self._size:
@@ -139,6 +140,8 @@ class Document:
             whole["extensionsUsed"] = sorted(self._used)
         if "scenes" in whole:
             whole["scene"] = 0
+        if wrong := next(_not_finite(whole, ""), None):
+            raise SceneError(f"{self.output.path}: expected finite numbers, got {wrong}")
         if not self.embedded:
             self.output.text(self.output.path.name, json.dumps(whole, allow_nan=False, indent=1) + "\n")
             return
@@ -151,3 +154,15 @@ class Document:
         if size > _SIZE_MOST:
             raise SceneError(f"{self.output.path}: expected less than 4 GiB, got {size:,} bytes; use .gltf")
         self.output.content(self.output.path.name, [struct.pack("<III", _GLB, 2, size), *chunks])
+
+
+def _not_finite(value: Any, place: str) -> Iterator[str]:
+    """Numbers of JSON that are not finite, with their places."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield f"{value} in {place.removeprefix('.')}"
+    elif isinstance(value, dict):
+        for name, one in value.items():
+            yield from _not_finite(one, f"{place}.{name}")
+    elif isinstance(value, list | tuple):
+        for number, one in enumerate(value):
+            yield from _not_finite(one, f"{place}[{number}]")

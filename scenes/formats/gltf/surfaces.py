@@ -50,33 +50,19 @@ Rough = Glass | Metal | Glossy | Plastic
 
 
 @dataclasses.dataclass(frozen=True)
-class Surface:
-    """A surface of glTF.
+class Surface(MetallicRough):
+    """A surface of glTF: the metallic-roughness surface, by default of no metal, with what its extensions add.
 
     Attributes:
-        base: colour of the diffuse part, of the metal, or of what passes through.
-        metallic, roughness: factors, in [0, 1]; the alpha of the facets is the roughness squared.
-        parts: texture whose green channel multiplies ``roughness`` and whose blue channel multiplies ``metallic``.
-        ior: refractive index.
         specular: factor of the reflection of the dielectric part.
-        coat, coat_roughness: strength and roughness of the clear coat.
-        emission, glow: radiance, and the texture that multiplies it.
         transmitted: whether light passes through.
         thick: whether what it passes through is solid, so that it is refracted; otherwise a pane.
         opacity, cutoff: as in :class:`scenes.canonical.Masked`.
         normals, normal_scale: as in :class:`scenes.canonical.NormalMapped`.
     """
 
-    base: Texture
     metallic: float = 0.0
-    roughness: float = 1.0
-    parts: Texture | None = None
-    ior: float = 1.5
     specular: float = 1.0
-    coat: float = 0.0
-    coat_roughness: float = 0.0
-    emission: Rgb = BLACK
-    glow: Texture | None = None
     transmitted: bool = False
     thick: bool = False
     opacity: Texture | None = None

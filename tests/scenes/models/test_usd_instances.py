@@ -48,7 +48,7 @@ def test_prototypes_that_are_not_defined_are_drawn_by_their_instances_alone(kind
 def test_nested_instances_are_counted_whatever_they_hold(
     leaf: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("scenes.models.usd_files._INSTANCES_MOST", 20)
+    monkeypatch.setattr("scenes.models.usd_instances.INSTANCES_MOST", 20)
     body = "".join(
         f"""def PointInstancer "p{depth}" {{
         int[] protoIndices = [0, 0, 0, 0]

@@ -124,6 +124,13 @@ def test_too_large_files_are_refused_and_nothing_is_left(tmp_path: Path, monkeyp
     assert list(tmp_path.iterdir()) == []
 
 
+def test_numbers_that_are_not_finite_are_named_and_nothing_is_left(tmp_path: Path) -> None:
+    light = PointLight((0.0, 0.0, 0.0), (float("inf"), 1.0, 1.0))
+    with pytest.raises(SceneError, match=r"a.gltf: expected finite numbers, got nan in extensions.KHR_lights_punctual"):
+        save_scene_file(Scene(PerspectiveCamera(np.eye(4)), (), (light,)), tmp_path / "a.gltf")
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_shared_is_written_once(tmp_path: Path) -> None:
     mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
     other = Matte(ConstantTexture((0.1, 0.1, 0.1)))
