@@ -148,9 +148,9 @@ def test_a_moment_is_held_with_its_errors(page: Page, hub: Hub) -> None:
 
 
 def test_the_wipe_and_both_sides(page: Page) -> None:
-    page.locator("#wipe").focus()
+    expect(page.locator("#wipe")).to_be_visible(timeout=PATIENCE_MS)  # once both sides have pictures
     before = page.evaluate(PIXELS)
-    page.keyboard.press("End")
+    page.locator("#wipe").press("End")
     expect(page.locator("#wipe")).to_have_attribute("aria-valuenow", "100")
     page.locator("#beside").check()
     expect(page.locator("#wipe")).to_be_hidden(timeout=PATIENCE_MS)
