@@ -275,7 +275,8 @@ def _write(options: RunOptions, setup: Setup, measured: Any, first_cycle_s: floa
         threads=setup.renderer_of(1).threads,
         content=content_of(options, setup.scene),
     )
-    derived = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}
+    tiling = {"level_max": options.tsar.level_max, "tile_count_max": options.tsar.tile_count_max}
+    derived = {**tiling, "metrics": options.further_metrics}
     summary = {
         "ledger": options.ledger,
         "capacity_flops": options.machine_flops,

@@ -15,6 +15,7 @@ from analysis.comparison.rivalry import Panels, best_rival_table
 from analysis.comparison.summary import Measured, measured_stages, modelled_stages
 from analysis.comparison.tables import key_table, ledger_table, metric_table, stage_table
 from analysis.comparison.viewers import EXACT, MAP_PX
+from analysis.metrics import METRICS
 from analysis.metrics.quality import ratio
 from analysis.page import figures
 from analysis.page.comparer import Comparer
@@ -143,11 +144,15 @@ def _lead(summary: Mapping[str, Any], measured: Measured) -> list[str]:
         f"{config['reference_samples_per_axis']}² samples a pixel."
     ]
     if measured.rival is not None:
-        statistics = measured.statistics(measured.rival)
+        statistics, own, rival = measured.statistics(measured.rival), measured.own, measured.rival
         found.insert(
             0,
-            f"The error of {measured.own} is {statistics.median:.3f} times that of {measured.rival} at the median of "
-            f"the reference times, and at most as large {100 * statistics.share_suitable:.0f} % of the time.",
+            f"The squared error of {own} is {statistics.median:.3f} times that of {rival} at the median of the "
+            f"reference times, and at most as large {100 * statistics.share_suitable:.0f} % of the time.",
+        )
+        found[0] += "".join(
+            f" {metric.upper()} is {values[own]:.3g} ({rival} {values[rival]:.3g}; {METRICS[metric].better} is better)."
+            for metric, values in summary["metrics"].items()
         )
     error = "The error is the mean squared difference of display-encoded values in [0, 1] over pixels and channels."
     return [*found, error]

@@ -58,6 +58,15 @@ def test_a_policy_without_records_is_counted_and_those_of_a_rival_are_kept(
     assert loaded.attrs["policy"] == "tsar" and loaded.attrs["recorded"] == "thesis" and "density_spatial" in loaded
 
 
+def test_the_page_and_the_summary_name_the_scores(default: tuple[dict[str, Any], Path]) -> None:
+    summary, page = default
+    assert summary["config"]["resolved"]["metrics"] == ["flip", "jod"] == list(summary["metrics"])
+    text = page.read_text()
+    for metric in ("flip", "jod"):
+        own, rival = (f"{summary['metrics'][metric][name]:.3g}" for name in ("tsar", "framed"))
+        assert f"{metric.upper()} is {own} (framed {rival}; " in text
+
+
 def test_the_page_begins_with_the_best_framed_rival_beside_the_policy(default: tuple[dict[str, Any], Path]) -> None:
     summary, page = default
     framed = [name for name in summary["rivals"] if name != "thesis"]
