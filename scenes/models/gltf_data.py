@@ -9,7 +9,6 @@ Source: Khronos Group, "glTF 2.0 specification", sections 3.6 (buffers, views, a
 from __future__ import annotations
 
 import base64
-import binascii
 import io
 import json
 import struct
@@ -19,39 +18,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
+from scenes.models.gltf_records import COMPONENTS, WIDTHS, record_of
+from scenes.models.json_records import described, misplaced, require
 from scenes.models.sources import Sources
 
-_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _GLB, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
-_COUNT_MAX = 1 << 28
+_COUNT_MAX, _ZEROS_MAX = 1 << 28, 1 << 22
 
 
 class GltfData:
     """A glTF or GLB file.
 
     Attributes:
-        json: parsed JSON object.
+        json: parsed JSON object, which is what :mod:`scenes.models.gltf_records` says.
     """
 
     def __init__(self, sources: Sources) -> None:
         """Reads the file.
 
         Raises:
-            SceneError: it is not a glTF 2 file.
+            SceneError: it is not a glTF 2 file, or one of its values is not what the format has there.
         """
         self.sources = sources
         content = sources.path.read_bytes()
         self._glb_buffer: bytes | None = None
         text = self._chunks(content) if content[:4] == b"glTF" else content
-        try:
-            self.json: dict[str, Any] = json.loads(text.decode("utf-8-sig"))
-        except ValueError:
-            raise SceneError("cannot be read: expected JSON") from None
+        self.json: dict[str, Any] = _parsed(text)
         asset = self.json.get("asset") if isinstance(self.json, dict) else None
-        version = str(asset.get("version", "")) if isinstance(asset, dict) else ""
-        if not version.startswith("2."):
-            raise SceneError(f"cannot be read: expected glTF 2, got version {version or 'none'}")
+        version = asset.get("version", "") if isinstance(asset, dict) else ""
+        if not (isinstance(version, str) and version.startswith("2.")):
+            got = version if isinstance(version, str) else described(version)
+            raise SceneError(f"cannot be read: asset.version: expected glTF 2, got version {got or 'none'}")
+        require(self.json, record_of(self.json))
         self._buffers: dict[int, bytes] = {}
 
     def _chunks(self, content: bytes) -> bytes:
@@ -75,91 +73,132 @@ class GltfData:
         """The objects of a top-level list, such as ``nodes``."""
         return self.json.get(name, [])
 
-    def at(self, name: str, index: Any) -> dict[str, Any]:
-        """An object of such a list.
+    def at(self, name: str, index: int) -> dict[str, Any]:
+        """An object of such a list; its index was checked."""
+        return self.items(name)[index]
 
-        Raises:
-            SceneError: there is no such object.
-        """
-        items = self.items(name)
-        if not isinstance(index, int) or not 0 <= index < len(items):
-            raise SceneError(f"cannot be read: expected an index of {name} below {len(items)}, got {index}")
-        return items[index]
-
-    def resource(self, uri: str, what: str) -> bytes:
+    def resource(self, uri: str, place: str, what: str) -> bytes:
         """The bytes of a URI: embedded data, or a file beside it."""
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2])
-            except binascii.Error:
-                raise SceneError(f"cannot be read: {what}: expected data in base64") from None
+            except ValueError:
+                raise SceneError(f"cannot be read: {place}.uri: expected data in base64") from None
         return self.sources.require(uri, what).read_bytes()
 
-    def view(self, index: Any) -> bytes:
+    def view(self, index: int) -> bytes:
         """The bytes of a buffer view."""
         view = self.at("bufferViews", index)
-        number = view.get("buffer", 0)
+        number = view["buffer"]
         if number not in self._buffers:
             buffer = self.at("buffers", number)
-            whole = self._glb_buffer if "uri" not in buffer else self.resource(buffer["uri"], "a buffer at")
+            uri, place = buffer.get("uri"), f"buffers[{number}]"
+            whole = self._glb_buffer if uri is None else self.resource(uri, place, "a buffer at")
             self._buffers[number] = whole if whole is not None else b""
         start, length = view.get("byteOffset", 0), view["byteLength"]
         found = self._buffers[number][start : start + length]
-        if start < 0 or len(found) < length:
-            raise SceneError(f"cannot be read: expected {length} bytes of buffer {number} at {start}, got {len(found)}")
+        if len(found) < length:
+            raise misplaced(f"bufferViews[{index}]", f"{length} bytes of buffer {number} at {start}", len(found))
         return found
 
-    def numbers(self, index: Any) -> NDArray[np.float64]:
-        """The elements ``(count, width)`` of an accessor; normalised integers are converted to fractions."""
-        accessor = self.at("accessors", index)
-        width, kind = _WIDTHS[accessor["type"]], np.dtype(_TYPES[accessor["componentType"]])
-        count = accessor["count"]
-        if not 0 <= count <= _COUNT_MAX:
-            raise SceneError(f"cannot be read: expected at most {_COUNT_MAX} elements of an accessor, got {count}")
+    def indices(self, index: int, of: str) -> NDArray[np.int64]:
+        """The elements ``(count, width)`` of an accessor of whole numbers; other arguments are as for :meth:`numbers`.
+
+        Raises:
+            SceneError: they are not whole.
+        """
+        if COMPONENTS[self.at("accessors", index)["componentType"]][1] != "u":
+            got = self.at("accessors", index)["componentType"]
+            raise misplaced(f"accessors[{index}].componentType", f"5121, 5123 or 5125 for {of}", got)
+        return self.numbers(index, of, ("VEC4",) if of.startswith("JOINTS") else ("SCALAR",)).astype(np.int64)
+
+    def numbers(self, index: int, of: str, types: tuple[str, ...], finite: bool = True) -> NDArray[np.float64]:
+        """The elements ``(count, width)`` of an accessor; normalised integers are converted to fractions.
+
+        Args:
+            index: index of the accessor.
+            of: what the elements are, for messages.
+            types: types that the accessor may have.
+            finite: whether elements that are not finite are an error.
+
+        Raises:
+            SceneError: the accessor has another type, too many elements, or refers beyond its buffer.
+        """
+        accessor, place = self.at("accessors", index), f"accessors[{index}]"
+        if accessor["type"] not in types:
+            raise misplaced(f"{place}.type", f"{' or '.join(types)} for {of}", accessor["type"])
+        found = self._elements(accessor, place)
+        if finite and not np.isfinite(found).all():
+            raise misplaced(place, f"finite numbers for {of}", found[~np.isfinite(found)][0])
+        return found
+
+    def _elements(self, accessor: dict[str, Any], place: str) -> NDArray[np.float64]:
+        width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
+        count, most = accessor["count"], _COUNT_MAX if "bufferView" in accessor else _ZEROS_MAX
+        if count > most:
+            raise misplaced(f"{place}.count", f"at most {most} elements", count)
         if "bufferView" in accessor:
             view = self.at("bufferViews", accessor["bufferView"])
-            found = _strided(
-                self.view(accessor["bufferView"]), accessor.get("byteOffset", 0), count, width, kind,
-                view.get("byteStride", 0),
-            )  # fmt: skip
+            start, stride = accessor.get("byteOffset", 0), view.get("byteStride", 0)
+            found = _strided(self.view(accessor["bufferView"]), start, count, width, kind, stride, place)
         else:
             found = np.zeros((count, width), kind)
         if "sparse" in accessor:
-            found = self._replaced(found, accessor["sparse"], kind)
+            found = self._replaced(found, accessor["sparse"], kind, f"{place}.sparse")
         if not accessor.get("normalized", False):
             return found.astype(np.float64)
         most = float(np.iinfo(kind).max) if kind.kind in "iu" else 1.0
         return np.maximum(found.astype(np.float64) / most, -1.0)
 
-    def _replaced(self, dense: NDArray[Any], sparse: dict[str, Any], kind: np.dtype) -> NDArray[Any]:
+    def _replaced(self, dense: NDArray[Any], sparse: dict[str, Any], kind: np.dtype, place: str) -> NDArray[Any]:
         """Elements with those of a sparse accessor replaced."""
         count, indices, values = sparse["count"], sparse["indices"], sparse["values"]
-        index_kind = np.dtype(_TYPES[indices["componentType"]])
-        places = _strided(self.view(indices["bufferView"]), indices.get("byteOffset", 0), count, 1, index_kind, 0)
-        rows = _strided(self.view(values["bufferView"]), values.get("byteOffset", 0), count, dense.shape[1], kind, 0)
-        if len(places) and places.max() >= len(dense):
-            raise SceneError("cannot be read: an element of a sparse accessor lies beyond it")
+        index_kind = np.dtype(COMPONENTS[indices["componentType"]])
+        starts = [part.get("byteOffset", 0) for part in (indices, values)]
+        at = _strided(self.view(indices["bufferView"]), starts[0], count, 1, index_kind, 0, f"{place}.indices")
+        rows = _strided(self.view(values["bufferView"]), starts[1], count, dense.shape[1], kind, 0, f"{place}.values")
+        if len(at) and not (at >= 0).all() & (at < len(dense)).all():
+            raise misplaced(f"{place}.indices", f"indices from 0 to {len(dense) - 1}", f"{at.min():g} to {at.max():g}")
         made = dense.copy()
-        made[places[:, 0]] = rows
+        made[at[:, 0].astype(np.int64)] = rows
         return made
 
-    def image_bytes(self, index: Any) -> tuple[str, io.BytesIO | None]:
+    def image_bytes(self, index: int) -> tuple[str, io.BytesIO | None]:
         """The file name of an image and None, or a name for messages and the embedded content."""
         image = self.at("images", index)
         uri = image.get("uri", "")
         if uri and not uri.startswith("data:"):
             return uri, None
-        content = self.resource(uri, "an image at") if uri else self.view(image["bufferView"])
+        if not uri and "bufferView" not in image:
+            raise misplaced(f"images[{index}]", "a uri or a bufferView", "none")
+        content = self.resource(uri, f"images[{index}]", "an image at") if uri else self.view(image["bufferView"])
         return f"{self.sources.path} image {index}", io.BytesIO(content)
 
 
-def _strided(content: bytes, start: int, count: int, width: int, kind: np.dtype, stride: int) -> NDArray[Any]:
+def _strided(
+    content: bytes, start: int, count: int, width: int, kind: np.dtype, stride: int, place: str
+) -> NDArray[Any]:
     """Rows of numbers. Deviation: columns of matrices of one-byte and two-byte elements are assumed to be packed."""
     size = kind.itemsize * width
     stride = stride or size
-    if start < 0 or stride < size or (count and start + stride * (count - 1) + size > len(content)):
-        raise SceneError(f"cannot be read: expected {count} elements of {size} bytes in {len(content)} bytes")
+    if stride < size or (count and start + stride * (count - 1) + size > len(content)):
+        apart = f" every {stride}" if stride != size else ""
+        raise misplaced(place, f"{count} elements of {size} bytes{apart} at {start}", f"{len(content)} bytes")
     if not count:
         return np.zeros((0, width), kind)
     rows = np.ndarray((count, width), kind, content, start, (stride, kind.itemsize))
     return rows.copy()
+
+
+def _parsed(content: bytes) -> Any:
+    try:
+        return json.loads(content.decode("utf-8-sig"))
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise SceneError(f"cannot be read: {where}: expected JSON ({error.msg})") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"cannot be read: byte {error.start}: expected JSON in UTF-8") from None
+    except ValueError:
+        raise SceneError("cannot be read: expected JSON with numbers of less than 4300 digits") from None
+    except RecursionError:
+        raise SceneError("cannot be read: expected JSON, got too many lists or objects within each other") from None

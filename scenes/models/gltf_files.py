@@ -20,6 +20,7 @@ from scenes.models.gltf_motion import GltfMotion, local_poses
 from scenes.models.gltf_skins import bends, bent, joint_matrices
 from scenes.models.gltf_textures import GltfTextures
 from scenes.models.gltf_views import camera_at_node, light_at_node
+from scenes.models.json_records import misplaced
 from scenes.models.model import Model, ModelCamera
 from scenes.models.motion import Poses, rigid_track
 from scenes.models.smoothing import unit_normals, with_corners
@@ -27,6 +28,7 @@ from scenes.models.sources import Sources
 
 _KINDS = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual"}
+_TYPES = {"NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
 _DEPTH_MAX = 256
 _Part = tuple[Mesh, Material]
 
@@ -83,7 +85,10 @@ class _Reader:
     def _roots(self) -> list[int]:
         scenes, nodes = self.data.items("scenes"), self.data.items("nodes")
         if scenes:
-            return self.data.at("scenes", self.data.json.get("scene", 0)).get("nodes", [])
+            number = self.data.json.get("scene", 0)
+            if number >= len(scenes):
+                raise misplaced("scene", f"an index of scenes below {len(scenes)}", number)
+            return scenes[number].get("nodes", [])
         children = {child for node in nodes for child in node.get("children", ())}
         return [number for number in range(len(nodes)) if number not in children]
 
@@ -101,10 +106,10 @@ class _Reader:
             depth: depth of the node.
         """
         if depth > _DEPTH_MAX:
-            raise SceneError(f"cannot be read: expected nodes at most {_DEPTH_MAX} deep")
+            raise SceneError(f"cannot be read: nodes[{number}]: expected nodes at most {_DEPTH_MAX} deep")
         node = self.data.at("nodes", number)
         if number in self._world:
-            raise SceneError(f"cannot be read: expected a tree of nodes, got node {number} twice")
+            raise misplaced(f"nodes[{number}]", "a tree of nodes", f"node {number} twice")
         name = node.get("name", f"node{number}")
         moved = self.motion.poses(number)
         if moved is not None:
@@ -113,6 +118,8 @@ class _Reader:
         else:
             frame = product(frame, local_poses(node)[0])
         matrix = product(above[0], frame)
+        if not np.isfinite(above).all() or not np.isfinite(matrix).all():
+            raise misplaced(f"nodes[{number}]", "a finite transform to the world", "one that overflows")
         self._world[number] = matrix
         if moving:
             self._moving.add(number)
@@ -134,9 +141,7 @@ class _Reader:
             self._node(child, above, frame, track, moving, depth + 1)
 
     def _add_light(self, node: dict[str, Any], matrix: Matrix, name: str, moving: bool) -> None:
-        light = light_at_node(
-            self.data, node["extensions"]["KHR_lights_punctual"].get("light"), matrix, name, self.report
-        )
+        light = light_at_node(self.data, node["extensions"]["KHR_lights_punctual"]["light"], matrix, name, self.report)
         if light is not None and moving:
             self.report.add(name, "a moving light", "the pose at its start")
         self._lights += [] if light is None else [light]
@@ -157,32 +162,37 @@ class _Reader:
     def _mesh_parts(self, number: int, matrices: NDArray[np.float64] | None) -> list[_Part]:
         mesh = self.data.at("meshes", number)
         name = mesh.get("name", f"mesh{number}")
-        made = [self._primitive(primitive, name, matrices) for primitive in mesh.get("primitives", ())]
+        made = [
+            self._primitive(primitive, name, f"meshes[{number}].primitives[{place}]", matrices)
+            for place, primitive in enumerate(mesh.get("primitives", ()))
+        ]
         return [part for part in made if part is not None]
 
-    def _primitive(self, primitive: dict[str, Any], name: str, matrices: NDArray[np.float64] | None) -> _Part | None:
-        mode, attributes = primitive.get("mode", 4), primitive.get("attributes", {})
+    def _primitive(
+        self, primitive: dict[str, Any], name: str, place: str, matrices: NDArray[np.float64] | None
+    ) -> _Part | None:
+        mode, attributes = primitive.get("mode", 4), primitive["attributes"]
         if mode in _KINDS or "POSITION" not in attributes:
             self.report.add(name, _KINDS.get(mode, "a primitive without positions"))
             return None
         if primitive.get("targets"):
             self.report.add(name, "morph targets")
-        points = self.data.numbers(attributes["POSITION"])
-        normals = self._of_vertices("NORMAL", attributes, len(points), name)
+        points = self.data.numbers(attributes["POSITION"], "POSITION", ("VEC3",))
+        normals = self._of_vertices("NORMAL", attributes, len(points), place)
         if matrices is not None:
-            points, normals = bent(bends(self.data, attributes, matrices, len(points)), points, normals)
-        if not np.isfinite(points).all():
-            raise SceneError("vertices hold non-finite values")
+            points, normals = bent(bends(self.data, attributes, matrices, len(points), place), points, normals)
+            if not np.isfinite(points).all():
+                raise misplaced(f"{place}.attributes.POSITION", "finite points of a skin", "some that overflow")
         indices = primitive.get("indices")
-        order = np.arange(len(points)) if indices is None else self.data.numbers(indices)[:, 0].astype(np.int64)
+        order = np.arange(len(points)) if indices is None else self.data.indices(indices, "indices")[:, 0]
         if len(order) and order.max() >= len(points):
-            raise SceneError(f"cannot be read: {name}: a face refers to vertex {order.max()} of {len(points)}")
+            raise misplaced(f"{place}.indices", f"indices of vertices below {len(points)}", order.max())
         faces = _triangles(order, mode)
         if not len(faces):
             return None
 
-        sets = {index: self._of_vertices(f"TEXCOORD_{index}", attributes, len(points), name) for index in range(4)}
-        colors = self._of_vertices("COLOR_0", attributes, len(points), name)
+        sets = {index: self._of_vertices(f"TEXCOORD_{index}", attributes, len(points), place) for index in range(4)}
+        colors = self._of_vertices("COLOR_0", attributes, len(points), place)
         painted = self.materials.painted(
             primitive.get("material"),
             {index: values[faces] for index, values in sets.items() if values is not None},
@@ -197,14 +207,15 @@ class _Reader:
         return mesh, painted.material
 
     def _of_vertices(
-        self, attribute: str, attributes: dict[str, Any], count: int, name: str
+        self, attribute: str, attributes: dict[str, Any], count: int, place: str
     ) -> NDArray[np.float64] | None:
-        """Values of the vertices; None without the attribute."""
+        """Values of the vertices; None without the attribute. Normals may be zero or not finite."""
         if attribute not in attributes:
             return None
-        values = self.data.numbers(attributes[attribute])
+        types = _TYPES[attribute.partition("_")[0]]
+        values = self.data.numbers(attributes[attribute], attribute, types, finite=attribute != "NORMAL")
         if len(values) != count:
-            raise SceneError(f"cannot be read: {name}: expected {count} of {attribute}, got {len(values)}")
+            raise misplaced(f"{place}.attributes.{attribute}", f"{count} elements", len(values))
         return values
 
 
@@ -217,6 +228,4 @@ def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     if mode == 5:
         odd = at % 2
         return np.stack([order[at], order[at + 1 + odd], order[at + 2 - odd]], axis=1)
-    if mode == 6:
-        return np.stack([order[at + 1], order[at + 2], np.full(count, order[0] if len(order) else 0)], axis=1)
-    raise SceneError(f"cannot be read: expected primitives of mode 0 to 6, got {mode}")
+    return np.stack([order[at + 1], order[at + 2], np.full(count, order[0] if len(order) else 0)], axis=1)

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from scenes.animation import continuous_quaternions
 from scenes.arithmetic import rotation_between
-from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
+from scenes.models.json_records import misplaced
 from scenes.models.motion import Poses, uniform_times
 
 _REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
@@ -54,19 +54,37 @@ class GltfMotion:
         animations = data.items("animations")
         if len(animations) > 1:
             report.add(stem, f"animations after the first ({len(animations) - 1})")
-        for channel in animations[0].get("channels", ()) if animations else ():
-            target = channel.get("target", {})
+        for number, channel in enumerate(animations[0].get("channels", ()) if animations else ()):
+            target = channel["target"]
             if "node" not in target or target.get("path") not in _REST:
                 report.add(stem, f"an animation of {target.get('path', 'nothing')}")
                 continue
-            sampler = animations[0]["samplers"][channel["sampler"]]
-            keys = data.numbers(sampler["input"])[:, 0]
-            values, kind = data.numbers(sampler["output"]), sampler.get("interpolation", "LINEAR")
-            if len(values) != len(keys) * (3 if kind == "CUBICSPLINE" else 1) or not (np.diff(keys) > 0.0).all():
-                raise SceneError(f"cannot be read: animation of node {target['node']}: keys and values do not match")
-            self._channels.setdefault(target["node"], {})[target["path"]] = keys, values, kind
+            samplers = animations[0].get("samplers", ())
+            if channel["sampler"] >= len(samplers):
+                place = f"animations[0].channels[{number}].sampler"
+                raise misplaced(place, f"an index of samplers below {len(samplers)}", channel["sampler"])
+            read = self._sampler(samplers[channel["sampler"]], target["path"], channel["sampler"])
+            self._channels.setdefault(target["node"], {})[target["path"]] = read
         spans = [keys for channels in self._channels.values() for keys, _, _ in channels.values() if len(keys)]
-        self.times_s = uniform_times(max((float(keys[-1]) for keys in spans), default=0.0))
+        self.times_s = uniform_times(max((float(keys[-1]) for keys in spans), default=0.0), "animations[0]")
+
+    def _sampler(self, sampler: dict[str, Any], path: str, number: int) -> tuple[NDArray, NDArray, str]:
+        """Keys, values and interpolation of a sampler.
+
+        Raises:
+            SceneError: they do not belong together.
+        """
+        place, kind = f"animations[0].samplers[{number}]", sampler.get("interpolation", "LINEAR")
+        keys = self.data.numbers(sampler["input"], "times", ("SCALAR",))[:, 0]
+        values = self.data.numbers(sampler["output"], f"a {path}", ("VEC4" if path == "rotation" else "VEC3",))
+        each = 3 if kind == "CUBICSPLINE" else 1
+        if len(values) != len(keys) * each:
+            raise misplaced(f"{place}.output", f"{each} elements for each of {len(keys)} times", len(values))
+        if not (np.diff(keys) > 0.0).all():
+            raise misplaced(f"{place}.input", "times that increase", "one that does not")
+        if path == "rotation" and not values[each // 2 :: each].any(axis=1).all():
+            raise misplaced(f"{place}.output", "quaternions other than zero", "zero")
+        return keys, values, kind
 
     def poses(self, number: int) -> Poses | None:
         """Transforms from a node to its parent at all times; None if it does not move."""

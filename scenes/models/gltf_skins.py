@@ -12,13 +12,14 @@ from jaxtyping import Float64
 from numpy.typing import NDArray
 
 from scenes.arithmetic import product
-from scenes.canonical import Matrix, SceneError
+from scenes.canonical import Matrix
 from scenes.models.gltf_data import GltfData
+from scenes.models.json_records import misplaced
 
 Bends = Float64[NDArray, "vertices 4 4"]
 
 
-def joint_matrices(data: GltfData, number: Any, world: dict[int, Matrix]) -> Float64[NDArray, "joints 4 4"]:
+def joint_matrices(data: GltfData, number: int, world: dict[int, Matrix]) -> Float64[NDArray, "joints 4 4"]:
     """Transforms from the bind pose to the world, of the joints of a skin.
 
     Args:
@@ -30,19 +31,22 @@ def joint_matrices(data: GltfData, number: Any, world: dict[int, Matrix]) -> Flo
         SceneError: the skin refers to a node outside of the scene, or has another number of inverse bind matrices.
     """
     skin = data.at("skins", number)
-    joints = skin.get("joints", [])
+    joints = skin["joints"]
     missing = [joint for joint in joints if joint not in world]
     if missing or not joints:
-        raise SceneError(f"cannot be read: skin {number}: expected joints in the scene, got {missing[:1] or 'none'}")
+        got = f"node {missing[0]} outside of it" if missing else "none"
+        raise misplaced(f"skins[{number}].joints", "nodes of the scene", got)
     if "inverseBindMatrices" not in skin:
         return np.stack([world[joint] for joint in joints])
-    rest = data.numbers(skin["inverseBindMatrices"])
-    if rest.shape != (len(joints), 16):
-        raise SceneError(f"cannot be read: skin {number}: expected {len(joints)} matrices, got shape {rest.shape}")
+    rest = data.numbers(skin["inverseBindMatrices"], "inverseBindMatrices", ("MAT4",))
+    if len(rest) != len(joints):
+        raise misplaced(f"skins[{number}].inverseBindMatrices", f"{len(joints)} matrices", len(rest))
     return product(np.stack([world[joint] for joint in joints]), np.swapaxes(rest.reshape(-1, 4, 4), 1, 2))
 
 
-def bends(data: GltfData, attributes: dict[str, Any], matrices: Float64[NDArray, "joints 4 4"], count: int) -> Bends:
+def bends(
+    data: GltfData, attributes: dict[str, Any], matrices: Float64[NDArray, "joints 4 4"], count: int, place: str
+) -> Bends:
     """The transform of each vertex: the mean of those of its joints by their weights, which are normalised.
 
     Raises:
@@ -51,17 +55,19 @@ def bends(data: GltfData, attributes: dict[str, Any], matrices: Float64[NDArray,
     total, sums = np.zeros((count, 4, 4)), np.zeros(count)
     sets = [index for index in range(4) if f"JOINTS_{index}" in attributes and f"WEIGHTS_{index}" in attributes]
     for index in sets:
-        joints = data.numbers(attributes[f"JOINTS_{index}"]).astype(np.int64)
-        weights = data.numbers(attributes[f"WEIGHTS_{index}"])
-        if joints.shape != (count, 4) or weights.shape != (count, 4) or not np.isfinite(weights).all():
-            raise SceneError(f"cannot be read: expected four joints and weights of {count} vertices, got {len(joints)}")
-        if count and (joints.max() >= len(matrices) or joints.min() < 0):
-            raise SceneError(f"cannot be read: a vertex refers to joint {joints.max()} of {len(matrices)}")
+        joints = data.indices(attributes[f"JOINTS_{index}"], f"JOINTS_{index}")
+        weights = data.numbers(attributes[f"WEIGHTS_{index}"], f"WEIGHTS_{index}", ("VEC4",))
+        for name, found in ((f"JOINTS_{index}", joints), (f"WEIGHTS_{index}", weights)):
+            if len(found) != count:
+                raise misplaced(f"{place}.attributes.{name}", f"{count} elements", len(found))
+        if count and joints.max() >= len(matrices):
+            expected = f"indices of joints below {len(matrices)}"
+            raise misplaced(f"{place}.attributes.JOINTS_{index}", expected, joints.max())
         for lane in range(4):
             total += weights[:, lane, None, None] * matrices[joints[:, lane]]
         sums += weights.sum(axis=1)
     if not sets or not (sums > 0.0).all():
-        raise SceneError("cannot be read: expected a joint with a weight for each vertex of a skin")
+        raise misplaced(f"{place}.attributes", "a joint with a weight for each vertex", "a vertex without")
     return total / sums[:, None, None]
 
 

@@ -7,21 +7,26 @@ KHR_texture_transform.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from pathlib import Path
+from typing import Any, BinaryIO, Literal, Protocol, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
+from PIL import UnidentifiedImageError
 
 from scenes.arithmetic import cos, sin
 from scenes.canonical import ImageTexture
 from scenes.formats.losses import LossReport
-from scenes.loading import decode_srgb
+from scenes.loading import decode_srgb, one_line
 from scenes.models.gltf_data import GltfData
+from scenes.models.json_records import misplaced
 from scenes.models.sources import Sources
 from scenes.pictures import Pixels, alpha_of, by_pillow, decoded, resized
 
+Values = TypeVar("Values")
 Uvs = Float[NDArray[np.float64], "*n 2"]
 _NEAREST, _CLAMP, _MIRRORED, _REPEAT = 9728, 33071, 33648, 10497
 BORDER = 33069  # black outside; not a mode of glTF
@@ -137,11 +142,7 @@ class GltfTextures(Textures):
         source = self._source(lookup)
         key = (source, numbers)
         if key not in self._pictures:
-            name, content = self.data.image_bytes(source)
-            if content is None:
-                found = decoded(self.data.sources.require(name, "a texture at"))
-            else:
-                found = by_pillow(content)
+            found = self._decoded(source, lambda file: decoded(file) if isinstance(file, Path) else by_pillow(file))
             if found.dtype != np.float32:
                 most = np.iinfo(found.dtype).max  # type: ignore[type-var]
                 found = found.astype(np.float32) / np.float32(most) if numbers else decode_srgb(found)  # type: ignore[arg-type]
@@ -151,14 +152,30 @@ class GltfTextures(Textures):
     def opacity(self, lookup: Lookup) -> Pixels:
         source = self._source(lookup)
         if source not in self._opacities:
-            name, content = self.data.image_bytes(source)
-            found = alpha_of(self.data.sources.require(name, "a texture at") if content is None else content)
+            found = self._decoded(source, alpha_of)
             self._opacities[source] = np.repeat(found[..., None], 3, axis=-1)
         return self._opacities[source]
 
-    def _source(self, lookup: Lookup) -> Any:
+    def _source(self, lookup: Lookup) -> int:
         texture = self.data.at("textures", lookup.texture)
-        return texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
+        source = texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
+        if source is None:
+            raise misplaced(f"textures[{lookup.texture}].source", "an index of images", "none")
+        return source
+
+    def _decoded(self, source: int, read: Callable[[Path | BinaryIO], Values]) -> Values:
+        """What a decoder makes of an image.
+
+        Raises:
+            SceneError: there is no such file, or it cannot be decoded.
+        """
+        name, content = self.data.image_bytes(source)
+        file = self.data.sources.require(name, "a texture at") if content is None else content
+        try:
+            return read(file)
+        except Exception as error:  # decoders raise arbitrary exceptions on broken files
+            why = "embedded data that is none" if isinstance(error, UnidentifiedImageError) else one_line(error)
+            raise misplaced(f"images[{source}]", "an image", why) from None
 
 
 def multiplied(first: Pixels, second: Pixels) -> Pixels:

@@ -8,7 +8,6 @@ Source: Khronos Group, "glTF 2.0 specification", section 3.10; extension KHR_lig
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -20,18 +19,18 @@ from scenes.canonical import (
     PerspectiveCamera,
     PointLight,
     RigidTrack,
-    SceneError,
     SpotLight,
 )
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
+from scenes.models.json_records import misplaced
 from scenes.models.model import ModelCamera, axis_of, shorter_fov_deg, unscaled
 
 _SHARP = 1e-6  # relative width of the edge of a spot that has none
 
 
-def camera_at_node(data: GltfData, number: Any, matrix: Matrix, track: RigidTrack | None) -> ModelCamera:
+def camera_at_node(data: GltfData, number: int, matrix: Matrix, track: RigidTrack | None) -> ModelCamera:
     """A camera at a node with this transform and motion.
 
     Raises:
@@ -39,19 +38,23 @@ def camera_at_node(data: GltfData, number: Any, matrix: Matrix, track: RigidTrac
     """
     given = data.at("cameras", number)
     kind = given.get("type", "perspective")
-    lens = given.get(kind, {})
+    place, lens = f"cameras[{number}].{kind}", given.get(kind)
+    if lens is None:
+        raise misplaced(place, "an object", "none")
     if kind == "orthographic":
-        wide, high = abs(float(lens.get("xmag", 1.0))), abs(float(lens.get("ymag", 1.0)))
-        if not 0.0 < min(wide, high) <= max(wide, high) < math.inf:
-            raise SceneError(f"cannot be read: camera {number}: expected positive magnifications, got {wide}, {high}")
+        wide, high = abs(float(lens["xmag"])), abs(float(lens["ymag"]))
+        if not min(wide, high) > 0.0:
+            raise misplaced(place, "an xmag and a ymag other than 0", f"{wide:g} and {high:g}")
         return ModelCamera(OrthographicCamera(unscaled(matrix), min(wide, high), track), wide / high)
-    aspect, fov = float(lens.get("aspectRatio", 1.0)), float(lens.get("yfov", 0.0))
-    if not (0.0 < fov < math.pi and 0.0 < aspect < math.inf):
-        raise SceneError(f"cannot be read: camera {number}: expected a yfov in (0, π), got {fov}, {aspect}")
+    aspect, fov = float(lens.get("aspectRatio", 1.0)), float(lens["yfov"])
+    if not 0.0 < fov < math.pi:
+        raise misplaced(f"{place}.yfov", "an angle in (0, π)", f"{fov:g}")
+    if not aspect > 0.0:
+        raise misplaced(f"{place}.aspectRatio", "a positive number", f"{aspect:g}")
     return ModelCamera(PerspectiveCamera(unscaled(matrix), shorter_fov_deg(fov, aspect), track=track), aspect)
 
 
-def light_at_node(data: GltfData, number: Any, matrix: Matrix, where: str, report: LossReport) -> Light | None:
+def light_at_node(data: GltfData, number: int, matrix: Matrix, where: str, report: LossReport) -> Light | None:
     """A light of the extension KHR_lights_punctual at a node with this transform.
 
     Spots fall off as ``x²`` in the cosine, as the extension recommends.
@@ -60,13 +63,12 @@ def light_at_node(data: GltfData, number: Any, matrix: Matrix, where: str, repor
         SceneError: there is no such light.
     """
     lights = data.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
-    if not isinstance(number, int) or not 0 <= number < len(lights):
-        raise SceneError(f"cannot be read: expected an index of lights below {len(lights)}, got {number}")
+    place = "extensions.KHR_lights_punctual.lights"
+    if number >= len(lights):
+        raise misplaced(f"node {where}", f"an index of {place} below {len(lights)}", number)
     given = lights[number]
     color = np.asarray(given.get("color", (1.0, 1.0, 1.0)), np.float64) * float(given.get("intensity", 1.0))
-    if color.shape != (3,) or not np.isfinite(color).all():
-        raise SceneError(f"cannot be read: light {number}: expected a finite colour and intensity")
-    strength, kind = rgb(np.maximum(color, 0.0)), given.get("type")
+    strength, kind = rgb(np.maximum(color, 0.0)), given["type"]
     if "range" in given:
         report.add(where, "the range of a light", "no limit")
     if kind == "directional":
@@ -80,8 +82,9 @@ def light_at_node(data: GltfData, number: Any, matrix: Matrix, where: str, repor
     spot, along = given.get("spot", {}), axis_of(matrix, 2)
     outer_deg = math.degrees(float(spot.get("outerConeAngle", math.pi / 4.0)))
     inner_deg = math.degrees(float(spot.get("innerConeAngle", 0.0)))
-    if not (0.0 <= inner_deg < math.inf and 0.0 < outer_deg <= 90.0 + 1e-6):
-        raise SceneError(f"cannot be read: light {number}: expected cone angles 0 <= inner < outer <= π/2")
+    if not (0.0 <= inner_deg and 0.0 < outer_deg <= 90.0 + 1e-6):
+        got = f"{math.radians(inner_deg):g} and {math.radians(outer_deg):g}"
+        raise misplaced(f"{place}[{number}].spot", "cone angles 0 <= inner < outer <= π/2", got)
     if inner_deg >= outer_deg:
         report.add(where, "a spot whose inner cone is as wide as its outer cone", "one that is slightly narrower")
         inner_deg = outer_deg * (1.0 - _SHARP)

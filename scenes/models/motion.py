@@ -19,14 +19,14 @@ _KEYS_MOST = 1 << 16
 _UNEVEN_MOST = 1e-3  # deviation of a rotation from an orthogonal matrix
 
 
-def uniform_times(last_s: float) -> NDArray[np.float64]:
+def uniform_times(last_s: float, place: str = "animation") -> NDArray[np.float64]:
     """Times of keys from 0 to ``last_s``, seconds, at most 1/120 s apart; none if nothing moves.
 
     Raises:
         SceneError: the motion needs more than 65,536 keys.
     """
     if not last_s < _KEYS_MOST * _INTERVAL_S:
-        raise SceneError(f"cannot be read: expected an animation of at most {_KEYS_MOST} keys, got {last_s:g} s")
+        raise SceneError(f"cannot be read: {place}: expected at most {_KEYS_MOST} keys, got {last_s:g} s")
     steps = int(np.ceil(last_s / _INTERVAL_S - 1e-9))
     return np.linspace(0.0, last_s, steps + 1) if steps > 0 else np.zeros(0)
 
