@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
-from scenes.canonical import SceneError
+from scenes.canonical import Scene, SceneError
 
 SAME_PICTURE = frozenset(
     "path volpath volpath_simple bdpt bidirectional mlt pssmlt erpt metropolis photonmapper photonmap ppm sppm "
@@ -114,3 +114,17 @@ class LossReport:
 def first_of(table: Mapping[str, str]) -> dict[str, str]:
     """For each canonical kind, the first kind of files that maps to it."""
     return {ours: theirs for theirs, ours in reversed(list(table.items()))}
+
+
+def without_settings(scene: Scene, report: LossReport) -> None:
+    """Reports what formats without settings of rendering leave out, and light that no surface or lamp sends."""
+    where = scene.name or "scene"
+    if scene.background is not None:
+        report.add(where, "a background that lights nothing")
+    if scene.ambient != (0.0, 0.0, 0.0):
+        report.add(where, "constant ambient light")
+    report.hint("integrator", scene.integrator.kind, "that of the renderer")
+    report.hint("sampler", f"{scene.sampler.kind}, {scene.sampler.samples_per_pixel} samples a pixel")
+    report.hint("film", f"{scene.film.width_px} x {scene.film.height_px} pixels", "their ratio")
+    if scene.film.filter != "box":
+        report.hint("film", f"a filter ({scene.film.filter})", "that of the renderer")

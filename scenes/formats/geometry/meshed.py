@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.arithmetic import product
 from scenes.canonical import (
@@ -28,6 +29,7 @@ from scenes.canonical import (
     Sphere,
     Texture,
 )
+from scenes.canonical.values import Matrix
 from scenes.formats.appearance.graphs import once_a_node, parts_of
 from scenes.formats.geometry.orientation import area_normals, turned
 from scenes.formats.geometry.revolution import partial_sphere, ring
@@ -128,3 +130,20 @@ def _cube() -> Mesh:
     arrays = (np.array(part, np.float32) for part in (vertices, normals, uvs))
     points, outward, texture = arrays
     return Mesh(points, np.array(faces, np.int32), outward, texture, "cube")
+
+
+@lru_cache(maxsize=1)
+def rectangle_mesh() -> Mesh:
+    """The rectangle, cut so that :mod:`scenes.formats.geometry.recognition` begins at its first corner."""
+    mesh = as_mesh(Rectangle())
+    return Mesh(mesh.vertices, np.array([[0, 1, 3], [1, 2, 3]], np.int32), mesh.normals, mesh.uvs, mesh.source)
+
+
+def about_middle(mesh: Mesh) -> tuple[NDArray[np.floating], Matrix | None]:
+    """The vertices for formats with floats of 32 bits: far ones are given from their middle, whose transform is
+    returned."""
+    if mesh.vertices.dtype.itemsize <= 4:
+        return mesh.vertices, None
+    middle = np.eye(4)
+    middle[:3, 3] = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    return mesh.vertices - middle[:3, 3], middle

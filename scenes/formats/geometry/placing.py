@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
-from scenes.animation import pose_at
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.animation import look_at, pose_at
 from scenes.arithmetic import product
 from scenes.canonical import Emissive, Instance, Mesh, Scene
 from scenes.canonical.values import Matrix, Rgb, RigidTrack
@@ -62,3 +65,11 @@ def tracks_of(scene: Scene) -> list[RigidTrack]:
     """All motions of a scene, beginning with the camera's."""
     found = [getattr(scene.camera, "track", None), *(one.track for one in scene.instances)]
     return [track for track in found if track is not None and len(track.translation) > 1]
+
+
+def facing(position: NDArray[np.floating], direction: NDArray[np.floating]) -> Matrix:
+    """The transform that has -z in a direction."""
+    place = np.eye(4)
+    place[:3, :3] = look_at(np.zeros(3), direction).as_matrix()
+    place[:3, 3] = position
+    return place

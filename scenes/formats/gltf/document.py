@@ -11,18 +11,16 @@ import math
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any, TypeVar
 from urllib.parse import quote
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 from numpy.typing import NDArray
 from PIL import Image
 
 from scenes.canonical import SceneError
 from scenes.formats.text.output import Output
-from scenes.loading import decode_srgb
 
 Json = dict[str, Any]
 Part = TypeVar("Part")
@@ -34,23 +32,6 @@ _TYPES = {"f4": 5126, "u4": 5125, "u2": 5123}
 _WIDTHS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _GLB, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _SIZE_MOST = (1 << 32) - 1
-
-
-@cache
-def _between_codes() -> Float[NDArray[np.float64], 255]:
-    """Linear values halfway between those of neighbouring 8-bit sRGB values."""
-    values = decode_srgb(np.arange(256, dtype=np.uint8)).astype(np.float64)
-    return 0.5 * (values[1:] + values[:-1])
-
-
-def srgb_codes(image: NDArray[np.floating]) -> UInt8[NDArray, ...]:
-    """The 8-bit sRGB values whose linear values are nearest; the inverse of decoding."""
-    return np.searchsorted(_between_codes(), image).astype(np.uint8)
-
-
-def number_codes(image: NDArray[np.floating]) -> UInt8[NDArray, ...]:
-    """The 8-bit values of numbers from 0 to 1."""
-    return np.rint(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
 @dataclass

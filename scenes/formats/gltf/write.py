@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cache
 
 import numpy as np
 
-from scenes.animation import look_at, pose_at
+from scenes.animation import pose_at
 from scenes.arithmetic import arctan, determinant, product, tan
 from scenes.canonical import (
     Camera,
@@ -39,13 +38,13 @@ from scenes.canonical.values import Matrix, Rgb, RigidTrack
 from scenes.daylight import sun_light
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
-from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
 from scenes.formats.geometry.orientation import is_closed
-from scenes.formats.geometry.placing import shines
+from scenes.formats.geometry.placing import facing, shines
 from scenes.formats.geometry.transform_stack import track_times
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter
-from scenes.formats.losses import LossReport
+from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
 from scenes.viewing import turned_up
 
@@ -75,20 +74,11 @@ class GltfWriter:
             self._instance(instance, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}")
         for light in scene.lights:
             self._light(light)
-        where = scene.name or "scene"
-        if scene.background is not None:
-            self.report.add(where, "a background that lights nothing")
-        if scene.ambient != (0.0, 0.0, 0.0):
-            self.report.add(where, "constant ambient light")
-        self.report.hint("integrator", scene.integrator.kind, "that of the renderer")
-        self.report.hint("sampler", f"{scene.sampler.kind}, {scene.sampler.samples_per_pixel} samples a pixel")
-        self.report.hint("film", f"{scene.film.width_px} x {scene.film.height_px} pixels", "their ratio")
-        if scene.film.filter != "box":
-            self.report.hint("film", f"a filter ({scene.film.filter})", "that of the renderer")
+        without_settings(scene, self.report)
         roots, turn = self._roots, _turned(scene)
         if not np.array_equal(turn, np.eye(4)):
             roots = [self._node({"name": "world", "children": roots}, turn)]
-        self.document.add("scenes", {"name": where, "nodes": roots})
+        self.document.add("scenes", {"name": scene.name or "scene", "nodes": roots})
         if self._lights:
             self.document.extensions |= self.document.extension("KHR_lights_punctual", {"lights": self._lights})
         if self._channels:
@@ -167,7 +157,7 @@ class GltfWriter:
         if isinstance(shape, Disk | Sphere):
             became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
             self.report.add(name, f"a {type(shape).__name__.lower()}", became)
-        mesh = _square() if isinstance(shape, Rectangle) else as_mesh(shape)
+        mesh = rectangle_mesh() if isinstance(shape, Rectangle) else as_mesh(shape)
         emission = instance.emission if shines(instance) and not isinstance(instance.material, Emissive) else None
         key = "mesh", id(mesh), id(instance.material), emission, both_sides
         number, middle = self.document.once(
@@ -190,11 +180,7 @@ class GltfWriter:
 
     def _geometry(self, mesh: Mesh, textured: bool) -> tuple[Json, Matrix | None]:
         """Vertices and faces; the format has floats of 32 bits, so that far vertices are given from their middle."""
-        points, middle = mesh.vertices, None
-        if points.dtype.itemsize > 4:
-            middle = np.eye(4)
-            middle[:3, 3] = 0.5 * (points.min(axis=0) + points.max(axis=0))
-            points = points - middle[:3, 3]
+        points, middle = about_middle(mesh)
         found = {"POSITION": self.document.accessor(points.astype(np.float32), VERTICES, bounds=True)}
         if mesh.normals is not None:
             found["NORMAL"] = self.document.accessor(mesh.normals.astype(np.float32), VERTICES)
@@ -229,13 +215,13 @@ class GltfWriter:
                 self.report.add("light", f"a spot of {light.outer_deg:g} degrees", "90 degrees")
             outer = math.radians(min(light.outer_deg, 90.0))
             inner = min(math.radians(light.inner_deg), outer - _SHARP_RAD)
-            place = _facing(np.array(light.position), np.subtract(light.target, light.position))
+            place = facing(np.array(light.position), np.subtract(light.target, light.position))
             cone = {"innerConeAngle": max(inner, 0.0), "outerConeAngle": outer}
             self._punctual("spot", light.intensity, place, spot=cone)
         else:
             if light.angle_deg > 0.0:
                 self.report.add("light", f"a sun of {light.angle_deg:g} degrees", "a parallel light")
-            self._punctual("directional", light.irradiance, _facing(np.zeros(3), np.array(light.direction)))
+            self._punctual("directional", light.irradiance, facing(np.zeros(3), np.array(light.direction)))
 
     def _punctual(self, kind: str, strength: Rgb, place: Matrix, **more: Json) -> None:
         """Adds a light with its node; colours are at most 1."""
@@ -245,21 +231,6 @@ class GltfWriter:
         node: Json = {"name": kind}
         node["extensions"] = self.document.extension("KHR_lights_punctual", {"light": len(self._lights) - 1})
         self._place(node, place)
-
-
-@cache
-def _square() -> Mesh:
-    """The rectangle, cut so that :mod:`scenes.formats.geometry.recognition` begins at its first corner."""
-    mesh = as_mesh(Rectangle())
-    return Mesh(mesh.vertices, np.array([[0, 1, 3], [1, 2, 3]], np.int32), mesh.normals, mesh.uvs, mesh.source)
-
-
-def _facing(position: np.ndarray, direction: np.ndarray) -> Matrix:
-    """The transform that has -z in a direction."""
-    place = np.eye(4)
-    place[:3, :3] = look_at(np.zeros(3), direction).as_matrix()
-    place[:3, 3] = position
-    return place
 
 
 def _turned(scene: Scene) -> Matrix:

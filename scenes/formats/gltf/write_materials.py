@@ -1,7 +1,7 @@
 """Writer of materials and textures of a glTF file.
 
 Source: Khronos Group, "glTF 2.0 specification", sections 3.8 and 3.9; extension KHR_texture_transform, and those of
-:mod:`scenes.formats.gltf.surfaces`.
+:mod:`scenes.formats.appearance.surfaces`.
 """
 
 from __future__ import annotations
@@ -12,20 +12,27 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture, Material, ScaleTexture, Texture
+from scenes.canonical import ImageTexture, Material, Texture
 from scenes.canonical.values import Rgb
-from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.pictured import (
+    factored,
+    in_bytes,
+    number_codes,
+    placed_alike,
+    srgb_codes,
+    unmirrored,
+)
 from scenes.formats.appearance.spectra import rgb
-from scenes.formats.gltf.document import Document, Json, number_codes, srgb_codes
-from scenes.formats.gltf.surfaces import Surface, surface_of
+from scenes.formats.appearance.surfaces import Surface, surface_of
+from scenes.formats.gltf.document import Document, Json
 from scenes.formats.losses import LossReport
-from scenes.loading import decode_srgb, read_image
+from scenes.loading import read_image
 from scenes.pictures import resized
 
 _NEAREST, _LINEAR, _LINEAR_LEVELS = 9728, 9729, 9987
 _WRAPS = {"repeat": 10497, "clamp": 33071, "black": 33071}
 _COPIED = (".png", ".jpg", ".jpeg")
-_WHOLE = (1.0, 1.0, 1.0)
 
 
 @dataclass
@@ -78,7 +85,7 @@ class GltfMaterialWriter:
             made["alphaMode"] = "BLEND" if surface.cutoff is None else "MASK"
             if surface.cutoff is not None:
                 made["alphaCutoff"] = surface.cutoff
-        if image is not None and holes is not None and not _alike(image, holes):
+        if image is not None and holes is not None and not placed_alike(image, holes):
             self.report.add(where, "holes that lie otherwise than the colours", "their mean")
             alpha, holes = alpha * mean_of(holes)[0], None
         rough["baseColorFactor"] = [min(max(float(part), 0.0), 1.0) for part in (*factor, alpha)]
@@ -142,29 +149,17 @@ class GltfMaterialWriter:
         Images that 8 bits do not hold are divided by their greatest values, so that what 8 bits come to is the same
         again. The mode is ``colour``, ``numbers`` (which are not encoded), or ``as it is``.
         """
-        if isinstance(texture, ConstantTexture):
-            return texture.value, None
-        if isinstance(texture, ScaleTexture):
-            for one, other in ((texture.first, texture.second), (texture.second, texture.first)):
-                if isinstance(one, ConstantTexture):
-                    factor, image = self._factored(other, where, mode)
-                    return rgb(np.multiply(factor, one.value)), image
-        if isinstance(texture, CheckerboardTexture):
-            texture = _checks(texture) or texture
-        if not isinstance(texture, ImageTexture):
-            plain = folded(texture)
-            if type(plain) is not type(texture):
-                return self._factored(plain, where, mode)
-            self.report.add(where, f"texture {type(texture).__name__}", "its mean")
-            return mean_of(texture), None
-        if texture.wrap == "black":
+        factor, image = factored(texture, where, self.report)
+        if image is None:
+            return factor, None
+        if image.wrap == "black":
             self.report.add(where, "a picture that is black beyond its border", "the colours of its border")
-        if mode == "as it is" or _in_bytes(texture.image, mode):
-            return _WHOLE, texture
+        if mode == "as it is" or in_bytes(image.image, mode == "numbers"):
+            return factor, image
         self.report.hint(where, "a picture of more than 8 bits", "8 bits")
-        most = np.maximum(texture.image.reshape(-1, 3).max(axis=0), 0.0)
-        _, image = self.document.once(("scaled", id(texture)), texture, lambda: (texture, _divided(texture, most)))
-        return rgb(most), image
+        most = np.maximum(image.image.reshape(-1, 3).max(axis=0), 0.0)
+        made = self.document.once(("scaled", id(image)), image, lambda: _divided(image, most))
+        return rgb(np.multiply(factor, most)), made
 
     def _lookup(
         self, surface: Surface, texture: ImageTexture, mode: str, holes: ImageTexture | None = None, white: bool = False
@@ -204,7 +199,7 @@ class GltfMaterialWriter:
         """The same texture with positive scales, by a mirrored picture where they are not."""
         if min(texture.uv_scale) >= 0.0:
             return texture
-        return self.document.once(("mirrored", id(texture)), texture, lambda: _mirrored(texture))
+        return self.document.once(("mirrored", id(texture)), texture, lambda: unmirrored(texture))
 
     def _image(self, texture: ImageTexture, mode: str, holes: ImageTexture | None, white: bool) -> int:
         path = Path(texture.source)
@@ -220,39 +215,6 @@ class GltfMaterialWriter:
         return self.document.picture(codes, stem)
 
 
-def _alike(first: ImageTexture, second: ImageTexture) -> bool:
-    """Whether two pictures lie in the same way."""
-    return (first.uv_scale, first.uv_offset, first.wrap) == (second.uv_scale, second.uv_offset, second.wrap)
-
-
-def _in_bytes(image: np.ndarray, mode: str) -> bool:
-    """Whether 8-bit sRGB values, or 8-bit numbers, hold an image."""
-    if mode == "colour":
-        return np.array_equal(decode_srgb(srgb_codes(image)), image)
-    return np.array_equal(number_codes(image).astype(np.float32) / np.float32(255.0), image)
-
-
 def _divided(texture: ImageTexture, most: np.ndarray) -> ImageTexture:
     image = (np.maximum(texture.image, 0.0) / np.where(most > 0.0, most, 1.0)).astype(np.float32)
     return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, texture.filter, texture.source)
-
-
-def _mirrored(texture: ImageTexture) -> ImageTexture:
-    """A texture with its picture mirrored along the axes whose scales are negative."""
-    image, scale, offset = texture.image, list(texture.uv_scale), list(texture.uv_offset)
-    for axis in (0, 1):
-        if scale[axis] < 0.0:
-            image = np.flip(image, 1 - axis)
-            scale[axis], offset[axis] = -scale[axis], 1.0 - offset[axis]
-    placed = (scale[0], scale[1]), (offset[0], offset[1])
-    return ImageTexture(np.ascontiguousarray(image), *placed, texture.wrap, texture.filter, texture.source)
-
-
-def _checks(texture: CheckerboardTexture) -> ImageTexture | None:
-    """Four texels that repeat, in place of squares of two colours."""
-    if not (isinstance(texture.even, ConstantTexture) and isinstance(texture.odd, ConstantTexture)):
-        return None
-    even, odd = texture.even.value, texture.odd.value
-    image = np.array([[odd, even], [even, odd]], np.float32)
-    scale = 0.5 * texture.uv_scale[0], 0.5 * texture.uv_scale[1]
-    return ImageTexture(image, scale, (0.0, 0.0), "repeat", "nearest")

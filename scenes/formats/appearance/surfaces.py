@@ -1,4 +1,4 @@
-"""Canonical materials as the surface of glTF: metallic-roughness, with the extensions that hold more.
+"""Canonical materials as the surface of glTF and of USD: metallic-roughness, with what the extensions of glTF add.
 
 Exact are metallic-roughness surfaces, matte ones, clear and rough glass, panes, what only glows, holes and normal maps.
 All others become the nearest such surface, which is reported.
@@ -51,7 +51,7 @@ Rough = Glass | Metal | Glossy | Plastic
 
 @dataclasses.dataclass(frozen=True)
 class Surface(MetallicRough):
-    """A surface of glTF: the metallic-roughness surface, by default of no metal, with what its extensions add.
+    """The metallic-roughness surface, by default of no metal, with what the extensions of glTF add.
 
     Attributes:
         specular: factor of the reflection of the dielectric part.
