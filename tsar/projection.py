@@ -46,8 +46,8 @@ def project(
     away = (1.0 - infinite.to(torch.float64)).reshape(-1)
 
     def seen(axis: int) -> Float64[Tensor, " n"]:
-        first, second, third = (matrix[:, axis, column].contiguous()[row] for column in range(3))
-        return first * x + second * y + third * z + offset[:, axis].contiguous()[row]
+        first, second, third = (matrix[:, axis, column].index_select(0, row) for column in range(3))
+        return first * x + second * y + third * z + offset[:, axis].index_select(0, row)
 
     right, up, depth = seen(0), seen(1), -seen(2)
     unit = depth if view.kind == "perspective" else away

@@ -85,11 +85,11 @@ class Afr(Policy[Sampled]):
 
     @property
     def price(self) -> Price:
-        """Per pixel: projection and summation of the buffer's samples (weight 3, sums 7), and the pyramid: up 20, down
-        26, times 4/3, with means 4. Per sample: replacement of non-finite values 6, luminance 10, gradients 14, sums of
-        tiles 12, comparison 8."""
+        """Per pixel: projection and summation of the buffer's samples (weight 3, sums 7), their limit of depth, and the
+        pyramid: up 20, down 26, times 4/3, with means 4. Per sample: replacement of non-finite values 6, luminance 10,
+        gradients 14, sums of tiles 12, comparison 8."""
         stored = SAMPLES_KEPT_PER_PIXEL * (deep_buffer.SAMPLE_FLOPS + 10)
-        return Price(int(self.config.budget), pixel_flops=stored + 65, sample_flops=50)
+        return Price(int(self.config.budget), pixel_flops=stored + deep_buffer.PIXEL_FLOPS + 65, sample_flops=50)
 
     @property
     def _depth(self) -> int:
@@ -138,10 +138,11 @@ class Afr(Policy[Sampled]):
         extent_s = extents(state.tree, self._depth, config, moment.cycle_s)
         extent_s = tiles.per_pixel(extent_s, state.tree, self._depth, config.window)
         sample, pixel = state.placed.sample, state.placed.pixel
-        time_s = state.buffer.time_s[sample]
-        weight = torch.exp((time_s - moment.time_s) / extent_s[pixel]).to(torch.float32)
+        time_s = state.buffer.time_s.index_select(0, sample)
+        weight = torch.exp((time_s - moment.time_s) / extent_s.index_select(0, pixel)).to(torch.float32)
         total = torch.zeros(pixels).index_add_(0, pixel, weight)
-        color = torch.zeros(pixels, 3).index_add_(0, pixel, state.buffer.color[sample] * weight[:, None])
+        weighted = state.buffer.color.index_select(0, sample) * weight[:, None]
+        color = torch.zeros(pixels, 3).index_add_(0, pixel, weighted)
         color = (color / total.clamp(min=1e-12)[:, None]).T.reshape(3, *shape).contiguous()
         image = pull_push(color, total.clamp(max=1.0).reshape(1, *shape)).permute(1, 2, 0).contiguous()
         newest_s = torch.full((pixels,), -inf, dtype=torch.float64).scatter_reduce(0, pixel, time_s, "amax")
@@ -203,8 +204,8 @@ def _values(
     spatial = (0.5 * (across.square() + down.square())).repeat(len(_CROSSHAIR))
     place = asked.place[:arms]
     column, row = (place * place.new_tensor(shape[::-1])).to(torch.int64).unbind(1)
-    rank = (buffer.time_s[placed.sample] < now_s).nonzero().squeeze(1)
-    newest = torch.full((shape[0] * shape[1],), -1).scatter_reduce(0, placed.pixel[rank], rank, "amax")
+    rank = (buffer.time_s.index_select(0, placed.sample) < now_s).nonzero().squeeze(1)
+    newest = torch.full((shape[0] * shape[1],), -1).scatter_reduce(0, placed.pixel.index_select(0, rank), rank, "amax")
     newest = newest[row * shape[1] + column]
     held = newest >= 0
     change, age_s = torch.zeros(arms), torch.zeros(arms)

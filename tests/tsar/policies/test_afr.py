@@ -10,7 +10,7 @@ from tests.oracles.screens import Layer, Screen
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
 from tsar.morton import floor_log2
-from tsar.policies import POLICIES, afr, tiles
+from tsar.policies import POLICIES, afr, deep_buffer, tiles
 from tsar.policies.deep_buffer import DeepBuffer
 from tsar.policy import Setting, run
 from tsar.types import FrameletBatch, Hits
@@ -124,3 +124,20 @@ def test_the_buffer_drops_what_is_hidden_and_outside_and_the_oldest() -> None:
     hits = Hits(*(values[:, :1] for values in vars(answer.hits).values()))
     buffer.add(torch.full((1, 3), 0.5), 0.1, place[:1], hits)
     assert buffer.seen(None, (8, 8)).sample.tolist() == [1, 2, 3, 0] and buffer.time_s.tolist() == [0.1, 0.0, 0.0, 0.0]
+
+
+def test_a_sample_is_hidden_where_one_in_its_pixel_or_six_around_it_are_nearer() -> None:
+    """The limits of depth, beside a count of the pixels around each sample that hold a nearer one."""
+    random, shape = torch.Generator().manual_seed(5), (7, 9)
+    pixel = torch.randint(shape[0] * shape[1], (300,), generator=random)
+    depth = 1.0 + 0.4 * torch.rand(300, generator=random, dtype=torch.float64)
+    depth[::17] = torch.inf
+    nearest = {divmod(at, shape[1]): depth[pixel == at].amin().item() for at in pixel.unique().tolist()}
+    limit, visible = deep_buffer._farthest(depth, pixel, shape), []
+    for at, z in zip(pixel.tolist(), depth.tolist(), strict=True):
+        row, column = divmod(at, shape[1])
+        around = [(row + r, column + c) for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c]
+        nearer = sum(nearest.get(one, torch.inf) * 1.07 < z for one in around)
+        visible.append(nearest[row, column] * 1.3 >= z and nearer < 6)
+    assert (depth <= limit[pixel]).tolist() == visible
+    assert 50 < sum(visible) < 250
