@@ -91,7 +91,7 @@ MATERIALS: dict[str, tuple[Material, Shape]] = {
     "uber, clear in part": (Uber(_RED, _CLEAR, _CLEAR, _even(0.2), _even(0.5)), Rectangle()),
     "mixture": (MixMaterial(Matte(_RED), Mirror(_even(0.9)), _even(0.25)), Rectangle()),
     "mask": (Masked(Matte(_RED), _even(0.5)), Rectangle()),
-    "normal-mapped": (NormalMapped(Matte(_RED), _even(0.5, 0.5, 1.0)), Rectangle()),
+    "normal-mapped": (NormalMapped(Matte(_RED), _even(0.8, 0.5, 0.9)), Rectangle()),
     "height field": (HeightField(Matte(_RED), np.zeros((8, 8), np.float32), 0.1), Rectangle()),
     "Phong": (Phong(_RED, (0.2, 0.2, 0.2)), Rectangle()),
     "glowing": (Emissive((0.6, 0.4, 0.2)), Rectangle()),

@@ -86,6 +86,7 @@ class Instance:
         name: name for messages and reports.
         emission: radiance of an area light, linear RGB, or None. It is emitted on the side of the normal by a
             :class:`Rectangle` or :class:`Sphere`.
+        emission_twosided: whether the back emits, too. The renderer's lamps do not; it is kept for conversion.
         one_sided: whether the back is black. The renderer treats both sides equally; it is kept for conversion.
     """
 
@@ -96,6 +97,7 @@ class Instance:
     name: str = ""
     emission: Rgb | None = None
     one_sided: bool = False
+    emission_twosided: bool = False
 
     def __post_init__(self) -> None:
         if self.to_world.shape != (4, 4) or not np.isfinite(self.to_world).all():

@@ -57,7 +57,7 @@ from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
-from scenes.formats.geometry.placing import lose_back
+from scenes.formats.geometry.placing import lose_back, lose_shine_behind
 from scenes.formats.losses import LossReport
 from scenes.models.phong_of_parts import EXPONENT_MAX
 
@@ -124,7 +124,10 @@ class Approximation:
         """Instances for a shape. Lamps must be rectangles or spheres: a cube becomes six rectangles, a disk a square,
         and other shapes only glow."""
         name = instance.name or f"shape {number}"
-        lose_back(dataclasses.replace(instance, name=name), self.report)
+        named = dataclasses.replace(instance, name=name)
+        lose_back(named, self.report)
+        if instance.emission is not None and isinstance(instance.shape, Rectangle | Disk):
+            lose_shine_behind(named, self.report)
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
         if instance.emission is None:
             if isinstance(instance.shape, Cube | Disk) and depends_on_uv(made.material):

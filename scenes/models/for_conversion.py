@@ -32,13 +32,15 @@ class _Parts:
     def __init__(self, report: LossReport) -> None:
         self.report = report
         self._materials: dict[int, tuple[Material, Material, Rgb | None]] = {}
-        self._shapes: dict[tuple[int, int], tuple[Instance, Instance, Matrix]] = {}
+        self._shapes: dict[tuple[int, int, bool], tuple[Instance, Instance, Matrix]] = {}
 
     def instance(self, instance: Instance) -> Instance:
-        key = id(instance.shape), id(instance.material)
+        key = id(instance.shape), id(instance.material), instance.emission_twosided
         if key not in self._shapes:
             material, emission = self._material(instance.material, instance.name)
-            made = dataclasses.replace(instance, material=material, emission=instance.emission or emission)
+            shine = instance.emission or emission
+            both = shine is not None and instance.emission_twosided
+            made = dataclasses.replace(instance, material=material, emission=shine, emission_twosided=both)
             shape, own = made.shape, np.eye(4)
             if isinstance(shape, Mesh):
                 shape, own = shape_of(shape, material, instance.name, self.report)

@@ -30,7 +30,8 @@ _KINDS = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual"}
 _TYPES = {"NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
 _DEPTH_MAX = 256
-_Part = tuple[Mesh, Material]
+_Part = tuple[Mesh, Material, bool]
+"""A mesh, its material, and whether its back is drawn, too."""
 
 
 def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> Model:
@@ -136,7 +137,7 @@ class _Reader:
             else:
                 stem = self.data.sources.path.stem
                 parts = self._mesh(node["mesh"])
-                self._parts += [Instance(*part, matrix, track, name=f"{stem}/{name}") for part in parts]
+                self._parts += [_placed(part, matrix, track, f"{stem}/{name}") for part in parts]
         for child in node.get("children", ()):
             self._node(child, above, frame, track, moving, depth + 1)
 
@@ -152,7 +153,7 @@ class _Reader:
             self.report.add(name, "a skin that moves", "the pose at its start")
         matrices = joint_matrices(self.data, node["skin"], self._world)
         name = f"{self.data.sources.path.stem}/{name}"
-        self._parts += [Instance(*part, name=name) for part in self._mesh_parts(node["mesh"], matrices)]
+        self._parts += [_placed(part, np.eye(4), None, name) for part in self._mesh_parts(node["mesh"], matrices)]
 
     def _mesh(self, number: int) -> list[_Part]:
         if number not in self._meshes:
@@ -193,18 +194,20 @@ class _Reader:
 
         sets = {index: self._of_vertices(f"TEXCOORD_{index}", attributes, len(points), place) for index in range(4)}
         colors = self._of_vertices("COLOR_0", attributes, len(points), place)
+        material = primitive.get("material")
+        doubled = material is not None and self.data.at("materials", material).get("doubleSided", False)
         painted = self.materials.painted(
-            primitive.get("material"),
+            material,
             {index: values[faces] for index, values in sets.items() if values is not None},
             None if colors is None else colors[faces][..., :3],
         )
         if normals is None and painted.uvs is None:
             mesh = Mesh(vertices_of(points), faces.astype(np.int32), source=str(self.data.sources.path))
-            return mesh, painted.material
+            return mesh, painted.material, doubled
         shading = None if normals is None else unit_normals(normals[faces], points[faces])
         source = str(self.data.sources.path)
         mesh = with_corners(points[faces], shading, painted.uvs, source, None if painted.baked else faces)
-        return mesh, painted.material
+        return mesh, painted.material, doubled
 
     def _of_vertices(
         self, attribute: str, attributes: dict[str, Any], count: int, place: str
@@ -217,6 +220,11 @@ class _Reader:
         if len(values) != count:
             raise misplaced(f"{place}.attributes.{attribute}", f"{count} elements", len(values))
         return values
+
+
+def _placed(part: _Part, matrix: Matrix, track: RigidTrack | None, name: str) -> Instance:
+    mesh, material, doubled = part
+    return Instance(mesh, material, matrix, track, name, emission_twosided=doubled)
 
 
 def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:

@@ -19,6 +19,7 @@ from scenes.canonical import (
 from scenes.formats.appearance.facets import Facets, facets_of
 from scenes.formats.appearance.folding import changed, folded, greatest_of, mean_of
 from scenes.formats.appearance.indices import index_of_reflectance
+from scenes.formats.appearance.normals import is_flat
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 
@@ -32,7 +33,8 @@ def simpler(material: HeightField | NormalMapped | MetallicRough, where: str, re
         report.add(where, "a height field", "its material, flat")
         return material.base
     if isinstance(material, NormalMapped):
-        report.add(where, "a normal map", "the normals of the shape")
+        if not is_flat(material):
+            report.add(where, "a normal map", "the normals of the shape")
         return material.base
     report.add(where, "a metallic-roughness surface", "plastic and metal of its parameters")
     if material.coat > 0.0:

@@ -42,6 +42,7 @@ from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import changed, folded, greatest_of, mean_of, product_of
 from scenes.formats.appearance.indices import index_of_reflectance, reflectance_of_index
 from scenes.formats.appearance.mixtures import is_nothing
+from scenes.formats.appearance.normals import is_flat
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.losses import LossReport
 
@@ -105,6 +106,10 @@ def surface_of(material: Material, where: str, report: LossReport) -> Surface:
         return dataclasses.replace(base, opacity=material.opacity, cutoff=material.cutoff)
     if isinstance(material, NormalMapped):
         base = surface_of(material.base, where, report)
+        if is_flat(material):
+            return base
+        if base.normals is not None:
+            report.add(where, "a normal map above another", "the outer one")
         return dataclasses.replace(base, normals=material.normals, normal_scale=material.scale)
     assert isinstance(material, HeightField | Bumped)
     if not (isinstance(material, Bumped) and isinstance(material.height, ConstantTexture)):

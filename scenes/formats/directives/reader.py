@@ -39,6 +39,7 @@ class Attributes:
 
     material: Material | None = None
     emission: tuple[float, float, float] | None = None
+    emission_twosided: bool = False
     power: float = 0.0  # power to which the emission is scaled, lumens; 0 for none
     reversed: bool = False
     # parameters for the following directives, by target and name

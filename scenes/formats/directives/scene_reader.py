@@ -248,7 +248,14 @@ class SceneReader(DirectiveReader):
             shape, local = shape_of(shape, material, str(directive.place), self.report)
         start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
         self._keep(
-            Instance(shape, material, product(start, local), track, emission=self.attributes.emission),
+            Instance(
+                shape,
+                material,
+                product(start, local),
+                track,
+                emission=self.attributes.emission,
+                emission_twosided=self.attributes.emission is not None and self.attributes.emission_twosided,
+            ),
             directive,
         )
         self.left_over(parameters, f"shape {kind!r}")

@@ -24,6 +24,7 @@ from scenes.canonical import (
     Instance,
     Material,
     Mesh,
+    NormalMapped,
     Rectangle,
     Shape,
     Sphere,
@@ -31,6 +32,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.graphs import once_a_node, parts_of
+from scenes.formats.appearance.normals import is_flat
 from scenes.formats.geometry.orientation import area_normals, turned
 from scenes.formats.geometry.revolution import partial_sphere, ring
 
@@ -41,13 +43,15 @@ SQUARE_UV = 0.5 * SQUARE[:, :2] + 0.5
 def depends_on_uv(part: Material | Texture) -> bool:
     """Whether the appearance of a material depends on texture coordinates.
 
-    It does if it has a texture, or a roughness that differs between the two directions of the surface.
+    It does if it has a texture, a normal map, or a roughness that differs between the two directions of the surface.
     """
     return once_a_node(_depends, part)
 
 
 def _depends(part: Material | Texture, again: Callable[[Material | Texture], bool]) -> bool:
     if isinstance(part, ImageTexture | CheckerboardTexture | HeightField):
+        return True
+    if isinstance(part, NormalMapped) and not is_flat(part):
         return True
     roughness = getattr(part, "roughness", 0.0)
     if isinstance(roughness, tuple) and roughness[0] != roughness[1]:

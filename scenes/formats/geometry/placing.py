@@ -40,12 +40,21 @@ def shines(instance: Instance) -> bool:
     return instance.emission is not None or isinstance(instance.material, Emissive)
 
 
-def radiance_of(instance: Instance, report: LossReport) -> Rgb | None:
-    """Radiance of the front of a lamp, or None for other shapes; a lamp that emits on both sides is reported."""
-    if isinstance(instance.material, Emissive):
+def shines_behind(instance: Instance) -> bool:
+    """Whether the back of a shape emits light that is visible; that of a closed shape is not."""
+    both = isinstance(instance.material, Emissive) or (instance.emission is not None and instance.emission_twosided)
+    return both and not is_closed(instance.shape)
+
+
+def lose_shine_behind(instance: Instance, report: LossReport) -> None:
+    """Reports light of the back."""
+    if shines_behind(instance):
         report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
-        return instance.material.radiance
-    return instance.emission
+
+
+def radiance_of(instance: Instance) -> Rgb | None:
+    """Radiance of the front of a lamp, or None for other shapes."""
+    return instance.material.radiance if isinstance(instance.material, Emissive) else instance.emission
 
 
 def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix], list[float]]:

@@ -149,7 +149,7 @@ class GltfWriter:
     # --- shapes ------------------------------------------------------------------------------------------------------
 
     def _instance(self, instance: Instance, name: str) -> None:
-        shape, lamp = instance.shape, instance.emission is not None
+        shape, lamp = instance.shape, instance.emission is not None and not instance.emission_twosided
         both_sides = not (lamp or instance.one_sided)
         if not both_sides and not is_closed(shape):
             what = "the back of a lamp" if lamp else "a surface with a black back"

@@ -15,6 +15,7 @@ import numpy as np
 from scenes.canonical import ImageTexture, Material, Texture
 from scenes.canonical.values import Rgb
 from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.normals import map_of
 from scenes.formats.appearance.pictured import (
     factored,
     in_bytes,
@@ -67,8 +68,10 @@ class GltfMaterialWriter:
             if image is not None:
                 rough["metallicRoughnessTexture"] = self._lookup(surface, image, "numbers")
         if surface.normals is not None:
-            _, image = self._factored(surface.normals, where, "as it is")
-            if image is not None:
+            _, image = self._factored(map_of(surface.normals), where, "as it is")
+            if image is None:
+                self.report.add(where, "a normal map", "the normals of the shape")
+            else:
                 made["normalTexture"] = {**self._lookup(surface, image, "numbers"), "scale": surface.normal_scale}
         self._emission(surface, emission, made, where)
         self._extensions(surface, made)

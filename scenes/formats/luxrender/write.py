@@ -37,7 +37,7 @@ from scenes.formats.directives.scene_writer import SceneWriter, quoted
 from scenes.formats.geometry.conventions import FAR, MAP_AXES
 from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.orientation import upright
-from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, shines
+from scenes.formats.geometry.placing import lose_shine_behind, motion_keys, part_key, radiance_of, shines
 from scenes.formats.geometry.revolution import lamp_sphere
 from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport, first_of
@@ -181,7 +181,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         self.lines += ["\tAttributeBegin", *(f"\t\t{line}" for line in (*placing, *made)), "\tAttributeEnd"]
 
     def part(self, instance: Instance) -> list[str]:
-        emission = radiance_of(instance, self.report)
+        emission = radiance_of(instance)
+        lose_shine_behind(instance, self.report)
         lines = [f'NamedMaterial "{self.material(instance.material)}"']
         if emission is not None:
             off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'

@@ -28,7 +28,6 @@ from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import changed, folded, mean_of
 from scenes.formats.appearance.simpler import ALPHA_MIN, metal_of, mixed
 from scenes.formats.appearance.spectra import grey
-from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_textures import MitsubaTextures
 from scenes.formats.mitsuba.write_elements import Element, ElementWriter
@@ -147,18 +146,3 @@ def _mean(properties: Properties, textures: MitsubaTextures, name: str, default:
     if not isinstance(found, ConstantTexture):
         textures.report.add(properties.where, f"{name}: a texture", f"its mean, {value:g}")
     return value
-
-
-def scaled_normals(normals: Texture, scale: float, where: str, report: LossReport) -> Texture:
-    """Normals whose first two components are multiplied, as the map itself."""
-    if scale == 1.0:
-        return normals
-
-    def change(values: np.ndarray) -> np.ndarray:
-        vectors = (2.0 * values - 1.0) * (scale, scale, 1.0)
-        return 0.5 + 0.5 * vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
-
-    made = changed(folded(normals), change)
-    if made is None:
-        report.add(where, f"normals scaled by {scale:g}", "as they are")
-    return normals if made is None else made

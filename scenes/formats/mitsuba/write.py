@@ -30,7 +30,15 @@ from scenes.formats.appearance.mixtures import direct_if_same
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.orientation import FLIPPED, scales_evenly, upright
-from scenes.formats.geometry.placing import PartKey, motion_keys, part_key, radiance_of, shared_parts, shines
+from scenes.formats.geometry.placing import (
+    PartKey,
+    lose_shine_behind,
+    motion_keys,
+    part_key,
+    radiance_of,
+    shared_parts,
+    shines,
+)
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read_settings import FILTERS, FORWARD
 from scenes.formats.mitsuba.write_elements import Element
@@ -237,7 +245,8 @@ class MitsubaWriter(MitsubaLightWriter):
         elif isinstance(shape, Disk):
             local = np.diag([shape.radius, shape.radius, 1.0, 1.0])
         ElementTree.SubElement(made, "ref", {"id": label})
-        emission = radiance_of(instance, self.report)
+        emission = radiance_of(instance)
+        lose_shine_behind(instance, self.report)
         if emission is not None:
             self.color(self.plugin("emitter", "area", made), "radiance", emission)
         return made, local

@@ -37,11 +37,12 @@ from scenes.canonical import (
 )
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.facets import with_even_facets
-from scenes.formats.appearance.folding import folded, height_of, mean_of
+from scenes.formats.appearance.folding import height_of, mean_of
 from scenes.formats.appearance.mixtures import added_metal, lobes_of
+from scenes.formats.appearance.normals import is_flat, map_of, scaled_normals
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
-from scenes.formats.mitsuba.principled import scaled_normals, write_principled
+from scenes.formats.mitsuba.principled import write_principled
 from scenes.formats.mitsuba.write_elements import Element, ElementWriter
 from scenes.formats.text.numbers import number
 
@@ -119,8 +120,11 @@ class MitsubaSurfaceWriter(ElementWriter):
         return both
 
     def _normal_mapped(self, material: NormalMapped, where: str) -> Element:
-        normals = folded(scaled_normals(material.normals, material.scale, where, self.report))
+        if is_flat(material):
+            return self.bsdf(material.base, where)
+        normals = map_of(scaled_normals(material.normals, material.scale, where, self.report))
         if not isinstance(normals, ImageTexture):
+            self.report.add(where, "a normal map", "the normals of the shape")
             return self.bsdf(material.base, where)
         made, base = self.plugin("bsdf", "normalmap"), self.bsdf(material.base, where)
         self.numbers(made, normals, "normalmap")

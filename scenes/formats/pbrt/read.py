@@ -125,7 +125,6 @@ class PbrtReader(SceneReader):
             self.report.unknown(directive.place, "area light", kind, "diffuse")
         scale = np.array(self.surfaces.color(parameters, "scale", (1.0, 1.0, 1.0)))
         self.attributes.emission = rgb(scale * self.surfaces.color(parameters, "L", (1.0, 1.0, 1.0)))
-        if parameters.truth("twosided", False):
-            self.report.add(str(directive.place), "a two-sided area light", "its front")
+        self.attributes.emission_twosided = parameters.truth("twosided", False)
         lights.lose_hints(parameters, self.report)
         self.left_over(parameters, "area light")

@@ -79,8 +79,6 @@ class V4Lights:
         where = str(parameters.place)
         strength = rgb(parameters.number("scale", 1.0) * np.array(self.surfaces.light(parameters, "L")))
         both = parameters.truth("twosided", False)
-        if both:
-            self.report.add(where, "a two-sided area light", "its front")
         if "filename" in parameters:
             parameters.asked.add("filename")
             self.report.add(where, "a lamp with a texture", "a constant radiance")

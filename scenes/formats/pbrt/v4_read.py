@@ -189,6 +189,7 @@ class PbrtV4Reader(PbrtReader):
         if kind != "diffuse":
             self.report.unknown(directive.place, "area light", kind, "diffuse")
         self.attributes.emission, self.attributes.power = self._lights.area(parameters)
+        self.attributes.emission_twosided = parameters.truth("twosided", False)
         self.left_over(parameters, "area light")
 
     def _keep(self, instance: Instance, directive: Directive) -> None:

@@ -23,7 +23,7 @@ from scenes.formats.text.numbers import listed, number
 from scenes.formats.text.output import Output
 
 _TYPES = {'"point P"': '"point3 P"', '"point from"': '"point3 from"', '"point to"': '"point3 to"',
-          '"float uv"': '"point2 uv"', '[ "false" ]': "[ false ]"}  # fmt: skip
+          '"float uv"': '"point2 uv"', '[ "false" ]': "[ false ]", '[ "true" ]': "[ true ]"}  # fmt: skip
 """Declarations of version 3, and their types in version 4."""
 
 _SAMPLERS = {"sobol": "zsobol", "halton": "halton", "hammersley": "halton", "independent": "independent",

@@ -35,7 +35,7 @@ from scenes.formats.directives.scene_reader import FILTERS, FORWARD
 from scenes.formats.directives.scene_writer import SceneWriter, quoted
 from scenes.formats.geometry.conventions import MAP_AXES
 from scenes.formats.geometry.meshed import as_mesh
-from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, tracks_of
+from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, shines_behind, tracks_of
 from scenes.formats.geometry.transform_stack import inverse, track_times
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.pbrt.read import PbrtReader
@@ -171,12 +171,13 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     def part(self, instance: Instance) -> list[str]:
         """Lines of a shape and its material, without its placement."""
         material = instance.material
-        emission = radiance_of(instance, self.report)
+        emission = radiance_of(instance)
         named = self.material(material.base if isinstance(material, Masked) else material)
         alpha = f" {self._alpha(material)}" if isinstance(material, Masked) else ""
         lines = [f'NamedMaterial "{named}"']
         if emission is not None:
-            lines.append(f'AreaLightSource "diffuse" "rgb L" {listed(emission)}')
+            both = ' "bool twosided" [ "true" ]' if shines_behind(instance) else ""
+            lines.append(f'AreaLightSource "diffuse" "rgb L" {listed(emission)}{both}')
         return [*lines, f"{self._shape(instance)}{alpha}"]
 
     def _alpha(self, material: Masked) -> str:

@@ -199,8 +199,10 @@ HOSTILE = {
                                         texture("T", "gone.png")),
     "cannot identify image file": textured("color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
                                                  texture("T", "in.usda")),
-    "animation: expected at most 65536 keys": mesh("double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 1e9: (1, 0, 0) }\n"
-                                            'uniform token[] xformOpOrder = ["xformOp:translate"]'),
+    "animation: expected at most 65536 keys": mesh(
+        "double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 1e9: (1, 0, 0) }\n"
+        'uniform token[] xformOpOrder = ["xformOp:translate"]'
+    ),
 }  # fmt: skip
 
 

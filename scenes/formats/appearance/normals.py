@@ -1,0 +1,42 @@
+"""Normal maps: those that bend nothing, constant ones, and factors of their tilt."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes.canonical import ConstantTexture, ImageTexture, NormalMapped, Texture
+from scenes.formats.appearance.folding import changed, folded
+from scenes.formats.losses import LossReport
+
+_STRAIGHT = 0.5  # the value of a component that is zero
+
+
+def is_flat(material: NormalMapped) -> bool:
+    """Whether the normal of the shape stays as it is everywhere."""
+    normals = folded(material.normals)
+    if material.scale == 0.0:
+        return True
+    return isinstance(normals, ConstantTexture) and normals.value[:2] == (_STRAIGHT, _STRAIGHT)
+
+
+def map_of(normals: Texture) -> Texture:
+    """The normals as a picture, of one texel if they are constant; other textures as they are."""
+    plain = folded(normals)
+    if not isinstance(plain, ConstantTexture):
+        return plain
+    return ImageTexture(np.array(plain.value, np.float32).reshape(1, 1, 3), filter="nearest", source="normals")
+
+
+def scaled_normals(normals: Texture, scale: float, where: str, report: LossReport) -> Texture:
+    """Normals whose first two components are multiplied, as the map itself."""
+    if scale == 1.0:
+        return normals
+
+    def change(values: np.ndarray) -> np.ndarray:
+        vectors = (2.0 * values - 1.0) * (scale, scale, 1.0)
+        return 0.5 + 0.5 * vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+
+    made = changed(folded(normals), change)
+    if made is None:
+        report.add(where, f"normals scaled by {scale:g}", "as they are")
+    return normals if made is None else made
