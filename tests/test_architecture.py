@@ -17,7 +17,7 @@ POSED = (*CANONICAL, "scenes.animation")
 SHARED = tuple(f"scenes.formats.{room}" for room in ("text", "geometry", "appearance", "losses"))
 BESIDE = tuple(f"scenes.{name}" for name in "animation arithmetic daylight loading models pictures viewing".split())
 MEASURED = tuple(f"analysis.{room}" for room in ("command", "storage", "metrics", "page"))
-DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks", "gltf")
+DIALECTS = ("pbrt", "luxrender", "mitsuba", "blocks", "gltf", "usd")
 OTHERS = ("renderer", "scenes", "tsar")
 QUESTIONS = (
     "comparison suitability ablation trade precision sensitivity spectrum cost_report conversion bench tracer "

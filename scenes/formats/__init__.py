@@ -24,6 +24,7 @@ FORMATS: Named[Format] = Named(
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
         "mitsuba-dictionary": "scenes.formats.mitsuba.declared:MITSUBA_DICTIONARY",
         "gltf": "scenes.formats.gltf.declared:GLTF",
+        "usd": "scenes.formats.usd.declared:USD",
         "model": "scenes.models.for_conversion:MODEL",
     },
 )

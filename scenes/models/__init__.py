@@ -30,10 +30,10 @@ def _read_usd(sources: Sources, report: LossReport, facets: bool) -> Model:
     return read_usd(sources, report, facets)
 
 
-_USD = (".usd", ".usda", ".usdc", ".usdz")
+USD_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 _READERS: dict[str, Read] = {
     ".obj": _parts_by(read_obj), ".ply": _parts_by(read_plain), ".stl": _parts_by(read_plain),
-    ".glb": read_gltf, ".gltf": read_gltf, **dict.fromkeys(_USD, _read_usd),
+    ".glb": read_gltf, ".gltf": read_gltf, **dict.fromkeys(USD_ENDINGS, _read_usd),
 }  # fmt: skip
 MODEL_ENDINGS = tuple(_READERS)
 

@@ -37,7 +37,7 @@ from scenes.models.usd_shapes import KINDS as SHAPES
 from scenes.models.usd_shapes import shapes_of
 from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
 from scenes.models.usd_values import finite, report_animated
-from scenes.models.usd_views import LAMP, camera_of, light_of
+from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
@@ -165,7 +165,7 @@ class _Reader:
 
     def _read(self, prim: Any) -> list[_Part]:
         name, kind = prim.GetName(), prim.GetTypeName()
-        if prim.HasAPI(UsdLux.LightAPI):
+        if prim.HasAPI(UsdLux.LightAPI) and not glow_of(prim, self.code, self.report):
             self.report.add(name, "the light of a mesh", "a surface that does not shine")
         opacity = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayOpacity")
         if opacity and opacity.HasValue() and self._bound(prim) is None:
@@ -175,7 +175,7 @@ class _Reader:
         if kind not in SHAPES:
             self.report.add(name, f"a prim of kind {kind}")
             return []
-        number, colors = self.described.number(self._bound(prim))
+        number, colors = self.described.number(self._bound(prim), bool(prim.GetAttribute("doubleSided").Get()))
         if self.described.coordinates(number):
             self.report.add(name, f"textures of a {kind.lower()}, which has no texture coordinates")
         color = None
@@ -209,7 +209,7 @@ class _Reader:
 
     def _part(self, mesh: Any, triangles: Triangles, bound: Any, name: str) -> tuple[Mesh, Material]:
         prim, source = mesh.GetPrim(), str(self.sources.path)
-        number, shown = self.described.number(bound)
+        number, shown = self.described.number(bound, bool(mesh.GetDoubleSidedAttr().Get()))
         sets = {}
         for index, primvar in self.described.coordinates(number).items():
             values = primvar_at_corners(prim, primvar, 2, triangles, self.code, name, self.report)

@@ -40,15 +40,27 @@ class UsdMaterials:
         self._numbers: dict[str, tuple[int, str]] = {}
         self._wraps: dict[Reading, tuple[int, int]] = {}
 
-    def number(self, material: Any) -> tuple[int, str]:
-        """The number of a material (None for that of a mesh without one), and the primvar of colours that it uses."""
+    def number(self, material: Any, both_sides: bool = False) -> tuple[int, str]:
+        """The number of a material (None for that of a mesh without one), and the primvar of colours that it uses.
+
+        A material that shines differs on shapes with both sides and on those with one.
+        """
         key = "" if material is None else str(material.GetPath())
         if key not in self._numbers:
             described = None if material is None else self._described(material)
             properties, colors = described or (_DISPLAYED, "displayColor")
-            self.document.materials.append(properties)
-            self._numbers[key] = len(self.document.materials) - 1, colors
-        return self._numbers[key]
+            self._numbers[key] = self._add(properties), colors
+        number, colors = self._numbers[key]
+        properties = self.document.materials[number]
+        if not both_sides or "emissiveTexture" in properties or not any(properties.get("emissiveFactor", ())):
+            return number, colors
+        if f"{key}|" not in self._numbers:
+            self._numbers[f"{key}|"] = self._add({**properties, "doubleSided": True}), colors
+        return self._numbers[f"{key}|"]
+
+    def _add(self, properties: dict[str, Any]) -> int:
+        self.document.materials.append(properties)
+        return len(self.document.materials) - 1
 
     def coordinates(self, number: int) -> dict[int, str]:
         """Numbers and primvars of the texture coordinates of a material."""
@@ -76,7 +88,12 @@ class UsdMaterials:
             if isinstance(value, Reading) and name not in _TEXTURED:
                 self.report.add(where, f"a texture of {name}")
                 given[name] = {**_NUMBERS, **_COLORS}[name]
-        return self._as_gltf(given, where)
+        made, colors = self._as_gltf(given, where)
+        if given["opacity"] == 0.0 and given["opacityThreshold"] <= 0.0:
+            if str(self._constant(shader, "opacityMode") or "transparent") == "transparent":
+                made["extensions"] |= {"KHR_materials_transmission": {"transmissionFactor": 1.0},
+                                       "KHR_materials_volume": {"thicknessFactor": 1.0}}  # fmt: skip
+        return made, colors
 
     def _as_gltf(self, given: dict[str, Any], where: str) -> tuple[dict[str, Any], str]:
         colors = ""

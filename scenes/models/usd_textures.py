@@ -5,11 +5,11 @@ Source: OpenUSD documentation, UsdPreviewSurface specification (UsdUVTexture, Us
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -20,7 +20,7 @@ from scenes.loading import decode_srgb, state_of
 from scenes.models.gltf_textures import BORDER, Lookup, Textures
 from scenes.models.sources import Sources
 from scenes.models.usd_library import Ar
-from scenes.pictures import Pixels, alpha_of, by_pillow, decoded
+from scenes.pictures import Pixels, alpha_of, decoded
 
 WRAPS = {"repeat": 10497, "mirror": 33648, "clamp": 33071, "black": BORDER}
 """Modes of UsdUVTexture, and their numbers of a glTF sampler."""
@@ -75,7 +75,7 @@ class Pictures:
 
     def _color(self, path: str, space: str) -> Pixels:
         if (path, space) not in self._colors:
-            given = self._read(path, decoded, by_pillow)
+            given = self._read(path, decoded)
             if given.dtype == np.float32 and space == "sRGB":
                 given = np.rint(np.clip(given, 0.0, 1.0) * 65535.0).astype(np.uint16)
             if given.dtype == np.float32:
@@ -91,25 +91,28 @@ class Pictures:
 
     def _is_encoded(self, path: str, given: np.ndarray) -> bool:
         """True if a picture of no given space is sRGB: one of 8 bits with 3 or 4 channels, or one that says so."""
-        return given.dtype == np.uint8 and self._read(path, _is_color, _is_color)
+        return given.dtype == np.uint8 and self._read(path, _is_color)
 
     def _opacity(self, path: str) -> Pixels:
         if path not in self._opacities:
-            self._opacities[path] = self._read(path, alpha_of, alpha_of)
+            self._opacities[path] = self._read(path, alpha_of)
         return self._opacities[path]
 
-    def _read(self, path: str, of_file: Callable[[Path], Any], of_content: Callable[[io.BytesIO], Any]) -> Any:
+    def _read(self, path: str, of_file: Callable[[Path], Any]) -> Any:
         try:
             if not path.endswith("]"):
                 self.sources.files.setdefault(Path(path), state_of(Path(path)))
                 return of_file(Path(path))
             asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
-            return of_content(io.BytesIO(bytes(asset.GetBuffer())))
+            with TemporaryDirectory() as folder:  # decoders of more than 8 bits need a file
+                unpacked = Path(folder) / f"picture{Path(path[:-1]).suffix}"
+                unpacked.write_bytes(bytes(asset.GetBuffer()))
+                return of_file(unpacked)
         except Exception as error:  # decoders raise arbitrary exceptions on broken files
             raise SceneError(f"texture {path}: cannot be read: {' '.join(str(error).split())}") from None
 
 
-def _is_color(path: Path | BinaryIO) -> bool:
+def _is_color(path: Path) -> bool:
     with Image.open(path) as image:
         return "srgb" in image.info or image.mode not in ("1", "L", "LA", "La")
 

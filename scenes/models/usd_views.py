@@ -69,7 +69,11 @@ def camera_of(prim: Any, code: Any, matrix: Matrix, track: RigidTrack | None, re
     focus = lens.focusDistance if lens.focusDistance > 0.0 else 1.0
     sharp = lens.fStop <= 0.0 or lens.focusDistance <= 0.0
     radius = 0.0 if sharp else tenth * lens.focalLength / (2.0 * lens.fStop)
-    return ModelCamera(PerspectiveCamera(placed, fov_deg, radius, focus, track, shift=shift), wide / high)
+    rate = float(prim.GetStage().GetTimeCodesPerSecond()) or 24.0
+    opened, closed = (float(_of(prim, f"shutter:{one}", code, 0.0)) / rate for one in ("open", "close"))
+    return ModelCamera(
+        PerspectiveCamera(placed, fov_deg, radius, focus, track, (opened, max(opened, closed)), shift), wide / high
+    )
 
 
 def light_of(
@@ -103,7 +107,9 @@ def light_of(
         radiance = radiance / area
     point = kind == "SphereLight" and bool(_value(prim, "treatAsPoint", None, False))
     if float(_value(prim, "shaping:cone:angle", code, 90.0)) < 90.0:
-        return _spot(prim, code, matrix, radiance * area / (4.0 if kind == "SphereLight" else 1.0), kind, report), None
+        if not point:
+            report.add(name, f"the extent of a {kind} with a cone", "a spot")
+        return _spot(prim, code, matrix, radiance * area / (4.0 if kind == "SphereLight" else 1.0)), None
     if point:
         x, y, z = (float(part) for part in matrix[:3, 3])
         return PointLight((x, y, z), rgb(radiance * area / 4.0)), None
@@ -113,7 +119,12 @@ def light_of(
 
 
 def _value(prim: Any, name: str, code: Any, rest: Any) -> Any:
-    attribute = prim.GetAttribute(f"inputs:{name}" if name != "treatAsPoint" else name)
+    return _of(prim, f"inputs:{name}" if name != "treatAsPoint" else name, code, rest)
+
+
+def _of(prim: Any, name: str, code: Any, rest: Any) -> Any:
+    """The value of an attribute."""
+    attribute = prim.GetAttribute(name)
     found = attribute.Get() if attribute and code is None else attribute.Get(code) if attribute else None
     return rest if found is None else finite(found, attribute.GetPath())
 
@@ -136,6 +147,13 @@ def _radiance(prim: Any, code: Any, report: LossReport) -> NDArray[np.float64]:
     return np.maximum(color * strength, 0.0)
 
 
+def glow_of(prim: Any, code: Any, report: LossReport) -> bool:
+    """Whether a shape with the quality of a light shines as its material does, which it then does without it."""
+    mode = str(_of(prim, "light:materialSyncMode", None, "noMaterialResponse"))
+    plain = not bool(_value(prim, "normalize", code, False)) and bool((_radiance(prim, code, report) == 1.0).all())
+    return mode == "materialGlowTintsLight" and plain
+
+
 def _lamp(prim: Any, kind: str, code: Any, matrix: Matrix) -> tuple[Shape, Matrix, float]:
     """Shape, local transform and area in the world of a lamp; flat ones emit along -z."""
     axes = [norm(matrix[:3, axis]) for axis in range(3)]
@@ -151,11 +169,8 @@ def _lamp(prim: Any, kind: str, code: Any, matrix: Matrix) -> tuple[Shape, Matri
     return Rectangle(), product(flat, np.diag([wide / 2.0, high / 2.0, 1.0, 1.0])), wide * high * axes[0] * axes[1]
 
 
-def _spot(
-    prim: Any, code: Any, matrix: Matrix, intensity: NDArray[np.float64], kind: str, report: LossReport
-) -> SpotLight:
+def _spot(prim: Any, code: Any, matrix: Matrix, intensity: NDArray[np.float64]) -> SpotLight:
     """A lamp with a cone as a spot without an area, with its intensity on the axis."""
-    report.add(prim.GetName(), f"the extent of a {kind} with a cone", "a spot")
     outer_deg = max(float(_value(prim, "shaping:cone:angle", code, 90.0)), 1e-3)
     softness = min(max(float(_value(prim, "shaping:cone:softness", code, 0.0)), 0.0), 1.0)
     (x, y, z), along = (float(part) for part in matrix[:3, 3]), axis_of(matrix, 2)

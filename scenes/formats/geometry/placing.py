@@ -76,7 +76,7 @@ def tracks_of(scene: Scene) -> list[RigidTrack]:
     return [track for track in found if track is not None and len(track.translation) > 1]
 
 
-def facing(position: NDArray[np.floating], direction: NDArray[np.floating]) -> Matrix:
+def facing(position: NDArray[np.float64], direction: NDArray[np.float64]) -> Matrix:
     """The transform that has -z in a direction."""
     place = np.eye(4)
     place[:3, :3] = look_at(np.zeros(3), direction).as_matrix()

@@ -25,7 +25,7 @@ MOVING += 'uniform token[] xformOpOrder = ["xformOp:translate"] }'
 PULSE = "color3f inputs:diffuseColor.timeSamples = {0: (1, 0, 0), 24: (0, 1, 0)}"
 
 CASES = {
-    "the light of a mesh": mesh().replace("Mesh", 'Mesh "quad" (prepend apiSchemas = ["MeshLightAPI"])', 1)
+    "the light of a mesh": mesh('uniform token light:materialSyncMode = "noMaterialResponse"\n').replace("Mesh", 'Mesh "quad" (prepend apiSchemas = ["MeshLightAPI"])', 1)
     .replace(' "quad" {', " {", 1),
     "an opacity without a material": mesh("float[] primvars:displayOpacity = [0.5]"),
     "2 polygons that the mesh does not have": mesh("""

@@ -1,0 +1,155 @@
+"""A USD file that is being written: its stage, its names and its pictures.
+
+Source: OpenUSD documentation, UsdGeom and UsdShade; "Usdz File Format Specification".
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from scenes.canonical import ImageTexture, SceneError
+from scenes.canonical.values import Matrix
+from scenes.formats.appearance.pictured import in_bytes, number_codes, srgb_codes
+from scenes.formats.text.output import Output
+from scenes.loading import read_image
+from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, Vt
+
+Part = TypeVar("Part")
+
+ROOT = "/World"
+RATE = 24.0
+"""Time codes per second."""
+
+_COPIED = (".png", ".jpg", ".jpeg")
+_SIDE_SHARP = 256
+_ALIGNED, _HEADER = 64, 30  # bytes to which files in a package are aligned, and of a header before its name
+_FIRST_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+class UsdStage:
+    """Collects the prims of a file; what is equal is written once.
+
+    Args:
+        output: receives the files.
+        up: upward axis, ``Y`` or ``Z``.
+
+    Attributes:
+        stage: the stage, in memory.
+    """
+
+    def __init__(self, output: Output, up: str) -> None:
+        self.output = output
+        self.stage: Any = Usd.Stage.CreateInMemory()
+        UsdGeom.SetStageUpAxis(self.stage, up)
+        UsdGeom.SetStageMetersPerUnit(self.stage, 1.0)
+        self.stage.SetDefaultPrim(UsdGeom.Xform.Define(self.stage, ROOT).GetPrim())
+        self._numbers: dict[str, int] = {}
+        self._made: dict[Any, tuple[object, Any]] = {}
+
+    def path(self, name: str, below: str = ROOT) -> str:
+        """A path below another that no prim has yet."""
+        plain = f"{below}/{Tf.MakeValidIdentifier(name)}"
+        path = plain
+        while path in self._numbers:
+            self._numbers[plain] += 1
+            path = f"{plain}_{self._numbers[plain]}"
+        self._numbers[path] = 0
+        return path
+
+    def once(self, key: Any, kept: object, make: Callable[[], Part]) -> Part:
+        """What ``make`` returned for the first call with this key; ``kept`` stays alive, so that its id is its own."""
+        if key not in self._made:
+            self._made[key] = kept, make()
+        return self._made[key][1]
+
+    def place(self, prim: Any, matrix: Matrix) -> None:
+        """Places a prim.
+
+        Raises:
+            SceneError: the transform is not finite.
+        """
+        if not np.isfinite(matrix).all():
+            raise SceneError(f"{self.output.path}: expected a finite transform of {prim.GetPath()}")
+        if not np.array_equal(matrix, np.eye(4)):
+            UsdGeom.Xformable(prim).AddTransformOp().Set(Gf.Matrix4d(matrix.T.tolist()))
+
+    def picture(self, texture: ImageTexture, numbers: bool) -> tuple[str, str]:
+        """The file of a picture, relative to this one, and its colour space: 8 bits where they hold it, else EXR.
+
+        Args:
+            texture: texture, of which the transform is not used.
+            numbers: whether its values are numbers rather than colours.
+        """
+        key = "picture", id(texture.image), numbers
+        return self.once(key, texture.image, lambda: self._picture(texture, numbers))
+
+    def _picture(self, texture: ImageTexture, numbers: bool) -> tuple[str, str]:
+        path, image = Path(texture.source), texture.image
+        space = "raw" if numbers else "sRGB"
+        if not numbers and path.suffix.lower() in _COPIED and path.is_file():
+            if np.array_equal(read_image(path), image):
+                return self.output.picture(image, texture.source, _COPIED), space
+        if in_bytes(image, numbers):
+            content = io.BytesIO()
+            Image.fromarray(number_codes(image) if numbers else srgb_codes(image), "RGB").save(content, "PNG")
+            return self.output.named("textures", path.stem or "picture", ".png", [content.getvalue()]), space
+        return self.output.picture(image, "", ()), "raw"
+
+    def write(self) -> None:
+        """Writes the file; a package (``.usdz``) has its pictures in it.
+
+        Raises:
+            SceneError: it cannot be written.
+        """
+        layer, path = self.stage.GetRootLayer(), self.output.path
+        if path.suffix.lower() == ".usda":
+            self.output.text(path.name, layer.ExportToString())
+            return
+        with TemporaryDirectory() as folder:
+            binary = Path(folder) / "scene.usdc"
+            try:
+                layer.Export(str(binary))
+            except Tf.ErrorException as error:
+                raise SceneError(f"{path}: cannot be written ({error.args[0].commentary})") from None
+            self.output.content(path.name, [binary.read_bytes()])
+
+
+def packed(output: Output, files: list[tuple[str, bytes]]) -> None:
+    """Writes a package: files without compression, each aligned, without dates, the scene first."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as package:
+        for name, part in files:
+            entry = zipfile.ZipInfo(name, _FIRST_DATE)
+            before = content.tell() + _HEADER + len(name.encode())
+            entry.extra = _padding(-before % _ALIGNED)
+            package.writestr(entry, part)
+    output.content(output.path.name, [content.getvalue()])
+
+
+def _padding(size: int) -> bytes:
+    """An extra field of a header, which has at least four bytes, or none."""
+    if size == 0:
+        return b""
+    size += _ALIGNED if size < 4 else 0
+    return b"\x86\x19" + (size - 4).to_bytes(2, "little") + bytes(size - 4)
+
+
+def sharp(texture: ImageTexture) -> ImageTexture:
+    """A picture whose texels are squares, of more texels, for formats that always interpolate."""
+    rows, columns = (max(1, _SIDE_SHARP // size) for size in texture.image.shape[:2])
+    image = np.ascontiguousarray(np.repeat(np.repeat(texture.image, rows, axis=0), columns, axis=1))
+    return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, "mipmap")
+
+
+def vectors(values: NDArray[Any], kind: str = "Vec3fArray") -> Any:
+    """Rows of numbers as an array of the library."""
+    return getattr(Vt, kind).FromNumpy(np.ascontiguousarray(values, np.float32))
