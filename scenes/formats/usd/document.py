@@ -108,9 +108,15 @@ class UsdStage:
         """Writes the file; a package (``.usdz``) has its pictures in it.
 
         Raises:
-            SceneError: it cannot be written.
+            SceneError: it cannot be written, or a number is not finite.
         """
         layer, path = self.stage.GetRootLayer(), self.output.path
+        for prim in Usd.PrimRange.AllPrims(self.stage.GetPseudoRoot()):
+            for one in prim.GetAuthoredAttributes():
+                value: Any = None if one.GetTypeName().isArray else one.Get()
+                number = isinstance(value, float | Gf.Vec2f | Gf.Vec3f | Gf.Vec4f)
+                if number and not np.isfinite(np.asarray(value)).all():
+                    raise SceneError(f"{path}: expected finite numbers, got {value} in {one.GetPath()}")
         if path.suffix.lower() == ".usda":
             self.output.text(path.name, layer.ExportToString())
             return

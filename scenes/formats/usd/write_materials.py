@@ -167,11 +167,13 @@ class _Shader:
             return factor, None
         if image.filter == "nearest" and not numbers and max(image.image.shape[:2]) > 1:
             self.report.add(self.where, "texels with sharp edges", "ones that are blurred at their edges")
-        if image.filter == "nearest":
-            finer = self.document.once(("sharp", id(image.image)), image, lambda: sharp(image)).image
-            image = dataclasses.replace(image, image=finer, filter="mipmap", source="")
-        if self.surface.normals is not None and min(image.uv_scale) < 0.0:
-            image = self.document.once(("mirrored", id(image)), image, lambda: unmirrored(image))
+        given = image
+        if given.filter == "nearest":
+            finer = self.document.once(("sharp", id(given.image)), given, lambda: sharp(given)).image
+            image = dataclasses.replace(given, image=finer, filter="mipmap", source="")
+        if self.surface.normals is not None and min(given.uv_scale) < 0.0:
+            interpolated = image
+            image = self.document.once(("mirrored", id(given)), given, lambda: unmirrored(interpolated))
         return factor, image
 
     def _value(

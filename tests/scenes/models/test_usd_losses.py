@@ -23,9 +23,10 @@ PLAIN = 'def Sphere "p" { }'
 MOVING = 'def Sphere "p" { double3 xformOp:translate.timeSamples = {0: (0, 0, 0), 24: (1, 0, 0)}\n'
 MOVING += 'uniform token[] xformOpOrder = ["xformOp:translate"] }'
 PULSE = "color3f inputs:diffuseColor.timeSamples = {0: (1, 0, 0), 24: (0, 1, 0)}"
+ALONE = 'uniform token light:materialSyncMode = "noMaterialResponse"\n'
 
 CASES = {
-    "the light of a mesh": mesh('uniform token light:materialSyncMode = "noMaterialResponse"\n').replace("Mesh", 'Mesh "quad" (prepend apiSchemas = ["MeshLightAPI"])', 1)
+    "the light of a mesh": mesh(ALONE).replace("Mesh", 'Mesh "quad" (prepend apiSchemas = ["MeshLightAPI"])', 1)
     .replace(' "quad" {', " {", 1),
     "an opacity without a material": mesh("float[] primvars:displayOpacity = [0.5]"),
     "2 polygons that the mesh does not have": mesh("""
