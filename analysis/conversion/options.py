@@ -23,8 +23,8 @@ class ConvertOptions:
     target: Annotated[Path, tyro.conf.Positional]
     """File to write; meshes and pictures go to the folders models and textures beside it."""
     to: str = ""
-    """Its format: pbrt, pbrt4, luxrender, mitsuba, mitsuba3, gltf, usd or an installed one; by default that of its
-    ending."""
+    """Its format: pbrt, pbrt4, luxrender, luxrender-parts, mitsuba, mitsuba3, gltf, usd or an installed one; by
+    default that of its ending."""
     strict: bool = False
     """A loss that changes the picture is an error, and nothing is written."""
     report: Path | None = None

@@ -20,6 +20,7 @@ FORMATS: Named[Format] = Named(
         "pbrt": "scenes.formats.pbrt.declared:PBRT",
         "pbrt4": "scenes.formats.pbrt.declared:PBRT_4",
         "luxrender": "scenes.formats.luxrender.declared:LUXRENDER",
+        "luxrender-parts": "scenes.formats.luxrender.declared:LUXRENDER_PARTS",
         "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
         "mitsuba-dictionary": "scenes.formats.mitsuba.declared:MITSUBA_DICTIONARY",

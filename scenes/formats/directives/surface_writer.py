@@ -47,6 +47,7 @@ class SurfaceWriter:
     """Collects the lines of a scene, and the names that they define.
 
     Attributes:
+        definitions: lines of textures and materials; those of the scene unless they have a file of their own.
         color_texture: type of colour textures.
         color: type of colour parameters.
         checkerboard_end: additional parameters of every checkerboard.
@@ -61,10 +62,14 @@ class SurfaceWriter:
     output: Output
     report: LossReport
     lines: list[str] = field(default_factory=list)
+    definitions: list[str] = field(init=False)
     _textures: dict[tuple[int, str], tuple[Texture, str]] = field(default_factory=dict)
     _materials: dict[int, tuple[Material, str]] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
     _counts: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.definitions = self.lines
 
     # --- textures ------------------------------------------------------------------------------------------------
 
@@ -83,7 +88,7 @@ class SurfaceWriter:
             made = self.texture_line(texture, kind)
             label = self.label("t", "")
             self._textures[key] = texture, label
-            self.lines.append(f'\tTexture "{label}" "{self.color_texture if kind == "color" else kind}" {made}')
+            self.definitions.append(f'\tTexture "{label}" "{self.color_texture if kind == "color" else kind}" {made}')
         return f'"texture {name}" [ "{self._textures[key][1]}" ]'
 
     def constant(self, name: str, value: Rgb, kind: Kind = "color") -> str:
@@ -139,7 +144,7 @@ class SurfaceWriter:
     def define(self, material: Material, label: str, line: str) -> None:
         """Writes a material under a name."""
         self._materials[id(material)] = material, label
-        self.lines.append(f'\tMakeNamedMaterial "{label}" {line}')
+        self.definitions.append(f'\tMakeNamedMaterial "{label}" {line}')
 
     def material_line(self, material: Material, name: str) -> str:
         """The definition of a material without its name; dialects override it for their own materials."""

@@ -136,10 +136,10 @@ class LuxSurfaceWriter(SurfaceWriter):
         known = (_METAL_NAMES.get(name) for name, index in METALS.items() if index == (material.eta, material.k))
         preset, plain = next(known, ""), mean_of(material.reflectance_scale) == (1.0, 1.0, 1.0)
         if preset and plain:
-            self.lines.append(f'\tTexture "{label}" "fresnel" "preset" "string name" [ "{preset}" ]')
+            self.definitions.append(f'\tTexture "{label}" "fresnel" "preset" "string name" [ "{preset}" ]')
         else:
             color = np.array(reflectance_of_index(material.eta, material.k)) * mean_of(material.reflectance_scale)
-            self.lines.append(f'\tTexture "{label}" "fresnel" "fresnelcolor" "color Kr" {listed(color)}')
+            self.definitions.append(f'\tTexture "{label}" "fresnel" "fresnelcolor" "color Kr" {listed(color)}')
             if material.k != (0.0, 0.0, 0.0) or not plain:
                 self.report.add(where, "the complex index of a metal", "its colour at normal incidence")
         return "metal2", [f'"texture fresnel" [ "{label}" ]', self.facets(material)]
