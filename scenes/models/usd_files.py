@@ -126,8 +126,10 @@ class _Reader:
             if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
                 self.report.add(prim.GetName(), "a node without extent")
                 return
+            both = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get())
             for shape, material, local in self._shapes(prim):
-                self._parts.append(Instance(shape, material, product(matrix, local), track, name))
+                place = product(matrix, local)
+                self._parts.append(Instance(shape, material, place, track, name, emission_twosided=both))
 
     def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None, name: str) -> None:
         if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
@@ -175,7 +177,7 @@ class _Reader:
         if kind not in SHAPES:
             self.report.add(name, f"a prim of kind {kind}")
             return []
-        number, colors = self.described.number(self._bound(prim), bool(prim.GetAttribute("doubleSided").Get()))
+        number, colors = self.described.number(self._bound(prim), bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()))
         if self.described.coordinates(number):
             self.report.add(name, f"textures of a {kind.lower()}, which has no texture coordinates")
         color = None

@@ -143,8 +143,8 @@ class UsdWriter:
             path, matrix = self._place(name, instance.to_world, instance.track)
             self._lights.lamp(instance, path, matrix)
             return
-        if not is_closed(instance.shape) and (instance.emission is not None or instance.one_sided):
-            what = "the back of a lamp" if instance.emission is not None else "a surface with a black back"
+        if not (_has_two_sides(instance) or is_closed(instance.shape)):
+            what = "a surface with a black back" if instance.emission is None else "the back of a lamp"
             self.report.add(name, what, "not drawn from behind")
         key = _shared_key(instance)
         if self._counts[key] == 1:
@@ -186,8 +186,7 @@ class UsdWriter:
             made, middle = self._mesh(mesh, path, textured)
             matrix = matrix if middle is None else product(matrix, middle)
         self.document.place(made, matrix)
-        lamp = instance.emission is not None
-        if not (lamp or instance.one_sided):
+        if _has_two_sides(instance):
             made.CreateDoubleSidedAttr(True)
         emission = instance.emission if not isinstance(instance.material, Emissive) else None
         material = self._materials.material(instance.material, emission, name)
@@ -224,12 +223,17 @@ class UsdWriter:
         return made, middle
 
 
+def _has_two_sides(instance: Instance) -> bool:
+    """Whether the back of a shape is as its front."""
+    return not instance.one_sided and (instance.emission is None or instance.emission_twosided)
+
+
 def _shared_key(instance: Instance) -> Any:
     """A key that is equal for instances that share all but their place."""
     if is_lamp_alone(instance):
         return None
-    shape = instance.shape
-    return id(shape) if isinstance(shape, Mesh) else shape, id(instance.material), instance.emission, instance.one_sided
+    shape = id(instance.shape) if isinstance(instance.shape, Mesh) else instance.shape
+    return shape, id(instance.material), instance.emission, _has_two_sides(instance)
 
 
 def save_usd(scene: Scene, output: Output, report: LossReport) -> None:

@@ -33,7 +33,7 @@ from scenes.canonical.values import Matrix, Rgb
 from scenes.daylight import sky_map, sun_light
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.orientation import scales_evenly
-from scenes.formats.geometry.placing import facing
+from scenes.formats.geometry.placing import facing, shines_behind
 from scenes.formats.losses import LossReport
 from scenes.formats.usd.document import UsdStage
 from scenes.models.usd_library import Sdf, UsdLux
@@ -45,9 +45,10 @@ _FLAT = np.diag([-1.0, 1.0, -1.0, 1.0])  # flat lights of USD shine along -z, ca
 
 
 def is_lamp_alone(instance: Instance) -> bool:
-    """Whether an instance is a lamp that UsdLux has: a sphere, disk or rectangle that reflects nothing."""
-    round_or_flat = isinstance(instance.shape, Sphere | Disk | Rectangle)
-    return instance.emission is not None and round_or_flat and instance.material == _BLACK
+    """Whether an instance is a lamp that UsdLux has: a sphere, disk or rectangle that shines on its front alone and
+    reflects nothing."""
+    round_or_flat = isinstance(instance.shape, Sphere | Disk | Rectangle) and instance.material == _BLACK
+    return instance.emission is not None and round_or_flat and not shines_behind(instance)
 
 
 class UsdLightWriter:

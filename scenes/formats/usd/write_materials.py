@@ -16,6 +16,7 @@ import numpy as np
 
 from scenes.canonical import ConstantTexture, ImageTexture, Material, Rgb, Texture
 from scenes.formats.appearance.indices import index_of_reflectance, reflectance_of_index
+from scenes.formats.appearance.normals import map_of
 from scenes.formats.appearance.pictured import factored, unmirrored
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.appearance.surfaces import Surface, surface_of
@@ -91,7 +92,7 @@ class _Shader:
         self._value("diffuseColor", "color3f", factor, image)
         parts, numbers = _ONE, None
         if surface.parts is not None:
-            parts, numbers = self._textured(surface.parts, numbers=True)
+            parts, numbers = self._textured(surface.parts)
         for name, share, channel in (("roughness", surface.roughness, "g"), ("metallic", surface.metallic, "b")):
             value = share * parts["rgb".index(channel)]
             self._value(name, "float", (value, value, value), numbers, channel, numbers=True)
@@ -121,7 +122,7 @@ class _Shader:
             return
         if surface.opacity is None:
             return
-        factor, image = self._textured(surface.opacity, numbers=True)
+        factor, image = self._textured(surface.opacity)
         values = np.array(factor) if image is None else image.image * np.array(factor)
         if np.ptp(values, axis=-1).any():
             self.report.add(self.where, "a coloured opacity", "the mean of its channels")
@@ -138,9 +139,8 @@ class _Shader:
     def _normals(self) -> None:
         if self.surface.normals is None:
             return
-        _, image = self._textured(self.surface.normals, numbers=True)
-        if image is None:
-            self.report.add(self.where, "normals of one direction", "those of the shape")
+        _, image = self._textured(map_of(self.surface.normals))
+        if image is None:  # a texture of textures, which is reported
             return
         scale = self.surface.normal_scale
         values = (2.0 * scale, 2.0 * scale, 2.0, 1.0), (-scale, -scale, -1.0, 0.0)
@@ -159,13 +159,13 @@ class _Shader:
 
     # --- textures ----------------------------------------------------------------------------------------------------
 
-    def _textured(self, texture: Texture, numbers: bool = False) -> tuple[Rgb, ImageTexture | None]:
+    def _textured(self, texture: Texture) -> tuple[Rgb, ImageTexture | None]:
         """A texture as a factor times a picture that is interpolated; beside a normal map pictures are not mirrored by
         their coordinates."""
         factor, image = factored(texture, self.where, self.report)
         if image is None:
             return factor, None
-        if image.filter == "nearest" and not numbers and max(image.image.shape[:2]) > 1:
+        if image.filter == "nearest" and max(image.image.shape[:2]) > 1:
             self.report.add(self.where, "texels with sharp edges", "ones that are blurred at their edges")
         given = image
         if given.filter == "nearest":

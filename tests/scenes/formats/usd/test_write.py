@@ -117,6 +117,26 @@ def test_lamps_that_reflect_nothing_are_lights_of_their_sizes(tmp_path: Path) ->
         assert read.instances[number].to_world[:3, 2] @ lamps[number].to_world[:3, 2] > 0.0
 
 
+def test_lamps_keep_their_sides_and_normals_of_one_direction_their_tilt(tmp_path: Path) -> None:
+    tilted = NormalMapped(Matte(ConstantTexture((0.5, 0.5, 0.5))), ConstantTexture((0.7, 0.5, 0.9)))
+    parts = (
+        Instance(Rectangle(), BLACK, emission=(2.0, 2.0, 2.0), emission_twosided=True),
+        Instance(Rectangle(), BLACK, emission=(2.0, 2.0, 2.0)),
+        Instance(Rectangle(), GREY, emission=(2.0, 2.0, 2.0), emission_twosided=True),
+        Instance(Rectangle(), tilted),
+    )
+    read, losses = back(tmp_path, Scene(PerspectiveCamera(), parts))
+    assert losses == []
+    assert [one.emission_twosided for one in read.instances] == [False, False, True, False]
+    assert [one.emission for one in read.instances[:3]] == [None, (2.0, 2.0, 2.0), (2.0, 2.0, 2.0)]
+    assert [one.material for one in read.instances[:3]] == [Emissive((2.0, 2.0, 2.0)), BLACK, GREY]
+    bent = read.instances[3].material
+    assert isinstance(bent, NormalMapped) and isinstance(bent.normals, ImageTexture)
+    np.testing.assert_allclose(bent.normals.image[0, 0], (0.7, 0.5, 0.9), atol=1e-6)
+    _, losses = back(tmp_path, Scene(PerspectiveCamera(), (Instance(Rectangle(), GREY, one_sided=True),)), "b.usda")
+    assert losses == ["Rectangle0: a surface with a black back: not drawn from behind"]
+
+
 def test_a_camera_keeps_its_lens_its_shift_and_its_shutter(tmp_path: Path) -> None:
     camera = PerspectiveCamera(np.eye(4), 40.0, 0.05, 7.0, shutter_s=(-0.25, 0.5), shift=(0.1, -0.2))
     scene = Scene(camera, (Instance(TRIANGLE, GREY),), film=Film(200, 100))
