@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import PurePath
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -15,7 +16,7 @@ class ConfigError(ValueError):
 def require(condition: bool, name: str, expected: str, got: object) -> None:
     """Raise :class:`ConfigError` unless the condition holds."""
     if not condition:
-        raise ConfigError(f"{name}: expected {expected}, got {got!r}")
+        raise ConfigError(f"{name}: expected {expected}, got {str(got) if isinstance(got, PurePath) else got!r}")
 
 
 Record = TypeVar("Record")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.metadata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +18,14 @@ from typing import Any, Generic, TypeVar, cast
 from tsar.checks import ConfigError
 
 Entry = TypeVar("Entry")
+
+
+def not_among(name: object, known: Iterable[str]) -> str:
+    """What to say of a name that is none of the known ones: these, the name, and the nearest of them if one is near."""
+    names = list(known)
+    near = difflib.get_close_matches(str(name), names, n=1)
+    hint = f" (nearest: {near[0]})" if near else ""
+    return f"expected one of {', '.join(names)}, got {name!r}{hint}"
 
 
 @dataclass(frozen=True)
@@ -112,10 +120,7 @@ class Named(Generic[Entry]):
         """
         if name in self:
             return
-        near = difflib.get_close_matches(str(name), self._entries, n=1)
-        hint = f" (nearest: {near[0]})" if near else ""
-        known = ", ".join(self._entries)
-        raise ConfigError(f"{field or self.kind}: expected one of {known}, got {name!r}{hint}")
+        raise ConfigError(f"{field or self.kind}: {not_among(name, self._entries)}")
 
     def is_own(self, name: str) -> bool:
         """Whether an entry is one of the project's own and not an added one."""

@@ -32,7 +32,6 @@ _NO_MEMORY = re.compile(
     r"can't allocate memory|[Cc]annot allocate memory|bad_alloc|[Ff]ailed to allocate|can't start new thread"
     r"|out of memory|failed to map segment"
 )
-_FRAME = re.compile(r"[╭╮╰╯│─]+|-{3,}")
 
 
 class InputError(ValueError):
@@ -111,6 +110,7 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     """
     import tyro
 
+    from analysis.command.messages import as_typed, one_line
     from analysis.command.subjects import by_subject, renamed
 
     caught, given = io.StringIO(), sys.argv[1:] if arguments is None else arguments
@@ -118,10 +118,12 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     try:
         with contextlib.redirect_stderr(caught), bad_input():
             return tyro.cli(shown, description=_as_called(description), args=given)
+    except InputError as error:
+        raise InputError(as_typed(str(error), given)) from None
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise InputError(renamed(options, given) or _one_line(caught.getvalue())) from None
+        raise InputError(renamed(options, given) or as_typed(one_line(caught.getvalue(), given), given)) from None
 
 
 def _as_called(description: str) -> str:
@@ -131,19 +133,20 @@ def _as_called(description: str) -> str:
     return re.sub(r"python scripts/(\w+)\.py", sys.argv[0], description)
 
 
+def require_files(*files: Path) -> None:
+    """Raises InputError unless all files can be opened; for commands whose libraries take long to load."""
+    for file in files:
+        try:
+            file.open("rb").close()
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read ({error.strerror or error})") from None
+
+
 def require_memory(need_bytes: float, what: str) -> None:
     """Raises InputError if less memory is free than ``what`` needs."""
     have = free_memory_bytes()
     if need_bytes > have:
         raise InputError(f"{what} needs about {need_bytes / 2**30:.1f} GiB of memory, {have / 2**30:.1f} GiB are free")
-
-
-def _one_line(box: str) -> str:
-    """The message inside the box that the parser draws, without its title and advice."""
-    inside = (re.sub(r"Error parsing \w+: ", "", line) for line in box.splitlines() if line[:1] != "╭")
-    lines = [re.sub(r"\s+", " ", _FRAME.sub(" ", line)).strip() for line in inside]
-    text = " ".join(line for line in lines if line)
-    return text.partition(" For full helptext")[0] or "the command line cannot be parsed"
 
 
 def run_cli(main: Callable[[], None]) -> None:

@@ -149,11 +149,22 @@ class RunOptions(ViewOptions):
             priced = expected_ledger(self.ledger)
             if not set(ADAPTIVE_STAGES).isdisjoint(runs):
                 cycle_s = float(adaptive_flops(self.cost, priced)) / self.machine_flops
-                limits.require_pace("capacity", self.machine_flops, cycle_s, self.start_s, self.seconds, warmup)
+                limits.require_pace(*self._pace_option, cycle_s, self.start_s, self.seconds, warmup)
+                last_s = (math.ceil(round(images, 6)) - 1) / self.reference_rate_hz
+                fits = self.policy not in ADAPTIVE_STAGES or cycle_s <= last_s
+                require(fits, "seconds", "time for a cycle before the last reference image", self.seconds)
             frame_s = float(nonadaptive_flops(self.cost, priced)) / self.machine_flops
             limits.require_count("capacity", self.machine_flops, self.seconds / frame_s, "framed images")
             least = f"a hundredth of a framed image in {self.seconds:g} s; one takes {frame_s:.3g} s"
-            require(frame_s <= 100.0 * self.seconds, "capacity", least, self.machine_flops)
+            name, value = self._pace_option
+            require(frame_s <= 100.0 * self.seconds, name, least, value)
+
+    @property
+    def _pace_option(self) -> tuple[str, object]:
+        """Name and value of the option that makes cycles too long for the run: no other does at its default."""
+        if self.capacity is not None:
+            return "capacity", self.capacity
+        return "seconds", self.seconds
 
     def _check_choice(self) -> None:
         """Checks that at most one option chooses a point, and that no other option sets the same values."""

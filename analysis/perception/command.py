@@ -12,9 +12,9 @@ Examples: python scripts/perception.py stimuli --width-px 128 --frames 20 --out 
 
 from __future__ import annotations
 
-from analysis.command.cli import parse
+from analysis.command.cli import parse, require_files
 from analysis.command.extras import require_extra
-from analysis.perception.options import AdaptiveOptions, StepOptions
+from analysis.perception.options import AdaptiveOptions, StepOptions, StimuliOptions
 
 
 def main() -> None:
@@ -22,6 +22,8 @@ def main() -> None:
     options = parse(StepOptions, __doc__ or "")  # type: ignore[arg-type]
     if isinstance(options, AdaptiveOptions):
         require_extra("study")
+    if isinstance(options, StimuliOptions):
+        require_files(*options.jobs)
     from analysis.command.console import show
     from analysis.perception.run import run
 

@@ -9,13 +9,14 @@ Examples: python scripts/spectrum.py --out out/spectrum
 
 from __future__ import annotations
 
-from analysis.command.cli import parse
+from analysis.command.cli import parse, require_files
 from analysis.spectrum.options import SpectrumOptions
 
 
 def main() -> None:
     """Parses, measures, prints the outcome and the place of the files."""
     options = parse(SpectrumOptions, __doc__ or "")
+    require_files(*options.images)
     from analysis.command.console import show
     from analysis.spectrum.run import run_study
     from analysis.spectrum.tables import tables

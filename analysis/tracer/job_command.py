@@ -7,13 +7,14 @@ Examples: python scripts/job.py scenes/assets/plane/plane_job.txt --out out/plan
 
 from __future__ import annotations
 
-from analysis.command.cli import parse
+from analysis.command.cli import parse, require_files
 from analysis.tracer.options import JobOptions
 
 
 def main() -> None:
     """Parses, renders missing frames, prints their number."""
     options = parse(JobOptions, __doc__ or "")
+    require_files(options.job)
     from analysis.command.console import show
     from analysis.tracer.run import job
 

@@ -74,6 +74,6 @@ class TradeOptions:
             at_once=(1, 1000),
             search_seed=limits.SEEDS,
             trace_segments=limits.SEGMENTS,
-            jod_s=(0.0, self.seconds),
+            jod_s=(0.0, max(self.seconds, TradeOptions.jod_s)),
             draws=(10, 100_000),
         )

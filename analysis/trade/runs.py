@@ -78,7 +78,7 @@ def runs(options: TradeOptions, points: Iterable[Point]) -> tuple[list[Run], dic
         ConfigError: the default does not fit.
     """
     scale, found, dropped = scale_of(options), list[Run](), dict[str, str]()
-    middle, half = 0.5 * scale.seconds, 0.5 * options.jod_s
+    middle, half = 0.5 * scale.seconds, 0.5 * min(options.jod_s, scale.seconds)
     base = Case(
         input=INPUTS[0],
         policy=OWN,

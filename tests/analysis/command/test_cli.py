@@ -10,11 +10,13 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from analysis.command import cli
 from analysis.command.cli import InputError, bad_input, full_disk, parse, require_memory, run_cli
+from analysis.command.options import Unprefixed
 from tsar.config import TsarConfig
 
 
@@ -28,10 +30,25 @@ class Options:
     """Where."""
     tsar: TsarConfig = field(default_factory=TsarConfig)
     """What."""
+    shares: tuple[float, ...] = ()
+    """Which."""
+    corner: tuple[float, float] = (0.0, 0.0)
+    """Where from."""
+    only: int | None = None
+    """Which alone."""
+    kind: Literal["dwt", "fft"] = "dwt"
+    """How."""
 
     def __post_init__(self) -> None:
         if self.count < 0:
             raise ValueError(f"count: expected at least 0,\n got {self.count}")
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Like a script whose options have no prefix."""
+
+    tsar: Unprefixed[TsarConfig] = field(default_factory=TsarConfig)
 
 
 def test_options_are_parsed() -> None:
@@ -52,6 +69,13 @@ def test_options_are_parsed() -> None:
         (["--tsar.batch-size", "-3"], ["batch_size: expected between 1 and 8192 framelets, got -3"]),
         (["--tsar.tiling.level-max", "9"], ["tiling.level_max: expected between 2 and 7, got 9"]),
         (["--tsar.error.norm", "l3"], ["error.norm", "l3", "linf"]),
+        (["--count", "1.5"], ["--count: expected a whole number, got '1.5'"]),
+        (["--shares", "1", "x", "--count", "2"], ["--shares: expected numbers, got '1', 'x'"]),
+        (["--corner", "1", "x"], ["--corner: expected FLOAT FLOAT, got '1', 'x'"]),
+        (["--corner=1"], ["--corner: expected 2 values, got '1'"]),
+        (["--kind"], ["--kind: expected a value, got none"]),
+        (["--only", "x"], ["--only: expected a whole number, got 'x'"]),
+        (["--kind", "fft2"], ["--kind: expected one of dwt, fft, got 'fft2' (nearest: fft)"]),
     ],
 )
 def test_bad_arguments_name_what_is_wrong_in_one_line(
@@ -69,6 +93,19 @@ def test_bad_arguments_name_what_is_wrong_in_one_line(
     printed = capsys.readouterr()
     assert stop.value.code == 2 and printed.out == ""
     assert printed.err.startswith("error: ") and printed.err.endswith("\n") and printed.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--rate-max=3"], "rate_max: expected 1, 2, 4 or 8, or 0, got 3"),
+        (["--bias", "9"], "bias: expected a number in [-8, 8], got 9.0"),
+    ],
+)
+def test_a_field_of_a_record_has_the_name_of_its_option(arguments: list[str], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse(Flat, "d", arguments)
+    assert str(caught.value) == message
 
 
 def test_help_goes_to_standard_output(capsys: pytest.CaptureFixture) -> None:

@@ -44,6 +44,40 @@ def test_unknown_scenes_are_refused_by_name_before_anything_loads() -> None:
     assert done.stdout == "False False\n"
 
 
+@pytest.mark.parametrize(
+    ("module", "arguments", "said"),
+    [
+        ("tracer.gallery_command", "glas", "effects: expected one of plain"),
+        ("tracer.job_command", "gone.txt", "gone.txt: cannot be read"),
+        ("spectrum.command", "gone.png", "gone.png: cannot be read"),
+        ("perception.command", "stimuli gone.txt", "gone.txt: cannot be read"),
+    ],
+)
+def test_bad_input_is_refused_before_libraries_load(module: str, arguments: str, said: str) -> None:
+    program = (
+        f"import sys; sys.argv = ['x', *{arguments.split()}]\nfrom analysis.{module} import main\n"
+        "try: main()\nexcept ValueError as error: print(error, *{'torch', 'warp'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(said) and done.stdout.endswith(("(nearest: glass)\n", "directory)\n")), done.stdout
+
+
+@pytest.mark.parametrize(
+    ("given", "blamed"),
+    [
+        ({"capacity": 1e6}, "capacity: .* got 1000000.0"),
+        ({"seconds": 0.001}, "seconds: .* got 0.001"),
+        (
+            {"seconds": 0.2, "policy": "thesis", "reference_rate_hz": 5.0},
+            "seconds: expected time for a cycle",
+        ),
+    ],
+)
+def test_cycles_too_long_for_a_run_blame_an_option_that_was_given(given: dict, blamed: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{blamed}"):
+        RunOptions("fly-by", **{"rivals": ("framed",), **given})
+
+
 @pytest.mark.parametrize("samples", [10, 26, 28])
 def test_stratified_samples_are_a_cube(samples: int) -> None:
     with pytest.raises(ConfigError, match=rf"^samples: expected a cube for the point set stratified, got {samples}"):

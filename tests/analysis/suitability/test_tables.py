@@ -51,6 +51,20 @@ def test_percentiles_stand_beside_the_thesis() -> None:
         assert list(table[f"{name} thesis"]) == [SUITABLE_PERCENTILE[row][INPUTS.index(name)] for row in (6, 7)]
 
 
+def test_runs_without_a_whole_cycle_have_their_lines() -> None:
+    """Such as on a machine whose cycles take most of the run: the summary of the run has nothing per cycle."""
+    whole = made(lambda run: 0.5)
+    gone = ("cycles", "cycle_s", "invariants")
+    short = [
+        RunResult(one.run, {name: value for name, value in one.summary.items() if name not in gone}, one.times)
+        for one in whole.all
+    ]
+    table = run_table(Results(short))
+    assert len(table) == 8 and not table["cycles"].any() and table["cycle_s"].isna().all()
+    assert table["invariants_ok"].all() and (table["median"] == 0.5).all()
+    assert vote_table(Results(short)).equals(vote_table(whole))
+
+
 def test_repetitions_are_pooled() -> None:
     """A run that is suitable always and one that never is make one suitable half of the time."""
     table = percentile_table(made(lambda run: 0.5 if run.repetition == 0 else 2.0))
