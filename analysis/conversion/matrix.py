@@ -7,6 +7,7 @@ read again and drawn by Mitsuba 3.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import re
 from collections.abc import Callable, Iterator
@@ -21,11 +22,12 @@ from numpy.typing import NDArray
 from analysis.command.progress import Task
 from analysis.conversion.peers import RenderedImage, rendered
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
-from scenes.canonical import Scene
+from scenes.canonical import Light, Scene
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
 
-FORMATS_OF = {"pbrt": ".pbrt", "pbrt4": ".pbrt", "mitsuba": ".xml", "mitsuba3": ".xml", "luxrender": ".lxs"}
+FORMATS_OF = {"pbrt": ".pbrt", "pbrt4": ".pbrt", "mitsuba": ".xml", "mitsuba3": ".xml", "luxrender": ".lxs",
+              "gltf": ".gltf"}  # fmt: skip
 """Formats and the endings of their files."""
 
 ENGINES = {"mitsuba": "mitsuba", "mitsuba3": "mitsuba", "luxrender": "luxcore"}
@@ -35,6 +37,7 @@ BOUND = 0.02
 
 _GONE = re.compile(r'type="(phong|ward|difftrans|mixturebsdf|roughdiffuse|sun|sky|sunsky)"')
 
+_SKY = "light all around"  # which glTF loses, and gets back
 _DIM = 0.1  # of the mean of a specimen, below which differences count as of this share
 
 
@@ -50,18 +53,20 @@ class Gallery:
         folder: folder for files and pictures.
         samples: samples per pixel.
         limit_s: most seconds for each picture.
+        sky: the light of the specimens where that is none of them; glTF, which has none all around, gets it back.
     """
 
     folder: Path
     samples: int
     limit_s: float
+    sky: tuple[Light, ...] = ()
     _drawn: dict[str, RenderedImage | str] = field(default_factory=dict)
 
     def picture(self, kind: str, file: Path, size_px: tuple[int, int]) -> RenderedImage | str:
         """The picture of a file of a format."""
         if kind not in ENGINES:
             again = file.with_name(f"{file.stem}-of-{kind}.xml")
-            save_scene_file(load_scene_file(file), again, "mitsuba3")
+            save_scene_file(read(file, self.sky), again, "mitsuba3")
             kind, file = "mitsuba3", again
         name = hashlib.blake2b(kind.encode() + file.read_bytes(), digest_size=8).hexdigest()
         if name not in self._drawn:
@@ -79,7 +84,12 @@ GROUPS: dict[str, Callable[[], Specimens]] = {
 
 
 def matrix_rows(
-    folder: Path, samples: int, limit_s: float, task: Task, groups: tuple[str, ...] = tuple(GROUPS)
+    folder: Path,
+    samples: int,
+    limit_s: float,
+    task: Task,
+    groups: tuple[str, ...] = tuple(GROUPS),
+    formats: tuple[str, ...] = tuple(FORMATS_OF),
 ) -> list[dict[str, Any]]:
     """A row for each specimen and each pair of formats, and for each format in which a specimen is written first.
 
@@ -89,61 +99,77 @@ def matrix_rows(
         limit_s: most seconds for each picture.
         task: progress, a step a group.
         groups: names in ``GROUPS``.
+        formats: names in ``FORMATS_OF``.
     """
     rows: list[dict[str, Any]] = []
     for name in groups:
         work = folder / name.replace(", ", "-").replace(" ", "-")
         work.mkdir(parents=True, exist_ok=True)
-        rows += _rows(GROUPS[name](), Gallery(work, samples, limit_s))
+        found = GROUPS[name]()
+        rows += _rows(found, Gallery(work, samples, limit_s, found.sky), formats)
         task.advance()
     return rows
 
 
-def _rows(found: Specimens, gallery: Gallery) -> Iterator[dict[str, Any]]:
+def read(file: Path, sky: tuple[Light, ...], report: LossReport | None = None) -> Scene:
+    """The scene of a file, of glTF with the light of the specimens."""
+    scene = load_scene_file(file, None, report)
+    if not sky or file.suffix != FORMATS_OF["gltf"]:
+        return scene
+    return dataclasses.replace(scene, lights=sky, ambient=(0.0, 0.0, 0.0), background=None)
+
+
+def _rows(found: Specimens, gallery: Gallery, formats: tuple[str, ...]) -> Iterator[dict[str, Any]]:
     scenes: dict[str, Scene] = {"scene": found.scene}
     pictures: dict[str, RenderedImage | str] = {}
     gone: dict[str, Known] = {}
-    for source in ("scene", *FORMATS_OF):
-        for target, ending in FORMATS_OF.items():
+    endings = {name: FORMATS_OF[name] for name in formats}
+    for source in ("scene", *formats):
+        for target, ending in endings.items():
             file = gallery.folder / f"{source}-to-{target}{ending}"
             save_scene_file(scenes[source], file, target)
             picture = gallery.picture(target, file, found.size_px)
             if source == "scene":
-                scenes[target], pictures[target] = load_scene_file(file), picture
+                scenes[target], pictures[target] = read(file, gallery.sky), picture
                 if target == "mitsuba3":
                     pictures["scene"] = picture
-        for target, ending in FORMATS_OF.items():
+        for target, ending in endings.items():
             file = gallery.folder / f"{source}-to-{target}{ending}"
             pair = pictures[source], gallery.picture(target, file, found.size_px)
             off = differences(found, *pair)
             for name, one in found.single.items():
-                lost, undrawn = losses(one, source, target, gallery.folder, gone.setdefault(name, {}))
+                lost, undrawn = losses(one, source, target, gallery.folder, gone.setdefault(name, {}), found.sky)
                 value, note = (float("nan"), undrawn) if undrawn else off[name]
                 yield {"specimen": name, "from": source, "to": target, "off": value, "note": note, "losses": lost}
 
 
-def losses(scene: Scene, source: str, target: str, folder: Path, known: Known | None = None) -> tuple[list[str], str]:
+def losses(
+    scene: Scene, source: str, target: str, folder: Path, known: Known | None = None, sky: tuple[Light, ...] = ()
+) -> tuple[list[str], str]:
     """What a conversion says to have lost of the picture, with the losses of the ways to renderers, and a plugin that
     Mitsuba 3 does not have, so that the file of Mitsuba 0.5 cannot be drawn."""
     ways = [(source, target), (source,)]
     found = [
-        _after(scene, way if way[-1] in ENGINES else (*way, "mitsuba3"), folder, {} if known is None else known)
+        _after(scene, way if way[-1] in ENGINES else (*way, "mitsuba3"), folder, {} if known is None else known, sky)
         for way in ways
     ]
     lost = dict.fromkeys(loss for one in found for loss in one[1])
     return list(lost), next((one[2] for one in found if one[2]), "")
 
 
-def _after(scene: Scene, way: tuple[str, ...], folder: Path, known: Known) -> tuple[Scene, tuple[str, ...], str]:
+def _after(
+    scene: Scene, way: tuple[str, ...], folder: Path, known: Known, sky: tuple[Light, ...]
+) -> tuple[Scene, tuple[str, ...], str]:
     """A scene after some formats, what it lost on the way, and the missing plugin; each way is gone once."""
     if way in ((), ("scene",)):
         return scene, (), ""
     if way not in known:
-        before, lost, undrawn = _after(scene, way[:-1], folder, known)
+        before, lost, undrawn = _after(scene, way[:-1], folder, known, sky)
         report, file = LossReport(), folder / f"single{FORMATS_OF[way[-1]]}"
         save_scene_file(before, file, way[-1], report)
-        after = load_scene_file(file, None, report)
-        lost += tuple(f"{loss.what}: {loss.became}" for loss in report.losses if loss.picture)
+        after = read(file, sky, report)
+        told = (loss for loss in report.losses if loss.picture and not (sky and loss.what == _SKY))
+        lost += tuple(f"{loss.what}: {loss.became}" for loss in told)
         if way[-1] == "mitsuba" and (gone := _GONE.search(file.read_text(encoding="utf-8"))):
             undrawn = f"Mitsuba 3 has no plugin {gone[1]!r}"
         known[way] = after, lost, undrawn

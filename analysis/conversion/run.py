@@ -47,7 +47,7 @@ def check(options: CheckOptions) -> list[Table]:
     """
     from analysis.conversion.check import checked
     from analysis.conversion.markers import marker_offsets
-    from analysis.conversion.matrix import GROUPS, matrix_rows, worst
+    from analysis.conversion.matrix import FORMATS_OF, GROUPS, matrix_rows, worst
     from analysis.conversion.mutations import summed
 
     with bad_input():
@@ -58,11 +58,11 @@ def check(options: CheckOptions) -> list[Table]:
         mutations = mutation_rows(options, shown.task("mutations", options.mutations)) if options.mutations else []
         rows = [] if options.mutations else checked(options, shown.task("scenes", len(options.scenes)))
         markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []
-        matrix = (
-            matrix_rows(options.out / "matrix", options.samples, options.limit_s, shown.task("matrix", len(GROUPS)))
-            if options.matrix
-            else []
-        )
+        matrix = []
+        if options.matrix:
+            given, task = (options.samples, options.limit_s), shown.task("matrix", len(GROUPS))
+            formats = options.formats or tuple(FORMATS_OF)
+            matrix = matrix_rows(options.out / "matrix", *given, task, formats=formats)
         tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix) if matrix else [],
                   "mutations": mutations}  # fmt: skip
         found = {name: part for name, part in tables.items() if part}

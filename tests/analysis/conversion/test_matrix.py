@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analysis.command.progress import Task
-from analysis.conversion.matrix import BOUND, FORMATS_OF, GROUPS, differences, losses, matrix_rows, worst
+from analysis.conversion.matrix import BOUND, FORMATS_OF, GROUPS, differences, losses, matrix_rows, read, worst
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, MATERIALS
 from scenes.canonical import Material, Metal
 from scenes.formats.conversion import load_scene_file, save_scene_file
@@ -42,6 +42,8 @@ def test_every_specimen_of_every_format_becomes_every_other(source: str, tmp_pat
                          ("metallic-roughness", "a metallic-roughness surface")])  # fmt: skip
 def test_what_no_format_has_is_a_loss(specimen: str, loss: str, tmp_path: Path) -> None:
     for target in FORMATS_OF:
+        if target == "gltf" and specimen != "height field":
+            continue  # it has both
         if (specimen, target) == ("normal-mapped", "mitsuba3"):
             continue  # it has normal maps
         assert any(one.startswith(loss) for one in losses(SINGLE[specimen], "scene", target, tmp_path)[0])
@@ -61,6 +63,28 @@ def test_an_even_height_is_left_out_as_luxcore_refuses_it(tmp_path: Path) -> Non
         save_scene_file(SINGLE["matte, bumped"], tmp_path / name, to)
         text = (tmp_path / name).read_text()
         assert "bumpmap" not in text and "displacement" not in text
+
+
+@pytest.mark.parametrize("specimen", ["matte", "glass", "metallic-roughness", "normal-mapped", "glowing"])
+def test_gltf_holds_these_materials_without_a_loss_under_the_sky_of_the_furnace(specimen: str, tmp_path: Path) -> None:
+    """glTF has no light all around, and gets it back for the picture."""
+    found = GROUPS["materials"]()
+    assert losses(SINGLE[specimen], "scene", "gltf", tmp_path)[0] != []
+    lost, _ = losses(SINGLE[specimen], "scene", "gltf", tmp_path, None, found.sky)
+    allowed = {"glowing": "a surface that shines on both sides", "glass": "sphere"}  # Mitsuba has no such surface
+    assert all(allowed.get(specimen, "nothing") in loss for loss in lost), lost
+    save_scene_file(SINGLE[specimen], tmp_path / "a.gltf")
+    assert read(tmp_path / "a.gltf", found.sky).lights == found.sky
+    assert read(tmp_path / "a.gltf", ()).lights != found.sky
+
+
+@pytest.mark.slow
+def test_glass_and_metal_of_gltf_are_as_bright_in_mitsuba(tmp_path: Path) -> None:
+    pytest.importorskip("mitsuba")
+    rows = matrix_rows(tmp_path, 64, 120.0, Task(), ("materials",), ("mitsuba3", "gltf"))
+    for row in rows:
+        if row["specimen"] in ("matte", "glass", "metallic-roughness", "normal-mapped", "mask", "glass, rough"):
+            assert row["off"] < BOUND and not row["note"], row
 
 
 def test_differences_are_those_of_the_cells() -> None:
@@ -88,4 +112,4 @@ def test_point_lights_are_as_bright_in_every_pair(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba")
     pytest.importorskip("pyluxcore")
     rows = matrix_rows(tmp_path, 64, 120.0, Task(), ("point",))
-    assert len(rows) == 30 and all(row["note"] == "" and row["off"] < BOUND for row in rows), rows
+    assert len(rows) == 42 and all(row["note"] == "" and row["off"] < BOUND for row in rows), rows
