@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from analysis.command.progress import Task
 from analysis.conversion.peers import RenderedImage, rendered
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
-from scenes.canonical import Light, Scene
+from scenes.canonical import Scene
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
 
@@ -53,20 +53,20 @@ class Gallery:
         folder: folder for files and pictures.
         samples: samples per pixel.
         limit_s: most seconds for each picture.
-        sky: the light of the specimens where that is none of them; glTF, which has none all around, gets it back.
+        like: the specimens; glTF files get back what the format has not (:func:`read`).
     """
 
     folder: Path
     samples: int
     limit_s: float
-    sky: tuple[Light, ...] = ()
+    like: Specimens
     _drawn: dict[str, RenderedImage | str] = field(default_factory=dict)
 
     def picture(self, kind: str, file: Path, size_px: tuple[int, int]) -> RenderedImage | str:
         """The picture of a file of a format."""
         if kind not in ENGINES:
             again = file.with_name(f"{file.stem}-of-{kind}.xml")
-            save_scene_file(read(file, self.sky), again, "mitsuba3")
+            save_scene_file(read(file, self.like.scene, self.like.sky), again, "mitsuba3")
             kind, file = "mitsuba3", again
         name = hashlib.blake2b(kind.encode() + file.read_bytes(), digest_size=8).hexdigest()
         if name not in self._drawn:
@@ -106,17 +106,18 @@ def matrix_rows(
         work = folder / name.replace(", ", "-").replace(" ", "-")
         work.mkdir(parents=True, exist_ok=True)
         found = GROUPS[name]()
-        rows += _rows(found, Gallery(work, samples, limit_s, found.sky), formats)
+        rows += _rows(found, Gallery(work, samples, limit_s, found), formats)
         task.advance()
     return rows
 
 
-def read(file: Path, sky: tuple[Light, ...], report: LossReport | None = None) -> Scene:
-    """The scene of a file, of glTF with the light of the specimens."""
+def read(file: Path, like: Scene, sky: bool, report: LossReport | None = None) -> Scene:
+    """The scene of a file; that of glTF gets the depth of paths of another scene, and with ``sky`` its lights."""
     scene = load_scene_file(file, None, report)
-    if not sky or file.suffix != FORMATS_OF["gltf"]:
+    if file.suffix != FORMATS_OF["gltf"]:
         return scene
-    return dataclasses.replace(scene, lights=sky, ambient=(0.0, 0.0, 0.0), background=None)
+    scene = dataclasses.replace(scene, integrator=like.integrator)
+    return dataclasses.replace(scene, lights=like.lights, ambient=(0.0,) * 3, background=None) if sky else scene
 
 
 def _rows(found: Specimens, gallery: Gallery, formats: tuple[str, ...]) -> Iterator[dict[str, Any]]:
@@ -130,7 +131,7 @@ def _rows(found: Specimens, gallery: Gallery, formats: tuple[str, ...]) -> Itera
             save_scene_file(scenes[source], file, target)
             picture = gallery.picture(target, file, found.size_px)
             if source == "scene":
-                scenes[target], pictures[target] = read(file, gallery.sky), picture
+                scenes[target], pictures[target] = read(file, found.scene, found.sky), picture
                 if target == "mitsuba3":
                     pictures["scene"] = picture
         for target, ending in endings.items():
@@ -144,7 +145,7 @@ def _rows(found: Specimens, gallery: Gallery, formats: tuple[str, ...]) -> Itera
 
 
 def losses(
-    scene: Scene, source: str, target: str, folder: Path, known: Known | None = None, sky: tuple[Light, ...] = ()
+    scene: Scene, source: str, target: str, folder: Path, known: Known | None = None, sky: bool = False
 ) -> tuple[list[str], str]:
     """What a conversion says to have lost of the picture, with the losses of the ways to renderers, and a plugin that
     Mitsuba 3 does not have, so that the file of Mitsuba 0.5 cannot be drawn."""
@@ -158,7 +159,7 @@ def losses(
 
 
 def _after(
-    scene: Scene, way: tuple[str, ...], folder: Path, known: Known, sky: tuple[Light, ...]
+    scene: Scene, way: tuple[str, ...], folder: Path, known: Known, sky: bool
 ) -> tuple[Scene, tuple[str, ...], str]:
     """A scene after some formats, what it lost on the way, and the missing plugin; each way is gone once."""
     if way in ((), ("scene",)):
@@ -167,7 +168,7 @@ def _after(
         before, lost, undrawn = _after(scene, way[:-1], folder, known, sky)
         report, file = LossReport(), folder / f"single{FORMATS_OF[way[-1]]}"
         save_scene_file(before, file, way[-1], report)
-        after = read(file, sky, report)
+        after = read(file, scene, sky, report)
         told = (loss for loss in report.losses if loss.picture and not (sky and loss.what == _SKY))
         lost += tuple(f"{loss.what}: {loss.became}" for loss in told)
         if way[-1] == "mitsuba" and (gone := _GONE.search(file.read_text(encoding="utf-8"))):

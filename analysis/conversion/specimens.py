@@ -160,7 +160,7 @@ class Specimens:
         size_px: width and height of the picture, pixels.
         cells: names of the cells, from left to right and from top to bottom.
         single: for each specimen, the scene that has it alone, whose losses are its own.
-        sky: the light in which materials are seen; none where lights are the specimens.
+        sky: whether the light is none of the specimens.
         reach: half side of the middle of a cell that counts, in half cells.
         hidden: half side of the part of it that does not count, in half cells.
     """
@@ -169,7 +169,7 @@ class Specimens:
     size_px: tuple[int, int]
     cells: tuple[str, ...]
     single: dict[str, Scene]
-    sky: tuple[Light, ...] = ()
+    sky: bool = False
     reach: float = 0.3
     hidden: float = 0.0
 
@@ -208,7 +208,7 @@ def materials() -> Specimens:
     }
     scene, size_px = _scene(list(found.values()), [_even_sky()], count, 16)
     single = {name: _scene([one], [_even_sky()], 1, 16)[0] for name, one in found.items()}
-    return Specimens(scene, size_px, tuple(found), single, scene.lights)
+    return Specimens(scene, size_px, tuple(found), single, True)
 
 
 def _cell() -> list[Instance]:

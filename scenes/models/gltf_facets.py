@@ -77,9 +77,8 @@ class FacetMaterials:
                 rgb(np.maximum(emission, 0.0)),
                 None if glow is None or not (emission > 0.0).any() else self._picture(glow, where),
             )
-            if given.get("doubleSided", False) and found == MetallicRough(
-                _BLACK, 0.0, rough, ior=1.0, emission=found.emission
-            ):
+            shining = MetallicRough(_BLACK, 0.0, rough, ior=1.0, emission=found.emission)
+            if given.get("doubleSided", False) and max(found.emission) > 0.0 and found == shining:
                 found = Emissive(found.emission)
         normal = pictures.get("normalTexture")
         if normal is not None:

@@ -74,8 +74,8 @@ def test_gltf_holds_these_materials_without_a_loss_under_the_sky_of_the_furnace(
     allowed = {"glowing": "a surface that shines on both sides", "glass": "sphere"}  # Mitsuba has no such surface
     assert all(allowed.get(specimen, "nothing") in loss for loss in lost), lost
     save_scene_file(SINGLE[specimen], tmp_path / "a.gltf")
-    assert read(tmp_path / "a.gltf", found.sky).lights == found.sky
-    assert read(tmp_path / "a.gltf", ()).lights != found.sky
+    lit, bare = (read(tmp_path / "a.gltf", SINGLE[specimen], sky) for sky in (True, False))
+    assert lit.lights == SINGLE[specimen].lights != bare.lights and lit.integrator == bare.integrator
 
 
 @pytest.mark.slow

@@ -84,6 +84,13 @@ def test_light_of_the_back_of_a_closed_shape_is_not_seen(tmp_path: Path) -> None
     assert BEHIND not in losses(report)
 
 
+def test_a_black_surface_does_not_shine(tmp_path: Path) -> None:
+    report, black = LossReport(), Matte(ConstantTexture((0.0, 0.0, 0.0)))
+    save_scene_file(Scene(PerspectiveCamera(), (Instance(Rectangle(), black),)), tmp_path / "a.gltf", None, report)
+    (part,) = load_scene_file(tmp_path / "a.gltf", None, report).instances
+    assert part.material == black and part.emission is None
+
+
 def mapped(normals: ConstantTexture | ImageTexture, scale: float = 1.0) -> Scene:
     """A square with bent normals, seen from above, under light from the right."""
     view = np.eye(4)
