@@ -15,6 +15,14 @@ Seed = Annotated[int, tyro.conf.arg(help="Seed of all random numbers.")]
 Threads = Annotated[int, tyro.conf.arg(help="Threads for tracing; 0 takes one per core.")]
 """In :data:`analysis.command.limits.THREADS`."""
 
+Scheduler = Annotated[
+    str,
+    tyro.conf.arg(
+        help="Address of a running Dask scheduler, such as tcp://host:8786, whose workers render the frames; they must "
+        "see the same folders and run the same source. Empty renders here."
+    ),
+]
+
 Device = Annotated[Literal["cpu", "cuda:0"], tyro.conf.arg(help="Where rays are traced.")]
 
 References = Annotated[Path, tyro.conf.arg(help="Folder for references, shared by all runs.")]

@@ -49,7 +49,7 @@ SUBJECTS = {
     "page": "host port bench bench_seconds",
     "machine": "device isa threads workers workers_least scheduler memory_limit_gib retries worker_wait_s log_level"
     " chunk_tiles",
-    "file": "out references write_frames layered_stills film page layers format explain markdown only compare",
+    "file": "out references write_frames layered_stills film video page layers format explain markdown only compare",
 }
 """Subjects in the order of the boxes, each with its options."""
 

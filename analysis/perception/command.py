@@ -13,6 +13,7 @@ Examples: python scripts/perception.py stimuli --width-px 128 --frames 20 --out 
 from __future__ import annotations
 
 from analysis.command.cli import parse, require_files
+from analysis.command.cluster import ClusterOptions
 from analysis.command.extras import require_extra
 from analysis.perception.options import AdaptiveOptions, StepOptions, StimuliOptions
 
@@ -24,6 +25,7 @@ def main() -> None:
         require_extra("study")
     if isinstance(options, StimuliOptions):
         require_files(*options.jobs)
+        ClusterOptions(scheduler=options.scheduler).require_port()  # before slow imports
     from analysis.command.console import show
     from analysis.perception.run import run
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
-from analysis.command.options import REFERENCES, References, Threads
+from analysis.command.options import REFERENCES, References, Scheduler, Threads
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.asked import require_distinct, require_inputs
 from analysis.study.inputs import INPUTS
@@ -43,6 +43,7 @@ class StimuliOptions:
     seed: int = 0
     """Seed of all random numbers; of point sets and shifts."""
     threads: Threads = 0
+    scheduler: Scheduler = ""
     out: Path = Path("out/perception")
     """Folder for the results; the stimuli, manifest.json and summary.json."""
 

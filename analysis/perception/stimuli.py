@@ -22,7 +22,8 @@ from analysis.storage.journal import Journal
 from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
 from analysis.storage.store import Store
-from analysis.tracer.jobs import prepare, run_job
+from analysis.tracer.job_farm import run_job_anywhere
+from analysis.tracer.jobs import prepare
 from analysis.tracer.options import JobOptions
 
 MANIFEST = "manifest.json"
@@ -51,11 +52,12 @@ def render_stimuli(options: StimuliOptions, bars: Bars) -> dict[str, Any]:
             format=options.format,
             box_share=options.box_share,
             threads=options.threads,
+            scheduler=options.scheduler,
         )
         work = prepare(job)
         scene = work.settings.name
         folder = options.out / scene
-        found = run_job(work, dataclasses.replace(job, out=folder), bars)
+        found = run_job_anywhere(work, dataclasses.replace(job, out=folder), bars)
         for combination, row in zip(work.job.combinations, found, strict=True):
             files = [folder / combination.name / f"frame{number:05d}.{options.format}" for number in work.frames]
             video = {}

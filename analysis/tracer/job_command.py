@@ -3,11 +3,13 @@
 Examples: python scripts/job.py scenes/assets/plane/plane_job.txt --out out/plane
           python scripts/job.py scenes/assets/spheres/spheres_job.txt --width-px 192 --frames 2 --out out/few
           python scripts/job.py my_job.txt --scene my_scene.txt --out out/mine
+          python scripts/job.py my_job.txt --scheduler tcp://host:8786 --threads 1 --out /shared/mine
 """
 
 from __future__ import annotations
 
 from analysis.command.cli import parse, require_files
+from analysis.command.cluster import ClusterOptions
 from analysis.tracer.options import JobOptions
 
 
@@ -15,6 +17,7 @@ def main() -> None:
     """Parses, renders missing frames, prints their number."""
     options = parse(JobOptions, __doc__ or "")
     require_files(options.job)
+    ClusterOptions(scheduler=options.scheduler).require_port()  # before slow imports
     from analysis.command.console import show
     from analysis.tracer.run import job
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analysis.command.progress import Bars, Task
+from analysis.command.progress import Bars
 from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
 from analysis.tracer.options import JobOptions
@@ -16,6 +16,9 @@ from scenes.canonical import Scene, SceneError
 from scenes.formats.blocks.jobs import Combination, Job, read_job
 from scenes.formats.blocks.read import load_blocks
 from scenes.formats.blocks.settings import Settings
+
+if TYPE_CHECKING:
+    from renderer.sampling.plan import SamplePlan
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,11 @@ class PreparedJob:
     settings: Settings
     size_px: tuple[int, int]
     frames: range
+
+    @property
+    def times_s(self) -> dict[int, float]:
+        """Animation time of each frame by its number, seconds."""
+        return {number: self.settings.frame_start_s(number) for number in self.frames}
 
 
 def prepare(options: JobOptions) -> PreparedJob:
@@ -64,30 +72,34 @@ def run_job(work: PreparedJob, options: JobOptions, bars: Bars) -> list[dict[str
     from renderer.frames import pictures
     from renderer.trace import Renderer
 
-    code = code_hash(Renderer, pictures, render_stills)
-    content = content_hash((work.scene, work.settings, work.size_px, code))
+    content = content_of(work)
     renderer = Renderer(work.scene, threads=options.threads or None, seed=options.seed)
     rows = []
     for combination in work.job.combinations:
-        task = bars.task(combination.name, len(work.frames))
-        rows.append({"combination": combination.name, **_run(renderer, combination, work, options, content, task)})
+        plan, task = plan_of(combination, options), bars.task(combination.name, len(work.frames))
+        picture, folder = pictures(renderer, plan, *work.size_px), options.out / combination.name
+        key, ending = content_hash((plan, content)), f".{options.format}"
+        rendered, nonfinite = render_stills(picture, work.times_s, folder, ending, key, task)
+        counts = {"frames": len(work.frames), "rendered_now": rendered, "nonfinite": nonfinite}
+        rows.append({"combination": combination.name, **counts})
     renderer.close()
     return rows
 
 
-def _run(
-    renderer: Any,
-    combination: Combination,
-    work: PreparedJob,
-    options: JobOptions,
-    content: str,
-    task: Task,
-) -> dict[str, Any]:
+def content_of(work: PreparedJob) -> str:
+    """Hash of everything that decides the frames of a job, except the sampling settings."""
     from analysis.tracer.stills import render_stills
     from renderer.frames import pictures
+    from renderer.trace import Renderer
+
+    return content_hash((work.scene, work.settings, work.size_px, code_hash(Renderer, pictures, render_stills)))
+
+
+def plan_of(combination: Combination, options: JobOptions) -> SamplePlan:
+    """Sampling settings of a combination."""
     from renderer.sampling.plan import SamplePlan
 
-    plan = SamplePlan(
+    return SamplePlan(
         combination.samples,
         combination.points,  # type: ignore[arg-type]
         options.seed,
@@ -97,9 +109,3 @@ def _run(
         options.box_share,
         combination.shift,  # type: ignore[arg-type]
     )
-    folder = options.out / combination.name
-    key = content_hash((plan, content))
-    times_s = {number: work.settings.frame_start_s(number) for number in work.frames}
-    picture = pictures(renderer, plan, *work.size_px)
-    rendered, nonfinite = render_stills(picture, times_s, folder, f".{options.format}", key, task)
-    return {"frames": len(work.frames), "rendered_now": rendered, "nonfinite": nonfinite}

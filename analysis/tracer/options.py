@@ -10,7 +10,7 @@ import tyro
 
 from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
-from analysis.command.options import Device, Seed, Threads, Unprefixed
+from analysis.command.options import Device, Scheduler, Seed, Threads, Unprefixed
 from analysis.tracer.film_options import FilmOptions
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
@@ -166,6 +166,7 @@ class JobOptions:
     seed: int = 0
     """Seed of all random numbers; of point sets and shifts."""
     threads: Threads = 0
+    scheduler: Scheduler = ""
     out: Path = Path("out/job")
     """Folder for the results; summary.json and a folder of frames for each combination; frames that an interrupted run
     of the same job left there are kept."""

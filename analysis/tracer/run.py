@@ -123,14 +123,19 @@ def job(options: JobOptions) -> tuple[PreparedJob, dict[str, Any]]:
     Raises:
         InputError: the job or its scene is invalid, or the results cannot be written.
     """
-    from analysis.tracer.jobs import prepare, run_job
+    from analysis.tracer.job_farm import run_job_anywhere
+    from analysis.tracer.jobs import prepare
     from renderer.film.files import FilmError
 
     with bad_input():
         work = prepare(options)
         own_results(options.out, ())
     with bad_input(), full_disk(options.out, FilmError), bars() as shown:
-        found = {"job": asdict(work.job), "settings": asdict(work.settings), "rows": run_job(work, options, shown)}
+        found = {
+            "job": asdict(work.job),
+            "settings": asdict(work.settings),
+            "rows": run_job_anywhere(work, options, shown),
+        }
         return work, write_summary(options.out, found, options, scene=work.settings.name, seed=options.seed)
 
 

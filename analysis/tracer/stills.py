@@ -7,12 +7,13 @@ are removed once the new ones are complete.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from torch import Tensor
 
 from analysis.command.progress import Task
-from analysis.storage.store import Store
+from analysis.storage.store import Making, Store
 from renderer.film.files import write_image
 from renderer.film.sequence import still_path
 
@@ -50,10 +51,18 @@ def render_stills(
     for number, time_s in times_s.items():
         found = store.find(names[number])
         if found is None:
-            with store.make(names[number]) as found:
-                found.facts["nonfinite"] = write(found.path, picture(number, time_s))
+            found = render_still(store, names[number], partial(picture, number, time_s), write)
             rendered += 1
         nonfinite += found.facts["nonfinite"]
         task.advance()
     store.discard_outdated("frame*")
     return rendered, nonfinite
+
+
+def render_still(
+    store: Store, name: str, picture: Callable[[], Tensor], write: Callable[[Path, Tensor], int] = write_image
+) -> Making:
+    """Renders a still and lists it in a store; returns it with the number of its non-finite values."""
+    with store.make(name) as made:
+        made.facts["nonfinite"] = write(made.path, picture())
+    return made

@@ -1,0 +1,56 @@
+"""Frames of a job on the workers of a scheduler: the same files, and what a worker with another source says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from analysis.command.progress import Bars
+from analysis.tracer import job_farm
+from analysis.tracer.jobs import content_of, prepare, run_job
+from analysis.tracer.options import JobOptions
+
+JOB = "planescene\n2\n1 8\n1\nhammersley\n1\nbox\n"
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=":0") as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> JobOptions:
+    (tmp_path / "job.txt").write_text(JOB)
+    return JobOptions(job=tmp_path / "job.txt", width_px=24, first_frame=80, frames=3, threads=1, out=tmp_path / "here")
+
+
+def frames(folder: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*.png")}
+
+
+def test_frames_of_workers_are_those_of_one_process_and_are_kept(job: JobOptions, scheduler: str) -> None:
+    work = prepare(job)
+    here = run_job(work, job, Bars())
+    there = replace(job, scheduler=scheduler, out=job.out.parent / "there")
+    rows = job_farm.run_job_anywhere(work, there, Bars())
+    assert rows == here and [row["rendered_now"] for row in rows] == [3, 3]
+    assert frames(there.out) == frames(job.out) and len(frames(job.out)) == 6
+    damaged = next(there.out.rglob("*.png"))
+    damaged.write_bytes(b"")
+    again = job_farm.run_job_anywhere(work, there, Bars())
+    assert sum(row["rendered_now"] for row in again) == 1 and frames(there.out) == frames(job.out)
+
+
+def test_a_worker_with_another_scene_or_source_renders_nothing(job: JobOptions, scheduler: str) -> None:
+    work = prepare(job)
+    with pytest.raises(ValueError, match="job.txt: expected source and scene 0000000000000000, this worker has others"):
+        job_farm.render_frame(job, 0, 80, "0" * 64)
+    assert not job.out.exists()
+    job_farm.render_frame(job, 0, 80, content_of(work))
+    assert len(frames(job.out)) == 1
