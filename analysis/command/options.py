@@ -18,8 +18,8 @@ Threads = Annotated[int, tyro.conf.arg(help="Threads for tracing; 0 takes one pe
 Scheduler = Annotated[
     str,
     tyro.conf.arg(
-        help="Address of a running Dask scheduler, such as tcp://host:8786, whose workers render the frames; they must "
-        "see the same folders and run the same source. Empty renders here."
+        help="Address of a running Dask scheduler, such as tcp://host:8786; its workers render the frames, see the "
+        "same folders and run the same source; empty renders here."
     ),
 ]
 
