@@ -140,6 +140,10 @@ def test_a_moment_is_held_with_its_errors(page: Page, hub: Hub) -> None:
     assert hub.engine.stands
     cells = page.locator("#errors tr").first.locator("td")
     assert float(cells.nth(0).inner_text()) > 0.0 and float(cells.nth(1).inner_text()) > 0.0
+    caption = page.locator("#frozen caption")
+    lines = caption.evaluate("one => one.offsetHeight / parseFloat(getComputedStyle(one).fontSize)")
+    assert 1.0 < lines < 2.5, "the caption is one line"
+    expect(page.locator("#missing")).to_contain_text("Not taken: jod")
     page.locator("#o-left").select_option("squared error")
     expect(page.locator("#left-said")).to_contain_text("sum over channels", timeout=PATIENCE_MS)
     page.locator("#freeze").click()

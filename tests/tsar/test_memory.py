@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 from pathlib import Path
 
@@ -55,3 +56,17 @@ def test_systems_that_tell_less_are_served(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(memory, "resource", None)
     monkeypatch.delattr(os, "sysconf")
     assert free_memory_bytes(tmp_path) == 1 << 62
+
+
+def test_modules_of_single_systems_are_imported_where_others_have_a_way() -> None:
+    """Files are locked by filelock and the machine is asked by psutil, which tells neither limits of memory nor the
+    peak on POSIX: there ``resource`` does, and Windows takes another way."""
+    root, single, found = Path(__file__).resolve().parents[2], {"fcntl", "resource", "termios", "pwd", "grp"}, []
+    for file in (
+        f for room in ("tsar", "renderer", "scenes", "analysis", "scripts") for f in (root / room).rglob("*.py")
+    ):
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [(file.relative_to(root).as_posix(), name) for name in names if name in single]
+    assert sorted(found) == [("analysis/study/memory.py", "resource"), ("tsar/memory.py", "resource")]
