@@ -21,6 +21,7 @@ from scenes.formats.losses import LossReport
 
 MAPS = 'Texture "tt" "float" "checkerboard"\nTexture "tt" "{color}" "checkerboard" "{rgb} tex1" [ .9 .1 .2 ]\n'
 TEXTURES = ("constant", "scale", "mix", "checkerboard")
+POINTS = '"point P" [ 0 0 0 1 0 0 0 1 0 ] "integer indices" [ 0 1 2 ]'
 SHAPES = ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid")
 
 
@@ -39,6 +40,7 @@ class Dialect:
     area: str = "diffuse"
     samplers: str = "stratified halton"
     textures: str = ""
+    mesh: str = "trianglemesh"
 
 
 DIALECTS = {
@@ -50,7 +52,7 @@ DIALECTS = {
     "luxrender": Dialect(".lxs", "fleximage", "path bidirectional directlighting exphotonmap igi",
                          "matte mirror glass glass2 roughglass metal metal2 glossy shinymetal mix mattetranslucent",
                          "Kd", "color", "color", "point spot distant infinite sun sky sky2 sunsky", "area",
-                         "lowdiscrepancy random metropolis sobol", "blackbody equalenergy"),
+                         "lowdiscrepancy random metropolis sobol", "blackbody equalenergy", "mesh"),
 }  # fmt: skip
 HEADS = {"Camera": "perspective orthographic environment", "PixelFilter": "gaussian mitchell box triangle"}
 NOTHING = {
@@ -62,13 +64,16 @@ NOTHING = {
     "infinite of a map: from", "hyperboloid: radius",  # what these do not have
     "point: to", "point: efficacy", "spot: efficacy", "infinite: gamma",  # without a direction, a power or a picture
     "coatedconductor: interface.eta", "coatedconductor: remaproughness",  # its coat is reported as a whole
+    "mesh: triindices", "trianglemesh: triindices",  # beside indices, which have the same meaning
     "translucent: Ks", "translucent: remaproughness",  # its glossy part is reported whenever there is one
 }  # fmt: skip
 CANDIDATES = (
     '"float {}" 0.37', '"float {}" 3', '"float {}" 40', '"rgb {}" [ .11 .22 .33 ]', '"texture {}" "tt"',
     '"bool {}" "true"', '"bool {}" "false"', '"string {}" "nosuch"', '"string {}" "clamp"',
     '"string {}" "nearest"', '"string {}" "point"', '"point {}" [ .3 .4 .5 ]',
-    '"float {}" [ -1 3 -2 2 ]',
+    '"float {}" [ -1 3 -2 2 ]', '"float {}" [ 0 0 1 0 0 1 ]', '"float {}" [ 0 0 1 0 0 1 1 1 ]',
+    '"normal {}" [ 0 0 1 0 .6 .8 0 0 1 ]', '"normal {}" [ 0 0 1 0 .6 .8 0 0 1 0 0 1 ]', '"integer {}" [ 0 1 2 0 ]',
+    '"point {}" [ 0 0 0 2 0 0 0 1 0 ]', '"point {}" [ 0 0 0 2 0 0 0 1 0 3 1 0 ]', '"integer {}" [ 0 2 1 ]',
 )  # fmt: skip
 
 
@@ -86,6 +91,9 @@ def texts(dialect: str) -> Iterator[str]:
     materials = found.materials.split()
     yield from (f'{bare}Material "{kind}" "float roughness" .2 {{}}\nShape "sphere"\n' for kind in materials)
     yield from (f'{bare}Shape "{kind}" {{}}\n' for kind in SHAPES)
+    yield f'{bare}Shape "{found.mesh}" {{}} {POINTS}\n'
+    if dialect == "pbrt4":
+        yield f'{bare}Shape "bilinearmesh" {{}} {POINTS.replace("0 1 0 ]", "0 1 0 1 1 0 ]").replace("2 ]", "2 3 ]")}\n'
     use = f'Material "{materials[0]}" "texture {found.base}" "t"\nShape "sphere"\n'
     yield f'{bare}Texture "t" "{found.color}" "imagemap" "string filename" "a.png" {{}}\n{use}'
     for kind in (*TEXTURES, *found.textures.split()):
