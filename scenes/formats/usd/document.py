@@ -31,6 +31,7 @@ RATE = 24.0
 
 _COPIED = (".png", ".jpg", ".jpeg")
 _SIDE_SHARP = 256
+_SIBLINGS = 256
 _ALIGNED, _HEADER = 64, 30  # bytes to which files in a package are aligned, and of a header before its name
 _FIRST_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -52,12 +53,22 @@ class UsdStage:
         UsdGeom.SetStageUpAxis(self.stage, up)
         UsdGeom.SetStageMetersPerUnit(self.stage, 1.0)
         self.stage.SetDefaultPrim(UsdGeom.Xform.Define(self.stage, ROOT).GetPrim())
-        self._numbers: dict[str, int] = {}
+        self._numbers: dict[str, int] = {f"{ROOT}/{name}": 0 for name in ("Materials", "Prototypes")}
+        self._counts: dict[str, int] = {}
+        self._groups: dict[str, str] = {}
         self._made: dict[Any, tuple[object, Any]] = {}
 
     def path(self, name: str, below: str = ROOT) -> str:
-        """A path below another that no prim has yet."""
-        plain = f"{below}/{Tf.MakeValidIdentifier(name)}"
+        """A path that no prim has yet, below another; of many prims, which cost the library a time that grows with the
+        square of their number, every 256 lie below a scope of their own."""
+        count = self._counts[below] = self._counts.get(below, -1) + 1
+        if count and count % _SIBLINGS == 0:
+            self._groups[below] = self._free(f"{below}/more")
+            self.stage.DefinePrim(self._groups[below], "Scope")
+        return self._free(f"{self._groups.get(below, below)}/{Tf.MakeValidIdentifier(name)}")
+
+    def _free(self, plain: str) -> str:
+        """A path that no prim has yet."""
         path = plain
         while path in self._numbers:
             self._numbers[plain] += 1

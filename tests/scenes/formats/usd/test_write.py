@@ -232,3 +232,27 @@ def test_files_that_cannot_be_written_leave_nothing(tmp_path: Path, monkeypatch:
         save_scene_file(shown(GREY), tmp_path / "a.usda")
     assert "expected the package usd-core" in str(extra_of(found.value))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_many_shapes_lie_in_groups_and_keep_their_places(tmp_path: Path) -> None:
+    names = ("Materials", "more", "camera", *(f"n{number % 7}" for number in range(700)))
+    places = [np.eye(4) for _ in names]
+    for number, place in enumerate(places):
+        place[0, 3] = number
+    materials = [Matte(ConstantTexture((number / 1000.0,) * 3)) for number in range(len(names))]
+    parts = tuple(
+        Instance(TRIANGLE, material, place, name=name)
+        for name, material, place in zip(names, materials, places, strict=True)
+    )
+    stage, losses = stage_of(tmp_path, Scene(PerspectiveCamera(), parts))
+    assert losses == []
+    assert max(len(prim.GetChildren()) for prim in stage.TraverseAll()) <= 256 + 8
+    read = load_scene_file(tmp_path / "a.usda")
+    assert sorted(one.to_world[0, 3] for one in read.instances) == list(range(len(names)))
+    for one in read.instances:
+        assert isinstance(one.material, Matte) and isinstance(one.material.reflectance, ConstantTexture)
+        assert one.material.reflectance.value[0] == pytest.approx(one.to_world[0, 3] / 1000.0, abs=1e-6)
+    save_scene_file(read, tmp_path / "b.usdc")
+    again = load_scene_file(tmp_path / "b.usdc")
+    save_scene_file(again, tmp_path / "c.usdc")
+    assert difference(again, load_scene_file(tmp_path / "c.usdc")) is None
