@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import hmac
-import html
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ from analysis.command.cluster import LOOPBACK
 from analysis.command.pages import Answering, accept_page, served
 from analysis.live.hub import Hub, Watcher
 from analysis.live.options import BATCHES, LATENCY_MOST, NOTHING, RESOLUTIONS, policies
+from analysis.page.environment import environment
 from tsar.choices import SOLVERS
 
 LEAST_S = 1.0 / 30.0
@@ -128,19 +128,10 @@ class _Socket(WebSocketHandler):
 
 def page(title: str, token: str) -> str:
     """The page of a live view."""
-    text = files("analysis.live").joinpath("live.html").read_text(encoding="utf-8")
-    chosen = {
-        "policies": [NOTHING, *policies()],
-        "solvers": list(SOLVERS),
-    }
-    steps = {"resolutions": RESOLUTIONS, "batches": BATCHES}
-    text = text.replace("{{latency_most}}", str(LATENCY_MOST))
-    for name, values in steps.items():
-        text = text.replace(f"{{{{{name}}}}}", " ".join(map(str, values)))
-        text = text.replace(f"{{{{{name}_last}}}}", str(len(values) - 1))
-    for name, values in chosen.items():
-        text = text.replace(f"{{{{{name}}}}}", "".join(f"<option>{html.escape(str(one))}</option>" for one in values))
-    return text.replace("{{title}}", html.escape(title)).replace("{{token}}", token)
+    return environment().get_template("live.html.j2").render(
+        title=title, token=token, policies=[NOTHING, *policies()], solvers=list(SOLVERS), resolutions=RESOLUTIONS,
+        batches=BATCHES, latency_most=LATENCY_MOST,
+    )  # fmt: skip
 
 
 @contextmanager

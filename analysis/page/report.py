@@ -6,21 +6,18 @@ import base64
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from analysis.command.console import Table
 from analysis.page import comparer as compared
 from analysis.page import explorer as explored
 from analysis.page.comparer import Comparer, block, source
 from analysis.page.curves import drawing, letters_of
+from analysis.page.environment import environment
 from analysis.page.explorer import Explorer
 from analysis.storage.files import atomic
 
-_TEMPLATES = Path(__file__).with_name("templates")
 STYLE = Path(__file__).with_name("report.css")
 
 
@@ -56,17 +53,6 @@ def write_report(path: Path, report: Report) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-@lru_cache(maxsize=1)
-def _environment() -> Environment:
-    return Environment(
-        loader=FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
 def render(report: Report) -> str:
     """The page as text."""
     scripts = [*(compared.SCRIPTS if report.comparer else ()), *([explored.SCRIPT] if report.explorer else [])]
@@ -80,7 +66,7 @@ def render(report: Report) -> str:
     if report.explorer:
         shown |= explored.shown(report.explorer)
     return (
-        _environment()
+        environment()
         .get_template("report.html.j2")
         .render(report=report, policy=_policy(script), script=script, style=_safe(style), source=source, flat=flat,
                 block=block, **shown)
