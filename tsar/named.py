@@ -28,6 +28,13 @@ def not_among(name: object, known: Iterable[str]) -> str:
     return f"expected one of {', '.join(names)}, got {name!r}{hint}"
 
 
+def require_known(name: str, field: str, known: Iterable[str]) -> None:
+    """Raises ConfigError if a name, the value of a field, is none of the known ones; see :func:`not_among`."""
+    names = list(known)
+    if name not in names:
+        raise ConfigError(f"{field}: {not_among(name, names)}")
+
+
 @dataclass(frozen=True)
 class Origin:
     """Where an entry comes from.

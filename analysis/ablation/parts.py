@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tsar.config import require
 from tsar.filtering.records import DEFAULT
+from tsar.named import require_known
 
 WHOLE = "all of it"
 """The policy as it is."""
@@ -66,6 +67,6 @@ def chosen_parts(names: Sequence[str]) -> tuple[Part, ...]:
     """
     known = {part.name: part for part in all_parts()}
     for name in names:
-        require(name in known, "parts", f"names out of {', '.join(known)}", name)
+        require_known(name, "parts", known)
     require(len(names) == len(set(names)), "parts", "none twice", tuple(names))
     return tuple(known[name] for name in names or known)

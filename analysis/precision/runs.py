@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from analysis.precision.options import PrecisionOptions
 from analysis.study.cases import SCALES, Case
 from analysis.study.inputs import phase_of
-from tsar.config import require
+from tsar.named import require_known
 from tsar.policies.stored import ALL
 
 TEXTURES = "textures"
@@ -71,7 +71,7 @@ def runs(options: PrecisionOptions) -> list[Run]:
     """
     known = dict.fromkeys(name for policy in options.policies for name in KEPT[policy])
     for name in options.kept:
-        require(name in known, "kept", f"names out of {', '.join(known)}", name)
+        require_known(name, "kept", known)
     scale = SCALES[options.scale].errors_alone
     found = []
     for repetition, policy, name in itertools.product(range(options.repetitions), options.policies, options.inputs):

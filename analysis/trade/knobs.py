@@ -12,6 +12,7 @@ from typing import Any
 from analysis.study.cases import ROWS, Case, Scale
 from tsar.config import TsarConfig, require
 from tsar.filtering.records import DEFAULT
+from tsar.named import require_known
 from tsar.policies import RIVALS
 
 OWN, THESIS = "tsar", "thesis"
@@ -160,7 +161,7 @@ def chosen_knobs(names: Sequence[str]) -> tuple[Knob, ...]:
         ConfigError: a name is unknown, or given twice.
     """
     for name in names:
-        require(name in KNOBS, "knobs", f"names out of {', '.join(KNOBS)}", name)
+        require_known(name, "knobs", KNOBS)
     require(len(names) == len(set(names)), "knobs", "none twice", tuple(names))
     return tuple(KNOBS[name] for name in names or KNOBS)
 

@@ -55,7 +55,8 @@ def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytes
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (("--knobs", "nothing"), ("knobs: expected names out of policy, batch", "nothing")),
+        (("--knobs", "nothing"), ("knobs: expected one of policy, batch", "nothing")),
+        (("--knobs", "footprnt"), ("knobs: expected one of policy, batch", "(nearest: footprint)")),
         (("--inputs", "nothing"), ("nothing",)),
         (
             ("--inputs", "nothing.pbrt"),

@@ -22,6 +22,7 @@ from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.decision import Decision
 from tsar.formats import NUMBER_FORMATS, rounded
+from tsar.named import require_known
 from tsar.policy import Cycle, Moment, Picture, Policy, Price, Setting
 from tsar.reconstruction import Reconstruction
 from tsar.stages import Stages, reference
@@ -59,7 +60,7 @@ class Stored(Policy[Any]):
         """
         self._formats: dict[str, str] = {}
         for name, form in formats.items():
-            require(name in (ALL, *FIELDS), "formats", f"names out of {', '.join((ALL, *FIELDS))}", name)
+            require_known(name, "formats", (ALL, *FIELDS))
             require(form in NUMBER_FORMATS, f"formats.{name}", ", ".join(NUMBER_FORMATS), form)
             self._formats |= dict.fromkeys(FIELDS, form) if name == ALL else {name: form}
         super().__init__(setting)

@@ -36,7 +36,7 @@ def test_every_part_changes_the_policy_and_no_two_are_alike() -> None:
 def test_parts_are_chosen_by_name() -> None:
     assert chosen_parts(()) == all_parts()
     assert [part.name for part in chosen_parts(("smoothing", "jitter"))] == ["smoothing", "jitter"]
-    with pytest.raises(ConfigError, match=r"^parts: expected names out of .*jitter, .*, got 'magic'$"):
+    with pytest.raises(ConfigError, match=r"^parts: expected one of .*jitter, .*, got 'magic'$"):
         chosen_parts(("magic",))
     with pytest.raises(ConfigError, match="none twice"):
         chosen_parts(("jitter", "jitter"))
