@@ -73,7 +73,7 @@ def test_commands_take_the_scene_and_the_format_of_an_installed_package(site: Pa
     assert done.returncode == 0 and "sphere" in done.stdout, done.stdout + done.stderr
     done = run(convert, "a.balls", "b.lxss")
     assert done.returncode == 2
-    assert ".usdc, .usdz, .balls, got '.lxss' (nearest: .lxs)" in " ".join(done.stderr.split())
+    assert ".ply, .stl, .balls, got '.lxss' (nearest: .lxs)" in " ".join(done.stderr.split())
     script = "from scenes.catalog import SCENES, load, load_any; "
     script += "print(len(load_any('a.balls')[0].instances), load('juggled', 0.5).instances[0].shape.radius); "
     script += "found = SCENES.origin('juggled'); print(found.module, found.distribution, found.version)"

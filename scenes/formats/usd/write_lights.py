@@ -74,7 +74,7 @@ class UsdLightWriter:
             place = matrix if not even else product(matrix, np.diag([*(3 * [1.0 / sizes[0]]), 1.0]))
         else:
             flat = product(matrix, _FLAT)
-            square = abs(float(axes[:, 0] @ axes[:, 1])) <= 1e-9 * sizes[0] * sizes[1]
+            square = abs(float((axes[:, 0] * axes[:, 1]).sum())) <= 1e-9 * sizes[0] * sizes[1]
             disk = isinstance(shape, Disk)
             square = square and (not disk or abs(sizes[0] - sizes[1]) <= 1e-9 * sizes[0])
             if square:
