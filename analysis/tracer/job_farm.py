@@ -51,7 +51,7 @@ def _rendered(client: Client, work: PreparedJob, options: JobOptions, bars: Bars
 
     content = content_of(work)
     scene = str(Path(options.scene).resolve()) if Path(options.scene).is_file() else options.scene
-    asked = replace(options, job=options.job.resolve(), scene=scene, out=options.out.resolve())
+    asked = replace(options, job=options.job.resolve(), scene=scene, out=options.out.resolve(), scheduler="")
     missing = list[tuple[int, int]]()
     for at, combination in enumerate(work.job.combinations):
         store = _store(combination, options, content)
@@ -83,7 +83,7 @@ def render_frame(options: JobOptions, at: int, number: int, content: str) -> str
     from analysis.tracer.stills import render_still
     from renderer.frames import pictures
 
-    work, renderer = _opened(replace(options, scheduler=""), content)
+    work, renderer = _opened(options, content)
     combination = work.job.combinations[at]
     store = _store(combination, options, content)
     name = _name(store, number, options)

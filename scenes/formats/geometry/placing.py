@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from scenes.animation import look_at, pose_at
 from scenes.arithmetic import product
@@ -63,6 +64,21 @@ def motion_keys(track: RigidTrack | None, to_world: Matrix) -> tuple[list[Matrix
         return [placed(track, to_world)], [0.0]
     times_s = track_times(track)
     return [product(pose_at(track, time_s), to_world) for time_s in times_s], times_s
+
+
+def keys_from_zero(track: RigidTrack, report: LossReport) -> tuple[list[float], NDArray, NDArray]:
+    """Keys of a motion for formats whose times begin at zero; earlier ones are a loss.
+
+    Returns:
+        Times, seconds; translations ``(keys, 3)`` in scene units; and rotations, quaternions ``(keys, 4)`` as
+        ``(x, y, z, w)``.
+    """
+    times_s = track_times(track)
+    if times_s[0] < 0.0:
+        report.add("motion", "motion before the time zero")
+        times_s = [0.0, *(time_s for time_s in times_s if time_s > 0.0)]
+    poses = np.stack([pose_at(track, time_s) for time_s in times_s])
+    return times_s, poses[:, :3, 3], Rotation.from_matrix(poses[:, :3, :3]).as_quat()
 
 
 def placed(track: RigidTrack | None, to_world: Matrix) -> Matrix:

@@ -40,8 +40,7 @@ from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
 from scenes.formats.geometry.orientation import is_closed
-from scenes.formats.geometry.placing import facing, shines
-from scenes.formats.geometry.transform_stack import track_times
+from scenes.formats.geometry.placing import facing, keys_from_zero, shines
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter
 from scenes.formats.losses import LossReport, without_settings
@@ -102,18 +101,11 @@ class GltfWriter:
 
     def _moving(self, track: RigidTrack) -> list[int]:
         """The children of a new node with the motion of a track; times of glTF begin at zero."""
-        times_s = track_times(track)
-        if times_s[0] < 0.0:
-            self.report.add("motion", "motion before the time zero")
-            times_s = [0.0, *(time_s for time_s in times_s if time_s > 0.0)]
-        from scipy.spatial.transform import Rotation
-
-        poses = np.stack([pose_at(track, time_s) for time_s in times_s])
-        turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+        times_s, places, turns = keys_from_zero(track, self.report)
         children: list[int] = []
         node = self.document.add("nodes", {"name": "motion", "children": children})
         times = self.document.accessor(np.array(times_s, np.float32), bounds=True)
-        for path, values in (("translation", poses[:, :3, 3]), ("rotation", turns)):
+        for path, values in (("translation", places), ("rotation", turns)):
             accessor = self.document.accessor(values.astype(np.float32))
             self._samplers.append({"input": times, "output": accessor, "interpolation": "LINEAR"})
             self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})

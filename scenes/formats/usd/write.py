@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from scenes.animation import pose_at
 from scenes.arithmetic import determinant, product, tan
@@ -38,8 +37,7 @@ from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.geometry.conventions import aspect_of
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
 from scenes.formats.geometry.orientation import is_closed
-from scenes.formats.geometry.placing import shines
-from scenes.formats.geometry.transform_stack import track_times
+from scenes.formats.geometry.placing import keys_from_zero, shines
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
 from scenes.formats.usd.document import RATE, ROOT, UsdStage, packed, vectors
@@ -92,16 +90,11 @@ class UsdWriter:
 
     def _mover(self, track: RigidTrack) -> str:
         """The path of a new transform with the motion of a track; motion begins at the time zero."""
-        times_s = track_times(track)
-        if times_s[0] < 0.0:
-            self.report.add("motion", "motion before the time zero")
-            times_s = [0.0, *(time_s for time_s in times_s if time_s > 0.0)]
-        poses = np.stack([pose_at(track, time_s) for time_s in times_s])
-        turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+        times_s, places, turns = keys_from_zero(track, self.report)
         prim = UsdGeom.Xform.Define(self.stage, self.document.path("motion"))
         move, turn = prim.AddTranslateOp(), prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
-        for time_s, pose, (x, y, z, w) in zip(times_s, poses, turns.tolist(), strict=True):
-            move.Set(Gf.Vec3d(*pose[:3, 3].tolist()), time_s * RATE)
+        for time_s, place, (x, y, z, w) in zip(times_s, places.tolist(), turns.tolist(), strict=True):
+            move.Set(Gf.Vec3d(*place), time_s * RATE)
             turn.Set(Gf.Quatd(w, x, y, z), time_s * RATE)
         self._last = max(self._last, times_s[-1] * RATE)
         return str(prim.GetPath())

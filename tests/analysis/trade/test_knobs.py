@@ -91,6 +91,15 @@ def test_the_default_is_measured_at_every_place() -> None:
     assert len(found) == 4 * 2 and list(dropped) == ["tsar, resolution 0.25"]
 
 
+def test_a_short_run_is_scored_whole() -> None:
+    """The default span of JOD is no longer than the run."""
+    short = dataclasses.replace(OPTIONS, seconds=0.1)
+    found, _ = runs(short, points_of(chosen_knobs(["batch"])))
+    assert {one.case.jod_span_s for one in found} == {(0.0, 0.1)}
+    with pytest.raises(ConfigError, match="jod_s: expected between"):
+        dataclasses.replace(OPTIONS, jod_s=3.0)
+
+
 def test_a_search_nears_the_front_and_is_the_same_again() -> None:
     """Cost and error by a simple function of two knobs: the batch costs, and jitter is free."""
     knobs = searched(chosen_knobs(["batch", "jitter", "depth", "policy", "structure", "tiles"]))
