@@ -12,10 +12,11 @@ import logging
 import signal
 import socket
 import sys
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from analysis.command import limits
 from analysis.command.cli import InputError
@@ -24,8 +25,9 @@ from tsar.config import closed_choices, require
 from tsar.memory import core_count
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
+    from distributed import Client, Future, LocalCluster
 
+Case = TypeVar("Case")
 WAIT_S = 30
 """Seconds to wait for an answer of a busy scheduler, or of a worker."""
 CONNECT_S = 3
@@ -139,6 +141,56 @@ def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line:
             logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the end of workers is wanted
             _end_workers(cluster)
             raise
+
+
+def ended(
+    client: Client, waiting: Mapping[Future, Case], wait_s: float = WAIT_S
+) -> Iterator[tuple[Case, Future, str | None]]:
+    """Cases as their futures end, each with the reason for its failure, or None.
+
+    If the scheduler is gone, or has had no worker for ``wait_s`` seconds, all remaining cases fail.
+    """
+    from distributed import wait
+
+    pending, seen_s = set(waiting), time.monotonic()
+    while pending:
+        try:
+            outcome: Any = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
+            done, pending = outcome
+        except TimeoutError:
+            done = set[Any]()
+        except Exception as error:  # the connection may raise errors of several libraries
+            yield from ((waiting[future], future, f"the scheduler is gone ({_reason(error)})") for future in pending)
+            return
+        for future in done:
+            yield waiting[future], future, _failure(future)
+        if done or _has_workers(client):
+            seen_s = time.monotonic()
+        elif time.monotonic() - seen_s > wait_s:
+            yield from ((waiting[future], future, f"no worker was there for {wait_s:g} s") for future in pending)
+            return
+
+
+def _failure(future: Future) -> str | None:
+    """The reason why a case has no result, or None if it has one."""
+    if future.status == "finished":
+        return None
+    if future.status == "error":
+        error: Any = future.exception()
+        return _reason(error)
+    return "the scheduler or its workers were ended"
+
+
+def _has_workers(client: Client) -> bool:
+    try:
+        return bool(client.scheduler_info(n_workers=1)["workers"])
+    except Exception:  # the connection may raise errors of several libraries
+        return False
+
+
+def _reason(error: BaseException | None) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text[:300]}"
 
 
 def dashboard_of(client: Client) -> str:

@@ -7,13 +7,12 @@ address, whose workers see the same folders and run the same source.
 from __future__ import annotations
 
 import ctypes
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.cluster import ClusterOptions, connected, ended
 from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
@@ -97,9 +96,8 @@ def run_cases(
         with connected(options, say) as client:
             client.run(_keep_freed_memory, on_error="ignore")
             client.run(_forget_scenes, on_error="ignore")
-            for case, reason in _outcomes(
-                client, _submit(client, missing, keys, place, options.retries), options.worker_wait_s
-            ):
+            waiting = _submit(client, missing, keys, place, options.retries)
+            for case, _, reason in ended(client, waiting, options.worker_wait_s):
                 if reason is not None:
                     failures[case] = reason
                 task.advance()
@@ -116,49 +114,6 @@ def _forget_scenes() -> None:
     from analysis.study.scenery import forget
 
     forget()
-
-
-def _outcomes(client: Client, waiting: dict[Future, Case], wait_s: float) -> Iterator[tuple[Case, str | None]]:
-    """Cases as they end, each with the reason for its failure, or None.
-
-    If the scheduler is gone, or has had no worker for a while, all remaining cases fail.
-    """
-    from distributed import wait
-
-    pending, seen_s = set(waiting), time.monotonic()
-    while pending:
-        try:
-            outcome: Any = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
-            done, pending = outcome
-        except TimeoutError:
-            done = set[Any]()
-        except Exception as error:  # the connection may raise errors of several libraries
-            yield from ((waiting[future], f"the scheduler is gone ({_reason(error)})") for future in pending)
-            return
-        for future in done:
-            yield waiting[future], _failure(future)
-        if done or _has_workers(client):
-            seen_s = time.monotonic()
-        elif time.monotonic() - seen_s > wait_s:
-            yield from ((waiting[future], f"no worker was there for {wait_s:g} s") for future in pending)
-            return
-
-
-def _failure(future: Future) -> str | None:
-    """The reason why a case has no result, or None if it has one."""
-    if future.status == "finished":
-        return None
-    if future.status == "error":
-        error: Any = future.exception()
-        return _reason(error)
-    return "the scheduler or its workers were ended"
-
-
-def _has_workers(client: Client) -> bool:
-    try:
-        return bool(client.scheduler_info(n_workers=1)["workers"])
-    except Exception:  # the connection may raise errors of several libraries
-        return False
 
 
 def describe_failures(failures: Mapping[str, str]) -> list[str]:
@@ -215,8 +170,3 @@ def _evaluate(case: Case, key: str, place: Resources, reference: None) -> str:
     from analysis.study.evaluation import evaluate
 
     return evaluate(case, key, place)
-
-
-def _reason(error: BaseException | None) -> str:
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text[:300]}"

@@ -12,7 +12,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.command.cluster import ClusterOptions, connected
+from analysis.command.cli import InputError
+from analysis.command.cluster import ClusterOptions, connected, ended
 from analysis.command.progress import Bars
 from analysis.storage.reference import content_hash
 from analysis.storage.store import Store
@@ -34,8 +35,9 @@ def run_job_anywhere(work: PreparedJob, options: JobOptions, bars: Bars) -> list
     """Like :func:`analysis.tracer.jobs.run_job`; with a scheduler, its workers render what is missing.
 
     Raises:
-        InputError: nothing answers at the scheduler's address.
-        ValueError: a worker runs another source, or a file of another origin lies where a frame belongs.
+        InputError: nothing answers at the scheduler's address, it is gone or without workers, or a worker runs another
+            source.
+        ValueError: a file of another origin lies where a frame belongs.
     """
     rendered = Counter[str]()
     if options.scheduler:
@@ -47,29 +49,33 @@ def run_job_anywhere(work: PreparedJob, options: JobOptions, bars: Bars) -> list
 
 def _rendered(client: Client, work: PreparedJob, options: JobOptions, bars: Bars) -> Counter[str]:
     """Has all missing frames rendered, the most expensive first; returns their number by combination."""
-    from distributed import as_completed
-
     content = content_of(work)
     scene = str(Path(options.scene).resolve()) if Path(options.scene).is_file() else options.scene
     asked = replace(options, job=options.job.resolve(), scene=scene, out=options.out.resolve(), scheduler="")
     missing = list[tuple[int, int]]()
     for at, combination in enumerate(work.job.combinations):
         store = _store(combination, options, content)
-        names = {number: _name(store, number, options) for number in work.frames}
-        store.require_own(names.values())
-        missing += [(at, number) for number, name in names.items() if store.find(name) is None]
+        files = {number: _name(store, number, options) for number in work.frames}
+        store.require_own(files.values())
+        missing += [(at, number) for number, file in files.items() if store.find(file) is None]
     missing.sort(key=lambda frame: -work.job.combinations[frame[0]].samples)
     task = bars.task("frames elsewhere", len(missing))
-    futures = [client.submit(render_frame, asked, *frame, content, pure=False, retries=_RETRIES) for frame in missing]
+    names = [combination.name for combination in work.job.combinations]
+    waiting = {
+        client.submit(render_frame, asked, *frame, content, pure=False, retries=_RETRIES): names[frame[0]]
+        for frame in missing
+    }
     rendered = Counter[str]()
-    for _, name in as_completed(futures, with_results=True, raise_errors=True):
+    for name, _, reason in ended(client, waiting):
+        if reason is not None:
+            raise InputError(f"{name}: {reason}")
         rendered[name] += 1
         task.advance()
     return rendered
 
 
-def render_frame(options: JobOptions, at: int, number: int, content: str) -> str:
-    """Renders one frame into the folder of the job, unless it is there; returns the name of its combination.
+def render_frame(options: JobOptions, at: int, number: int, content: str) -> None:
+    """Renders one frame into the folder of the job, unless it is there.
 
     Args:
         options: options of the job, with absolute paths.
@@ -90,7 +96,6 @@ def render_frame(options: JobOptions, at: int, number: int, content: str) -> str
     if store.find(name) is None:
         picture = pictures(renderer, plan_of(combination, options), *work.size_px)
         render_still(store, name, lambda: picture(number, work.times_s[number]))
-    return combination.name
 
 
 @lru_cache(maxsize=1)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from analysis.command.progress import Bars
+from analysis.command.cli import InputError
+from analysis.command.progress import Bars, Task
 from analysis.tracer import job_farm
 from analysis.tracer.jobs import content_of, prepare, run_job
 from analysis.tracer.options import JobOptions
@@ -54,3 +56,20 @@ def test_a_worker_with_another_scene_or_source_renders_nothing(job: JobOptions, 
     assert not job.out.exists()
     job_farm.render_frame(job, 0, 80, content_of(work))
     assert len(frames(job.out)) == 1
+
+
+def test_a_scheduler_that_ends_is_one_line_and_frames_stay(job: JobOptions) -> None:
+    from distributed import LocalCluster
+
+    longer = replace(job, frames=30)
+    cluster: Any = LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=":0")
+
+    class Ending(Bars):
+        """Bars that end the cluster at the first frame."""
+
+        def task(self, label: str, total: int) -> Task:
+            return Task(show=lambda done: cluster.close())
+
+    with cluster, pytest.raises(InputError, match=r"^hammersley-box-\d{4}: .*(gone|ended|no worker)"):
+        job_farm.run_job_anywhere(prepare(longer), replace(longer, scheduler=cluster.scheduler_address), Ending())
+    assert 0 < len(frames(job.out)) < 60
