@@ -126,7 +126,9 @@ class _Reader:
             self._moving.add(number)
         if "camera" in node:
             names = name if "name" in node else self.data.at("cameras", node["camera"]).get("name", name)
-            self._cameras.setdefault(str(names), camera_at_node(self.data, node["camera"], matrix, track))
+            if names in self._cameras:
+                self.report.add(names, "a further camera of this name")
+            self._cameras.setdefault(names, camera_at_node(self.data, node["camera"], matrix, track))
         if "KHR_lights_punctual" in node.get("extensions", {}):
             self._add_light(node, matrix, name, moving)
         if "mesh" in node and "skin" in node:

@@ -65,7 +65,7 @@ class GltfMotion:
                 raise misplaced(place, f"an index of samplers below {len(samplers)}", channel["sampler"])
             read = self._sampler(samplers[channel["sampler"]], target["path"], channel["sampler"])
             self._channels.setdefault(target["node"], {})[target["path"]] = read
-        spans = [keys for channels in self._channels.values() for keys, _, _ in channels.values() if len(keys)]
+        spans = [keys for channels in self._channels.values() for keys, _, _ in channels.values()]
         self.times_s = uniform_times(max((float(keys[-1]) for keys in spans), default=0.0), "animations[0]")
 
     def _sampler(self, sampler: dict[str, Any], path: str, number: int) -> tuple[NDArray, NDArray, str]:
@@ -78,6 +78,8 @@ class GltfMotion:
         keys = self.data.numbers(sampler["input"], "times", ("SCALAR",))[:, 0]
         values = self.data.numbers(sampler["output"], f"a {path}", ("VEC4" if path == "rotation" else "VEC3",))
         each = 3 if kind == "CUBICSPLINE" else 1
+        if not len(keys):
+            raise misplaced(f"{place}.input", "at least one time", "none")
         if len(values) != len(keys) * each:
             raise misplaced(f"{place}.output", f"{each} elements for each of {len(keys)} times", len(values))
         if not (np.diff(keys) > 0.0).all():

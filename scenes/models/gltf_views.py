@@ -82,9 +82,9 @@ def light_at_node(data: GltfData, number: int, matrix: Matrix, where: str, repor
     spot, along = given.get("spot", {}), axis_of(matrix, 2)
     outer_deg = math.degrees(float(spot.get("outerConeAngle", math.pi / 4.0)))
     inner_deg = math.degrees(float(spot.get("innerConeAngle", 0.0)))
-    if not (0.0 <= inner_deg and 0.0 < outer_deg <= 90.0 + 1e-6):
+    if not (0.0 <= inner_deg and 0.0 < outer_deg <= 90.0 + 1e-5):
         got = f"{math.radians(inner_deg):g} and {math.radians(outer_deg):g}"
-        raise misplaced(f"{place}[{number}].spot", "cone angles 0 <= inner < outer <= π/2", got)
+        raise misplaced(f"{place}[{number}].spot", "cone angles 0 <= inner and 0 < outer <= π/2", got)
     if inner_deg >= outer_deg:
         report.add(where, "a spot whose inner cone is as wide as its outer cone", "one that is slightly narrower")
         inner_deg = outer_deg * (1.0 - _SHARP)

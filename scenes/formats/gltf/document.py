@@ -121,12 +121,16 @@ class Document:
             whole["extensionsUsed"] = sorted(self._used)
         if "scenes" in whole:
             whole["scene"] = 0
-        if wrong := next(_not_finite(whole, ""), None):
-            raise SceneError(f"{self.output.path}: expected finite numbers, got {wrong}")
+        style: Json = {"separators": (",", ":")} if self.embedded else {"indent": 1}
+        try:
+            written = json.dumps(whole, allow_nan=False, **style)
+        except ValueError:
+            wrong = next(_not_finite(whole, ""))
+            raise SceneError(f"{self.output.path}: expected finite numbers, got {wrong}") from None
         if not self.embedded:
-            self.output.text(self.output.path.name, json.dumps(whole, allow_nan=False, indent=1) + "\n")
+            self.output.text(self.output.path.name, written + "\n")
             return
-        text = json.dumps(whole, allow_nan=False, separators=(",", ":")).encode()
+        text = written.encode()
         text += b" " * (-len(text) % 4)
         chunks = [struct.pack("<II", len(text), _JSON), text]
         if self._size:

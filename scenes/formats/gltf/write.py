@@ -40,7 +40,7 @@ from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
 from scenes.formats.geometry.orientation import is_closed
-from scenes.formats.geometry.placing import facing, keys_from_zero, shines
+from scenes.formats.geometry.placing import facing, keys_from_zero, lose_shine_behind, shines
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter
 from scenes.formats.losses import LossReport, without_settings
@@ -143,6 +143,8 @@ class GltfWriter:
     def _instance(self, instance: Instance, name: str) -> None:
         shape, lamp = instance.shape, instance.emission is not None and not instance.emission_twosided
         both_sides = not (lamp or instance.one_sided)
+        if not both_sides:
+            lose_shine_behind(instance, self.report)
         if not both_sides and not is_closed(shape):
             what = "the back of a lamp" if lamp else "a surface with a black back"
             self.report.add(name, what, "not drawn from behind")

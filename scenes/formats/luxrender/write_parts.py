@@ -39,7 +39,7 @@ def save_luxrender_parts(scene: Scene, output: Output, report: LossReport) -> No
     writer.write(scene)
     included = []
     for ending, lines in ((".lxm", writer.definitions), (".lxo", writer.shapes)):
-        name = f"{output.path.stem}{ending}"
+        name = f"{output.path.stem}{ending}".replace('"', "").replace("\\", "-")  # what a quoted name can hold
         included.append(f"\tInclude {quoted(name)}")
         output.text(name, "\n".join(lines) + "\n")
     at = writer.lines.index("WorldBegin") + 1

@@ -181,3 +181,13 @@ def test_what_is_no_json_is_named_with_its_place(content: bytes, said: str, tmp_
     with pytest.raises(SceneError) as caught:
         read_model(path)
     assert str(caught.value) == f"model {path}: cannot be read: {said}"
+
+
+def test_an_animation_without_times_is_named(tmp_path: Path) -> None:
+    file = whole_file(tmp_path)
+    number = file.json["animations"][0]["samplers"][0]["input"]
+    file.json["accessors"][number]["count"] = 0
+    with pytest.raises(
+        SceneError, match=r"animations\[0\]\.samplers\[0\]\.input: expected at least one time, got none"
+    ):
+        read_model(file.written())

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scenes import catalog
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from tests.scenes.formats.files import DELIVERED, MITSUBA, REAL, needs_data, real, seen
@@ -37,3 +38,9 @@ def test_luxcore_draws_three_files_as_one(tmp_path: Path) -> None:
     assert one.mean() > 0.1
     np.testing.assert_allclose(three, one, rtol=0.3, atol=0.1 * one.mean())
     assert three.mean() == pytest.approx(one.mean(), rel=0.02)
+
+
+def test_a_name_with_quotes_is_found_again(tmp_path: Path) -> None:
+    file = tmp_path / 'a"b c.lxs'
+    save_scene_file(catalog.load("quad-light"), file, "luxrender-parts")
+    assert len(load_scene_file(file).instances) == len(catalog.load("quad-light").instances)
