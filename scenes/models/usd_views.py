@@ -194,5 +194,7 @@ def _dome(
         path = file.resolvedPath or str(pictures.sources.require(file.path, "an environment map at"))
         if str(_value(prim, "texture:format", code, "automatic")) not in ("automatic", "latlong"):
             report.add(prim.GetName(), "the layout of an environment map", "latitude and longitude")
-        image = pictures.values(Reading(path, "rgb", "auto", *_IDENTITY, ()))
+        space = prim.GetAttribute("inputs:texture:file").GetColorSpace()
+        space = space if space in ("raw", "sRGB") else "auto"
+        image = pictures.values(Reading(path, "rgb", space, *_IDENTITY, ()))
     return EnvironmentLight((image * radiance.astype(np.float32)).astype(np.float32), turn, source=str(prim.GetName()))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -12,9 +13,10 @@ from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture,
 from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
-from scenes.loading import decode_srgb
+from scenes.loading import decode_srgb, read_image
 
 _WHOLE = (1.0, 1.0, 1.0)
+_FILES = (".png", ".jpg", ".jpeg")
 
 
 def factored(texture: Texture, where: str, report: LossReport) -> tuple[Rgb, ImageTexture | None]:
@@ -42,10 +44,14 @@ def _checks(texture: CheckerboardTexture) -> ImageTexture | None:
     """Four texels that repeat, in place of squares of two colours; None if they are not plain."""
     if not (isinstance(texture.even, ConstantTexture) and isinstance(texture.odd, ConstantTexture)):
         return None
-    even, odd = texture.even.value, texture.odd.value
+    return _four_texels(texture.even.value, texture.odd.value, *texture.uv_scale)
+
+
+@lru_cache(maxsize=256)
+def _four_texels(even: Rgb, odd: Rgb, across: float, down: float) -> ImageTexture:
+    """Equal ones are one picture, which writers then store once."""
     image = np.array([[odd, even], [even, odd]], np.float32)
-    scale = 0.5 * texture.uv_scale[0], 0.5 * texture.uv_scale[1]
-    return ImageTexture(image, scale, (0.0, 0.0), "repeat", "nearest")
+    return ImageTexture(image, (0.5 * across, 0.5 * down), (0.0, 0.0), "repeat", "nearest")
 
 
 def placed_alike(first: ImageTexture, second: ImageTexture) -> bool:
@@ -62,6 +68,14 @@ def unmirrored(texture: ImageTexture) -> ImageTexture:
             scale[axis], offset[axis] = -scale[axis], 1.0 - offset[axis]
     placed = (scale[0], scale[1]), (offset[0], offset[1])
     return ImageTexture(np.ascontiguousarray(image), *placed, texture.wrap, texture.filter, texture.source)
+
+
+def as_file(texture: ImageTexture) -> bytes | None:
+    """The content of the PNG or JPEG file of a picture of colours; None if there is none, or its colours differ."""
+    path = Path(texture.source)
+    if path.suffix.lower() in _FILES and path.is_file() and np.array_equal(read_image(path), texture.image):
+        return path.read_bytes()
+    return None
 
 
 @cache

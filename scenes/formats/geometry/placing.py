@@ -36,6 +36,22 @@ def lose_back(instance: Instance, report: LossReport) -> None:
         report.add(instance.name or "shape", "a surface with a black back", "the same on both sides")
 
 
+def has_two_sides(instance: Instance) -> bool:
+    """Whether the back of a shape is as its front."""
+    return not instance.one_sided and (instance.emission is None or instance.emission_twosided)
+
+
+def lose_undrawn_back(instance: Instance, name: str, report: LossReport) -> None:
+    """For formats whose shapes have one side or two equal ones: reports a back that is not drawn."""
+    if has_two_sides(instance):
+        return
+    if not is_closed(instance.shape):
+        what = "a surface with a black back" if instance.emission is None else "the back of a lamp"
+        report.add(name, what, "not drawn from behind")
+    if instance.one_sided:
+        lose_shine_behind(instance, report)
+
+
 def shines(instance: Instance) -> bool:
     """Whether a shape is a lamp."""
     return instance.emission is not None or isinstance(instance.material, Emissive)

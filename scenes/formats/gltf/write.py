@@ -39,8 +39,7 @@ from scenes.daylight import sun_light
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
-from scenes.formats.geometry.orientation import is_closed
-from scenes.formats.geometry.placing import facing, keys_from_zero, lose_shine_behind, shines
+from scenes.formats.geometry.placing import facing, has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter
 from scenes.formats.losses import LossReport, without_settings
@@ -141,13 +140,8 @@ class GltfWriter:
     # --- shapes ------------------------------------------------------------------------------------------------------
 
     def _instance(self, instance: Instance, name: str) -> None:
-        shape, lamp = instance.shape, instance.emission is not None and not instance.emission_twosided
-        both_sides = not (lamp or instance.one_sided)
-        if not both_sides:
-            lose_shine_behind(instance, self.report)
-        if not both_sides and not is_closed(shape):
-            what = "the back of a lamp" if lamp else "a surface with a black back"
-            self.report.add(name, what, "not drawn from behind")
+        shape, both_sides = instance.shape, has_two_sides(instance)
+        lose_undrawn_back(instance, name, self.report)
         if isinstance(shape, Disk | Sphere):
             became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
             self.report.add(name, f"a {type(shape).__name__.lower()}", became)

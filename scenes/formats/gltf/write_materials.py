@@ -17,6 +17,7 @@ from scenes.canonical.values import Rgb
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.normals import map_of
 from scenes.formats.appearance.pictured import (
+    as_file,
     factored,
     in_bytes,
     number_codes,
@@ -28,12 +29,10 @@ from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.surfaces import Surface, surface_of
 from scenes.formats.gltf.document import Document, Json
 from scenes.formats.losses import LossReport
-from scenes.loading import read_image
 from scenes.pictures import resized
 
 _NEAREST, _LINEAR, _LINEAR_LEVELS = 9728, 9729, 9987
 _WRAPS = {"repeat": 10497, "clamp": 33071, "black": 33071}
-_COPIED = (".png", ".jpg", ".jpeg")
 
 
 @dataclass
@@ -207,9 +206,9 @@ class GltfMaterialWriter:
     def _image(self, texture: ImageTexture, mode: str, holes: ImageTexture | None, white: bool) -> int:
         path = Path(texture.source)
         stem = path.stem or "picture"
-        if mode == "colour" and holes is None and path.suffix.lower() in _COPIED and path.is_file():
-            if np.array_equal(read_image(path), texture.image):
-                return self.document.image(path.read_bytes(), stem, path.suffix.lower().replace(".jpeg", ".jpg"))
+        content = as_file(texture) if mode == "colour" and holes is None else None
+        if content is not None:
+            return self.document.image(content, stem, path.suffix.lower().replace(".jpeg", ".jpg"))
         codes = number_codes(texture.image) if mode == "numbers" else srgb_codes(texture.image)
         if holes is not None:
             opacity = number_codes(resized(holes.image[..., :1], *texture.image.shape[:2]))

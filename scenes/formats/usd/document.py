@@ -18,9 +18,8 @@ from PIL import Image
 
 from scenes.canonical import ImageTexture, SceneError
 from scenes.canonical.values import Matrix
-from scenes.formats.appearance.pictured import in_bytes, number_codes, srgb_codes
+from scenes.formats.appearance.pictured import as_file, in_bytes, number_codes, srgb_codes
 from scenes.formats.text.output import Output
-from scenes.loading import read_image
 from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, Vt
 
 Part = TypeVar("Part")
@@ -29,7 +28,6 @@ ROOT = "/World"
 RATE = 24.0
 """Time codes per second."""
 
-_COPIED = (".png", ".jpg", ".jpeg")
 _SIDE_SHARP = 256
 _SIBLINGS = 256
 _ALIGNED, _HEADER = 64, 30  # bytes to which files in a package are aligned, and of a header before its name
@@ -41,14 +39,15 @@ class UsdStage:
 
     Args:
         output: receives the files.
+        target: the file as messages name it.
         up: upward axis, ``Y`` or ``Z``.
 
     Attributes:
         stage: the stage, in memory.
     """
 
-    def __init__(self, output: Output, up: str) -> None:
-        self.output = output
+    def __init__(self, output: Output, target: Path, up: str) -> None:
+        self.output, self.target = output, target
         self.stage: Any = Usd.Stage.CreateInMemory()
         UsdGeom.SetStageUpAxis(self.stage, up)
         UsdGeom.SetStageMetersPerUnit(self.stage, 1.0)
@@ -89,7 +88,7 @@ class UsdStage:
             SceneError: the transform is not finite.
         """
         if not np.isfinite(matrix).all():
-            raise SceneError(f"{self.output.path}: expected a finite transform of {prim.GetPath()}")
+            raise SceneError(f"{self.target}: expected a finite transform of {prim.GetPath()}")
         if not np.array_equal(matrix, np.eye(4)):
             UsdGeom.Xformable(prim).AddTransformOp().Set(Gf.Matrix4d(matrix.T.tolist()))
 
@@ -106,13 +105,13 @@ class UsdStage:
     def _picture(self, texture: ImageTexture, numbers: bool) -> tuple[str, str]:
         path, image = Path(texture.source), texture.image
         space = "raw" if numbers else "sRGB"
-        if not numbers and path.suffix.lower() in _COPIED and path.is_file():
-            if np.array_equal(read_image(path), image):
-                return self.output.picture(image, texture.source, _COPIED), space
+        content = None if numbers else as_file(texture)
+        if content is not None:
+            return self.output.named("textures", path.stem, path.suffix.lower(), [content]), space
         if in_bytes(image, numbers):
-            content = io.BytesIO()
-            Image.fromarray(number_codes(image) if numbers else srgb_codes(image), "RGB").save(content, "PNG")
-            return self.output.named("textures", path.stem or "picture", ".png", [content.getvalue()]), space
+            made = io.BytesIO()
+            Image.fromarray(number_codes(image) if numbers else srgb_codes(image), "RGB").save(made, "PNG")
+            return self.output.named("textures", path.stem or "picture", ".png", [made.getvalue()]), space
         return self.output.picture(image, "", ()), "raw"
 
     def write(self) -> None:
@@ -127,7 +126,7 @@ class UsdStage:
                 value: Any = None if one.GetTypeName().isArray else one.Get()
                 number = isinstance(value, float | Gf.Vec2f | Gf.Vec3f | Gf.Vec4f)
                 if number and not np.isfinite(np.asarray(value)).all():
-                    raise SceneError(f"{path}: expected finite numbers, got {value} in {one.GetPath()}")
+                    raise SceneError(f"{self.target}: expected finite numbers, got {value} in {one.GetPath()}")
         if path.suffix.lower() == ".usda":
             self.output.text(path.name, layer.ExportToString())
             return
@@ -136,7 +135,7 @@ class UsdStage:
             try:
                 layer.Export(str(binary))
             except Tf.ErrorException as error:
-                raise SceneError(f"{path}: cannot be written ({error.args[0].commentary})") from None
+                raise SceneError(f"{self.target}: cannot be written ({error.args[0].commentary})") from None
             self.output.content(path.name, [binary.read_bytes()])
 
 

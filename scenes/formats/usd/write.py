@@ -36,8 +36,7 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.geometry.conventions import aspect_of
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
-from scenes.formats.geometry.orientation import is_closed
-from scenes.formats.geometry.placing import keys_from_zero, shines
+from scenes.formats.geometry.placing import has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
 from scenes.formats.usd.document import RATE, ROOT, UsdStage, packed, vectors
@@ -136,9 +135,7 @@ class UsdWriter:
             path, matrix = self._place(name, instance.to_world, instance.track)
             self._lights.lamp(instance, path, matrix)
             return
-        if not (_has_two_sides(instance) or is_closed(instance.shape)):
-            what = "a surface with a black back" if instance.emission is None else "the back of a lamp"
-            self.report.add(name, what, "not drawn from behind")
+        lose_undrawn_back(instance, name, self.report)
         key = _shared_key(instance)
         if self._counts[key] == 1:
             path, matrix = self._place(name, instance.to_world, instance.track)
@@ -179,7 +176,7 @@ class UsdWriter:
             made, middle = self._mesh(mesh, path, textured)
             matrix = matrix if middle is None else product(matrix, middle)
         self.document.place(made, matrix)
-        if _has_two_sides(instance):
+        if has_two_sides(instance):
             made.CreateDoubleSidedAttr(True)
         emission = instance.emission if not isinstance(instance.material, Emissive) else None
         material = self._materials.material(instance.material, emission, name)
@@ -200,7 +197,7 @@ class UsdWriter:
         """A mesh, and the place of its origin if that was moved."""
         points, middle = about_middle(mesh)
         if not np.abs(points).max() <= np.finfo(np.float32).max:
-            raise SceneError(f"{self.document.output.path}: expected finite vertices of {path}")
+            raise SceneError(f"{self.document.target}: expected finite vertices of {path}")
         made = UsdGeom.Mesh.Define(self.stage, path)
         made.CreatePointsAttr(vectors(points))
         made.CreateExtentAttr(vectors(np.stack([points.min(axis=0), points.max(axis=0)])))
@@ -216,17 +213,12 @@ class UsdWriter:
         return made, middle
 
 
-def _has_two_sides(instance: Instance) -> bool:
-    """Whether the back of a shape is as its front."""
-    return not instance.one_sided and (instance.emission is None or instance.emission_twosided)
-
-
 def _shared_key(instance: Instance) -> Any:
     """A key that is equal for instances that share all but their place."""
     if is_lamp_alone(instance):
         return None
     shape = id(instance.shape) if isinstance(instance.shape, Mesh) else instance.shape
-    return shape, id(instance.material), instance.emission, _has_two_sides(instance)
+    return shape, id(instance.material), instance.emission, has_two_sides(instance)
 
 
 def save_usd(scene: Scene, output: Output, report: LossReport) -> None:
@@ -236,12 +228,12 @@ def save_usd(scene: Scene, output: Output, report: LossReport) -> None:
         SceneError: it has numbers that are not finite.
     """
     if output.path.suffix.lower() != ".usdz":
-        _write(scene, output, report)
+        _write(scene, output, output.path, report)
         return
     with TemporaryDirectory() as folder:
         inner = Output(Path(folder) / f"{output.path.stem}.usdc")
         try:
-            _write(scene, inner, report)
+            _write(scene, inner, output.path, report)
             inner.place()
         finally:
             inner.discard()
@@ -249,7 +241,7 @@ def save_usd(scene: Scene, output: Output, report: LossReport) -> None:
         packed(output, [(path.relative_to(folder).as_posix(), path.read_bytes()) for path in files])
 
 
-def _write(scene: Scene, output: Output, report: LossReport) -> None:
-    document = UsdStage(output, up_of(scene).upper())
+def _write(scene: Scene, output: Output, target: Path, report: LossReport) -> None:
+    document = UsdStage(output, target, up_of(scene).upper())
     UsdWriter(document, report).write(scene)
     document.write()

@@ -151,7 +151,7 @@ class UsdLightWriter:
 
 
 def strengthen(prim: Any, strength: Rgb) -> None:
-    """Gives a light its colour and intensity; those of white of strength 1 are the defaults."""
+    """Gives a light its intensity, and its colour unless that is white."""
     light, most = UsdLux.LightAPI(prim), max(strength)
     light.CreateIntensityAttr(most)
     if min(strength) != most:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import zipfile
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from analysis.command.extras import extra_of
 from scenes.animation import pose_at
@@ -42,6 +44,7 @@ from scenes.canonical import (
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
+from scenes.loading import read_image
 from tests.scenes.formats.gltf.files import GREY, shown
 
 pytest.importorskip("pxr")
@@ -219,8 +222,9 @@ def test_packages_are_aligned_and_the_library_finds_no_fault(tmp_path: Path) -> 
 
 def test_files_that_cannot_be_written_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     far = Instance(Mesh(np.eye(3) * 1e300, TRIANGLE.faces), GREY)
-    with pytest.raises(SceneError, match=r"a\.usda: expected finite"):
-        save_scene_file(Scene(PerspectiveCamera(), (far,)), tmp_path / "a.usda")
+    for name in ("a.usda", "a.usdc", "a.usdz"):
+        with pytest.raises(SceneError, match=f"^{re.escape(str(tmp_path / name))}: expected finite"):
+            save_scene_file(Scene(PerspectiveCamera(), (far,)), tmp_path / name)
     light = PointLight((0.0, 0.0, 0.0), (float("inf"), 1.0, 1.0))
     with pytest.raises(SceneError, match=r"a\.usdc: expected finite"):
         save_scene_file(shown(GREY, lights=(light,)), tmp_path / "a.usdc")
@@ -256,3 +260,26 @@ def test_many_shapes_lie_in_groups_and_keep_their_places(tmp_path: Path) -> None
     again = load_scene_file(tmp_path / "b.usdc")
     save_scene_file(again, tmp_path / "c.usdc")
     assert difference(again, load_scene_file(tmp_path / "c.usdc")) is None
+
+
+@pytest.mark.parametrize("colour_first", [True, False])
+def test_a_picture_is_kept_as_colours_and_as_numbers(colour_first: bool, tmp_path: Path) -> None:
+    Image.fromarray(np.random.default_rng(3).integers(0, 256, (4, 4, 3), np.uint8)).save(tmp_path / "same.png")
+    picture = ImageTexture(read_image(tmp_path / "same.png"), source=str(tmp_path / "same.png"))
+    materials = [Matte(picture), MetallicRough(ConstantTexture((0.5, 0.5, 0.5)), 0.5, 0.5, picture)]
+    found, losses = back(tmp_path, shown(*(materials if colour_first else materials[::-1])))
+    matte, rough = (one.material for one in (found.instances if colour_first else found.instances[::-1]))
+    assert losses == [] and isinstance(matte, Matte) and isinstance(rough, MetallicRough)
+    assert isinstance(matte.reflectance, ImageTexture) and isinstance(rough.parts, ImageTexture)
+    np.testing.assert_array_equal(matte.reflectance.image, picture.image)
+    np.testing.assert_allclose(rough.parts.image[..., 1] * rough.roughness, 0.5 * picture.image[..., 1], atol=1e-6)
+
+
+def test_the_picture_of_a_dome_keeps_its_colour_space(tmp_path: Path) -> None:
+    Image.fromarray(np.array([[10, 90], [160, 250]], np.uint8)).save(tmp_path / "grey.png")
+    image = read_image(tmp_path / "grey.png")
+    dome = EnvironmentLight(image, np.eye(4), source=str(tmp_path / "grey.png"))
+    found, _ = back(tmp_path, shown(GREY, lights=(dome,)))
+    (read,) = found.lights
+    assert isinstance(read, EnvironmentLight)
+    np.testing.assert_allclose(read.image, image, atol=1e-6)
