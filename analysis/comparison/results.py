@@ -150,12 +150,20 @@ def _lead(summary: Mapping[str, Any], measured: Measured) -> list[str]:
             f"The squared error of {own} is {statistics.median:.3f} times that of {rival} at the median of the "
             f"reference times, and at most as large {100 * statistics.share_suitable:.0f} % of the time.",
         )
-        found[0] += "".join(
-            f" {metric.upper()} is {values[own]:.3g} ({rival} {values[rival]:.3g}; {METRICS[metric].better} is better)."
-            for metric, values in summary["metrics"].items()
-        )
+        if "best_rival" in summary:
+            times = summary["best_rival"]["ratio_statistics"].median
+            found[0] += f" It is {times:.3f} times the least of all rivals at each of them."
+        found[0] += "".join(_score(metric, values, measured) for metric, values in summary["metrics"].items())
     error = "The error is the mean squared difference of display-encoded values in [0, 1] over pixels and channels."
     return [*found, error]
+
+
+def _score(metric: str, values: Mapping[str, float], measured: Measured) -> str:
+    """A sentence about a metric: the run's own, that of the rival, and that of the best of all rivals."""
+    better = METRICS[metric].better
+    best = (max if better == "higher" else min)(measured.rivals, key=lambda name: values[name])
+    named = ", ".join(f"{name} {values[name]:.3g}" for name in dict.fromkeys((measured.rival or best, best)))
+    return f" {metric.upper()} is {values[measured.own]:.3g} ({named}; {better} is better)."
 
 
 def _png(figure: Figure) -> bytes:

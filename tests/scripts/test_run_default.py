@@ -63,8 +63,13 @@ def test_the_page_and_the_summary_name_the_scores(default: tuple[dict[str, Any],
     assert summary["config"]["resolved"]["metrics"] == ["flip", "jod"] == list(summary["metrics"])
     text = page.read_text()
     for metric in ("flip", "jod"):
-        own, rival = (f"{summary['metrics'][metric][name]:.3g}" for name in ("tsar", "framed"))
-        assert f"{metric.upper()} is {own} (framed {rival}; " in text
+        values = {name: value for name, value in summary["metrics"][metric].items() if name != "tsar"}
+        best = min(values, key=values.__getitem__) if metric == "flip" else max(values, key=values.__getitem__)
+        named = ", ".join(f"{name} {values[name]:.3g}" for name in dict.fromkeys(("framed", best)))
+        assert f"{metric.upper()} is {summary['metrics'][metric]['tsar']:.3g} ({named}; " in text
+    if len(summary["rivals"]) > 1:
+        ratio = summary["best_rival"]["ratio_statistics"]["median"]
+        assert f"It is {ratio:.3f} times the least of all rivals" in text
 
 
 def test_the_page_begins_with_the_best_framed_rival_beside_the_policy(default: tuple[dict[str, Any], Path]) -> None:
